@@ -20,10 +20,9 @@ from benchmarks.families import REGIMES, tops
 from symtop.core.multiprecision import context
 from symtop.core.numbers import EPSILON
 from symtop.model.charts import Array
-from symtop.model.exact import closed_form, motion_constants, motion_layout as at
+from symtop.model.exact import closed_form, constants, layout as at
 from symtop.model.exact.closed_form import ClosedForm
-from symtop.model.exact.precise_constants import precise_constants
-from symtop.model.exact.precise_form import PreciseForm
+from symtop.model.exact.digits import PreciseForm, precise_constants
 from symtop.model.top import Angles, SymmetricTop, flat
 
 DIGITS, SEED, EACH = 50, 25, 385
@@ -36,7 +35,7 @@ CONSTANTS = (
     "angles at the start (rad)",
     "every other constant (units in the last place)",
 )
-LIMITS = (motion_constants.RATE, 2e-18, 1e-28, 1e-18, 1.0)  # digits enough for 1e12 radians
+LIMITS = (constants.RATE, 2e-18, 1e-28, 1e-18, 1.0)  # digits enough for 1e12 radians
 LINES = (at.PHI_LINE, at.PSI_LINE, at.PHI_TURNS, at.DOWN_TURNS, at.UP_TURNS)
 MARKS = (at.ARITHMETIC, at.RATE_ERROR, at.VALUE_ERROR)
 
@@ -66,7 +65,7 @@ class Examined(NamedTuple):
 def short(top: SymmetricTop, start: Angles) -> tuple[Array, int]:
     """The constants without the last resort, interpreted, and their status."""
     out = [0.0] * at.SIZE
-    status = motion_constants.motion_constants(*flat(top, start), out)
+    status = constants.motion_constants(*flat(top, start), out)
     return np.array(out), status
 
 

@@ -26,7 +26,7 @@ from symtop.methods.lagrangian import exact_discrete
 from symtop.methods.lagrangian.oscillators import exact_map
 from symtop.methods.vectors import accumulate_plainly
 from symtop.model import charts
-from symtop.model.exact.precise_form import PreciseForm
+from symtop.model.exact.digits import PreciseForm
 from symtop.model.top import Angles, SymmetricTop
 
 METHOD = "exact-discrete"

@@ -30,7 +30,7 @@ from symtop.methods.framework.lanes import W
 from symtop.methods.framework.many import members_of
 from symtop.methods.taylor import heyoka
 from symtop.model import charts
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import flat
 from symtop.runner.study import Table
 

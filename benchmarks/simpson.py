@@ -41,7 +41,7 @@ class Point(NamedTuple):
 
 
 class Cost(NamedTuple):
-    """A row at the coarsest step that meets the accuracy of the inclination."""
+    """A variant at the coarsest step that meets the accuracy of the inclination."""
 
     row: str
     per_nutation: float
@@ -100,7 +100,7 @@ def points(scene: Scene) -> list[Point]:
 
 
 def cost(scene: Scene) -> list[Cost]:
-    """Times of all rows at the accuracy, each at the coarsest of steps 5 % apart that meets it."""
+    """Times of all variants at the accuracy, each at the coarsest of steps 5 % apart that meets it."""
     horizon = NUTATIONS * scene.nutation_period
     ladder = np.unique(np.rint(np.geomspace(20, 20_000, 143)))
     data = symtop.sweep(scene, ROWS, per_nutation=ladder, horizon=horizon, quiet=True).isel(scene=0)

@@ -16,7 +16,7 @@ import symtop
 from symtop.core.jit import OPTIONS, register_jitable
 from symtop.core.sines import sincos
 from symtop.measure.timing import Timing, timings
-from symtop.model.effective import half_angle_force
+from symtop.model.top import half_angle_force
 
 LANES = 32
 PER_NUTATION = 400.37

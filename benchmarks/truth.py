@@ -11,9 +11,8 @@ import numpy as np
 
 from symtop.measure.timing import timings
 from symtop.model.exact import closed_form
-from symtop.model.exact.closed_form import ClosedForm
-from symtop.model.exact.closed_forms import ClosedForms
-from symtop.model.exact.precise_form import PreciseForm
+from symtop.model.exact.closed_form import ClosedForm, ClosedForms
+from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import sleeping, spinning, steady
 from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.run.reference.truth import reference

@@ -130,7 +130,7 @@ def recommend(
     accuracy = positive("accuracy", accuracy)
     one_of("quantity", quantity, KNOWN_QUANTITIES)
     if quantity in settings.ANGLES and accuracy >= math.pi:
-        raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}")
+        raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}", "accuracy")
     horizon = scene.horizon if horizon is None else horizon_of(horizon)
     data = None if results is None else _stored(Path(results) / STORED_STUDY)
     limit = settings.judgeable(scene, quantity, horizon)

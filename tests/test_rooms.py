@@ -37,7 +37,6 @@ NAMED = {  # strings that name a module above on purpose
     "symtop": "the lazy table of the public names",
     "symtop.runner.scripts": "loads studies by the name of their package",
     "symtop.runner.settled": "hashes the files of the studies, which it does not import",
-    "symtop.cli.completion": "watches the folder of the studies, which it does not import",
 }
 
 

@@ -178,7 +178,7 @@ def ours(scene: Scene, tell: Callable[[str], None]) -> list[tuple[Peer, list[Poi
 
 
 def measure(peers: Sequence[Peer], scenes: Sequence[str] = SCENES) -> xr.Dataset:
-    """Everything: dimensions call, scene, integrator (a row ``method[chart]``), setting and batch."""
+    """Everything: dimensions call, scene, variant (``method[chart]``), setting and batch."""
     cells: dict[tuple[str, str], dict[str, Any]] = {}
     about: dict[str, Peer] = {}
     facts = circumstances()

@@ -10,7 +10,7 @@ from symtop.report import style
 from symtop.runner.study import Picture, Study
 
 SOLVE_IVP = "scipy["  # how the groups of SciPy's solve_ivp begin: a chart and a language each
-SPOKEN, OTHER = style.VERMILLION, "#888888"  # rows that the title is about, and the others
+SPOKEN, OTHER = style.VERMILLION, "#888888"  # variants that the title is about, and the others
 WORDS = {"numba": "compiled", "Python": "Python"}  # a right-hand side
 
 
@@ -54,7 +54,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         f"{_gain(data, known)}A line is a library, with the chart and the language of its right-hand side where it was "
         "given several; a dot is one scene and one accuracy, at which its fastest method and setting is divided by "
         "the fastest of symtop's own kernels. Left, the call that a user types; right, the inner loop alone; the same "
-        f"runs at the same settings in both. All on (e, L), but arkode-sprk and the rows [angles] in Euler angles. "
+        f"runs at the same settings in both. All on (e, L), but arkode-sprk and the variants [angles] in Euler angles. "
         "symtop with heyoka is taylor, heyoka's stepper called by symtop."
     )
     alt = "Dot plots of the time of each library over that of symtop, a panel for each call, a line a library."

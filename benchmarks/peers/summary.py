@@ -39,7 +39,7 @@ class Best(NamedTuple):
 
 
 def groups(data: xr.Dataset) -> dict[str, list[str]]:
-    """Rows by group: ours first, then heyoka's, then by package."""
+    """Variants by group: ours first, then heyoka's, then by package."""
     packages = data["package"].values.astype(str).tolist()
     kinds = list(zip(packages, data["chart"].values.astype(str), data["language"].values.astype(str), strict=True))
     several = {one for one in packages if len({kind for kind in kinds if kind[0] == one}) > 1} - {OURS, HEYOKA}
@@ -52,7 +52,7 @@ def groups(data: xr.Dataset) -> dict[str, list[str]]:
 
 
 def best_of(data: xr.Dataset, call: str, scene: str, rows: Sequence[str], target: float) -> Best | None:
-    """The fastest measured run of some rows with an error of at most `target`; None if none is."""
+    """The fastest measured run of some variants with an error of at most `target`; None if none is."""
     cell = data.sel(call=call, scene=scene, variant=list(rows))
     seconds = np.where(cell["axis"].values <= target, cell["seconds"].values, np.inf)
     seconds[np.isnan(seconds)] = np.inf
@@ -192,11 +192,11 @@ def _cells(data: xr.Dataset, scene: str, target: float, rows: Sequence[str], our
 
 
 def tables(data: xr.Dataset) -> list[Table]:
-    """Both comparisons side by side, group by group and row by row, and what every row was given."""
+    """Both comparisons side by side, group by group and variant by variant, and what every variant was given."""
     known = groups(data)
     ours = known.get(OURS, [])
     places = [(str(scene), target) for scene in data["scene"].values for target in JUDGED]
-    heads = [word for call in NAMES.values() for word in (f"{call}: row", call, "times symtop's")]
+    heads = [word for call in NAMES.values() for word in (f"{call}: variant", call, "times symtop's")]
     by_group = [
         [scene, f"{target:.0e}", name, *_cells(data, scene, target, rows, ours)]
         for scene, target in places
@@ -223,18 +223,20 @@ def tables(data: xr.Dataset) -> list[Table]:
             both,
         ),
         Table(
-            "Both comparisons, the fastest row of each library", ["scene", "axis error", "library", *heads], by_group
+            "Both comparisons, the fastest variant of each library",
+            ["scene", "axis error", "library", *heads],
+            by_group,
         ),
         Table(
-            "Both comparisons, every row that reaches the accuracy",
-            ["scene", "axis error", "row", NAMES["public"], "times symtop's", NAMES["inner"], "times symtop's"],
+            "Both comparisons, every variant that reaches the accuracy",
+            ["scene", "axis error", "variant", NAMES["public"], "times symtop's", NAMES["inner"], "times symtop's"],
             by_row,
         ),
         Table("What a number of a library rests on", ["library", "note"], NOTES),
         Table(
-            "What each row was given",
+            "What each variant was given",
             [
-                "row",
+                "variant",
                 "package",
                 "version of its wheel",
                 "chart",
@@ -250,13 +252,13 @@ def tables(data: xr.Dataset) -> list[Table]:
 
 HOW_TO_READ = (
     "Held fixed: the top, the start, ten nutations, the largest axis error over them, one thread, double precision. "
-    "One code measures all errors, and the setting is searched for every row. A row is method[chart]: axis is the six "
-    "equations on (e, L), angles are Euler's, attitude is a quaternion. Two calls are timed. Public call: what a user "
-    f"types, with the objects built in it. It returns {SHOWN} samples, or the ends of the library's own steps where it "
-    "does not interpolate. Inner loop: all that can be built once is built before; start to horizon, no samples. Below "
-    "about 15 us it compares calls from Python more than integrators. Compilation is outside of both calls for all. "
-    "The columns `times symtop's` divide by the time of the fastest of symtop's own kernels in the same call. None of "
-    "this says anything about a library's other uses."
+    "One code measures all errors, and the setting is searched for every variant. A variant is method[chart]: axis is "
+    "the six equations on (e, L), angles are Euler's, attitude is a quaternion. Two calls are timed. Public call: "
+    f"what a user types, with the objects built in it. It returns {SHOWN} samples, or the ends of the library's own "
+    "steps where it does not interpolate. Inner loop: all that can be built once is built before; start to horizon, "
+    "no samples. Below about 15 us it compares calls from Python more than integrators. Compilation is outside of "
+    "both calls for all. The columns `times symtop's` divide by the time of the fastest of symtop's own kernels in "
+    "the same call. None of this says anything about a library's other uses."
 )
 
 

@@ -22,7 +22,7 @@ from symtop.methods.framework.many import members_of
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.space import on_axis
 from symtop.model import charts
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import flat
 from symtop.runner.study import Table
 

@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.ticker import NullLocator
 
-from symtop.judging.claims import SCENE
-from symtop.judging.findings import CLAIMS, Finding, spoken
+from symtop.judging.battery import CLAIMS, SCENE
+from symtop.judging.findings import Finding, spoken
 from symtop.methods.framework.registry import FAMILIES, integrators
 from symtop.report import style
 from symtop.report.figures import name_ends

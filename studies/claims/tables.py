@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import xarray as xr
 
-from symtop.judging.claims import SCENE
+from symtop.judging.battery import SCENE
 from symtop.judging.findings import Finding, read
 
 

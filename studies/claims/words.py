@@ -4,8 +4,8 @@ from collections import Counter
 
 import xarray as xr
 
-from symtop.judging.claims import SCENE
-from symtop.judging.findings import CLAIMS, VERDICTS, Finding, spoken
+from symtop.judging.battery import CLAIMS, SCENE
+from symtop.judging.findings import VERDICTS, Finding, spoken
 from symtop.report.sentences import FEW, joined
 from symtop.runner.study import Table
 

@@ -12,7 +12,7 @@ from symtop.report.figures import SMALLEST, error_band
 from symtop.report.style import FIRM, LEAST_TEXT, few_ticks, headline, legend_below, line, look, number, panels
 from symtop.runner.study import Picture
 
-from .named import TARGET, least_work, named_rows
+from .named import TARGET, least_work, named_variants
 from .tables import (
     HISTORY_STEPS,
     LARGE,
@@ -40,7 +40,7 @@ WINDOWS = 18  # of time, in each of which the largest energy error is drawn
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
-    """The five named methods; the work that each row with a step needs; error against the tolerance."""
+    """The five named methods; the work that each variant with a step needs; error against the tolerance."""
     drawn = [_named(data)] if any(split_name(str(name))[0] in NAMED for name in data["variant"].values) else []
     works = efficiencies(data, TARGET)
     drawn += [_constants(data, works)] if works else []
@@ -57,7 +57,7 @@ def _line(axis: Any, name: str, label: str, x: Any, y: Any) -> None:
 
 def _named(data: xr.Dataset) -> Picture:
     """Four panels on one scene: error against the step, against the tolerance, against work; energy over time."""
-    part, labels = named_rows(data)
+    part, labels = named_variants(data)
     scene = str(part["scene"].values)
     figure, axes = panels(2, 2, height=2.3)
     steps, tolerances, work, energy = axes.flat
@@ -125,7 +125,7 @@ def _history(axis: Any, name: str, label: str, cell: xr.Dataset) -> None:
 
 
 def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Picture:
-    """A line a row, grouped by order: the work that the error constants foretell for `TARGET`, over the scenes."""
+    """A line a variant, grouped by order: the work that the error constants foretell for `TARGET`, over the scenes."""
     labels = merged(stepping(data), MAIN)
     scenes = [str(name) for name in data["scene"].values]
     sizes = {name: [works[scene, name] for scene in scenes if (scene, name) in works] for name in labels}
@@ -182,13 +182,13 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
         f"best of order {declared_order(low)}, {times} times as many",
     )
     caption = (
-        "Force evaluations per nutation that each row, method[chart], needs for an axis error of "
+        "Force evaluations per nutation that each variant, method[chart], needs for an axis error of "
         f"{TARGET:g} rad {HORIZON}, by its law error = C h^p. p is the declared order, and C the median of error / h^p "
         f"over the steps of the fit. Bar: from the least to the largest of the scenes {', '.join(scenes)}. Marker: "
         f"their median, open if {TARGET:g} rad lies outside the errors that were fitted on most of them. Charts of a "
-        "method with the same errors share a line. Rows without an order to be trusted are in the table only."
+        "method with the same errors share a line. Variants without an order to be trusted are in the table only."
     )
-    alt = "Dot plot of the work for one accuracy, a line a row, grouped by order."
+    alt = "Dot plot of the work for one accuracy, a line a variant, grouped by order."
     return Picture("constants", figure, caption, alt)
 
 
@@ -202,7 +202,7 @@ def _halves(blocks: list[list[str]]) -> list[list[list[str]]]:
 
 
 class Met(NamedTuple):
-    """The errors of an adaptive row over its tolerances, and the scene of the largest."""
+    """The errors of an adaptive variant over its tolerances, and the scene of the largest."""
 
     ratios: Array
     worst_on: str
@@ -214,7 +214,7 @@ class Met(NamedTuple):
 
 
 def _met(data: xr.Dataset) -> dict[str, Met]:
-    """Of each adaptive row, where its tolerance rules; the row that errs least first."""
+    """Of each adaptive variant, where its tolerance rules; the variant that errs least first."""
     fitted, listed = tolerance_fits(data), {}
     for name in merged(data, MAIN):
         parts = {}
@@ -228,7 +228,7 @@ def _met(data: xr.Dataset) -> dict[str, Met]:
 
 
 def _by_tolerance(data: xr.Dataset) -> Picture:
-    """Error over tolerance of every run of the adaptive rows, a line a row, with the line where they are equal."""
+    """Error over tolerance of every run of the adaptive variants, with the line where they are equal."""
     met = _met(data)
     figure, axes = panels(1, 1, height=0.155 * max(len(met), 6) + 1.0)
     axis = axes[0, 0]
@@ -268,7 +268,7 @@ def _by_tolerance(data: xr.Dataset) -> Picture:
     )
     caption = (
         f"Largest axis error {HORIZON} of the adaptive methods over the tolerance that was asked for; relative and "
-        "absolute tolerance of the Runge-Kutta methods are equal. A dot is a run, a mark the median of its row, "
+        "absolute tolerance of the Runge-Kutta methods are equal. A dot is a run, a mark the median of its variant, "
         "method[chart]. Right of the wide line a run loses more than it was asked for. Left out are errors that do not "
         f"follow the tolerance: above {LARGE:g} rad, and near the error bound of the reference, where rounding rules."
     )

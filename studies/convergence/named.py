@@ -15,7 +15,7 @@ from .tables import MAIN, NAMED, evaluations_a_nutation, merged
 TARGET = 1e-6  # rad, the axis error at which costs are compared
 
 
-def named_rows(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
+def named_variants(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
     """The five named methods on the first scene, without a chart that another covers, and their labels."""
     named = [name for name in map(str, data["variant"].values) if split_name(name)[0] in NAMED]
     names = [name for name in named if name.replace("[attitude]", "[axis]") not in named or "[attitude]" not in name]
@@ -23,7 +23,7 @@ def named_rows(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
 
 
 def least_work(part: xr.Dataset, labels: Mapping[str, str]) -> list[tuple[str, float]]:
-    """What each row pays for an error below `TARGET`: force evaluations per nutation, the least first.
+    """What each variant pays for an error below `TARGET`: force evaluations per nutation, the least first.
 
     `part` is one scene.
     """

@@ -7,21 +7,19 @@ import xarray as xr
 from symtop.measure.order_table import observable, order_table
 from symtop.measure.settings import step_ladder, tolerance_ladder
 from symtop.methods.framework.registry import integrator, variants
-from symtop.model.scenes import scene
+from symtop.model.scenes import TAGS, scene
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
 from . import figures, tables, words
 
-LEFT_OUT = {
-    "goldstein is the same top, let go at another speed": ("goldstein-falling", "goldstein-rising"),
-    "loop is the same top, let go at another speed": ("cusp", "wave"),
-    "a steady precession, whose angles have other orders": ("steady", "kinon-betsch", "steady-fast"),
-    "the coarsest steps are limited by the spin and not by the nutation": ("fast", "simo-wong"),
-    "close to a pole, where the angles chart fails": ("bruls-cardona-arnold", "grazing"),
-    "unstable or nearly so: errors grow with the motion": ("sleeping", "sleeping-unstable", "separatrix"),
+LEFT_OUT = {  # tags of scenes, with the reason
+    "repeats": "the same orders show",
+    "steady": "the angles of a steady precession have other orders",
+    "fast": "the coarsest steps are limited by the spin and not by the nutation",
+    "near_pole": "the angles chart fails",
+    "unstable": "errors grow with the motion",
 }
-NOT_QUICK = {"left to the ordinary grid": ("goldstein", "loop", "hairer-lubich-wanner")}
 WHOLE = "spheroid"  # runs to its horizon; the other scenes run for `NUTATIONS` at most
 NUTATIONS = 8.0
 MOST_STEPS = 1e6  # of a run
@@ -30,7 +28,7 @@ HISTORY = (1000.0, 100.0)  # nutations of the run that shows the energy over tim
 
 def cases(quick: bool) -> list[Case]:
     """Every method in every chart: steps from ten a nutation to so short that rounding rules, tolerances likewise."""
-    names = grid_scenes(LEFT_OUT | (NOT_QUICK if quick else {}))
+    names = grid_scenes(TAGS if quick else LEFT_OUT)
     return [case for name in names for case in on_scene(name, quick)]
 
 
@@ -38,19 +36,19 @@ def on_scene(name: str, quick: bool) -> list[Case]:
     """The cases of one scene."""
     on, grid = scene(name), []
     horizon = min(on.horizon, math.inf if name == WHOLE else NUTATIONS * on.nutation_period)
-    for row in variants():
-        if row.exact_steps:
+    for variant in variants():
+        if variant.exact_steps:
             continue  # no step is more accurate than another
-        if row.fixed_step:
-            settings = step_ladder(row, on, horizon, *((8, 1e5) if quick else (17, MOST_STEPS)))
-        elif row.adaptive:
-            settings = tolerance_ladder(row, 5 if quick else 13)
+        if variant.fixed_step:
+            settings = step_ladder(variant, on, horizon, *((8, 1e5) if quick else (17, MOST_STEPS)))
+        elif variant.adaptive:
+            settings = tolerance_ladder(variant, 5 if quick else 13)
         else:
             continue  # a formula has nothing to set
         chosen = {"horizon": horizon, "settings": settings, "dense": not quick}
-        if name == WHOLE and row.method in tables.NAMED:
+        if name == WHOLE and variant.method in tables.NAMED:
             chosen["history"] = HISTORY[quick]
-        grid.append(Case(name, row.name, chosen))
+        grid.append(Case(name, variant.name, chosen))
     return grid
 
 
@@ -75,7 +73,7 @@ STUDY = Study(
         "line bends at the top, the step is too large for the order to show; where it flattens at the bottom, the "
         "error has reached rounding or the grey band, below which the reference cannot judge. Lines of one order look "
         "alike; what tells their methods apart is the constant C in error = C h^p, shown as the work that it takes to "
-        "one accuracy. A row is a method in one "
+        "one accuracy. A variant is a method in one "
         "chart, rk4[axis]: angles are Euler's angles, axis is the direction of the axis with the angular momentum, "
         "attitude is the quaternion with the angular momentum. Steps of adaptive methods follow from their tolerance; "
         "they are drawn against it, and against work beside the methods of fixed step."

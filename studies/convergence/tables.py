@@ -1,6 +1,6 @@
 """Numerics of the study: orders, what they say of the declared ones, and how errors follow a tolerance.
 
-The dataset has the columns of `symtop.measure.accuracy.error_table`, over ``scene``, ``integrator`` (the name of a row,
+The dataset has the columns of `symtop.measure.accuracy.error_table`, over ``scene``, ``variant`` (the name of one,
 ``rk4[axis]``) and ``setting``, and ``horizon`` over the first two.
 """
 
@@ -25,34 +25,34 @@ NAMED = ("midpoint", "trapezoidal", "stormer-verlet", "rk45", "taylor")  # the f
 HISTORY_STEPS, HISTORY_TOLERANCE = 100.0, 1e-6  # a nutation; of their runs for the energy over time
 LARGE = LARGEST_ERROR  # radians: larger errors follow no power of the step
 ABOVE_BOUND = 100.0  # times the reference's own error bound: smaller errors may be the reference's
-SAME = 0.02  # rows of a method whose errors differ by less are drawn as one
+SAME = 0.02  # variants of a method whose errors differ by less are drawn as one
 
-Pairs = dict[tuple[str, str], Fit]  # by scene and row
+Pairs = dict[tuple[str, str], Fit]  # by scene and variant
 
 
 def registered(name: str) -> Integrator | None:
-    """The row of that name; None if its method is not registered any more."""
+    """The variant of that name; None if its method is not registered any more."""
     return integrator(name) if split_name(name)[0] in integrators() else None
 
 
 def declared_order(name: str) -> int | None:
-    """The order that a row declares; None if it declares none or is not registered any more."""
+    """The order that a variant declares; None if it declares none or is not registered any more."""
     row = registered(name)
     return row.order if row else None
 
 
 def stepping(data: xr.Dataset) -> xr.Dataset:
-    """The rows that have a step to choose."""
+    """The variants that have a step to choose."""
     return data.sel(variant=np.isfinite(data["step_size"]).any(["scene", "setting"]))
 
 
 def adaptive(data: xr.Dataset) -> xr.Dataset:
-    """The rows that have a tolerance to choose."""
+    """The variants that have a tolerance to choose."""
     return data.sel(variant=np.isfinite(data["tolerance"]).any(["scene", "setting"]))
 
 
 def by_order(data: xr.Dataset) -> dict[int, list[str]]:
-    """Rows by their declared order, 0 for none, from low to high."""
+    """Variants by their declared order, 0 for none, from low to high."""
     groups: dict[int, list[str]] = {}
     for name in data["variant"].values:
         groups.setdefault(declared_order(str(name)) or 0, []).append(str(name))
@@ -61,7 +61,7 @@ def by_order(data: xr.Dataset) -> dict[int, list[str]]:
 
 @of_one_dataset
 def fits(data: xr.Dataset, quantity: str, *, at_end: bool = False) -> Pairs:
-    """The order of every row of fixed step on every scene, from the largest errors or those at the end."""
+    """The order of every variant of fixed step on every scene, from the largest errors or those at the end."""
     column, part = f"{quantity}_end" if at_end else quantity, stepping(data)
     fitted = {}
     for name, label in product(map(str, part["scene"].values), map(str, part["variant"].values)):
@@ -72,14 +72,14 @@ def fits(data: xr.Dataset, quantity: str, *, at_end: bool = False) -> Pairs:
 
 
 class Judged(NamedTuple):
-    """The verdict on one row and scene, and the slopes that it rests on."""
+    """The verdict on one variant and scene, and the slopes that it rests on."""
 
     verdict: str  # see `order_verdict`
     fits: dict[str, Fit]  # by quantity; only those that the chart shows
 
 
 def judged(data: xr.Dataset) -> dict[tuple[str, str], Judged]:
-    """What the slopes of every row say of its declared order, on every scene."""
+    """What the slopes of every variant say of its declared order, on every scene."""
     by_quantity = {quantity: fits(data, quantity) for quantity in (MAIN, *OTHERS)}
     result = {}
     for pair, main in by_quantity[MAIN].items():
@@ -90,7 +90,7 @@ def judged(data: xr.Dataset) -> dict[tuple[str, str], Judged]:
 
 
 def tolerance_fits(data: xr.Dataset) -> Pairs:
-    """error = constant * tolerance^slope of every adaptive row on every scene, a straight line."""
+    """error = constant * tolerance^slope of every adaptive variant on every scene, a straight line."""
     part, fitted = adaptive(data), {}
     for name, label in product(map(str, part["scene"].values), map(str, part["variant"].values)):
         cell = part.sel(scene=name, variant=label)
@@ -100,7 +100,7 @@ def tolerance_fits(data: xr.Dataset) -> Pairs:
 
 
 def merged(data: xr.Dataset, quantity: str) -> dict[str, str]:
-    """Labels of rows for a figure: rows of one method with the same errors are one, ``strang[axis, attitude]``."""
+    """Labels of variants for a figure: those of one method with the same errors are one, ``strang[axis, attitude]``."""
     labels: dict[str, str] = {}
     for name in map(str, data["variant"].values):
         method, chart = split_name(name)
@@ -113,7 +113,7 @@ def merged(data: xr.Dataset, quantity: str) -> dict[str, str]:
 
 
 def _same(data: xr.Dataset, first: str, second: str, quantity: str) -> bool:
-    """Do two rows have the same errors, wherever these are above rounding?"""
+    """Do two variants have the same errors, wherever these are above rounding?"""
     one, other = (data[quantity].sel(variant=name).values for name in (first, second))
     limit = ABOVE_BOUND * data[f"{quantity}_bound"].sel(variant=first).values
     seen = np.isfinite(one) & np.isfinite(other) & (one > np.maximum(limit, EPSILON))
@@ -126,33 +126,33 @@ def evaluations_a_nutation(cell: xr.Dataset, name: str) -> np.ndarray:
     return work
 
 
-def energy_history(on: Scene, row: Integrator, nutations: float) -> xr.Dataset:
+def energy_history(on: Scene, variant: Integrator, nutations: float) -> xr.Dataset:
     """The relative change of the energy over time of a run with `HISTORY_STEPS` or `HISTORY_TOLERANCE`.
 
     Dimension ``moment``: ``history_time`` in nutation periods, ``history_energy``. An adaptive method with a default
     tolerance, the rounding of its arithmetic, keeps it; ``history_tolerance`` is what it ran with.
     """
-    period, tolerance = on.nutation_period, row.default_tolerance or HISTORY_TOLERANCE
-    setting = {"step_size": period / HISTORY_STEPS} if row.fixed_step else {"tolerance": tolerance}
-    run = simulate(on, row, horizon=nutations * period, samples=801, guard=False, **setting)
+    period, tolerance = on.nutation_period, variant.default_tolerance or HISTORY_TOLERANCE
+    setting = {"step_size": period / HISTORY_STEPS} if variant.fixed_step else {"tolerance": tolerance}
+    run = simulate(on, variant, horizon=nutations * period, samples=801, guard=False, **setting)
     return xr.Dataset(
         {
             "history_time": ("moment", run["time"].values / period),
             "history_energy": ("moment", np.abs(residuals(on, run)["energy"])),
-            "history_tolerance": np.nan if row.fixed_step else tolerance,
+            "history_tolerance": np.nan if variant.fixed_step else tolerance,
         }
     )
 
 
 class Efficiency(NamedTuple):
-    """What a row pays for an axis error by its law, error = C h^p: force evaluations per nutation."""
+    """What a variant pays for an axis error by its law, error = C h^p: force evaluations per nutation."""
 
     work: float
     foreseen: bool  # does the error lie outside those that were fitted?
 
 
 def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Efficiency]:
-    """The work for an axis error of every row with a fixed step on every scene where it has an order to trust.
+    """The work for an axis error of every variant with a fixed step on every scene where it has an order to trust.
 
     A step h costs E force evaluations, so that C h^p = error takes E T (C / error)^(1/p) of them in a nutation T. E is
     the median over the steps of the fit.

@@ -11,7 +11,7 @@ from symtop.methods.framework.registry import split_name
 from symtop.report.sentences import abridged, joined
 from symtop.runner.study import Table
 
-from .named import TARGET, least_work, named_rows
+from .named import TARGET, least_work, named_variants
 from .tables import MAIN, OTHERS, Judged, Pairs, adaptive, declared_order, fits, judged, tolerance_fits
 
 QUOTED = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]")  # whose error constants are quoted
@@ -33,11 +33,13 @@ def tables(data: xr.Dataset) -> list[Table]:
     short = [_open(results), _by_method(data), _cheapest(data)]
     if adaptive(data).sizes["variant"]:
         header = ["scene", "method[chart]", "x in axis error ~ tolerance^x", "axis error / tolerance", "least error"]
-        made.append(Table("Errors of adaptive methods against their tolerance", header, list(_tolerance_rows(data))))
+        made.append(
+            Table("Errors of adaptive methods against their tolerance", header, list(_tolerance_variants(data)))
+        )
     return [*(table for table in short if table.rows), *made]
 
 
-def _tolerance_rows(data: xr.Dataset) -> Iterable[list[str]]:
+def _tolerance_variants(data: xr.Dataset) -> Iterable[list[str]]:
     for (scene, name), fit in tolerance_fits(data).items():
         cell = data.sel(scene=scene, variant=name)
         ratio = (cell[MAIN] / cell["tolerance"]).values[fit.used]
@@ -66,7 +68,7 @@ def _followed(one: "Followed | None") -> str:
 
 
 def _open(results: Mapping[tuple[str, str], Judged]) -> Table:
-    """The rows whose order is not confirmed, with the scenes and what was measured there."""
+    """The variants whose order is not confirmed, with the scenes and what was measured there."""
     scenes: dict[tuple[str, str], list[str]] = {}
     for (scene, name), (word, slopes) in results.items():
         if word in ("refuted", "undecided"):
@@ -79,14 +81,14 @@ def _open(results: Mapping[tuple[str, str], Judged]) -> Table:
 
 def _cheapest(data: xr.Dataset) -> Table:
     """What the five named methods pay for an error."""
-    part, labels = named_rows(data)
+    part, labels = named_variants(data)
     rows = [[name, f"{work:.3g}"] for name, work in least_work(part, labels)]
     title = f"The cheapest run of each named method with an axis error below {TARGET:g} rad on {part['scene'].item()}"
     return Table(title, ["method[chart]", "force evaluations a nutation"], rows)
 
 
 def spans(fitted: Pairs) -> str:
-    """From where to where the orders of some rows lie, with the widest of their intervals."""
+    """From where to where the orders of some variants lie, with the widest of their intervals."""
     slopes = [fit for fit in fitted.values() if np.isfinite(fit.slope)]
     if not slopes:
         return "No order could be measured."
@@ -105,15 +107,17 @@ def verdict(data: xr.Dataset) -> list[str]:
     for (_, name), (word, _) in results.items():
         by_word.setdefault(word, []).append(name)
     share = (
-        f"{len(by_word.get('confirmed', []))} of {len(results)} pairs of a row and a scene show the order that the "
+        f"{len(by_word.get('confirmed', []))} of {len(results)} pairs of a variant and a scene show the order that the "
         "method declares: the 95 % interval of the slope at h = 0, widened by "
         f"{BESIDE:g} on either side, contains it."
     )
     sentences = [share]
     for word, said in (("refuted", "is refuted"), ("undecided", "is left undecided")):
         if names := by_word.get(word):
-            rows = abridged(list(dict.fromkeys(names)))
-            sentences.append(f"The declared order {said} in {len(names)} pairs, with {rows}; a table has their scenes.")
+            variants = abridged(list(dict.fromkeys(names)))
+            sentences.append(
+                f"The declared order {said} in {len(names)} pairs, with {variants}; a table has their scenes."
+            )
     return [
         *sentences, spans(fits(data, MAIN)), *cheapest_sentence(data), *constants_sentence(data),
         *tolerance_sentence(data),
@@ -122,7 +126,7 @@ def verdict(data: xr.Dataset) -> list[str]:
 
 def cheapest_sentence(data: xr.Dataset) -> list[str]:
     """What the best and the worst of the named methods pay for an error."""
-    part, labels = named_rows(data)
+    part, labels = named_variants(data)
     paid = least_work(part, labels)
     if len(paid) < 2:
         return []
@@ -135,7 +139,7 @@ def cheapest_sentence(data: xr.Dataset) -> list[str]:
 
 
 def constants_sentence(data: xr.Dataset) -> list[str]:
-    """The error constants of the quoted rows."""
+    """The error constants of the quoted variants."""
     ends = fits(data, MAIN, at_end=True)
     known = [(name, end) for name in QUOTED if (end := ends.get((QUOTED_ON, name))) and np.isfinite(end.slope)]
     laws = [f"{end.constant:.4g} h^{end.slope:.2f} with {name}" for name, end in known]
@@ -143,14 +147,14 @@ def constants_sentence(data: xr.Dataset) -> list[str]:
 
 
 class Followed(NamedTuple):
-    """How the errors of an adaptive row follow its tolerance, over the scenes."""
+    """How the errors of an adaptive variant follow its tolerance, over the scenes."""
 
     slopes: list[float]
     ratios: list[float]  # errors over tolerances
 
 
 def by_tolerance(data: xr.Dataset) -> dict[str, Followed]:
-    """The adaptive rows whose errors follow a power of the tolerance somewhere."""
+    """The adaptive variants whose errors follow a power of the tolerance somewhere."""
     known: dict[str, Followed] = {}
     for (scene, name), fit in tolerance_fits(data).items():
         if np.isfinite(fit.slope):
@@ -161,7 +165,7 @@ def by_tolerance(data: xr.Dataset) -> dict[str, Followed]:
 
 
 def tolerance_sentence(data: xr.Dataset) -> list[str]:
-    """By what power of the tolerance the errors of adaptive rows fall, and how far they are from it."""
+    """By what power of the tolerance the errors of adaptive variants fall, and how far they are from it."""
     known = by_tolerance(data)
     if not known:
         return []
@@ -172,7 +176,7 @@ def tolerance_sentence(data: xr.Dataset) -> list[str]:
     )
     said = (
         f"The axis errors of adaptive methods fall as tolerance^{min(slopes):.2f} to tolerance^{max(slopes):.2f}, by "
-        f"row and scene. They are {min(known[least].ratios):.1g} ({least}) to {max(known[most].ratios):.1g} ({most}) "
-        "times the tolerance that was asked for."
+        f"variant and scene. They are {min(known[least].ratios):.1g} ({least}) to {max(known[most].ratios):.1g} "
+        f"({most}) times the tolerance that was asked for."
     )
     return [said]

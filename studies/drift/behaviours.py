@@ -1,4 +1,4 @@
-"""What became of every row over a million steps: a sentence a constant, one on the phase, and their tables."""
+"""What became of every variant over a million steps: a sentence a constant, one on the phase, and their tables."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -29,7 +29,7 @@ ENERGY = {  # what it does, by its behaviour
 
 
 class Fate(NamedTuple):
-    """What became of one constant with one row."""
+    """What became of one constant with one variant."""
 
     largest: float  # relative change, on any scene
     row: str
@@ -37,7 +37,7 @@ class Fate(NamedTuple):
 
 
 class Phase(NamedTuple):
-    """How the phase error of one row grows."""
+    """How the phase error of one variant grows."""
 
     largest: float  # rad, on any scene
     row: str
@@ -50,7 +50,7 @@ class Phase(NamedTuple):
 
 
 def fates(histories: xr.Dataset, constant: str) -> dict[str, list[Fate]]:
-    """The rows by what became of a constant on the scene where it fared worst, a key of `MEANING`."""
+    """The variants by what became of a constant on the scene where it fared worst, a key of `MEANING`."""
     groups: dict[str, list[Fate]] = {word: [] for word in MEANING}
     asked = histories[["outcome", *(f"{constant}_{part}" for part in ("largest", "exponent", "exponent_interval"))]]
     for k, row in enumerate(map(str, histories["variant"].values)):
@@ -61,7 +61,7 @@ def fates(histories: xr.Dataset, constant: str) -> dict[str, list[Fate]]:
 
 
 def constant_sentence(histories: xr.Dataset, constant: str) -> str:
-    """How many rows keep a constant, bound its error, or lose it, with the worst of each."""
+    """How many variants keep a constant, bound its error, or lose it, with the worst of each."""
     groups = fates(histories, constant)
     kept, held, failed = (groups.get(word, []) for word in ("kept", "bounded", FAILED))
     lost = sorted(one for word in ("random walk", "growing", "drift") for one in groups.get(word, []))
@@ -84,14 +84,14 @@ def _the(constant: str) -> str:
 
 
 def phases(histories: xr.Dataset) -> dict[str, list[Phase]]:
-    """The rows by how their phase error grows: as t, faster, or by no one power on all scenes; the largest first.
+    """The variants by how their phase error grows: as t, faster, or by no one power on all scenes; the largest first.
 
     It grows as t if the interval of the exponent, or `PHASE_SLACK`, reaches 1 on every scene, and faster if it lies
     above 1 by more on every scene. Phases below `SEEN_PHASE` are left out.
     """
     groups: dict[str, list[Phase]] = {STEADY: [], FASTER: [], UNCLEAR: []}
-    for row in map(str, histories["variant"].values):
-        cell = histories.sel(variant=row)
+    for variant in map(str, histories["variant"].values):
+        cell = histories.sel(variant=variant)
         seen = cell["phase_largest"].values > SEEN_PHASE
         sizes, slopes, doubts = (
             cell[f"phase_{part}"].values[seen] for part in ("largest", "exponent", "exponent_interval")
@@ -102,7 +102,7 @@ def phases(histories: xr.Dataset) -> dict[str, list[Phase]]:
         steady, faster = bool(np.all(np.abs(slopes - 1.0) <= doubt)), bool(np.all(slopes - doubt > 1.0))
         powers = " and ".join(dict.fromkeys(f"t^{slope:.2f}" for slope in slopes))
         word = STEADY if steady else FASTER if faster else UNCLEAR
-        groups[word].append(Phase(float(sizes.max()), row, powers))
+        groups[word].append(Phase(float(sizes.max()), variant, powers))
     return {word: sorted(group, reverse=True) for word, group in groups.items() if group}
 
 
@@ -124,7 +124,7 @@ def phase_sentence(histories: xr.Dataset) -> str:
 
 
 def _unseen(histories: xr.Dataset) -> int:
-    """How many rows have no phase error above `SEEN_PHASE` on any scene."""
+    """How many variants have no phase error above `SEEN_PHASE` on any scene."""
     return int((~(histories["phase_largest"] > SEEN_PHASE).any("scene")).sum())
 
 
@@ -152,27 +152,27 @@ def faster_sentence(histories: xr.Dataset) -> str:
 
 
 def run_shares(histories: xr.Dataset) -> dict[str, float]:
-    """The length of every row's run over that of the longest, on the scene where it is least."""
+    """The length of every variant's run over that of the longest, on the scene where it is least."""
     ends = histories["sample_time"].max("sample")
     shares = (ends / ends.max("variant")).min("scene")
     return dict(zip(map(str, histories["variant"].values), map(float, shares.values), strict=True))
 
 
 def _rows(group: Sequence[Phase]) -> str:
-    """One or two rows by name, more by their number."""
+    """One or two variants by name, more by their number."""
     return few([one.row for one in group], most=2)
 
 
 def tables(histories: xr.Dataset) -> list[Table]:
-    """How many rows fare how, and every row: what became of its constants and of its phase."""
+    """How many variants fare how, and every variant: what became of its constants and of its phase."""
     counts = [
         [constant, MEANING[word], str(len(group)), f"{group[0].largest:.1e}", group[0].row, f"{group[-1].largest:.1e}",
          group[-1].row]
         for constant in CONSTANTS for word, group in fates(histories, constant).items()
     ]  # fmt: skip
-    header = ["constant", "what became of it", "rows", "least change", "with", "largest change", "with this row"]
-    shown = Table("What became of energy and momenta: largest relative change, on the scene where a row fares worst",
-                  header, counts)  # fmt: skip
+    header = ["constant", "what became of it", "variants", "least change", "with", "largest change", "with"]
+    title = "What became of energy and momenta: largest relative change, on the scene where a variant fares worst"
+    shown = Table(title, header, counts)
     grown = {one.row: (one, word) for word, group in phases(histories).items() for one in group}
     cells: dict[str, list[str]] = {row: [row] for row in map(str, histories["variant"].values)}
     for constant in CONSTANTS:
@@ -184,6 +184,6 @@ def tables(histories: xr.Dataset) -> list[Table]:
         phase, word = grown.get(row, (None, "not seen"))
         cell.extend([f"{phase.largest:.1g}", phase.powers, word] if phase else ["", "", word])
     columns = [head for one in CONSTANTS for head in (f"largest change of {one}", f"behaviour of {one}")]
-    every = Table("Every row, over all scenes", ["row", *columns, "phase error (rad)", "its powers", "it grows"],
+    every = Table("Every variant, over all scenes", ["variant", *columns, "phase error (rad)", "powers", "it grows"],
                   list(cells.values()))  # fmt: skip
     return [shown, every]

@@ -12,7 +12,7 @@ from symtop.methods.framework.registry import integrators, split_name
 from symtop.report import style
 from symtop.runner.study import Picture
 
-from . import behaviours, messages, rows
+from . import behaviours, messages, variants
 
 LABELS = {
     "energy": "energy", "modified_energy": "modified energy", "p_phi": r"$p_\varphi$", "p_psi": r"$p_\psi$",
@@ -34,8 +34,8 @@ TELLING = {"bounded": messages.as_time, "lost": messages.faster}  # the runs tha
 
 
 def sizes(histories: xr.Dataset) -> Picture:
-    """The largest change of each constant: rows that hold all three by family, every other one by its name."""
-    data = rows.without_repeats(histories)
+    """The largest change of each constant: variants that hold all three by family, every other one by its name."""
+    data = variants.without_repeats(histories)
     groups = messages.lost(data)
     lines = _lines(groups)
     figure, axes = style.panels(1, len(CONSTANTS), height=0.5 + 0.145 * len(lines), sharex=True, sharey=True)
@@ -57,8 +57,8 @@ def sizes(histories: xr.Dataset) -> Picture:
     style.headline(figure, messages.sizes(data))
     caption = (
         "Largest relative change of every constant over the run and all scenes, energies relative to E0 - min V. "
-        "A dot is a row, method[chart]: those that hold all constants on a line for each family, the "
-        f"others on their own. {rows.setting(data)} A million steps of rounding explain changes up to "
+        "A dot is a variant, method[chart]: those that hold all constants on a line for each family, the "
+        f"others on their own. {variants.setting(data)} A million steps of rounding explain changes up to "
         f"{ROUNDED:.0e} of a momentum or of |E|: what a method conserves lies below. A larger change is the truncation "
         "error of a step or, farthest right, a drift."
     )
@@ -67,7 +67,7 @@ def sizes(histories: xr.Dataset) -> Picture:
 
 
 def _lines(groups: dict[tuple[str, ...], list[str]]) -> list[tuple[str, list[str], tuple[str, ...]]]:
-    """Label, rows and lost constants of every line of the figure; a heading has no rows."""
+    """Label, variants and lost constants of every line of the figure; a heading has no variants."""
     known, lines = integrators(), list[tuple[str, list[str], tuple[str, ...]]]()
     for gone, names in groups.items():
         what = " and ".join(LABELS[one] for one in gone) if len(gone) < len(CONSTANTS) else "all three"
@@ -102,7 +102,7 @@ def _name_lines(axis: Any, lines: list[tuple[str, list[str], tuple[str, ...]]]) 
 
 def exponents(histories: xr.Dataset) -> Picture:
     """The growth exponents of the phase error, a dot a run, by what happens to the energy."""
-    data = rows.without_repeats(histories)
+    data = variants.without_repeats(histories)
     groups = {word: slopes for word, slopes in messages.by_energy(data).items() if slopes.size}
     tall = [max(map(len, _columns(slopes).values())) / ABREAST + 3.0 for slopes in groups.values()]
     figure, axes = style.panels(len(groups) or 1, 1, height=1.35, sharex=True, height_ratios=tall or None)
@@ -131,10 +131,10 @@ def exponents(histories: xr.Dataset) -> Picture:
     style.headline(figure, messages.exponents(data))
     caption = (
         "Growth exponents of the phase error over the last decade of time, a dot a run of a method[chart], in columns "
-        f"of {BIN:g}; a panel holds the runs whose row fares alike with its energy on its worst scene. 0 is a bounded "
-        "error, 1 a steady lag (shaded), 3/2 the phase under a random walk of the energy, 2 that under a drift of the "
-        f"energy. Phase errors below {behaviours.ROUNDED_PHASE:g} rad may be rounding alone, which also grows as "
-        f"t^3/2. {rows.setting(data)}"
+        f"of {BIN:g}; a panel holds the runs whose variant fares alike with its energy on its worst scene. 0 is a "
+        "bounded error, 1 a steady lag (shaded), 3/2 the phase under a random walk of the energy, 2 that under a "
+        f"drift of the energy. Phase errors below {behaviours.ROUNDED_PHASE:g} rad may be rounding alone, which also "
+        f"grows as t^3/2. {variants.setting(data)}"
     )
     alt = "Columns of dots of the growth exponents of the phase error, in a panel for each behaviour of the energy."
     return Picture("exponents", figure, caption, alt)

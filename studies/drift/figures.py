@@ -14,7 +14,7 @@ from symtop.report.style import BLACK, GREY, few_ticks, headline, line, look, nu
 from symtop.run.long_run import PER_NUTATION
 from symtop.runner.study import Picture
 
-from . import dot_figures, messages, rows, words
+from . import dot_figures, messages, variants, words
 from .dot_figures import LABELS, NOTE, SMALLEST
 from .keeping import LENGTHS, chosen, keeping
 from .phase_loss import FEWEST, LOST
@@ -45,7 +45,7 @@ def envelope(t: np.ndarray, r: np.ndarray) -> tuple[list[float], list[float]]:
 
 
 def _residuals(histories: xr.Dataset) -> Picture:
-    small = rows.without_repeats(histories)
+    small = variants.without_repeats(histories)
     names = [name for name in small["variant"].values if name in SHOWN]
     data = small.sel(variant=names) if names else small
     figure, axes = panels(len(CONSTANTS), data.sizes["scene"], height=1.9, sharex="col", sharey="row")
@@ -78,9 +78,9 @@ def _residuals(histories: xr.Dataset) -> Picture:
     caption = (
         "Change of the energy since the start, relative to E0 - min V, the energy of the nutation, and of both "
         "momenta, relative to the larger. Dots are samples, markers the largest in a window of time (at 1e-17 "
-        f"if less); the dashed line rises as t; open markers are rows in angles. {rows.setting(data)} On every scene "
-        f"the energy stays at rounding or within bounds with {len(words.holding(data))} of these "
-        f"{data.sizes['variant']} rows, which does not bound the error of the motion."
+        f"if less); the dashed line rises as t; open markers are variants in angles. {variants.setting(data)} On "
+        f"every scene the energy stays at rounding or within bounds with {len(words.holding(data))} of these "
+        f"{data.sizes['variant']} variants, which does not bound the error of the motion."
     )
     alt = (
         "Log-log plots of residuals over time: level for discrete Lagrangians and splittings, rising for explicit or "
@@ -120,11 +120,11 @@ def _windows(data: xr.Dataset) -> Picture:
     headline(figure, messages.windows(data))
     momenta = [np.abs(data[f"{name}_{part}"]).max() for name in ("p_phi", "p_psi") for part in ("least", "largest")]
     caption = (
-        f"{float(data['steps'].max()):.0e} steps of rows in angles and in the axis chart on {data['scene'].values[0]}, "
-        f"{PER_NUTATION:.0f} steps a nutation. A band reaches from the least to the largest change in a window of "
-        "steps, the line is its mean, the dashed line that of the first window. A percentage is the mean of the last "
-        "window less that of the first, over the band's width. The modified energy adds the h^2 term of the discrete "
-        f"motion to the energy. {words.scatter(data)} Momenta stay within "
+        f"{float(data['steps'].max()):.0e} steps of variants in angles and in the axis chart on "
+        f"{data['scene'].values[0]}, {PER_NUTATION:.0f} steps a nutation. A band reaches from the least to the "
+        "largest change in a window of steps, the line is its mean, the dashed line that of the first window. A "
+        "percentage is the mean of the last window less that of the first, over the band's width. The modified energy "
+        f"adds the h^2 term of the discrete motion to the energy. {words.scatter(data)} Momenta stay within "
         f"{max(map(float, momenta)):.0e}."
     )
     alt = (
@@ -172,7 +172,7 @@ def _rounding(data: xr.Dataset) -> Picture:
     headline(figure, messages.rounding(ensembles))
     caption = (
         f"Drift of the modified energy by rounding near {data['scene'].values[0]}, {PER_NUTATION:.0f} steps a "
-        f"nutation, over {float(data['elapsed'].max()):.0e} steps; the chart is in the row's name. Each of "
+        f"nutation, over {float(data['elapsed'].max()):.0e} steps; the chart is in the variant's name. Each of "
         f"{members[0]} starts is a thin line, their root mean square a thick one. Dashed is that of the first "
         f"{members[1]} with plain sums in the same kernels. Above a panel: the fitted exponents of both, in it the "
         f"ratio of the root mean squares over the last decade of steps. {words.walks(ensembles)}"
@@ -182,7 +182,7 @@ def _rounding(data: xr.Dataset) -> Picture:
 
 
 def _horizons(data: xr.Dataset) -> Picture:
-    """Work per nutation that keeps the phase for N nutations: measured at one N, and by the law of each row elsewhere.
+    """Work per nutation that keeps the phase for N nutations: measured at one N, by the law of each variant elsewhere.
 
     The phase error is LOST (N / N0)^q (h / h0)^p with the measured exponent q and the declared order p, so that the
     work grows as N^(q / p).
@@ -227,10 +227,10 @@ def _horizons(data: xr.Dataset) -> Picture:
         name_ends(axis, ends)
     caption = (
         f"Force evaluations per nutation that keep the phase error of the nutation of {data['scene'].values[0]} below "
-        f"{LOST:g} rad for N nutations, a line a row, method[chart]. The marker is measured: there each row, with a "
-        "step of its own, loses its phase. The rest follows from its law, error as N^q h^p with the exponent q found "
-        f"there and the declared order p, without rounding. Coloured: {len(named)} rows, the familiar ones and the "
-        "cheapest of each order for a thousand nutations; grey: all others."
+        f"{LOST:g} rad for N nutations, a line a variant, method[chart]. The marker is measured: there each variant, "
+        "with a step of its own, loses its phase. The rest follows from its law, error as N^q h^p with the exponent q "
+        f"found there and the declared order p, without rounding. Coloured: {len(named)} variants, the familiar ones "
+        "and the cheapest of each order for a thousand nutations; grey: all others."
     )
-    alt = "Log-log plot of the work per nutation against the nutations that the phase must last, a line a row."
+    alt = "Log-log plot of the work per nutation against the nutations that the phase must last, a line a variant."
     return Picture("horizons", figure, caption, alt)

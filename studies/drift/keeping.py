@@ -1,8 +1,8 @@
-"""What it costs to keep the phase for N nutations, by the law of a row that was measured at one N.
+"""What it costs to keep the phase for N nutations, by the law of a variant that was measured at one N.
 
-The phase error of a row with step h after N nutations is LOST (N / N0)^q (h / h0)^p: q is the exponent of its growth
-that was measured, p the declared order, N0 when a run with step h0 reached LOST. A row that is to last N nutations
-needs h = h0 (N / N0)^(-q / p), and as many force evaluations a nutation more.
+The phase error of a variant with step h after N nutations is LOST (N / N0)^q (h / h0)^p: q is the exponent of its
+growth that was measured, p the declared order, N0 when a run with step h0 reached LOST. A variant that is to last N
+nutations needs h = h0 (N / N0)^(-q / p), and as many force evaluations a nutation more.
 """
 
 import math
@@ -20,7 +20,7 @@ MOST = 8  # names
 
 
 class Keeping(NamedTuple):
-    """The law of one row: what it paid, for how long, and how its cost grows."""
+    """The law of one variant: what it paid, for how long, and how its cost grows."""
 
     order: int
     length: float  # nutations after which the phase was lost
@@ -33,7 +33,7 @@ class Keeping(NamedTuple):
 
 
 def keeping(name: str, loss: xr.Dataset) -> Keeping | None:
-    """The law of a row; None without a declared order, or if its phase was not seen to be lost."""
+    """The law of a variant; None without a declared order, or if its phase was not seen to be lost."""
     row = integrator(name) if split_name(name)[0] in integrators() else None
     if row is None or row.order is None or "evaluations" not in loss:
         return None
@@ -44,7 +44,7 @@ def keeping(name: str, loss: xr.Dataset) -> Keeping | None:
 
 
 def chosen(laws: Mapping[str, Keeping]) -> list[str]:
-    """The rows that are named: the familiar ones, and the cheapest of each order for a thousand nutations."""
+    """The variants that are named: the familiar ones, and the cheapest of each order for a thousand nutations."""
     best: dict[int, str] = {}
     for name in sorted(laws, key=lambda name: float(laws[name].work(1000.0))):
         best.setdefault(laws[name].order, name)

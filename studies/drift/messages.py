@@ -15,12 +15,12 @@ AS_TIME = 0.1  # of an exponent
 
 
 def holds(cell: xr.Dataset, constant: str) -> bool:
-    """Does a row keep a constant, or bound its error, on every scene?"""
+    """Does a variant keep a constant, or bound its error, on every scene?"""
     return worst_behaviour(cell, constant) in HELD
 
 
 def residuals(data: xr.Dataset) -> str:
-    """Who keeps the energy best, and who loses most of it, of the rows that are drawn."""
+    """Who keeps the energy best, and who loses most of it, of the variants that are drawn."""
     largest = {str(name): float(data["energy_largest"].sel(variant=name).max()) for name in data["variant"].values}
     behaviour = {name: worst_behaviour(data.sel(variant=name), "energy") for name in largest}
     held = [name for name in largest if behaviour[name] in HELD]
@@ -32,7 +32,7 @@ def residuals(data: xr.Dataset) -> str:
 
 
 def lost(data: xr.Dataset) -> dict[tuple[str, ...], list[str]]:
-    """The rows by the constants that they neither keep nor bound on every scene: those that lose none first, then most.
+    """The variants by the constants that they neither keep nor bound on all scenes: first those that lose none or most.
 
     Within a group those with the largest change of energy come last.
     """
@@ -45,7 +45,7 @@ def lost(data: xr.Dataset) -> dict[tuple[str, ...], list[str]]:
 
 
 def sizes(data: xr.Dataset) -> str:
-    """How many rows hold all three constants."""
+    """How many variants hold all three constants."""
     names, held = data.sizes["variant"], len(lost(data).get((), []))
     rest = names - held
     return f"{held} of {names} methods hold the energy and both momenta, at rounding or with a bounded error" + (
@@ -57,7 +57,7 @@ ENERGIES = {"bounded": "a bounded energy error", "lost": "an energy that drifts 
 
 
 def by_energy(data: xr.Dataset) -> dict[str, np.ndarray]:
-    """Growth exponents of the phase error of all runs, by what the row's energy does: a key of `ENERGIES`."""
+    """Growth exponents of the phase error of all runs, by what the variant's energy does: a key of `ENERGIES`."""
     groups: dict[str, list[float]] = {word: [] for word in ENERGIES}
     for name in data["variant"].values:
         cell = data.sel(variant=name)

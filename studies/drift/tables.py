@@ -1,6 +1,6 @@
 """What the study reads out of its dataset: behaviour of the constants, lengths of the runs, predicted losses of phase.
 
-The dataset is a tree of four groups, each over ``scene`` and ``integrator``; these say what their variables are:
+The dataset is a tree of four groups, each over ``scene`` and ``variant``; these say what their variables are:
 
     histories   a million steps of every method          `symtop.measure.conservation.history`
     windows     10^8 steps of four methods               `symtop.run.long_run.long_run`

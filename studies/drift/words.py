@@ -16,8 +16,8 @@ from . import behaviours
 from .long_runs import PLAIN_MEMBERS
 from .messages import strayed
 from .phase_loss import LOST
-from .rows import charts_apart, charts_table, setting, used, without_repeats
 from .tables import HISTORIES, HORIZONS, ROUNDINGS, WINDOWS, by_integrator, losses, rounding, worst_behaviour
+from .variants import charts_apart, charts_table, setting, used, without_repeats
 
 CLOSE = 0.1  # a prediction that is further off, relative, counts as missed
 ROUNDING_COLUMNS = {  # header: variable
@@ -56,7 +56,7 @@ def tables(data: xr.DataTree) -> list[Table]:
 
 
 def _residual_table(histories: xr.Dataset) -> Table:
-    header, rows = ["scene", "row", "step or tolerance", "nutations", "outcome"], []
+    header, rows = ["scene", "variant", "step or tolerance", "nutations", "outcome"], []
     for name in CONSTANTS:
         header += [f"largest {name} residual", f"trend of {name} over the run", f"exponent, law of {name}"]
     ends = histories["sample_time"].max("sample")
@@ -78,7 +78,7 @@ def _number_table(title: str, runs: Mapping[str, xr.Dataset], columns: Mapping[s
         [name, *(format(cell[column], form) if math.isfinite(cell[column]) else "" for column in columns.values())]
         for name, cell in runs.items()
     ]
-    return Table(title, ["row", *columns], rows)
+    return Table(title, ["variant", *columns], rows)
 
 
 def _scene(group: xr.Dataset) -> str:
@@ -117,7 +117,7 @@ def holding(histories: xr.Dataset) -> list[str]:
 
 
 def shortened(histories: xr.Dataset) -> str:
-    """How many rows ran over a part of the horizon only, with its share of the longest run; empty if none did."""
+    """How many variants ran over a part of the horizon only, with its share of the longest run; empty if none did."""
     every = behaviours.run_shares(histories)
     shorter = {row: share for row, share in every.items() if share < behaviours.FULL_LENGTH}
     if not shorter:
@@ -162,7 +162,7 @@ def walks(ensembles: Mapping[str, xr.Dataset]) -> str:
 
 
 def predictions(runs: Mapping[str, xr.Dataset], place: str = "", left: Sequence[str] = ()) -> str:
-    """Which losses of phase were predicted, and which were not; `left` are the rows of which nothing was foretold."""
+    """Which losses of phase were predicted, and which were not; nothing was foretold of the variants `left`."""
     off = {name: abs(float(cell["ratio"]) - 1.0) for name, cell in runs.items()}  # NaN: not reached
     times = [float(cell["measured"] / cell["short"]) for name, cell in runs.items() if math.isfinite(off[name])]
     hits = [100.0 * error for error in off.values() if error <= CLOSE]

@@ -31,12 +31,12 @@ def pictures(data: xr.DataTree) -> list[Picture]:
     return [draw_error(data), draw_cost(data), draw_shares(data)]
 
 
-def color(data: xr.DataTree, row: str) -> str:
+def color(data: xr.DataTree, variant: str) -> str:
     """By measured order; black for the catalogue's methods."""
-    if words.of_catalogue(row):
+    if words.of_catalogue(variant):
         return OURS
-    order = words.facts(data, row).order if not words.single(row) else 1.0
-    return COLORS[0 if row in words.without_term(data) else min(COLORS, key=lambda known: abs(known - order))]
+    order = words.facts(data, variant).order if not words.single(variant) else 1.0
+    return COLORS[0 if variant in words.without_term(data) else min(COLORS, key=lambda known: abs(known - order))]
 
 
 def key(figure: Any) -> None:
@@ -48,7 +48,7 @@ def key(figure: Any) -> None:
 
 
 def draw_error(data: xr.DataTree) -> Picture:
-    """Axis error of every row on the slow top, against its steps a nutation; each line is labelled at its end."""
+    """Axis error of every variant on the slow top, against its steps a nutation; each line is labelled at its end."""
     figure, axes = style.panels(1, 1, height=5.6)
     axis, names = axes[0, 0], words.rows(data)
     curves = {row: words.curve(data, row) for row in names}
@@ -103,7 +103,7 @@ def draw_error(data: xr.DataTree) -> Picture:
     caption = (
         f"Axis error on {words.SLOW} against the steps a nutation; method[chart] at each line. {SAID} Without a "
         f"gyroscopic term the error is {wall:.3g} rad or more at any step. Dashed: single precision, where a triangle "
-        f"marks the best step; with a gyroscopic term none is below {low:.1e} rad, and of these {len(floors)} rows "
+        f"marks the best step; with a gyroscopic term none is below {low:.1e} rad, and of these {len(floors)} variants "
         f"{worse} are worse at the most steps than at fewer. Vertical lines: the steps that people use. One body with "
         "a fixed centre, no contacts or joints."
     )
@@ -111,7 +111,7 @@ def draw_error(data: xr.DataTree) -> Picture:
 
 
 def draw_cost(data: xr.DataTree) -> Picture:
-    """Axis errors at as many evaluations of the torque a second: a line a row, a panel a scene."""
+    """Axis errors at as many evaluations of the torque a second: a line a variant, a panel a scene."""
     names = sorted(words.rows(data), key=lambda row: words.level(data, row, words.USUAL), reverse=True)
     figure, axes = style.panels(1, 2, height=0.15 * len(names) + 0.9, sharex=True, sharey=True)
     for axis, at in zip(axes[0], SCENES, strict=True):
@@ -136,15 +136,15 @@ def draw_cost(data: xr.DataTree) -> Picture:
                            f"{style.number(best)}{style.FIRM}rad on scene {words.SLOW}, {names[0]} by "
                            f"{style.number(worst)}{style.FIRM}rad")  # fmt: skip
     caption = (
-        f"Axis error within {HORIZON:g} s on two scenes, each row in the chart that it names, with the same number of "
-        "evaluations of the torque: a method of four evaluations a step takes steps four times as long. "
+        f"Axis error within {HORIZON:g} s on two scenes, each variant in the chart that it names, with the same "
+        "number of evaluations of the torque: a method of four evaluations a step takes steps four times as long. "
         f"Sorted by the error on {words.SLOW} at {words.USUAL:g} a second. {SAID} Pi marks a run that ended early."
     )
-    return Picture("cost", figure, caption, "Dots, one line a row, of the axis error at three costs on two tops.")
+    return Picture("cost", figure, caption, "Dots, one line a variant, of the axis error at three costs on two tops.")
 
 
 def draw_shares(data: xr.DataTree) -> Picture:
-    """The share of the population that each row follows to five degrees."""
+    """The share of the population that each variant follows to five degrees."""
     names = sorted(words.rows(data), key=lambda row: words.share(data, row))
     figure, axes = style.panels(1, 1, height=0.14 * len(names) + 0.4)
     axis: Any = axes[0, 0]

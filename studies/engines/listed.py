@@ -44,7 +44,8 @@ def spherical(data: xr.DataTree) -> list[Table]:
         for row in words.without_term(data)
     ]  # fmt: skip
     title = f"Without a gyroscopic term: the axis (rad) from the spherical top's, within {HORIZON:g} s of {words.SLOW}"
-    header = ["row", *(f"1/{rate:g} s" for rate in FREQUENCIES), "order", f"from the true axis, 1/{words.USUAL:g} s",
+    header = ["variant", *(f"1/{rate:g} s" for rate in FREQUENCIES), "order",
+              f"from the true axis, 1/{words.USUAL:g} s",
               f"{words.FAST} precesses at this part of its rate"]  # fmt: skip
     return [Table(title, header, lines)] if lines else []
 
@@ -67,7 +68,7 @@ def used(data: xr.DataTree) -> Table:
 
     long = f"{words.seconds(data):g} s"
     header = [
-        "scene", "row", "step (s)", "forces a second",
+        "scene", "variant", "step (s)", "forces a second",
         *(f"{name}, {HORIZON:g} s" for name in ("axis", "energy", "precession")),
         *(f"{name}, {long}" for name in ("axis", *CHANGES)),
     ]  # fmt: skip
@@ -78,7 +79,7 @@ def used(data: xr.DataTree) -> Table:
 def same_cost(data: xr.DataTree) -> Table:
     """The axis error at as many evaluations of the torque."""
     header = [
-        "row", "evaluations a step",
+        "variant", "evaluations a step",
         *(f"{scene}, {rate:g} a second, {time:g} s" for scene in SCENES for rate in FREQUENCIES
           for time in (HORIZON, words.seconds(data))),
     ]  # fmt: skip
@@ -111,7 +112,7 @@ def kinds(data: xr.DataTree) -> Table:
         "and the share of the population within 5 degrees"
     )
     header = [
-        "row", "what it is", "order", *(f"axis on {words.SLOW}, 1/{rate:g} s" for rate in FREQUENCIES),
+        "variant", "what it is", "order", *(f"axis on {words.SLOW}, 1/{rate:g} s" for rate in FREQUENCIES),
         f"axis on {words.FAST}, {step}", *(f"{name}, {long}" for name in CHANGES), "least axis error (rad)",
         "at steps a nutation", "at the most steps (rad)", "share",
     ]  # fmt: skip

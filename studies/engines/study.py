@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.methods.framework.registry import engines, integrator
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.scenes import scene
 from symtop.run.ensemble.ensemble import ensemble
 from symtop.run.ensemble.population import NUMBERS, population
@@ -26,16 +26,16 @@ QUICK = {"steps": 3e4, "long": 20.0, "members": 100}
 FRAME = 1.0 / 240.0  # unit of time, on the population
 
 
-def row_names() -> list[str]:
+def variant_names() -> list[str]:
     """Every map on the axis, or the attitude if it has no other chart, and what is compared with them."""
     charts = {name: entry.charts() for name, entry in engines().items()}
     return [f"{name}[{'axis' if 'axis' in known else known[0]}]" for name, known in charts.items()] + list(COMPARED)
 
 
 def cases(quick: bool) -> list[Case]:
-    """One case a row and scene, and one a row for the population."""
+    """One case a variant and scene, and one a variant for the population."""
     chosen = QUICK if quick else ORDINARY
-    plan, names = {"steps": chosen["steps"], "long": chosen["long"]}, row_names()
+    plan, names = {"steps": chosen["steps"], "long": chosen["long"]}, variant_names()
     runs = [Case(one, name, plan, group="tops") for one in SCENES for name in names]
     many = {"members": chosen["members"], "seed": SEED}
     return [*runs, *(Case("population", name, many, group="population") for name in names)]
@@ -50,7 +50,7 @@ def _members(count: int, seed: int) -> tuple[xr.Dataset, np.ndarray, np.ndarray]
 
 
 def measure(case: Case) -> xr.Dataset:
-    """The table of a row on a scene, or the angles at the end on the population."""
+    """The table of a variant on a scene, or the angles at the end on the population."""
     chosen, row = case.settings, integrator(case.integrator)
     if case.group == "tops":
         there = scene(case.scene)

@@ -1,4 +1,4 @@
-"""Errors of one row on one scene: against the steps a nutation, at the steps that people use, and at the same cost.
+"""Errors of one variant on one scene: against the steps a nutation, at the steps that people use, and at the same cost.
 
 axis        the largest angle (rad) between the axis and the true one, at a hundred samples
 spherical   the same to the axis of the spherical top, I3 := I1, with the same start
@@ -17,10 +17,10 @@ import xarray as xr
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.charts import axis_of, space_energy, space_momenta
+from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop, flat
-from symtop.model.view import axis_of, space_energy, space_momenta
 
 SCENES = ("goldstein", "fast")
 HORIZON = 10.0  # s
@@ -43,13 +43,13 @@ def azimuth(e: np.ndarray) -> float:
     return float(turned[-1] - turned[0])
 
 
-def judged(there: Scene, row: Integrator, h: float, horizon: float) -> dict[str, float]:
+def judged(there: Scene, variant: Integrator, h: float, horizon: float) -> dict[str, float]:
     """One run, and what became of it."""
-    chart, top = row.charts()[0], there.top
+    chart, top = variant.charts()[0], there.top
     steps = max(SAMPLES, round(horizon / h))
     between = max(1, min(math.ceil(WINDING * horizon / (there.nutation_period * SAMPLES)), steps // SAMPLES))
     marks = np.rint(np.linspace(0.0, steps, SAMPLES * between + 1)).astype(int)
-    run = solve(row, chart, top, there.start, Plan.steps(h, marks))
+    run = solve(variant, chart, top, there.start, Plan.steps(h, marks))
     form, ball = (ClosedForms([flat(one, there.start)]) for one in (top, SymmetricTop(top.I1, top.I1, top.mgl)))
     with np.errstate(over="ignore", invalid="ignore"):  # a run that flies apart
         e, spin = axis_of(chart, run.states), space_momenta(chart, run.states)[1]
@@ -67,18 +67,18 @@ def judged(there: Scene, row: Integrator, h: float, horizon: float) -> dict[str,
     }
 
 
-def ladder(there: Scene, row: Integrator, most: float) -> xr.Dataset:
+def ladder(there: Scene, variant: Integrator, most: float) -> xr.Dataset:
     """The axis error after `HORIZON` from few steps a nutation to many, at most so many in all."""
     counts = PER_NUTATION[PER_NUTATION * HORIZON / there.nutation_period <= most]
-    runs = [judged(there, row, there.nutation_period / count, HORIZON) for count in counts]
+    runs = [judged(there, variant, there.nutation_period / count, HORIZON) for count in counts]
     return xr.Dataset({"axis": ("per_nutation", [one["axis"] for one in runs])}, coords={"per_nutation": counts})
 
 
-def frames(there: Scene, row: Integrator, horizons: tuple[float, float]) -> xr.Dataset:
+def frames(there: Scene, variant: Integrator, horizons: tuple[float, float]) -> xr.Dataset:
     """Errors after a short time and a long one, at so many steps a second and at so many evaluations of the torque."""
 
     def at(rates: Sequence[float]) -> list[list[dict[str, float]]]:
-        return [[judged(there, row, 1.0 / rate, horizon) for horizon in horizons] for rate in rates]
+        return [[judged(there, variant, 1.0 / rate, horizon) for horizon in horizons] for rate in rates]
 
     runs = at(FREQUENCIES)
     a_step = max(1, *(round(one["forces"] / one["steps"]) for part in runs for one in part))

@@ -23,20 +23,20 @@ DOES_NOT_SAY = (
     "description names, without damping, sleep and limits of speed."
 )
 HOW_TO_READ = (
-    "These are the maps by which engines step a free body; a row is a map in one chart. "
+    "These are the maps by which engines step a free body; a variant is a map in one chart. "
     f"{SLOW} nutates in 3 s, {FAST} spins at 100 rad/s and nutates in 0.13 s. Steps: from 16 a nutation up, and 60, "
     "240 and 1000 a second. The error of the axis is the largest of a hundred samples, against the closed form; pi for "
     "a run that ended early. Energy is relative to |E| + |mgl|, the spin L.e to the larger of both momenta. The "
     "precession is the azimuth that the axis has run through, which means little once the axis is far off. Cost is "
     "counted in evaluations of the torque: four substeps on one torque count as one. The population is that of "
     "`symtop.population`, its unit of time taken for a second. Damping, sleep, limits of speed or another version "
-    "change what an engine does. Rows in single precision round after every operation, in symtop's order. The last "
+    "change what an engine does. Variants in single precision round after every operation, in symtop's order. The last "
     "table quotes engines' own documentation."
 )
 
 
 class Facts(NamedTuple):
-    """What is known of a row on the slow top."""
+    """What is known of a variant on the slow top."""
 
     order: float
     best: float  # rad
@@ -45,45 +45,47 @@ class Facts(NamedTuple):
 
 
 def rows(data: xr.DataTree) -> list[str]:
-    """All rows, in the order of the study."""
+    """All variants, in the order of the study."""
     return [str(name) for name in data["tops"]["variant"].values]
 
 
-def of_catalogue(row: str) -> bool:
+def of_catalogue(variant: str) -> bool:
     """Is it a method that stands beside the engines?"""
-    return integrator(row).family != "engine"
+    return integrator(variant).family != "engine"
 
 
-def single(row: str) -> bool:
+def single(variant: str) -> bool:
     """Is it a map in single precision?"""
-    return split_name(row)[0].endswith(SINGLE)
+    return split_name(variant)[0].endswith(SINGLE)
 
 
-def curve(data: xr.DataTree, row: str, scene: str = SLOW) -> tuple[np.ndarray, np.ndarray]:
+def curve(data: xr.DataTree, variant: str, scene: str = SLOW) -> tuple[np.ndarray, np.ndarray]:
     """Steps a nutation, and the axis error there."""
-    one = data["tops"]["axis"].sel(scene=scene, variant=row)
+    one = data["tops"]["axis"].sel(scene=scene, variant=variant)
     good = np.isfinite(one.values)
     return one["per_nutation"].values[good], one.values[good]
 
 
-def facts(data: xr.DataTree, row: str) -> Facts:
+def facts(data: xr.DataTree, variant: str) -> Facts:
     """Order, floor and where it lies."""
-    count, error = curve(data, row)
+    count, error = curve(data, variant)
     part = (count > BETWEEN[0]) & (count < BETWEEN[1])
     order = -float(np.polyfit(np.log(count[part]), np.log(error[part]), 1)[0])
     least = int(np.argmin(error))
     return Facts(order, float(error[least]), float(count[least]), float(error[-1]))
 
 
-def frame(data: xr.DataTree, row: str, variable: str, rate: float, *, scene: str = SLOW, long: bool = False) -> float:
+def frame(
+    data: xr.DataTree, variant: str, variable: str, rate: float, *, scene: str = SLOW, long: bool = False
+) -> float:
     """A number at the step of so many a second, after the short time or the long one."""
-    cell = data["tops"][f"frame_{variable}"].sel(scene=scene, variant=row, rate=rate)
+    cell = data["tops"][f"frame_{variable}"].sel(scene=scene, variant=variant, rate=rate)
     return float(cell.isel(horizon=int(long)))
 
 
-def share(data: xr.DataTree, row: str) -> float:
+def share(data: xr.DataTree, variant: str) -> float:
     """The share of the population whose axis is within `NEAR` at the end."""
-    off = data["population"]["off"].sel(scene="population", variant=row).values
+    off = data["population"]["off"].sel(scene="population", variant=variant).values
     return float(np.mean(off <= NEAR))
 
 
@@ -119,7 +121,7 @@ def span(values: Iterable[float], say: Callable[[float], str]) -> str:
     return " to ".join(dict.fromkeys((say(min(several)), say(max(several)))))
 
 
-def engine_rows(data: xr.DataTree) -> list[str]:
+def engine_variants(data: xr.DataTree) -> list[str]:
     """The maps of engines in double precision."""
     return [row for row in rows(data) if not of_catalogue(row) and not single(row)]
 
@@ -127,8 +129,10 @@ def engine_rows(data: xr.DataTree) -> list[str]:
 def by_order(data: xr.DataTree) -> dict[int, list[str]]:
     """The maps of engines in double precision by their order, 0 without the gyroscopic term."""
     groups: dict[int, list[str]] = {}
-    for row in engine_rows(data):
-        groups.setdefault(0 if row in without_term(data) else max(1, round(facts(data, row).order)), []).append(row)
+    for variant in engine_variants(data):
+        groups.setdefault(0 if variant in without_term(data) else max(1, round(facts(data, variant).order)), []).append(
+            variant
+        )
     return dict(sorted(groups.items()))
 
 
@@ -144,7 +148,7 @@ def ordered(data: xr.DataTree) -> str:
 
 def in_the_long_run(data: xr.DataTree) -> str:
     """What the maps do to energy and spin over the long time, with the worst of each."""
-    there, parts = engine_rows(data), []
+    there, parts = engine_variants(data), []
     for name in ("energy", "spin"):
         changed = {row: frame(data, row, name, USUAL, long=True) for row in there}
         size = {row: abs(value) if math.isfinite(value) else math.inf for row, value in changed.items()}
@@ -154,7 +158,7 @@ def in_the_long_run(data: xr.DataTree) -> str:
 
 
 def in_single_precision(data: xr.DataTree) -> str:
-    """Where shorter steps stop helping; empty without such a row."""
+    """Where shorter steps stop helping; empty without such a variant."""
     floors = {row: facts(data, row) for row in rows(data) if single(row) and row not in without_term(data)}
     if not floors:
         return ""
@@ -168,13 +172,13 @@ def in_single_precision(data: xr.DataTree) -> str:
 
 
 def without_term(data: xr.DataTree) -> list[str]:
-    """The rows whose map leaves the gyroscopic term out."""
+    """The variants whose map leaves the gyroscopic term out."""
     return [row for row in rows(data) if split_name(row)[0].startswith("no-gyro")]
 
 
-def order_of_difference(data: xr.DataTree, row: str) -> float:
+def order_of_difference(data: xr.DataTree, variant: str) -> float:
     """With which power of the step a map comes to the spherical top."""
-    off = [frame(data, row, "spherical", rate) for rate in FREQUENCIES]
+    off = [frame(data, variant, "spherical", rate) for rate in FREQUENCIES]
     return -float(np.polyfit(np.log(FREQUENCIES), np.log(off), 1)[0])
 
 
@@ -194,15 +198,15 @@ def spherical(data: xr.DataTree) -> str:
     )
 
 
-def level(data: xr.DataTree, row: str, rate: float, *, scene: str = SLOW, long: bool = False) -> float:
+def level(data: xr.DataTree, variant: str, rate: float, *, scene: str = SLOW, long: bool = False) -> float:
     """The axis error at so many evaluations of the torque a second."""
-    cell = data["tops"]["level_axis"].sel(scene=scene, variant=row, rate=rate)
+    cell = data["tops"]["level_axis"].sel(scene=scene, variant=variant, rate=rate)
     return float(cell.isel(horizon=int(long)))
 
 
 def at_the_same_cost(data: xr.DataTree) -> list[str]:
     """On each scene the best map of an engine and the best of the catalogue, at as many evaluations of the torque."""
-    engines, said = engine_rows(data), []
+    engines, said = engine_variants(data), []
     for scene in SCENES:
         off = {row: level(data, row, USUAL, scene=scene) for row in rows(data)}
         best = min(engines, key=lambda row: off[row])
@@ -217,7 +221,7 @@ def at_the_same_cost(data: xr.DataTree) -> list[str]:
 
 def summary(data: xr.DataTree) -> str:
     """The two ends of the field, in a sentence."""
-    ranked = sorted(engine_rows(data), key=lambda row: frame(data, row, "axis", USUAL))
+    ranked = sorted(engine_variants(data), key=lambda row: frame(data, row, "axis", USUAL))
     best, worst = ranked[0], ranked[-1]
     beside = next(row for row in rows(data) if of_catalogue(row))
     return (
@@ -232,7 +236,7 @@ def on_the_population(data: xr.DataTree) -> str:
     shares = {row: share(data, row) for row in rows(data)}
     beside = next(row for row in rows(data) if of_catalogue(row))
     count = data["population"].sizes["member"]
-    followed = span((shares[row] for row in engine_rows(data)), "{:.0%}".format)
+    followed = span((shares[row] for row in engine_variants(data)), "{:.0%}".format)
     median = float(np.nanmedian(data["population"]["steps_a_nutation"].values))
     return (
         f"Of {count} random tops, at {median:.0f} steps a nutation in the median, the maps of engines end within 5 "

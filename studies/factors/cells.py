@@ -65,11 +65,11 @@ class Cell:
     scheme: str
     chart: str
     language: str
-    method: Integrator = field(compare=False)  # a row: it has this chart alone
+    method: Integrator = field(compare=False)  # a variant: it has this chart alone
 
     @property
     def name(self) -> str:
-        """The name of the row."""
+        """The name of the variant."""
         return self.method.name
 
     @property
@@ -98,7 +98,7 @@ def cells(schemes: Sequence[str] | None = None) -> list[Cell]:
 
 
 def taylor_in_angles() -> Integrator:
-    """The row ``taylor[angles]``: heyoka on the Euler-Lagrange equations, from the same formulas as the others."""
+    """The variant ``taylor[angles]``: heyoka on the Euler-Lagrange equations, from the same formulas as the others."""
 
     def read(top: SymmetricTop, times: Array, states: Array) -> tuple[Array, Array, Array]:
         par = BareTop(top.I1, top.I3, top.mgl)

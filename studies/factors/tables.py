@@ -1,6 +1,6 @@
 """Settings of equal accuracy, their times, and the comparisons that change one factor.
 
-Dimensions: integrator (rows such as ``rk45-numba[axis]``, see `cells`), horizon (nutation periods), target (of the axis
+Dimensions: variant (such as ``rk45-numba[axis]``, see `cells`), horizon (nutation periods), target (of the axis
 error, rad), call, batch.
 """
 
@@ -44,7 +44,7 @@ class Column:
     """Variables of the dataset."""
 
     SETTING, AXIS, AXIS_BOUND, FORCES = "setting", "axis", "axis_bound", "force_evaluations"  # of one run
-    REASON = "reason"  # why a row has no setting; empty if it has
+    REASON = "reason"  # why a variant has no setting; empty if it has
     SECONDS, SPREAD, SAMPLES = "seconds", "spread", "seconds_samples"  # the least sample, (median - least)/least, all
 
 

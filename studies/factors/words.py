@@ -30,13 +30,13 @@ from .tables import (
 
 HOW_TO_READ = (
     "Four factors make the time of a run: the method, the chart that its equations are written in, the language that "
-    "executes them and the call around them. A row is a method in one chart. Every row has its own step or tolerance, "
-    "the coarsest found that meets the stated error of the axis, so that times compare at equal accuracy. A factor's "
-    "effect is the ratio of two measured times that differ in this factor alone. The waterfall changes one factor "
-    "after the other. A table has the same factor's effect in every other surrounding, because factors do not simply "
-    "multiply: a smaller chart helps a compiled loop more than a Python one. A kernel is the bare solver with two "
-    f"samples; simulate and solve_ivp are what a user calls, with {SAMPLES} samples. SciPy's loop is Python, whatever "
-    "the language of its right-hand side. The closed form does not take part."
+    "executes them and the call around them. A variant is a method in one chart. Every variant has its own step or "
+    "tolerance, the coarsest found that meets the stated error of the axis, so that times compare at equal accuracy. "
+    "A factor's effect is the ratio of two measured times that differ in this factor alone. The waterfall changes one "
+    "factor after the other. A table has the same factor's effect in every other surrounding, because factors do not "
+    "simply multiply: a smaller chart helps a compiled loop more than a Python one. A kernel is the bare solver with "
+    f"two samples; simulate and solve_ivp are what a user calls, with {SAMPLES} samples. SciPy's loop is Python, "
+    "whatever the language of its right-hand side. The closed form does not take part."
 )
 
 WATERFALL = ["scene", "nutations", "axis error", "changed", "run", "call", "time", "ratio", "product so far", "noise"]
@@ -105,7 +105,7 @@ def largest_step(bars: Sequence[Bar]) -> str:
 
 
 class Against(NamedTuple):
-    """One of SciPy's methods in its fastest chart beside the fastest compiled row, as a user calls them and inside."""
+    """One of SciPy's methods in its fastest chart beside the fastest compiled variant, called by a user and inside."""
 
     public: Timed
     ours: Timed
@@ -114,7 +114,7 @@ class Against(NamedTuple):
 
     @property
     def user(self) -> float:
-        """How many times less the own row takes where a user measures."""
+        """How many times less the own variant takes where a user measures."""
         return self.public.seconds / self.ours.seconds
 
     @property
@@ -150,9 +150,9 @@ def scipy_sentence(data: xr.Dataset) -> str:
     methods = abridged(list(dict.fromkeys(pair.public.method for pair in pairs)))
     return (
         f"SciPy's {methods} take {times_faster(user[0])} to {times_faster(user[-1])} times as long as the fastest "
-        "compiled row of this study (series[axis] takes no part) where a user measures, solve_ivp against simulate. "
-        f"They take {times_faster(author[0])} to {times_faster(author[-1])} times as long in the inner loop, kernel "
-        "against kernel."
+        "compiled variant of this study (series[axis] takes no part) where a user measures, solve_ivp against "
+        f"simulate. They take {times_faster(author[0])} to {times_faster(author[-1])} times as long in the inner "
+        "loop, kernel against kernel."
     )
 
 
@@ -314,7 +314,7 @@ def _scipy(data: xr.Dataset) -> Table:
         for pair in against_scipy(times(part))
     ]  # fmt: skip
     return Table(
-        "SciPy's methods, each in its fastest chart, beside the fastest compiled row of this study", SCIPY, lines
+        "SciPy's methods, each in its fastest chart, beside the fastest compiled variant of this study", SCIPY, lines
     )
 
 

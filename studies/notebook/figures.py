@@ -189,7 +189,7 @@ def draw_hope(data: xr.Dataset) -> Picture:
         figure,
         f"Largest energy error so far of {SOLVER} at tolerance {SOLVER_TOLERANCE:g} and of methods of order two at "
         f"{STEPS_A_NUTATION:.0f} steps a nutation, from the same start, on both scenes and far beyond the notebook's "
-        "end. Open markers are rows in angles, full ones in the axis chart; a ring is the time from which a method "
+        "end. Open markers are variants in angles, full ones in the axis chart; a ring is the time from which a method "
         f"stays better than the solver. {words.hope_message(data)}.",
         "Two log-log plots: the solver's energy error rises with time and crosses the flat lines of the discrete "
         "methods, one after the other.",
@@ -334,8 +334,8 @@ def draw_modified_energy(data: xr.Dataset) -> Picture:
     return Picture(
         "modified-energy",
         figure,
-        f"Why the energy is bounded, over the notebook's horizons on {' and '.join(PARTS)}, both rows in angles: the "
-        "map conserves a modified Hamiltonian, from which the energy H differs by O(h^2). "
+        f"Why the energy is bounded, over the notebook's horizons on {' and '.join(PARTS)}, both variants in angles: "
+        "the map conserves a modified Hamiltonian, from which the energy H differs by O(h^2). "
         f"{words.modified_sentence(data)}",
         "Left, the energy oscillates and the modified energy hardly; right, log-log plots of slopes 2 and 4.",
     )

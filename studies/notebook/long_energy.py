@@ -24,7 +24,7 @@ SAMPLES = 12_001  # of a run
 
 
 def long_energy(scene: Scene, name: str, setting: float, horizon: float) -> xr.Dataset:
-    """Largest relative energy error so far of one row, at times from `FIRST` to `horizon`; dimension ``long``."""
+    """Largest relative energy error so far of one variant, at times from `FIRST` to `horizon`; dimension ``long``."""
     method = integrator(name)
     control = method.setting(setting).kwargs()
     run = simulate(scene, method, observe="nutation", samples=SAMPLES, horizon=horizon, guard=False, **control)
@@ -37,7 +37,7 @@ def long_energy(scene: Scene, name: str, setting: float, horizon: float) -> xr.D
 
 
 def better_from(data: xr.Dataset, scene: str, name: str) -> float:
-    """The time (s) from which a row has a smaller energy error than the solver, up to the end; inf if it never has.
+    """The time (s) from which a variant has a smaller energy error than the solver, up to the end; inf if it never has.
 
     0 means that it is smaller at every stored time.
     """
@@ -56,6 +56,6 @@ def notebook_end(data: xr.Dataset, scene: str) -> float:
 
 
 def energy_until(data: xr.Dataset, scene: str, name: str, time: float) -> float:
-    """The largest energy error of a row up to a time."""
+    """The largest energy error of a variant up to a time."""
     cell = data.sel(scene=scene, variant=name)
     return float(cell[Column.LONG_ENERGY].values[np.searchsorted(cell[Column.LONG_TIME].values, time)])

@@ -1,4 +1,4 @@
-"""What the runs far beyond the notebook's end say: whether, and from when on, a row keeps the energy better."""
+"""What the runs far beyond the notebook's end say: whether, and from when on, a variant keeps the energy better."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -36,13 +36,13 @@ def answer(data: xr.Dataset, named: tuple[str, ...]) -> list[str]:
 
 
 def _listed(values: Mapping[str, float], names: Sequence[str], most: int) -> str:
-    """Rows, by name if at most so many, with their errors, from the least to the largest."""
+    """Variants, by name if at most so many, with their errors, from the least to the largest."""
     ends = dict.fromkeys(f"{pick(values[name] for name in names):.0e}" for pick in (min, max))
     return f"{few(names, most=most)} ({' to '.join(ends)})"
 
 
 def _later(data: xr.Dataset, scene: str, names: list[str]) -> str:
-    """From when on the rows that are worse at first are better, row by row."""
+    """From when on the variants that are worse at first are better, one by one."""
     if not names:
         return ""
     last, end = float(data[Column.LONG_TIME].sel(scene=scene).max()), notebook_end(data, scene)
@@ -62,7 +62,7 @@ def _later(data: xr.Dataset, scene: str, names: list[str]) -> str:
 
 
 def long_table(data: xr.Dataset, named: Sequence[str]) -> Table:
-    """Energy errors at the notebook's end and far beyond it, and from when on a row keeps the energy better."""
+    """Energy errors at the notebook's end and far beyond it, and from when on a variant keeps the energy better."""
     last, lines = float(data[Column.LONG_TIME].max()), []
     for scene in map(str, data["scene"].values):
         end = notebook_end(data, scene)
@@ -71,7 +71,7 @@ def long_table(data: xr.Dataset, named: Sequence[str]) -> Table:
             better = "" if name == SOLVER else f"{since:.3g}" if math.isfinite(since) else "not to the end"
             errors = (energy_until(data, scene, name, time) for time in (end, last))
             lines.append([scene, name, f"{end:g}", *(f"{error:.0e}" for error in errors), better])
-    header = ["scene", "row", "notebook's end (s)", "energy error to then", f"to t = {last:g}", "better from t (s)"]
+    header = ["scene", "variant", "notebook's end (s)", "energy error to then", f"to t = {last:g}", "better from t (s)"]
     title = (
         f"Energy of {SOLVER} at tolerance {SOLVER_TOLERANCE:g} and of methods of order two at {STEPS_A_NUTATION:.0f} "
         "steps a nutation"

@@ -22,7 +22,7 @@ LONG = 3000.0  # s: some 2500 nutations of the first scene, 1000 of the second
 
 
 def cases(quick: bool) -> list[Case]:
-    """The notebook's solver and every discrete row, on both scenes."""
+    """The notebook's solver and every discrete variant, on both scenes."""
     settings = {"film": 20 if quick else 80, "shadow_steps": 3 if quick else 6, "long": 0.2 * LONG if quick else LONG}
     methods = [*(QUICK if quick else tables.discrete_methods()), SOLVER]
     return [Case(name, method, settings) for name in SCENES for method in methods]

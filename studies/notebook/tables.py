@@ -27,7 +27,7 @@ SOLVER = "lsoda[angles]"  # the default solver of the notebook's system is of th
 SOLVER_TOLERANCE = 2.6e-7  # chosen: at it LSODA keeps as many figures as the notebook reports; its own is not known
 STEPS_A_NUTATION = 118.02  # of every discrete method; no whole number, so that samples and nutation do not lock
 MIDPOINT = "midpoint[angles]"
-MODIFIED = (MIDPOINT, "stormer-verlet[angles]")  # rows whose modified energy is stored
+MODIFIED = (MIDPOINT, "stormer-verlet[angles]")  # variants whose modified energy is stored
 FILMED = MIDPOINT
 ALPHA = 1.6  # of the second scene, as the notebook prints it
 SAMPLES = 301
@@ -62,8 +62,10 @@ class Column:
 
 
 def discrete_methods() -> list[str]:
-    """Rows of the discrete Lagrangians and splittings of the registry, in the angles or the axis chart."""
-    return [row.name for row in grid_variants("nutation") if row.family in ("discrete-lagrangian", "splitting")]
+    """Variants of the discrete Lagrangians and splittings of the registry, in the angles or the axis chart."""
+    return [
+        variant.name for variant in grid_variants("nutation") if variant.family in ("discrete-lagrangian", "splitting")
+    ]
 
 
 def residual_history(scene: Scene, name: str, setting: float, samples: int = SAMPLES) -> xr.Dataset:

@@ -25,8 +25,8 @@ ORDER_TWO = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]"
 DRAWN = (*ORDER_TWO, "strang[axis]", "cayley[axis]")  # methods of order two that the figures name
 
 HOW_TO_READ = (
-    "A row is a method in one chart, method[chart]. Each figure has what the notebook drew, by its own means, beside "
-    "the truth; captions say what was reproduced, what was matched by choice and what was corrected. A discrete "
+    "A variant is a method in one chart, method[chart]. Each figure has what the notebook drew, by its own means, "
+    "beside the truth; captions say what was reproduced, what was matched by choice and what was corrected. A discrete "
     "Lagrangian L_d(q0, q1) gives a step by p0 = -D1 L_d and p1 = D2 L_d. If L_d does not change when phi is shifted "
     "at both ends, D1 L_d + D2 L_d = 0 along phi and p_phi cannot change (Noether's theorem): a symmetry of L_d "
     "conserves a momentum, at any step. A splitting conserves it because each of its parts has the symmetry. L_d also "
@@ -165,7 +165,7 @@ def verdict(data: xr.Dataset) -> list[str]:
 
 
 def modified_orders(data: xr.Dataset) -> dict[tuple[str, str], tuple[float, float]]:
-    """Slopes of the energy change and of the modified energy's change against the step, by scene and row."""
+    """Slopes of the energy change and of the modified energy's change against the step, by scene and variant."""
     slopes = {}
     for scene in map(str, data["scene"].values):
         for name in (row for row in MODIFIED if row in data["variant"].values):
@@ -179,7 +179,7 @@ def modified_orders(data: xr.Dataset) -> dict[tuple[str, str], tuple[float, floa
 
 
 def modified_sentence(data: xr.Dataset) -> str:
-    """Both slopes, from the least to the largest over scenes and rows."""
+    """Both slopes, from the least to the largest over scenes and variants."""
     plain, modified = (
         f"{min(values):.2f} to {max(values):.2f}" for values in zip(*modified_orders(data).values(), strict=True)
     )
@@ -198,12 +198,12 @@ def tables(data: xr.Dataset) -> list[Table]:
             since = better_from(data, str(scene), str(name))
             better = "" if name == SOLVER else f"{since:.3g}" if math.isfinite(since) else "not to the end"
             rows.append([str(scene), str(name), str(run[Column.OUTCOME].item()), *largest, better])
-    header = ["scene", "row", "outcome", "largest energy residual", "of p_phi", "of p_psi", "better from t (s)"]
+    header = ["scene", "variant", "outcome", "largest energy residual", "of p_phi", "of p_psi", "better from t (s)"]
     title = (
         f"Largest relative residuals over the notebook's own horizons ({STEPS_A_NUTATION:g} steps a nutation; {SOLVER} "
         f"at tolerance {SOLVER_TOLERANCE:g}), and the time from which the energy is kept better than by {SOLVER}"
     )
     powers = [[*place, *(f"{slope:.2f}" for slope in both)] for place, both in modified_orders(data).items()]
     modified = Table("Powers of the step with which the energy and the modified energy change",
-                     ["scene", "row", "energy", "modified energy"], powers)  # fmt: skip
+                     ["scene", "variant", "energy", "modified energy"], powers)  # fmt: skip
     return [long_table(data, DRAWN), modified, Table(title, header, rows)]

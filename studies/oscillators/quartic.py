@@ -35,7 +35,7 @@ import numpy as np
 
 from symtop.methods.lagrangian.oscillators import on_oscillators, one_oscillator
 from symtop.model.charts import Array
-from symtop.model.exact.weierstrass import differences, half_period, roots
+from symtop.model.exact.elliptic import differences, half_period, roots
 from symtop.model.scenes import Scene
 
 BITS, ORDER, PER_PERIOD = 96, 20, 48  # of the truth: its terms fall by 10 an order, to 1e-20

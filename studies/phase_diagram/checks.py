@@ -2,8 +2,8 @@
 
 A cell is chosen on the one scene if it was foretold, its winner is beyond a tie, and its runs are within a number of
 force evaluations; from each panel in turn that whose horizon is furthest beyond the last one that was measured. The
-winner and the next row run at the two settings on both sides of the target, to the horizon of the cell. Of cells that
-the same runs decide, one is chosen.
+winner and the next variant run at the two settings on both sides of the target, to the horizon of the cell. Of cells
+that the same runs decide, one is chosen.
 """
 
 from typing import Any, NamedTuple
@@ -22,17 +22,17 @@ COUNT = 10
 
 
 def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
-    """Settings of the checks: quantity, target, horizon, and of two rows the two settings; the dearest first."""
+    """Settings of the checks: quantity, target, horizon, and of two variants the two settings; the dearest first."""
     eligible: dict[str, list[tuple[float, float, dict[str, Any]]]] = {}
     for quantity in QUANTITIES:
         panel = tables.diagram(data, tables.SCENE, quantity)
         eligible[quantity] = []
-        rows = [_Row.of(data, name, quantity) for name in panel.names]
+        variants = [_Row.of(data, name, quantity) for name in panel.names]
         for at in zip(
             *np.nonzero(panel.foretold & (panel.ratio >= tables.TIE) & np.isfinite(panel.ratio)), strict=True
         ):
             pair = [int(panel.winner[at]), int(panel.second[at])]
-            parts = [rows[place].settings(at) for place in pair]
+            parts = [variants[place].settings(at) for place in pair]
             horizon = float(panel.horizons[at[1]])
             dearest = max(work for _, work, _ in parts) * horizon
             if dearest > limit:
@@ -57,7 +57,7 @@ def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
 
 
 class _Row(NamedTuple):
-    """What was measured of a row, and the finer of the two settings that each cell comes from."""
+    """What was measured of a variant, and the finer of the two settings that each cell comes from."""
 
     one: xr.Dataset
     level: Array
@@ -68,7 +68,7 @@ class _Row(NamedTuple):
         return cls(one, tables.cost_of(one, quantity, np.ones(one.sizes["setting"]))[1])
 
     def settings(self, at: tuple[int, int]) -> tuple[list[float], float, float]:
-        """The coarser and the finer setting in a cell, the evaluations a nutation of the finer, the row's reach."""
+        """The coarser and the finer setting in a cell, the evaluations a nutation of the finer, the variant's reach."""
         fine = min(int(self.level[at][0]), self.one.sizes["setting"] - 1)
         pair = [max(fine - 1, 0), fine]
         values, reach = self.one["setting_value"].values[pair], self.one["reach"].values[pair].min()
@@ -76,7 +76,7 @@ class _Row(NamedTuple):
 
 
 def cost(one: xr.Dataset, rank: int, prices: Array) -> float:
-    """Of what was checked, the cost a nutation of the winner or of the next row; infinite if the target is not reached.
+    """The cost a nutation of the winner or of the next variant of a check; infinite if the target is not reached.
 
     `prices` (sides,) are those of an evaluation.
     """
@@ -88,8 +88,8 @@ def cost(one: xr.Dataset, rank: int, prices: Array) -> float:
 def check(asked: Any) -> xr.Dataset:
     """Errors and ``work``, evaluations a nutation, of the runs that decide a cell, over ``rank`` and ``side``.
 
-    The ranks are the winner and the next row, the sides the coarser and the finer setting. ``quantity``, ``target``,
-    ``horizon`` and ``contender`` say which cell it is.
+    The ranks are the winner and the next variant, the sides the coarser and the finer setting. ``quantity``,
+    ``target``, ``horizon`` and ``contender`` say which cell it is.
     """
     tops, far = tops_of(tables.SCENE, 1, 0), horizons()
     ends = far[far <= 1.0001 * asked["horizon"]]

@@ -1,4 +1,4 @@
-"""The pictures: the family of the cheapest row for every allowed error and horizon, three errors wide."""
+"""The pictures: the family of the cheapest variant for every allowed error and horizon, three errors wide."""
 
 import textwrap
 from collections import Counter
@@ -20,7 +20,7 @@ from .tables import TARGETS, TIE, Diagram, diagram, tops_run
 
 HATCH = "///"  # foretold
 LETTER = 0.62  # of a cell: the width of a letter of a name on a region
-PALE = 0.45  # of white in the colour of a family beside that of its row in the title
+PALE = 0.45  # of white in the colour of a family beside that of its variant in the title
 MOST_NAMES = 4  # of a family in the key
 KEY = 44  # letters of a line of it
 UNREACHED = "#F0F0F0"
@@ -50,7 +50,7 @@ def draw(data: xr.DataTree, name: str) -> Picture:
     for panel in each.values():
         area.update(panel.names[k] for k in panel.winner.ravel() if k >= 0)
     leaders = words.leaders(data, name)
-    spoken = {row for row, _ in leaders.values()}  # rows of the title, which have a colour of their own
+    spoken = {row for row, _ in leaders.values()}  # variants of the title, which have a colour of their own
     groups: dict[str, list[str]] = {}
     for row, _ in area.most_common():
         groups.setdefault(row if row in spoken else integrator(row).family, []).append(row)
@@ -83,21 +83,21 @@ def draw(data: xr.DataTree, name: str) -> Picture:
     return Picture(
         "map" if name == POPULATION else name,
         figure,
-        f"The cheapest row, method[chart], or its family, for an allowed error up to a horizon, on {place}; every row "
-        "has the step or tolerance that suits a cell. Axis is the angle between the axes at one time, energy is "
-        "relative to E0 - min V, shape is the distance of height and vertical velocity from the true orbit, whatever "
-        "the delay. A name is that of the method with the most cells of a region. Hatched cells were not run: they are "
-        f"predicted from the measured growth of the winner's own run. {words.level_sentence(data, name)}",
+        f"The cheapest variant, method[chart], or its family, for an allowed error up to a horizon, on {place}; every "
+        "variant has the step or tolerance that suits a cell. Axis is the angle between the axes at one time, energy "
+        "is relative to E0 - min V, shape is the distance of height and vertical velocity from the true orbit, "
+        "whatever the delay. A name is that of the method with the most cells of a region. Hatched cells were not "
+        f"run: they are predicted from the measured growth of the winner's own run. {words.level_sentence(data, name)}",
         f"Three maps of the cheapest method over horizon and allowed error on {tops}: axis, energy and shape.",
         lead="Cheapest by error and run length" if name == POPULATION else "",
     )
 
 
-def _color(rows: list[str], spoken: set[str]) -> Any:
-    """That of the row with the most cells; paler if a row of the title is of the same family."""
-    kin = {integrator(row).family for row in spoken.difference(rows)}
-    part = PALE if integrator(rows[0]).family in kin else 0.0
-    return part + (1.0 - part) * np.array(to_rgb(look(rows[0]).color))
+def _color(variants: list[str], spoken: set[str]) -> Any:
+    """That of the variant with the most cells; paler if a variant of the title is of the same family."""
+    kin = {integrator(row).family for row in spoken.difference(variants)}
+    part = PALE if integrator(variants[0]).family in kin else 0.0
+    return part + (1.0 - part) * np.array(to_rgb(look(variants[0]).color))
 
 
 def _panel(axis: Any, panel: Diagram, groups: dict[str, list[str]], painted: dict[str, Any]) -> None:
@@ -142,16 +142,16 @@ def _names(axis: Any, mine: Any, panel: Diagram, centres: tuple[Any, Any]) -> No
         )  # fmt: skip
 
 
-def _method(row: str) -> str:
-    """A row without its chart, if that is the axis, which most of them have."""
-    return split_name(row)[0] if row.endswith("[axis]") else row
+def _method(variant: str) -> str:
+    """A variant without its chart, if that is the axis, which most of them have."""
+    return split_name(variant)[0] if variant.endswith("[axis]") else variant
 
 
-def _key(group: str, rows: list[str]) -> str:
-    """A row of the title, or a family with those of its rows that are the cheapest in the most cells."""
-    if group in rows:
+def _key(group: str, variants: list[str]) -> str:
+    """A variant of the title, or a family with those of its variants that are the cheapest in the most cells."""
+    if group in variants:
         return group
-    more = len(rows) - MOST_NAMES
+    more = len(variants) - MOST_NAMES
     others = f" and {more} other{'s' * (more > 1)}" if more > 0 else ""
-    label = f"{FAMILIES.get(group, group)}: {', '.join(map(_method, rows[:MOST_NAMES]))}{others}"
+    label = f"{FAMILIES.get(group, group)}: {', '.join(map(_method, variants[:MOST_NAMES]))}{others}"
     return textwrap.fill(label, KEY, break_on_hyphens=False)

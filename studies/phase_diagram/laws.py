@@ -10,13 +10,13 @@ at the end: an oscillation whose largest values scatter must not pass for a drif
 angle cannot grow any further, and points before the last `DECADES` are left out.
 
 A map that loses energy loses as much in every nutation, so that energy and shape grow as H at most. The phase is the
-integral of a frequency that hangs on the energy, and grows as H^2 at most. Which form a law has is known in part: a row
-that is neither symplectic nor keeps the energy by construction drifts, however small its drift beside its oscillation,
-so that of such a row any positive second coefficient of energy and shape is taken, and one of the phase at the level
-`LOOSE`. A drift that is still hidden at the last measured horizon is not foretold.
+integral of a frequency that hangs on the energy, and grows as H^2 at most. Which form a law has is known in part: a
+variant that is neither symplectic nor keeps the energy by construction drifts, however small its drift beside its
+oscillation, so that of such a variant any positive second coefficient of energy and shape is taken, and one of the
+phase at the level `LOOSE`. A drift that is still hidden at the last measured horizon is not foretold.
 
-What rounding adds is a walk: with w the smallest energy error over sqrt(evaluations) that any setting of a row showed,
-but no more than the rounding of the energy itself,
+What rounding adds is a walk: with w the smallest energy error over sqrt(evaluations) that any setting of a variant
+showed, but no more than the rounding of the energy itself,
 
     energy, shape   w sqrt(N)                        N evaluations up to the horizon
     axis            2 pi H w sqrt(N) / sqrt(3)       the phase under a walk of the energy, whose period changes with it

@@ -1,4 +1,4 @@
-"""One row on some tops: its errors at all horizons with each setting, measured as far as a budget goes, then foretold.
+"""One variant on some tops: its errors at all horizons with each setting, measured within a budget, then foretold.
 
 A horizon H ends a stretch of the run in which `SAMPLES` whole steps are looked at, golden fractions apart, so that no
 two fall on the same phase of the nutation. The error up to H is the largest so far:
@@ -24,11 +24,9 @@ from symtop.core.numbers import EPSILON, GOLDEN
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
-from symtop.model.charts import Array
-from symtop.model.effective import effective_potential
+from symtop.model.charts import Array, axis_of, space_energy
 from symtop.model.scenes import scene
-from symtop.model.top import flat
-from symtop.model.view import axis_of, space_energy
+from symtop.model.top import effective_potential, flat
 
 from ..population.ladder import in_turn, stepped, stored
 from ..population.tops import Body, Tops, numbers_of
@@ -47,9 +45,9 @@ DONE = 3e-13  # an error at ten nutations that no finer setting is asked to impr
 BITS = 24  # of a step
 
 
-def drifts_of(row: Integrator) -> bool:
-    """Is it known that the energy of a row drifts: neither symplectic nor kept by construction?"""
-    return not row.symplectic and "energy" not in (row.conserves or ())
+def drifts_of(variant: Integrator) -> bool:
+    """Is it known that the energy of a variant drifts: neither symplectic nor kept by construction?"""
+    return not variant.symplectic and "energy" not in (variant.conserves or ())
 
 
 class Shown(NamedTuple):
@@ -87,12 +85,12 @@ def places(ends: Array) -> Array:
     return np.asarray(ends[:, np.newaxis] * np.append(0.8 + 0.2 * fractions, 1.0))
 
 
-def setting_of(row: Integrator, level: int) -> float:
-    """Steps a nutation, or the tolerance; NaN below the least that the row has."""
-    if row.fixed_step:
+def setting_of(variant: Integrator, level: int) -> float:
+    """Steps a nutation, or the tolerance; NaN below the least that the variant has."""
+    if variant.fixed_step:
         return COARSEST * 2.0**level
     tolerance = LOOSEST * 10.0**-level
-    return tolerance if tolerance >= row.least_tolerance else math.nan
+    return tolerance if tolerance >= variant.least_tolerance else math.nan
 
 
 class Asked(NamedTuple):
@@ -103,22 +101,22 @@ class Asked(NamedTuple):
     budget: float  # force evaluations
 
 
-def run(row: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Shown, Array]]:
+def run(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Shown, Array]]:
     """The runs of all tops with each setting, and the times (n, samples) of what they show.
 
     Those of a fixed step go side by side, the settings too, in one call.
     """
-    if row.fixed_step:
-        return together(row, tops, wanted)
+    if variant.fixed_step:
+        return together(variant, tops, wanted)
     made = []
     for setting, ends, budget in wanted:
         times = places(ends).ravel() * tops.period[:, np.newaxis]
-        done = in_turn(row, tops.numbers, [Plan.until(one, setting, budget) for one in times])
+        done = in_turn(variant, tops.numbers, [Plan.until(one, setting, budget) for one in times])
         made.append((Shown(done.states, done.momenta, done.work, done.outcome == 0), times))
     return made
 
 
-def together(row: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Shown, Array]]:
+def together(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Shown, Array]]:
     """The runs of a fixed step. A call wants as many samples of all; those that nobody asked for are dropped."""
     marks = []
     for setting, ends, _ in wanted:
@@ -127,12 +125,12 @@ def together(row: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple
     each, n = [np.unique(one) for one in marks], len(tops.period)
     most = max((one.size for one in each), default=0)
     if any(one[-1] < most for one in each):  # a run with fewer steps than another has samples
-        return [made for asked in wanted for made in together(row, tops, [asked])]
+        return [made for asked in wanted for made in together(variant, tops, [asked])]
     if not wanted:
         return []
     shown = np.stack([filled(one, most) for one in each])
     h = np.stack([steps_of(tops, asked.setting) for asked in wanted])
-    done = stepped(row, np.tile(tops.numbers, (len(wanted), 1)), h.ravel(), np.repeat(shown, n, axis=0))
+    done = stepped(variant, np.tile(tops.numbers, (len(wanted), 1)), h.ravel(), np.repeat(shown, n, axis=0))
     made = []
     for k, (one, seen) in enumerate(zip(marks, shown, strict=True)):
         rows, columns = slice(k * n, (k + 1) * n), np.searchsorted(seen, one)
@@ -181,22 +179,22 @@ def shape(tops: Tops, u: Array, rate: Array) -> Array:
     return np.asarray(np.abs(off) / np.hypot(slope, 2.0 * omega * rate))
 
 
-def measured(row: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Array, Array]]:
+def measured(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Array, Array]]:
     """For each setting, the largest errors (quantities, horizons, n) of the stretches, inf after a failure, and
     evaluations a nutation.
     """
-    (chart,), made = row.charts(), []
-    for (setting, ends, _), (shown, times) in zip(wanted, run(row, tops, wanted), strict=True):
+    (chart,), made = variant.charts(), []
+    for (setting, ends, _), (shown, times) in zip(wanted, run(variant, tops, wanted), strict=True):
         each = errors(chart, tops, shown, times)
         largest = np.stack([each[name].reshape(len(times), len(ends), SAMPLES).max(axis=2).T for name in QUANTITIES])
-        if row.fixed_step and setting < LEAST_STEPS:
+        if variant.fixed_step and setting < LEAST_STEPS:
             largest[1:] = np.inf
         made.append((largest, np.where(shown.ended, shown.evaluations / ends[-1], np.nan)))
     return made
 
 
-def ladder(row: Integrator, tops: Tops, levels: int, steps: float, budget: float) -> xr.Dataset:
-    """All settings of a row, each as far as `steps` and `budget` (evaluations of a run) go, and foretold behind that.
+def ladder(variant: Integrator, tops: Tops, levels: int, steps: float, budget: float) -> xr.Dataset:
+    """All settings of a variant, measured as far as `steps` and `budget` (evaluations of a run) go, then foretold.
 
     Over `quantity`, `setting`, `horizon`, `member`: ``error``, the largest up to the horizon, and of its law the
     leading ``power`` and the free exponent ``slope`` with its ``interval``. ``setting_value`` is the steps a nutation
@@ -208,27 +206,29 @@ def ladder(row: Integrator, tops: Tops, levels: int, steps: float, budget: float
     reach, values = np.full(levels, np.nan), np.full(levels, np.nan)
     wanted: dict[int, Asked] = {}
     for level in range(levels):
-        setting = setting_of(row, level)
+        setting = setting_of(variant, level)
         if math.isnan(setting):
             break
-        ((tried, first),) = measured(row, tops, [Asked(setting, far[:1], math.inf if row.fixed_step else budget)])
+        ((tried, first),) = measured(
+            variant, tops, [Asked(setting, far[:1], math.inf if variant.fixed_step else budget)]
+        )
         taken = float(np.nanmedian(first)) if np.isfinite(first).any() else math.nan
         if math.isnan(taken):
             values[level], reach[level], seen[:, level, 0] = setting, far[0], np.inf
             continue
-        longest = min(budget / taken, steps / setting if row.fixed_step else math.inf, 1.0001e6)
+        longest = min(budget / taken, steps / setting if variant.fixed_step else math.inf, 1.0001e6)
         if longest < far[laws.FEWEST]:
             break
         wanted[level] = Asked(setting, far[far <= longest], 10.0 * budget)
         if np.median(tried[:, 0], axis=1).max() < DONE:
             break
-    for (level, asked), shown in zip(wanted.items(), measured(row, tops, list(wanted.values())), strict=True):
+    for (level, asked), shown in zip(wanted.items(), measured(variant, tops, list(wanted.values())), strict=True):
         values[level], reach[level] = asked.setting, asked.ends[-1]
         seen[:, level, : asked.ends.size], work[level] = shown
     grain = EPSILON * np.maximum((np.abs(tops.energy) + np.abs(tops.numbers[:, 2])) / tops.energy_scale, 1.0)
-    return foretold(seen, work, far, grain, drifts=drifts_of(row)).assign(
-        setting_value=("setting", values), reach=("setting", reach), chart=((), row.charts()[0]),
-        conserves_energy=((), float("energy" in (row.conserves or ()))),
+    return foretold(seen, work, far, grain, drifts=drifts_of(variant)).assign(
+        setting_value=("setting", values), reach=("setting", reach), chart=((), variant.charts()[0]),
+        conserves_energy=((), float("energy" in (variant.conserves or ()))),
     )  # fmt: skip
 
 

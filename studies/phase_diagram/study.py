@@ -1,7 +1,8 @@
 """Which method is the cheapest for an accuracy over a horizon, from ten nutations to a billion?
 
-A case is a row, a method in one chart, on a population of random tops or on one scene; one more, alone on the machine,
-times a force evaluation of each row. A second round runs ten cells that were foretold, to see whether they are right.
+A case is a variant, a method in one chart, on a population of random tops or on one scene; one more, alone on the
+machine, times a force evaluation of each variant. A second round runs ten cells that were foretold, to see whether
+they are right.
 """
 
 import xarray as xr
@@ -16,7 +17,7 @@ from .runs import POPULATION, ladder, tops_of
 from .tables import CHECKS, LADDERS, PRICES, SCENE
 
 SEED = 1
-CANDIDATES = (  # what can win: the cheapest rows of each family in `population` and `work_precision`
+CANDIDATES = (  # what can win: the cheapest variants of each family in `population` and `work_precision`
     "stormer-verlet[angles]", "midpoint[angles]", "strang[axis]", "takahashi-imada[axis]", "chin-4a[axis]",
     "aba-10-4[axis]", "srkn-14-6[axis]", "kahan-li-8[axis]", "sofroniou-spaletta-10[axis]", "gauss-4[axis]",
     "gauss-8[axis]", "gauss-12[axis]", "rk4[axis]", "rk45-compiled[axis]", "series[axis]", "series-adaptive[axis]",
@@ -29,8 +30,8 @@ CHECKED = {False: 1e8, True: 4e6}  # force evaluations of one run of a check, by
 
 
 def candidates() -> list[str]:
-    """The rows of `CANDIDATES` that this machine has: heyoka's Taylor series may be missing."""
-    there = {row.name for row in variants()}
+    """The variants of `CANDIDATES` that this machine has: heyoka's Taylor series may be missing."""
+    there = {variant.name for variant in variants()}
     return [name for name in CANDIDATES if name in there]
 
 
@@ -47,7 +48,7 @@ def grid(quick: bool) -> list[Case]:
 
 
 def follow_up(data: xr.DataTree) -> list[Case]:
-    """The cells to check, each a case: the cheapest row and the next, at the settings on both sides of the target."""
+    """The cells to check, each a case: the cheapest variant and the next, at the settings around the target."""
     quick = float(data[LADDERS]["reach"].max()) < 1e6
     return [
         Case(SCENE, f"check-{place}", settings, group=CHECKS)
@@ -56,7 +57,7 @@ def follow_up(data: xr.DataTree) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """The errors of a row at all horizons, the prices, or a cell run in full."""
+    """The errors of a variant at all horizons, the prices, or a cell run in full."""
     asked = case.settings
     if case.group == PRICES:
         return prices(asked["integrators"], asked["rounds"], asked["batch"])

@@ -1,10 +1,10 @@
-"""From errors at all horizons to a diagram: the cost of each row for each target and horizon, and who is the cheapest.
+"""From errors at all horizons to a diagram: what each variant costs for a target and a horizon, and the cheapest.
 
-cost(row)   median over the tops of seconds a nutation: force evaluations a nutation of the cheapest setting that
+cost(variant)   median over the tops of seconds a nutation: force evaluations a nutation of the cheapest setting that
             keeps the error below the target up to the horizon, times the measured seconds of an evaluation at that
             setting (`population.prices`), interpolated in logarithms between settings
             (`population.costs.cost_to_reach`). No run is timed
-winner      the row of the least cost; level with it is every row within `TIE`
+winner      the variant of the least cost; level with it is every variant within `TIE`
 foretold    if for most tops one of the two settings of the winner was not run as far as the horizon
 """
 
@@ -28,7 +28,7 @@ TARGETS = tuple(float(target) for target in np.logspace(-2, -12, 21))
 
 
 class Diagram(NamedTuple):
-    """One panel: arrays over targets and horizons, `costs` over rows before them."""
+    """One panel: arrays over targets and horizons, `costs` over variants before them."""
 
     names: list[str]
     horizons: Array
@@ -51,7 +51,7 @@ def tops_run(data: xr.DataTree) -> list[str]:
 
 
 def rows_of(data: xr.DataTree, scene: str, quantity: str) -> list[str]:
-    """Rows of a panel: those that conserve the energy by construction keep it and the shape at any step."""
+    """Variants of a panel: those that conserve the energy by construction keep it and the shape at any step."""
     group = data[LADDERS].to_dataset().sel(scene=scene)
     return [
         str(name) for name in group["variant"].values
@@ -60,7 +60,7 @@ def rows_of(data: xr.DataTree, scene: str, quantity: str) -> list[str]:
 
 
 def cell(data: xr.DataTree, scene: str, name: str) -> xr.Dataset:
-    """What was measured of a row: without padding, with errors of runs that failed or have no law infinite."""
+    """What was measured of a variant: without padding, with errors of runs that failed or have no law infinite."""
     one = data[LADDERS].to_dataset().sel(scene=scene, variant=name)
     ran = np.isfinite(one["setting_value"].values)
     one = one.isel(setting=np.flatnonzero(ran))
@@ -82,7 +82,7 @@ def answered(work: Array) -> Array:
 
 
 def cost_of(one: xr.Dataset, quantity: str, prices: Array) -> tuple[Array, Array]:
-    """Cost a nutation (targets, horizons, n) of a row, and the finer of the two settings that it comes from.
+    """Cost a nutation (targets, horizons, n) of a variant, and the finer of the two settings that it comes from.
 
     `prices` (settings,) are those of an evaluation.
     """

@@ -20,9 +20,9 @@ PANELS = {
     "shape": "shape: distance to the true orbit",
 }
 HOW_TO_READ = (
-    "A row is a method in one chart. A cell is an allowed error and a horizon; its colour is the row of the least "
-    "cost, or the family of that method. The cost is force evaluations a nutation times the measured price of one, "
-    "without the call, at the step or tolerance of the cell; of the population the median. No run was timed. The "
+    "A variant is a method in one chart. A cell is an allowed error and a horizon; its colour is the variant of the "
+    "least cost, or the family of that method. The cost is force evaluations a nutation times the measured price of "
+    "one, without the call, at the step or tolerance of the cell; of the population the median. No run was timed. The "
     "evaluations are those of the coarsest step or tolerance whose error stays below the target up "
     "to the horizon, interpolated between settings a factor of 2 in the step or 10 in the tolerance apart. "
     "Errors are measured to 10^6 nutations at most, as far as the budget of a run goes. Beyond, they are predicted "
@@ -31,16 +31,16 @@ HOW_TO_READ = (
     "of the Gauss methods, which keep both at any step. Left out are exact and exact-discrete, closed forms of "
     "constant cost."
 )
-NEXT = 3  # rows that the table of shares names after the first
+NEXT = 3  # variants that the table of shares names after the first
 CELLS = ["tops", "quantity", "target", "nutations", "cheapest", "ns a nutation", "next", "ratio", "kind"]
 SPOTS = ["quantity", "target", "nutations", "cheapest, predicted", "ns a nutation, predicted",
          "by the evaluations of its runs", "next, by those of its runs", "right"]  # fmt: skip
-LAWS = ["tops", "row", "setting", "measured to", *(f"{name}: power" for name in QUANTITIES),
+LAWS = ["tops", "variant", "setting", "measured to", *(f"{name}: power" for name in QUANTITIES),
         *(f"{name}: exponent" for name in QUANTITIES)]  # fmt: skip
 
 
 class Spot(NamedTuple):
-    """A foretold cell and the costs by its runs in full: ns a nutation of the winner, and of the next row.
+    """A foretold cell and the costs by its runs in full: ns a nutation of the winner, and of the next variant.
 
     Their errors and evaluations are measured; the cost is evaluations times the price of one, as in the diagram.
     """
@@ -54,7 +54,7 @@ class Spot(NamedTuple):
 
     @property
     def winner(self) -> bool:
-        """Is the winner cheaper than the next row in the runs as well?"""
+        """Is the winner cheaper than the next variant in the runs as well?"""
         return self.by_runs[0] < self.by_runs[1]
 
     @property
@@ -107,14 +107,14 @@ class Share(NamedTuple):
     """Who owns how much of a panel."""
 
     tops: str  # in words
-    reached: int  # cells that some row reaches
+    reached: int  # cells that some variant reaches
     foretold: int  # of these
-    close: float  # share of these in which another row costs less than `TIE` times as much
-    owners: list[tuple[str, float]]  # rows with their share of these, the largest first
+    close: float  # share of these in which another variant costs less than `TIE` times as much
+    owners: list[tuple[str, float]]  # variants with their share of these, the largest first
 
 
 def winners(data: xr.DataTree, quantity: str) -> list[Share]:
-    """Which rows own how much of the panels of an error, measured and predicted."""
+    """Which variants own how much of the panels of an error, measured and predicted."""
     shares = []
     for name in diagrams.tops_run(data):
         panel = diagram(data, name, quantity)
@@ -128,7 +128,7 @@ def winners(data: xr.DataTree, quantity: str) -> list[Share]:
 
 
 def winners_sentence(data: xr.DataTree, quantity: str) -> str:
-    """Which rows are the cheapest in the most cells, of the population and of the scene."""
+    """Which variants are the cheapest in the most cells, of the population and of the scene."""
     said = [
         f"on {one.tops} {', then '.join(f'{row} in {share:.0%}' for row, share in one.owners[:2])}"
         for one in winners(data, quantity)
@@ -136,28 +136,28 @@ def winners_sentence(data: xr.DataTree, quantity: str) -> str:
     ]
     error, _, meaning = PANELS[quantity].partition(": ")
     if not said:
-        return f"No row reaches any target of the {error} ({meaning})."
+        return f"No variant reaches any target of the {error} ({meaning})."
     return (
-        f"The cheapest rows for the {error} ({meaning.replace(' (', ', ').rstrip(')')}) are {', and '.join(said)} of "
-        "the cells that some row reaches."
+        f"The cheapest variants for the {error} ({meaning.replace(' (', ', ').rstrip(')')}) are {', and '.join(said)} "
+        "of the cells that some variant reaches."
     )
 
 
 def _shares(data: xr.DataTree) -> Table:
-    """The rows that own the most of each panel."""
+    """The variants that own the most of each panel."""
     lines = []
     for quantity in QUANTITIES:
         for one in winners(data, quantity):
             cells = [f"{row} {share:.0%}" for row, share in one.owners]
             lines.append([PANELS[quantity].partition(":")[0], one.tops, str(one.reached), str(one.foretold),
                           f"{one.close:.0%}", *cells, *[""] * (1 + NEXT - len(cells))])  # fmt: skip
-    header = ["error", "tops", "cells reached", "of them predicted", f"another row within {TIE:g} times",
+    header = ["error", "tops", "cells reached", "of them predicted", f"another variant within {TIE:g} times",
               "cheapest in most", *(["next"] * NEXT)]  # fmt: skip
-    return Table("The cheapest rows, by the share of the cells that some row reaches", header, lines)
+    return Table("The cheapest variants, by the share of the cells that some variant reaches", header, lines)
 
 
 def leaders(data: xr.DataTree, name: str) -> dict[str, tuple[str, float]]:
-    """Of each error the row that is the cheapest in the most cells of these tops, and its share of them."""
+    """Of each error the variant that is the cheapest in the most cells of these tops, and its share of them."""
     most = {}
     for quantity in QUANTITIES:
         panel = diagram(data, name, quantity)
@@ -169,7 +169,7 @@ def leaders(data: xr.DataTree, name: str) -> dict[str, tuple[str, float]]:
 
 
 def message(data: xr.DataTree, name: str) -> str:
-    """The figure's one message of these tops: the row that is cheapest most often, for each of the three errors."""
+    """The figure's one message of these tops: the variant that is cheapest most often, for each of the three errors."""
     shares: dict[str, list[str]] = {}
     for quantity, (row, share) in leaders(data, name).items():
         said = f"{share:.0%}{'' if shares else ' of the cells that any method reaches'} for "
@@ -179,20 +179,20 @@ def message(data: xr.DataTree, name: str) -> str:
 
 
 def foretold_share(data: xr.DataTree, name: str) -> float:
-    """Of the cells of these tops that any row reaches, the share that is foretold."""
+    """Of the cells of these tops that any variant reaches, the share that is foretold."""
     panels = [diagram(data, name, quantity) for quantity in QUANTITIES]
     reached = sum(int((panel.winner >= 0).sum()) for panel in panels)
     return sum(int((panel.foretold & (panel.winner >= 0)).sum()) for panel in panels) / max(reached, 1)
 
 
 def taking_part(data: xr.DataTree) -> list[str]:
-    """The rows of the diagram, those on the axis without their chart."""
-    rows = map(str, data[LADDERS].to_dataset()["variant"].values)
-    return [row.removesuffix("[axis]") for row in rows]
+    """The variants of the diagram, those on the axis without their chart."""
+    variants = map(str, data[LADDERS].to_dataset()["variant"].values)
+    return [row.removesuffix("[axis]") for row in variants]
 
 
 def part_sentence(data: xr.DataTree) -> str:
-    """How many rows take part, and why another study may have another winner."""
+    """How many variants take part, and why another study may have another winner."""
     return (
         f"{counted(len(taking_part(data)))} take part. Others, as taylor-longdouble and taylor-quad, can be faster "
         "where errors are close to the rounding of double precision, as the study work_precision shows."
@@ -200,13 +200,13 @@ def part_sentence(data: xr.DataTree) -> str:
 
 
 def parts_table(data: xr.DataTree) -> Table:
-    """Every row that takes part, and in which panels."""
+    """Every variant that takes part, and in which panels."""
     tops = diagrams.tops_run(data)[0]
-    rows = [str(row) for row in data[LADDERS].to_dataset()["variant"].values]
+    variants = [str(row) for row in data[LADDERS].to_dataset()["variant"].values]
     panels = {quantity: set(diagrams.rows_of(data, tops, quantity)) for quantity in QUANTITIES}
-    marks = [[row, *("yes" if row in panels[quantity] else "no" for quantity in QUANTITIES)] for row in rows]
+    marks = [[row, *("yes" if row in panels[quantity] else "no" for quantity in QUANTITIES)] for row in variants]
     names = [PANELS[quantity].partition(":")[0] for quantity in QUANTITIES]
-    return Table("The rows that take part, and in which errors", ["row", *names], marks)
+    return Table("The variants that take part, and in which errors", ["variant", *names], marks)
 
 
 def level_sentence(data: xr.DataTree, name: str) -> str:
@@ -214,7 +214,9 @@ def level_sentence(data: xr.DataTree, name: str) -> str:
     panels = [diagram(data, name, quantity) for quantity in QUANTITIES]
     ratios = np.concatenate([panel.ratio[panel.winner >= 0] for panel in panels])
     share = (ratios < TIE).mean() if ratios.size else 0.0
-    return f"In {share:.0%} of the cells that any row reaches another row costs less than {TIE:g} times as much."
+    return (
+        f"In {share:.0%} of the cells that any variant reaches another variant costs less than {TIE:g} times as much."
+    )
 
 
 def population_sentence(data: xr.DataTree) -> str:
@@ -225,7 +227,7 @@ def population_sentence(data: xr.DataTree) -> str:
     )
     reach = float(group["reach"].max())
     return (
-        f"{group.sizes['variant']} rows on {members} random tops (seed 1) and on {SCENE}: measured to "
+        f"{group.sizes['variant']} variants on {members} random tops (seed 1) and on {SCENE}: measured to "
         f"{reach:.2g} nutations, predicted to {float(group['horizon'].max()):.0e}."
     )
 
@@ -256,7 +258,7 @@ def _cells(data: xr.DataTree) -> Table:
                      f"{1e9 * panel.costs[first, t, h]:.3g}", panel.names[second] if np.isfinite(ratio) else "none",
                      f"{ratio:.2f}" if np.isfinite(ratio) else "", "predicted" if panel.foretold[t, h] else "measured"]
                 )  # fmt: skip
-    return Table("The cheapest row of each cell, whole decades of the error", CELLS, lines)
+    return Table("The cheapest variant of each cell, whole decades of the error", CELLS, lines)
 
 
 def _spots(data: xr.DataTree) -> Table:
@@ -279,8 +281,8 @@ def _spots(data: xr.DataTree) -> Table:
 def _laws(data: xr.DataTree) -> Table:
     lines = []
     for name in diagrams.tops_run(data):
-        for row in map(str, data[LADDERS].to_dataset()["variant"].values):
-            one = diagrams.cell(data, name, row)
+        for variant in map(str, data[LADDERS].to_dataset()["variant"].values):
+            one = diagrams.cell(data, name, variant)
             for k, value in enumerate(one["setting_value"].values):
                 part = one.isel(setting=k)
                 middle = {key: part[key].median("member").values for key in ("power", "slope", "interval")}
@@ -288,7 +290,7 @@ def _laws(data: xr.DataTree) -> Table:
                 if not np.isfinite(middle["power"]).any():
                     continue
                 lines.append(
-                    [named(name), row, f"{value:.3g}", f"{float(part['reach']):.2g}",
+                    [named(name), variant, f"{value:.3g}", f"{float(part['reach']):.2g}",
                      *(f"{power:g}" for power in middle["power"]),
                      *(f"{slope:.2f} +- {wide:.2f}" for slope, wide in slopes)]
                 )  # fmt: skip

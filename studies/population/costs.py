@@ -2,12 +2,12 @@
 
     cost       log-log interpolation between the last miss (E1, e1) and the first hit (E2, e2) behind it:
                log E = log E1 + (log E2 - log E1) log(e1/target)/log(e1/e2)
-    slowdown   cost over the least cost of any row on the same top
+    slowdown   cost over the least cost of any variant on the same top
     share      k of n with Wilson's interval: (p + z^2/2n +- z sqrt(p (1-p)/n + z^2/4n^2)) / (1 + z^2/n)
 
-A hit that a finer setting misses is luck and no hit. A row wins on a top if every other row costs at least `TIE` times
-as much; within that it is level with the cheapest. A cell's winner is sure if its share of wins is ahead of the next
-by `Z` standard errors of the difference, which for shares of one sample is sqrt((p + q - (p - q)^2)/n).
+A hit that a finer setting misses is luck and no hit. A variant wins on a top if every other variant costs at least
+`TIE` times as much; within that it is level with the cheapest. A cell's winner is sure if its share of wins is ahead
+of the next by `Z` standard errors of the difference, which for shares of one sample is sqrt((p + q - (p - q)^2)/n).
 Source: Wilson, J. Am. Stat. Assoc. 22 (1927) 209; run-length distributions: Hoos and Stuetzle, J. Autom. Reasoning 24
 (2000) 421.
 """
@@ -50,7 +50,7 @@ def cost_to_reach(work: Array, errors: Array, targets: Sequence[float]) -> Array
 
 
 def slowdowns(costs: Array) -> Array:
-    """Costs (rows, n) over the least on each top; NaN where no row reaches it."""
+    """Costs (variants, n) over the least on each top; NaN where no variant reaches it."""
     best = np.min(costs, axis=0, initial=np.inf)
     with np.errstate(invalid="ignore"):
         return np.asarray(np.where(np.isfinite(best), costs / best, np.nan))
@@ -86,18 +86,18 @@ class Share(NamedTuple):
 
 
 def wins(costs: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Of costs (rows, n): where a row wins beyond ties, and where it is level with the cheapest or wins."""
+    """Of costs (variants, n): where a variant wins beyond ties, and where it is level with the cheapest or wins."""
     with np.errstate(invalid="ignore"):
         level = costs < TIE * np.min(costs, axis=0, initial=np.inf)
     return level & (level.sum(axis=0) == 1), level
 
 
 class Winner(NamedTuple):
-    """The row with the most wins of a cell, and the next."""
+    """The variant with the most wins of a cell, and the next."""
 
     row: int
     share: Share
-    next_row: int
+    next_variant: int
     next_share: Share
     steady: bool = True  # is it also the winner if times are measured again?
 
@@ -109,7 +109,7 @@ class Winner(NamedTuple):
 
 
 def winner(costs: Array) -> Winner | None:
-    """The winner of costs (rows, n) over the tops that some row solves; None if there are none."""
+    """The winner of costs (variants, n) over the tops that some variant solves; None if there are none."""
     solved = np.isfinite(costs).any(axis=0)
     if not solved.any() or len(costs) < 2:
         return None

@@ -18,18 +18,18 @@ from .costs import TIE, Share, run_lengths
 from .ladder import KEPT, WRONG
 from .verdicts import ALL, UNITS, Cell
 
-NAMED = 6  # rows with a label; all others are thin and grey
+NAMED = 6  # variants with a label; all others are thin and grey
 FAMILIAR = ("rk4[axis]", "strang[axis]", "midpoint[angles]")  # always among them, thin
 MARKS = 9  # on a line
-SHOWN = 6  # rows of a panel of slowdowns
-NOBODY = "nobody"  # the tops on which no row is the cheapest beyond ties
-EVEN = 1e-6  # of a win: what a tie counts between rows with the same wins
+SHOWN = 6  # variants of a panel of slowdowns
+NOBODY = "nobody"  # the tops on which no variant is the cheapest beyond ties
+EVEN = 1e-6  # of a win: what a tie counts between variants with the same wins
 FAR = 1e3  # slowdown at which an axis ends
-LATEST = 0.995  # of a named row's costs lie within the axis of a panel
+LATEST = 0.995  # of a named variant's costs lie within the axis of a panel
 RARE = 1e-3  # share of false alarms at which an axis begins
-LEAST = 0.05  # a row that solves less is named in words
+LEAST = 0.05  # a variant that solves less is named in words
 OTHERS = "all other methods"
-OTHER = "#999999"  # of rows and bars that a title is not about
+OTHER = "#999999"  # of variants and bars that a title is not about
 
 
 def pictures(data: xr.DataTree) -> list[Picture]:
@@ -50,7 +50,7 @@ def power(target: float) -> str:
 
 
 def named(data: xr.DataTree, horizon: str, unit: str) -> list[str]:
-    """The familiar rows and those with the most wins at the targets of the axis."""
+    """The familiar variants and those with the most wins at the targets of the axis."""
     standings = [
         verdicts.standings(verdicts.costs(data, Cell(horizon, "axis", target), unit))
         for target in verdicts.targets(data)
@@ -63,12 +63,12 @@ def named(data: xr.DataTree, horizon: str, unit: str) -> list[str]:
 
 
 def drawn(name: str) -> dict[str, Any]:
-    """How a named row is drawn: its look, as in every figure, and thin if it is familiar."""
+    """How a named variant is drawn: its look, as in every figure, and thin if it is familiar."""
     return style.line(name) | {"lw": 0.9 if name in FAMILIAR else 1.7, "zorder": 3, "label": name}
 
 
 def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Picture:
-    """The share of tops that each row has solved within a cost, one panel a target."""
+    """The share of tops that each variant has solved within a cost, one panel a target."""
     targets, rows = verdicts.targets(data), named(data, horizon, unit)
     scale = 1e6 if unit != "evaluations" else 1.0
     label = "force evaluations of a run" if unit == "evaluations" else "force evaluations × measured price of one (µs)"
@@ -116,18 +116,19 @@ def draw_run_lengths(data: xr.DataTree, unit: str, horizon: str = "short") -> Pi
     return Picture(
         f"run-lengths-{unit}",
         figure,
-        "Share of random tops, no named scene, on which a row, method[chart], has met the axis error within a cost. "
-        f"Further left is faster; a line that ends higher solves more tops within {words.budget(data, horizon)} force "
-        f"evaluations a nutation. {words.span(data, horizon)}, {asked:,} with a nutation wider than the largest error. "
-        f"Cost in {UNITS[unit]}{untimed}, with the step or tolerance that suits the top. Thick: rows that win on the "
-        "most tops; thin: familiar ones; grey: all others. Ring: first to half of the tops. To "
+        "Share of random tops, no named scene, on which a variant, method[chart], has met the axis error within a "
+        f"cost. Further left is faster; a line that ends higher solves more tops within {words.budget(data, horizon)} "
+        f"force evaluations a nutation. {words.span(data, horizon)}, {asked:,} with a nutation wider than the largest "
+        "error. "
+        f"Cost in {UNITS[unit]}{untimed}, with the step or tolerance that suits the top. Thick: variants that win on "
+        "the most tops; thin: familiar ones; grey: all others. Ring: first to half of the tops. To "
         f"{targets[0]:.0e}: {words.winner_words(data, Cell(horizon, 'axis', targets[0]), unit, spoken=True)}.",
         f"Empirical distribution functions of the cost, one panel for each axis error, {len(rows)} lines with a name.",
     )
 
 
 def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
-    """The rows with the most wins: median and 10 to 90 % of the slowdown of each, a panel for each target."""
+    """The variants with the most wins: median and 10 to 90 % of the slowdown of each, a panel for each target."""
     targets = verdicts.targets(data)
     cells = [verdicts.standings(verdicts.costs(data, Cell(horizon, "axis", target), words.UNIT)) for target in targets]
     wins: Counter[str] = Counter()
@@ -167,7 +168,7 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
     note = (
         f"Cost: force evaluations × measured price of one, alone. Cheapest: every other method costs at least {TIE:g} "
         f"times as much; nobody: two are closer. Counted are the tops that any method solves. "
-        f"{messages.asked_sentence(data, horizon)} Rows: the {len(names)} of "
+        f"{messages.asked_sentence(data, horizon)} Variants: the {len(names)} of "
         f"{max(map(len, cells))} methods that are the cheapest {'most often' if others else 'on at least one top'}."
     )
     figure.legends[0].set_title("\n".join(textwrap.wrap(note, 120)))
@@ -175,17 +176,18 @@ def draw_slowdowns(data: xr.DataTree, horizon: str) -> Picture:
     return Picture(
         f"slowdowns-{horizon}",
         figure,
-        f"The {len(names)} rows, method[chart], with the most wins, each at its own step or tolerance. Marker: median "
-        "of the slowdown against the cheapest row on the same top. Bar: from the 10 % to the 90 % quantile; arrow: not "
-        "reached within the budget. Beside it the share of the tops that a row solves on which it is the cheapest; "
-        f"last, those on which two are closer. {messages.asked_sentence(data, horizon)} {words.span(data, horizon)}, "
-        f"no named scene; cost in {UNITS[words.UNIT]}. A bar that stays near 1 is a safe choice.",
+        f"The {len(names)} variants, method[chart], with the most wins, each at its own step or tolerance. Marker: "
+        "median of the slowdown against the cheapest variant on the same top. Bar: from the 10 % to the 90 % quantile; "
+        "arrow: not reached within the budget. Beside it the share of the tops that a variant solves on which it is "
+        f"the cheapest; last, those on which two are closer. {messages.asked_sentence(data, horizon)} "
+        f"{words.span(data, horizon)}, no named scene; cost in {UNITS[words.UNIT]}. "
+        "A bar that stays near 1 is a safe choice.",
         "Dot plots of slowdown with bars from the 10 to the 90 % quantile, one panel for each axis error.",
     )
 
 
 def _slowdown(axis: Any, place: int, one: verdicts.Standing, spoken: bool) -> None:
-    """A line of a panel; the rows that the title is about in their colour, the others grey."""
+    """A line of a panel; the variants that the title is about in their colour, the others grey."""
     low, middle, high = one.slowdown
     mark, weight = look(one.name), "bold" if spoken else "normal"
     color = mark.color if spoken else OTHER
@@ -204,7 +206,7 @@ def _beside(axis: Any, place: int, text: str, weight: str = "normal") -> None:
 
 
 def draw_strata(data: xr.DataTree) -> Picture:
-    """The row with the most wins of every stratum and target, one panel a horizon."""
+    """The variant with the most wins of every stratum and target, one panel a horizon."""
     from matplotlib.colors import to_rgb
 
     targets, kinds, spans = verdicts.targets(data), [ALL, *verdicts.strata(data)], verdicts.horizons(data)
@@ -222,8 +224,8 @@ def draw_strata(data: xr.DataTree) -> Picture:
                     axis.fill_between(*box, color=shade, lw=0)
                     color = "white" if shade @ np.array([0.3, 0.59, 0.11]) < 0.55 else "black"
                     share = f"{won.share.value:.0%}" if won.share.count else "level"
-                    row = method if chart == "axis" else taken.names[won.row]
-                    name = "\n".join(textwrap.wrap(f"{'' if won.sure else '~'}{row}", 12))
+                    variant = method if chart == "axis" else taken.names[won.row]
+                    name = "\n".join(textwrap.wrap(f"{'' if won.sure else '~'}{variant}", 12))
                     label = f"{name}\n{share}"
                 axis.text(column, line, label, ha="center", va="center", fontsize=LEAST_TEXT, color=color)
         axis.set(
@@ -244,11 +246,11 @@ def draw_strata(data: xr.DataTree) -> Picture:
     return Picture(
         "strata",
         figure,
-        "The row that wins on the most tops of each kind, and its share of those that a row solves, for each axis "
-        "error. Pale and with a tilde: its lead may be chance or noise of the times; level: two rows are closer than a "
-        f"win. Cost in {UNITS[words.UNIT]}, each at its own step or tolerance on each top. "
+        "The variant that wins on the most tops of each kind, and its share of those that a variant solves, for each "
+        "axis error. Pale and with a tilde: its lead may be chance or noise of the times; level: two variants are "
+        f"closer than a win. Cost in {UNITS[words.UNIT]}, each at its own step or tolerance on each top. "
         f"{words.strata_sentence(data)}",
-        "Coloured cells naming the winning row, a line a stratum, a column an accuracy, a panel a horizon.",
+        "Coloured cells naming the winning variant, a line a stratum, a column an accuracy, a panel a horizon.",
     )
 
 
@@ -286,9 +288,10 @@ def draw_silent(data: xr.DataTree) -> Picture:
     return Picture(
         "silent",
         figure,
-        "Wrong runs, and the share of them that look healthy: of all rows, method[chart]; of the rows with a fixed "
-        f"step, with at least {words.FINE:g} steps a nutation and at each number of them. {words.span(data, 'short')}, "
-        f"no named scene. {words.silent_sentence(data)} A conserved energy is no sign of a right answer.",
+        "Wrong runs, and the share of them that look healthy: of all variants, method[chart]; of the variants with a "
+        f"fixed step, with at least {words.FINE:g} steps a nutation and at each number of them. "
+        f"{words.span(data, 'short')}, no named scene. {words.silent_sentence(data)} A conserved energy is no sign of "
+        "a right answer.",
         "Bars of the share of wrong runs that look healthy: of all, of those with small steps, by steps a nutation.",
         lead="How often a run is wrong without a sign",
     )
@@ -333,7 +336,7 @@ def draw_guard(data: xr.DataTree) -> Picture:
         figure,
         "Wrong runs that are noticed against right ones that are suspected. Black: by the guard's "
         f"forecast before the run (dot: it warns at {EXPECTED:g} rad). Orange: by the larger error of energy and "
-        f"momenta after the run (dot: {KEPT:.0%}). All rows, method[chart], at their ten coarsest steps or "
+        f"momenta after the run (dot: {KEPT:.0%}). All variants, method[chart], at their ten coarsest steps or "
         "tolerances, on "
         f"{' and on '.join(messages.guarded(data, one) for one in spans)}, without those that the guard's trial covers "
         "whole; no named scene. The higher a line, the more "

@@ -1,4 +1,4 @@
-"""One row on all tops: runs from coarse to fine settings, and what they cost and hide.
+"""One variant on all tops: runs from coarse to fine settings, and what they cost and hide.
 
 Steps are halved from setting to setting, tolerances divided by ten. A member leaves the ladder
 
@@ -53,7 +53,7 @@ WRONG = 0.1  # rad
 KEPT = 0.01  # of the energy of the nutation, of the larger momentum
 ASYMPTOTIC = 1e-2  # rad; an error below this falls as the order says
 FORGIVEN = 10.0
-BLOCK = 256  # members of an adaptive row that climb together: as many starts as heyoka's conversion remembers
+BLOCK = 256  # members of an adaptive variant that climb together: as many starts as heyoka's conversion remembers
 DIGITS = 10  # bits of a cost that are stored, 0.1 %
 TENTHS = 10.0  # of a decade: how finely a tolerance is stored, in a byte
 Members = NDArray[np.int64]  # places of members
@@ -79,101 +79,101 @@ class Climb(NamedTuple):
     settled: NDArray[np.bool_]  # (n,): left with an accurate run
 
 
-def quantities_of(row: Integrator, twin: bool) -> tuple[str, ...]:
-    """What a row is judged by: the attitude alone where the axis chart has the same axis (`twin`).
+def quantities_of(variant: Integrator, twin: bool) -> tuple[str, ...]:
+    """What a variant is judged by: the attitude alone where the axis chart has the same axis (`twin`).
 
-    The energy is not asked of a row that claims to conserve it: any step would do.
+    The energy is not asked of a variant that claims to conserve it: any step would do.
     """
-    (chart,) = row.charts()
-    left = {"energy"} if "energy" in (row.conserves or ()) else set()
+    (chart,) = variant.charts()
+    left = {"energy"} if "energy" in (variant.conserves or ()) else set()
     left |= {"attitude"} if chart == "axis" else {"axis", "energy"} if twin else set()
     return tuple(name for name in ASKED if name not in left)
 
 
-def setting_of(row: Integrator, level: int) -> float:
-    """Steps a nutation, or the tolerance; NaN below the least that the row has."""
-    if row.fixed_step:
+def setting_of(variant: Integrator, level: int) -> float:
+    """Steps a nutation, or the tolerance; NaN below the least that the variant has."""
+    if variant.fixed_step:
         return FIRST * 2.0**level
     tolerance = 10.0 ** (-2 - level)
-    return tolerance if tolerance >= row.least_tolerance else math.nan
+    return tolerance if tolerance >= variant.least_tolerance else math.nan
 
 
-def run_level(row: Integrator, tops: Tops, chosen: Members, level: int, budget: float) -> Level:
+def run_level(variant: Integrator, tops: Tops, chosen: Members, level: int, budget: float) -> Level:
     """Run the chosen members with one setting."""
-    if row.fixed_step:
+    if variant.fixed_step:
         h = tops.period[chosen] / FIRST * 0.5**level
         marks = np.broadcast_to(tops.marks << level, (len(chosen), tops.marks.size))
-        return stepped(row, tops.numbers[chosen], h, marks)
-    tolerance, solver = setting_of(row, level), row.solvers[row.charts()[0]]
+        return stepped(variant, tops.numbers[chosen], h, marks)
+    tolerance, solver = setting_of(variant, level), variant.solvers[variant.charts()[0]]
     times = tops.times[chosen]
     if isinstance(solver, Adaptive):
         n, samples = times.shape
         done, _ = solver.many(tops.numbers[chosen], np.full(n, tolerance), times, np.full(n, samples), budget)
         return Level(done.states, done.momenta, done.work.astype(float), done.outcome)
     plans = [Plan.until(row_times, tolerance, budget) for row_times in times]
-    return one_by_one(row, tops.members(chosen), plans)
+    return one_by_one(variant, tops.members(chosen), plans)
 
 
-def stepped(row: Integrator, numbers: Array, h: Array, marks: NDArray[np.int64]) -> Level:
-    """Runs of steps `h` (n,), sampled at `marks` (n, samples): in one call where the row has a loop to share."""
-    solver = inside(row.solvers[row.charts()[0]])
+def stepped(variant: Integrator, numbers: Array, h: Array, marks: NDArray[np.int64]) -> Level:
+    """Runs of steps `h` (n,), sampled at `marks` (n, samples): in one call where the variant has a loop to share."""
+    solver = inside(variant.solvers[variant.charts()[0]])
     if solver is None:
-        return in_turn(row, numbers, [Plan.steps(float(step), ends) for step, ends in zip(h, marks, strict=True)])
+        return in_turn(variant, numbers, [Plan.steps(float(step), ends) for step, ends in zip(h, marks, strict=True)])
     many = solver.many(numbers, h, marks)
     work = np.asarray(solver.counts(many.steps, many.work)[0], dtype=float)
     return Level(many.states, many.momenta, work, many.outcome)
 
 
-def in_turn(row: Integrator, numbers: Array, plans: Sequence[Plan]) -> Level:
+def in_turn(variant: Integrator, numbers: Array, plans: Sequence[Plan]) -> Level:
     """Runs of tops in rows of nine numbers one after another, with equally many samples each."""
-    return one_by_one(row, members_of(numbers), plans)
+    return one_by_one(variant, members_of(numbers), plans)
 
 
-def one_by_one(row: Integrator, members: Iterable[tuple[SymmetricTop, Angles]], plans: Sequence[Plan]) -> Level:
+def one_by_one(variant: Integrator, members: Iterable[tuple[SymmetricTop, Angles]], plans: Sequence[Plan]) -> Level:
     """The same of tops and starts."""
-    (chart,), shape = row.charts(), (len(plans), plans[0].times.size)
+    (chart,), shape = variant.charts(), (len(plans), plans[0].times.size)
     states, momenta = np.full((*shape, DIMENSIONS[chart]), np.nan), np.full((*shape, 2), np.nan)
     work, outcome = np.empty(len(plans)), np.empty(len(plans), dtype=np.int64)
     for k, ((top, start), plan) in enumerate(zip(members, plans, strict=True)):
-        run = solve(row, chart, top, start, plan)
+        run = solve(variant, chart, top, start, plan)
         states[k], momenta[k, :, 0], momenta[k, :, 1] = run.states, run.p_phi, run.p_psi
         work[k], outcome[k] = run.force_evaluations, OUTCOMES.index(run.outcome)
     return Level(states, momenta, work, outcome)
 
 
-def climb(row: Integrator, tops: Tops, asked: dict[str, NDArray[np.bool_]], budget: float) -> Climb:
-    """All runs of a row; `asked` (targets, n) by quantity."""
-    n, (chart,) = len(tops.period), row.charts()
+def climb(variant: Integrator, tops: Tops, asked: dict[str, NDArray[np.bool_]], budget: float) -> Climb:
+    """All runs of a variant; `asked` (targets, n) by quantity."""
+    n, (chart,) = len(tops.period), variant.charts()
     names = (*asked, *(name for name in ("axis", "energy", MOMENTA) if name not in asked))
     blank = np.full((LEVELS, n), np.nan)
     done = Climb(blank.copy(), {name: blank.copy() for name in names}, np.zeros((LEVELS, n), bool), np.zeros(n, bool))
     everyone = np.flatnonzero(tops.known)
-    for block in [everyone] if row.fixed_step else np.array_split(everyone, -(-everyone.size // BLOCK) or 1):
+    for block in [everyone] if variant.fixed_step else np.array_split(everyone, -(-everyone.size // BLOCK) or 1):
         live = block
         for level in range(LEVELS):
-            if not live.size or math.isnan(setting_of(row, level)):
+            if not live.size or math.isnan(setting_of(variant, level)):
                 break
-            runs = run_level(row, tops, live, level, budget)
+            runs = run_level(variant, tops, live, level, budget)
             shown = tops.errors(chart, runs, live)
             good = (runs.outcome == 0) & np.isfinite(shown["axis"])
             done.work[level, live], done.ended[level, live] = runs.work, good
             for name, values in done.errors.items():
                 values[level, live] = np.where(good, shown[name], np.inf)
-            stay, settled = _stay(row, done, asked, live, level, budget)
+            stay, settled = _stay(variant, done, asked, live, level, budget)
             done.settled[live] = settled
             live = live[stay]
     return done
 
 
 def _stay(
-    row: Integrator, done: Climb, asked: dict[str, NDArray[np.bool_]], live: Members, level: int, budget: float
+    variant: Integrator, done: Climb, asked: dict[str, NDArray[np.bool_]], live: Members, level: int, budget: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:  # fmt: skip
     """Which of the live members go on to the next setting, and which have an accurate run."""
     work, good = done.work[level, live], done.ended[level, live]
     typical = float(np.max(work[good], initial=1.0))  # a run that failed early has not shown what the next one costs
     work = np.where(good, work, typical)
-    order = float(row.order or 1)
-    ratio, falls = (2.0, 2.0**order) if row.fixed_step else (10.0 ** (1.0 / (row.order or 20)), 10.0)
+    order = float(variant.order or 1)
+    ratio, falls = (2.0, 2.0**order) if variant.fixed_step else (10.0 ** (1.0 / (variant.order or 20)), 10.0)
     left = np.floor(np.log(budget / np.maximum(work, 1.0)) / math.log(ratio))
     settled = done.errors["axis"][level, live] <= ASYMPTOTIC
     worth = ~settled
@@ -197,44 +197,44 @@ def stored(values: Array) -> Array:
     return np.asarray(np.ldexp(np.rint(np.ldexp(size, DIGITS)), power - DIGITS))
 
 
-def met_at(row: Integrator, done: Climb, name: str, targets: Sequence[float] = TARGETS) -> NDArray[np.uint8]:
+def met_at(variant: Integrator, done: Climb, name: str, targets: Sequence[float] = TARGETS) -> NDArray[np.uint8]:
     """The tolerance that reaches each target, (targets, n), interpolated as its cost is, in tenths of a decade."""
-    if row.fixed_step:
+    if variant.fixed_step:
         return np.zeros((len(targets), done.work.shape[1]), dtype=np.uint8)
-    tolerances = np.array([[setting_of(row, level)] for level in range(LEVELS)])
+    tolerances = np.array([[setting_of(variant, level)] for level in range(LEVELS)])
     reached = cost_to_reach(np.where(np.isfinite(done.work), tolerances, np.nan), done.errors[name], targets)
     return np.where(np.isfinite(reached), np.rint(-TENTHS * np.log10(reached)), 0.0).astype(np.uint8)
 
 
 def table(
-    row: Integrator, tops: Tops, strata: NDArray[np.int64], kinds: int, budget: float, *, twin: bool, guarded: int
+    variant: Integrator, tops: Tops, strata: NDArray[np.int64], kinds: int, budget: float, *, twin: bool, guarded: int
 ) -> xr.Dataset:
-    """The dataset of one row over one horizon."""
-    asked = {name: mask for name, mask in tops.asked(TARGETS).items() if name in quantities_of(row, twin)}
-    done = climb(row, tops, asked, budget)
+    """The dataset of one variant over one horizon."""
+    asked = {name: mask for name, mask in tops.asked(TARGETS).items() if name in quantities_of(variant, twin)}
+    done = climb(variant, tops, asked, budget)
     costs = np.full((len(ASKED), len(TARGETS), len(tops.period)), np.nan)
     met = np.zeros(costs.shape, dtype=np.uint8)
     for place, name in enumerate(ASKED):
         if name in asked:
-            first = round(math.log2(LEAST_STEPS / FIRST)) if row.fixed_step and name == "energy" else 0
+            first = round(math.log2(LEAST_STEPS / FIRST)) if variant.fixed_step and name == "energy" else 0
             reached = cost_to_reach(done.work[first:], done.errors[name][first:], TARGETS)
             costs[place] = np.where(asked[name], stored(reached), np.nan)
-            met[place] = np.where(np.isfinite(costs[place]), met_at(row, done, name), 0)
+            met[place] = np.where(np.isfinite(costs[place]), met_at(variant, done, name), 0)
     data: dict[str, Any] = {
         "cost": (("quantity", "target", "member"), costs),
         "met_at": (("quantity", "target", "member"), met),
-        "setting": ("level", [setting_of(row, level) for level in range(LEVELS)]),
+        "setting": ("level", [setting_of(variant, level) for level in range(LEVELS)]),
         **{name: (("level", "stratum"), values) for name, values in _healthy(done, tops, strata, kinds).items()},
-        "chart": ((), row.charts()[0]),
-        "control": ((), row.control or ""),
-        "order": ((), float(row.order or math.nan)),
+        "chart": ((), variant.charts()[0]),
+        "control": ((), variant.control or ""),
+        "order": ((), float(variant.order or math.nan)),
         "budget": ((), budget),
         "made": ((), float(np.isfinite(done.work).sum())),
         "evaluated": ((), float(np.nansum(done.work))),
     }
     if guarded:
         data |= {
-            name: (("level", "guarded"), values) for name, values in guarded_runs(row, tops, done, guarded).items()
+            name: (("level", "guarded"), values) for name, values in guarded_runs(variant, tops, done, guarded).items()
         }
     return xr.Dataset(data, coords={"quantity": list(ASKED), "target": list(TARGETS)})
 
@@ -252,9 +252,9 @@ def _healthy(done: Climb, tops: Tops, strata: NDArray[np.int64], kinds: int) -> 
     }
 
 
-def guarded_runs(row: Integrator, tops: Tops, done: Climb, guarded: int) -> dict[str, Array]:
+def guarded_runs(variant: Integrator, tops: Tops, done: Climb, guarded: int) -> dict[str, Array]:
     """What the guard foretells, what is watched and what is measured, for the first members; (LEVELS, guarded)."""
-    (chart,) = row.charts()
+    (chart,) = variant.charts()
     seen = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured", "whole")}
     chosen = np.flatnonzero(tops.known)[:guarded]
     for place, (top, start) in enumerate(tops.members(chosen)):
@@ -262,11 +262,11 @@ def guarded_runs(row: Integrator, tops: Tops, done: Climb, guarded: int) -> dict
         scene = Scene(f"member-{member}", top, start, horizon=float(tops.times[member, -1]))
         for level in range(GUARDED_LEVELS):
             if math.isfinite(done.work[level, member]):
-                if row.fixed_step:
+                if variant.fixed_step:
                     plan = Plan.steps(float(tops.period[member]) / FIRST * 0.5**level, tops.marks << level)
                 else:
-                    plan = Plan.until(tops.times[member], setting_of(row, level))
-                expected = forecast(scene, row, chart, plan)
+                    plan = Plan.until(tops.times[member], setting_of(variant, level))
+                expected = forecast(scene, variant, chart, plan)
                 seen["foretold"][level, place], seen["whole"][level, place] = expected.axis_error, expected.whole
                 seen["watched"][level, place] = max(done.errors[name][level, member] for name in ("energy", MOMENTA))
                 seen["measured"][level, place] = done.errors["axis"][level, member]

@@ -15,7 +15,7 @@ from .prices import TOLERANCE, of_processes
 from .verdicts import ALL, UNITS, Cell
 from .words import interval, percent, ratio, span
 
-LISTED = 8  # rows of a cell in a table
+LISTED = 8  # variants of a cell in a table
 STEPS = (4.37, 17.48, 69.92)  # a nutation, of the table of silent failures
 
 RULES = {
@@ -25,11 +25,11 @@ RULES = {
     "cost of an error": "interpolated in logarithms between the last run that misses it and the first that meets it "
     "for good; no run of these tables was timed",
     "price of an evaluation": "the slope of the time between a short and a long run, so that the call itself has no "
-    "part in it; of rows whose order follows the tolerance at each of several, and on each top that of the tolerance "
-    "that meets the error, which is interpolated as the cost is",
+    "part in it; of variants whose order follows the tolerance at each of several, and on each top that of the "
+    "tolerance that meets the error, which is interpolated as the cost is",
     "tops that are asked": "those whose nutation is wider than the error, and where this is at least ten times the "
     "error of the truth",
-    "energy": "is asked of the rows that do not conserve it by construction",
+    "energy": "is asked of the variants that do not conserve it by construction",
     "errors": "the largest of a dozen samples that are not commensurate with the nutation, against the closed form",
     "wrong runs without a sign": "are counted here among the wrong runs that keep energy and momenta, on all tops at "
     "the settings that were run on every one; the maps of the study stability count, of all inaccurate runs, those "
@@ -37,14 +37,18 @@ RULES = {
     **{f"left out: {' and '.join(names)}": why for why, names in words.LEFT_OUT.items()},
 }
 STANDINGS = [
-    "nutations", "quantity", "target", "row", "solved", "slowdown, median", "10 %", "90 %", "wins", "95 % interval",
+    "nutations", "quantity", "target", "variant", "solved", "slowdown, median", "10 %", "90 %", "wins", "95 % interval",
     "tied for the cheapest",
 ]  # fmt: skip
 BY_QUANTITY = ["nutations", "error", *words.QUANTITIES_ASKED]
 WINNERS = ["nutations", "target", "stratum", "tops", "wins most", "on", "next", "on", "sure", "unsolved"]
-SILENT = ["row", *(f"{kind} at {steps:.3g} a nutation" for steps in STEPS for kind in ("wrong", "silent")), "hidden"]
-GUARD = ["nutations", "tops", "rows", "runs", "wrong", "caught", "false alarms", "area under the curve"]
-PRICES = ["row", "alone (ns)", "together (ns)", "ratio", "noise"]
+SILENT = [
+    "variant",
+    *(f"{kind} at {steps:.3g} a nutation" for steps in STEPS for kind in ("wrong", "silent")),
+    "hidden",
+]
+GUARD = ["nutations", "tops", "variants", "runs", "wrong", "caught", "false alarms", "area under the curve"]
+PRICES = ["variant", "alone (ns)", "together (ns)", "ratio", "noise"]
 
 
 def tables(data: xr.DataTree) -> list[Table]:
@@ -65,9 +69,8 @@ def _by_quantity(data: xr.DataTree) -> Table:
         for horizon in verdicts.horizons(data)
         for target in verdicts.targets(data)
     ]  # fmt: skip
-    title = (
-        f"The cheapest row, ties left out, on the most of the tops that some row solves; cost in {UNITS[words.UNIT]}"
-    )
+    unit = UNITS[words.UNIT]
+    title = f"The cheapest variant, ties left out, on the most of the tops that some variant solves; cost in {unit}"
     return Table(title, BY_QUANTITY, lines)
 
 
@@ -85,7 +88,7 @@ def _standings(data: xr.DataTree, unit: str) -> Table:
                     [*goal, percent(one.solved), middle, low, high, percent(one.won), interval(one.won),
                      percent(one.level)]
                 )  # fmt: skip
-    return Table(f"Slowdown against the cheapest row on each top, and wins, by {UNITS[unit]}", STANDINGS, lines)
+    return Table(f"Slowdown against the cheapest variant on each top, and wins, by {UNITS[unit]}", STANDINGS, lines)
 
 
 def _by_stratum(data: xr.DataTree) -> Table:
@@ -98,17 +101,17 @@ def _by_stratum(data: xr.DataTree) -> Table:
             lines.append([*start, "none", "", "", "", "", f"{1:.0%}" if tops else ""])
             continue
         unsolved = Share(tops - won.share.total, tops)
-        names = taken.names[won.row], taken.names[won.next_row]
+        names = taken.names[won.row], taken.names[won.next_variant]
         lines.append(
             [*start, names[0], percent(won.share), names[1], percent(won.next_share), "yes" if won.sure else "no",
              percent(unsolved)]
         )  # fmt: skip
-    return Table(f"Which tops want which row: wins by stratum, axis, {UNITS[words.UNIT]}", WINNERS, lines)
+    return Table(f"Which tops want which variant: wins by stratum, axis, {UNITS[words.UNIT]}", WINNERS, lines)
 
 
 def _silent(data: xr.DataTree) -> Table:
     lines = []
-    for name in verdicts.judged_rows(data):
+    for name in verdicts.judged_variants(data):
         one = verdicts.health(data, name)
         if not one.fixed_step:
             continue
@@ -132,7 +135,7 @@ def _guard(data: xr.DataTree) -> Table:
     lines = []
     for horizon in verdicts.horizons(data):
         length, tops = f"{verdicts.nutations(data, horizon):g}", f"{words.asked_of(data, horizon)}"
-        ways = [(label, "foretold", names) for label, names in guarded_rows(data, horizon).items()]
+        ways = [(label, "foretold", names) for label, names in guarded_variants(data, horizon).items()]
         for label, score, names in [*ways, (f"{ways[0][0]}, by energy and momenta afterwards", "watched", ways[0][2])]:
             hits, alarms = verdicts.caught(data, horizon, score, names)
             area = verdicts.detected(data, horizon, score, names).area
@@ -142,14 +145,14 @@ def _guard(data: xr.DataTree) -> Table:
             )  # fmt: skip
     title = (
         f"The guard's forecast above {EXPECTED:g} rad as a warning of a wrong run, asked at the coarsest steps or "
-        f"tolerances of each row; energy and momenta: a change above {KEPT:.0%}"
+        f"tolerances of each variant; energy and momenta: a change above {KEPT:.0%}"
     )
     return Table(title, GUARD, lines)
 
 
-def guarded_rows(data: xr.DataTree, horizon: str) -> dict[str, list[str]]:
-    """The rows that the guard was asked about: all, and by what they have in common."""
-    rows, group = verdicts.judged_rows(data, horizon), data[horizon].to_dataset().isel(scene=0)
+def guarded_variants(data: xr.DataTree, horizon: str) -> dict[str, list[str]]:
+    """The variants that the guard was asked about: all, and by what they have in common."""
+    rows, group = verdicts.judged_variants(data, horizon), data[horizon].to_dataset().isel(scene=0)
     control = dict(zip(map(str, group["variant"].values), map(str, group["control"].values), strict=True))
     fixed = [name for name in rows if control[name] == "step_size"]
     parts = {
@@ -179,5 +182,7 @@ def _prices_by_tolerance(data: xr.DataTree) -> Table:
     names = [str(name) for name in group["variant"].values]
     lines = [[name, *(f"{1e9 * price:.3g}" for price in row)]
              for name, row in zip(names, by, strict=True) if np.ptp(row)]  # fmt: skip
-    header = ["row", *(f"{tolerance:.0e}" for tolerance in group["priced_at"].values)]
-    return Table("Price of a force evaluation alone (ns), by tolerance, of rows whose order follows it", header, lines)
+    header = ["variant", *(f"{tolerance:.0e}" for tolerance in group["priced_at"].values)]
+    return Table(
+        "Price of a force evaluation alone (ns), by tolerance, of variants whose order follows it", header, lines
+    )

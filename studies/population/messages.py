@@ -56,7 +56,7 @@ class First(NamedTuple):
 
 
 def first_to_half(data: xr.DataTree, cell: Cell, unit: str) -> First | None:
-    """The row that solves half of the tops within the least cost; None if no row does at any."""
+    """The variant that solves half of the tops within the least cost; None if no variant does at any."""
     taken = verdicts.costs(data, cell, unit)
     if not taken.names or not taken.values.shape[1]:
         return None

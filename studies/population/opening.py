@@ -1,4 +1,4 @@
-"""What the report says first: which row to take, how often that is right, and what nothing warns of."""
+"""What the report says first: which variant to take, how often that is right, and what nothing warns of."""
 
 import math
 from collections import Counter
@@ -12,26 +12,26 @@ from .costs import TIE
 from .verdicts import Standing
 
 HEADER = [
-    "nutations", "axis error (rad)", "cheapest most often", "wins, of the tops that a row solves",
+    "nutations", "axis error (rad)", "cheapest most often", "wins, of the tops that a variant solves",
     "cost over the cheapest: median (90% quantile)", "next", "meets it, of all tops", "met on most tops by",
 ]  # fmt: skip
 EXPLAINED = {
-    "work_precision": "the times and the work of every row on eight named scenes",
-    "stability": "where rows fail",
+    "work_precision": "the times and the work of every variant on eight named scenes",
+    "stability": "where variants fail",
 }
 
 
-MARGIN = 0.05  # of all tops: that many more met by another row are said
+MARGIN = 0.05  # of all tops: that many more met by another variant are said
 ENOUGH = 30  # tops of a kind whose gap is told
 
 
 def behind(one: Standing, widest: Standing) -> bool:
-    """Does another row meet the error on clearly more tops?"""
+    """Does another variant meet the error on clearly more tops?"""
     return widest.solved.value - one.solved.value >= MARGIN
 
 
 def unmet_sentence(data: xr.DataTree) -> str:
-    """In how many lines another row meets the error on clearly more tops than the cheapest, and where the most do."""
+    """In how many lines another variant meets the error on clearly more tops than the cheapest, and where most do."""
     gaps: dict[str, list[tuple[float, str]]] = {"all": [], "kind": []}
     lines = 0
     for cell in verdicts.cells(data, "axis"):
@@ -56,17 +56,17 @@ def unmet_sentence(data: xr.DataTree) -> str:
         return ""
     kind = f" By kind of top the widest gap is: {max(gaps['kind'])[1]}." if gaps["kind"] else ""
     return (
-        f"In {len(gaps['all'])} of the {lines} lines another row meets the error on more tops than the cheapest, by at "
-        f"least {MARGIN:.0%}: {max(gaps['all'])[1]}.{kind}"
+        f"In {len(gaps['all'])} of the {lines} lines another variant meets the error on more tops than the cheapest, "
+        f"by at least {MARGIN:.0%}: {max(gaps['all'])[1]}.{kind}"
     )
 
 
 def opening(data: xr.DataTree) -> Opening:
-    """The row that wins on the most tops, for each horizon and target of the axis, and what to expect of it."""
+    """The variant that wins on the most tops, for each horizon and target of the axis, and what to expect of it."""
     rows = []
     ahead: Counter[str] = Counter()
     won_by: list[tuple[float, str]] = []  # the share of wins, and in words where and by whom
-    met: list[tuple[float, str]] = []  # the share of the tops that the first row solves, and the same in words
+    met: list[tuple[float, str]] = []  # the share of the tops that the first variant solves, and the same in words
     for cell in verdicts.cells(data, "axis", (verdicts.ALL,)):
         taken, won = verdicts.best(data, cell, words.UNIT)
         start = [f"{verdicts.nutations(data, cell.horizon):g}", f"{cell.target:.0e}"]
@@ -90,17 +90,18 @@ def opening(data: xr.DataTree) -> Opening:
         more = f", and {widest.name} on {words.percent(widest.solved)}" if behind(first, widest) else ""
         said = f"{first.name} meets {task} on {words.percent(first.solved)} of all tops{more}"
         met.append((first.solved.value, said))
-        won = f"{first.name} wins on {words.percent(first.won)} of the tops that a row solves{second}"
+        won = f"{first.name} wins on {words.percent(first.won)} of the tops that a variant solves{second}"
         won_by.append((first.won.value, f"{task}: {won}"))
     (name, count), *_ = [*ahead.most_common(), ("none", 0)]
     lines = "in every line" if count == len(rows) else f"in {count} of the {len(rows)} lines"
     drawn = " and ".join(words.span(data, horizon) for horizon in verdicts.horizons(data))
     first_choice = (
-        f"Begin with {name}. On more tops than any other row it reaches a given error of the axis at the least cost, "
-        f"{lines} of the table."
+        f"Begin with {name}. On more tops than any other variant it reaches a given error of the axis at the least "
+        f"cost, {lines} of the table."
     )
     closest = (
-        f"The closest contest is at {min(won_by)[1]}. A row wins if every other costs at least {TIE:g} times as much."
+        f"The closest contest is at {min(won_by)[1]}. A variant wins if every other costs at least "
+        f"{TIE:g} times as much."
         if won_by
         else ""
     )
@@ -111,7 +112,7 @@ def opening(data: xr.DataTree) -> Opening:
         else ""
     )
     measured = (
-        f"Measured on {drawn}, drawn at random. A row is a method in one chart. Its cost is force evaluations, "
+        f"Measured on {drawn}, drawn at random. A variant is a method in one chart. Its cost is force evaluations, "
         "interpolated between the last setting that misses the error and the first that meets it, times the measured "
         "price of one. No run of the tops was timed."
     )
@@ -121,8 +122,8 @@ def opening(data: xr.DataTree) -> Opening:
         "tolerance which meets the error."
     )
     shares = (
-        "Shares have two denominators. A row meets the error on a share of all tops whose nutation is wider than it. "
-        "It wins on a share of those that some row solves, which are fewer."
+        "Shares have two denominators. A variant meets the error on a share of all tops whose nutation is wider than "
+        "it. It wins on a share of those that some variant solves, which are fewer."
     )
     yours = "For your own scene and accuracy: symtop recommend SCENE --accuracy 1e-6."
     said = [

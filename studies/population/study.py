@@ -1,7 +1,8 @@
 """Does the verdict hold for tops that nobody picked?
 
-A row, a method in one chart, runs thousands of random tops from coarse settings to fine ones, and each top has a cost
-for each target. A case is a row and a horizon; a last one, alone on the machine, times a force evaluation of each row.
+A variant, a method in one chart, runs thousands of random tops from coarse settings to fine ones, and each top has a
+cost for each target. A case is a variant and a horizon; a last one, alone on the machine, times a force evaluation of
+each variant.
 """
 
 import numpy as np
@@ -19,33 +20,33 @@ from .tops import Tops, strata_of
 
 SEED = 1
 HORIZONS = {"short": 10.0, "long": 1000.0}  # nutations, by the group of cases
-MEMBERS = {"short": 10_000, "long": 50}  # at 25 ms and 2 s of one core a top, all rows together
+MEMBERS = {"short": 10_000, "long": 50}  # at 25 ms and 2 s of one core a top, all variants together
 BUDGET = 1000.0  # force evaluations a nutation, of one run
 QUICK = {"horizons": {"short": 10.0, "long": 100.0}, "members": {"short": 300, "long": 30}, "budget": 600.0}
 GUARDED = {"short": 100, "long": 50}  # tops that the guard is asked about, which takes it 60 us and more a run
 TOPS, PRICES = "tops", "prices"  # groups: what is known of the tops, and what an evaluation costs
 
 
-def compiled_rows() -> list[Integrator]:
-    """Every compiled row with a step or a tolerance, but those that are left out."""
+def compiled_variants() -> list[Integrator]:
+    """Every compiled variant with a step or a tolerance, but those that are left out."""
     left = {name for names in words.LEFT_OUT.values() for name in names}
     return [
-        row
-        for row in variants()
-        if row.implementation == "compiled" and row.control is not None and row.method not in left
+        variant
+        for variant in variants()
+        if variant.implementation == "compiled" and variant.control is not None and variant.method not in left
     ]
 
 
-def has_twin(row: Integrator) -> bool:
+def has_twin(variant: Integrator) -> bool:
     """Is it the attitude chart of a method that steps the same axis in the axis chart?"""
-    return row.charts() == ("attitude",) and "axis" in integrator(row.method).charts()
+    return variant.charts() == ("attitude",) and "axis" in integrator(variant.method).charts()
 
 
 def grid(*, quick: bool = False, full: bool = False) -> list[Case]:
-    """Every row over both horizons, the tops themselves, and the prices."""
+    """Every variant over both horizons, the tops themselves, and the prices."""
     horizons, members = (QUICK["horizons"], QUICK["members"]) if quick else (HORIZONS, MEMBERS)
     members = dict.fromkeys(members, MEMBERS["short"]) if full else members
-    names, cases = [row.name for row in compiled_rows()], []
+    names, cases = [variant.name for variant in compiled_variants()], []
     for group, nutations in horizons.items():
         drawn = {"members": members[group], "seed": SEED, "nutations": nutations}
         budget = (QUICK["budget"] if quick else BUDGET) * nutations
@@ -60,7 +61,7 @@ def grid(*, quick: bool = False, full: bool = False) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """The table of a row, of the tops, or of the prices."""
+    """The table of a variant, of the tops, or of the prices."""
     chosen = case.settings
     if case.group == PRICES:
         return prices(chosen["integrators"], chosen["rounds"], chosen["batch"])

@@ -6,10 +6,10 @@ formulas are those of `symtop.measure.errors` and `symtop.model.scenes`, and the
     axis, attitude   angle between, rad                      energy   |E - E0| / (E0 - p_psi^2/2 I3 - min V)
     momenta          the larger of |p_phi - ref| and |p_psi - ref|, over max(|p_phi|, |p_psi|)
 
-A run of a row with fixed step makes FIRST 2^k steps a nutation. Its samples fall on the same times at every k, a dozen
-that are not commensurate with the nutation, so that the truth is computed once. Of the largest error of 2000 samples
-they see 93 to 100 % in the median run, and half in one of twenty; it is the same for all rows. The coarsest run is that
-coarse because a step of 14 stages meets 1e-6 at four a nutation.
+A run of a variant with fixed step makes FIRST 2^k steps a nutation. Its samples fall on the same times at every k, a
+dozen that are not commensurate with the nutation, so that the truth is computed once. Of the largest error of 2000
+samples they see 93 to 100 % in the median run, and half in one of twenty; it is the same for all variants. The
+coarsest run is that coarse because a step of 14 stages meets 1e-6 at four a nutation.
 """
 
 import functools
@@ -23,12 +23,10 @@ from numpy.typing import NDArray
 
 from symtop.core.numbers import EPSILON, GOLDEN, TINY
 from symtop.methods.framework.many import members_of
-from symtop.model import charts, scales
-from symtop.model.charts import Array
-from symtop.model.effective import effective_potential
-from symtop.model.exact.closed_forms import ClosedForms
-from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import axis_of, space_energy
+from symtop.model import charts, scenes
+from symtop.model.charts import Array, axis_of, space_energy
+from symtop.model.exact.closed_form import ClosedForms
+from symtop.model.top import Angles, SymmetricTop, effective_potential
 from symtop.run.ensemble.population import NUMBERS, STRATA, population
 from symtop.run.reference.bounds import ROUNDING
 
@@ -75,7 +73,7 @@ class Tops:
 
     @staticmethod
     def drawn(members: int, seed: int, nutations: float) -> "Tops":
-        """The first members of the population of that seed; made once and kept, for every row runs the same."""
+        """The first members of the population of that seed; made once and kept, for every variant runs the same."""
         return _drawn(members, seed, nutations)
 
     @property
@@ -97,17 +95,17 @@ class Tops:
     @cached_property
     def momenta(self) -> tuple[Array, Array, Array, Array]:
         """p_phi, p_psi, p_phi - p_psi and p_phi + p_psi of the starts, each (n,)."""
-        return scales.momenta(self.numbers)
+        return scenes.start_momenta(self.numbers)
 
     @cached_property
     def energy(self) -> Array:
         """Total energy (n,)."""
-        return scales.energy(self.numbers)
+        return scenes.start_energies(self.numbers)
 
     @cached_property
     def energy_scale(self) -> Array:
         """What energy errors are divided by, (n,): `Scene.energy_scale`, the energy of the nutation."""
-        return scales.energy_scale(self.numbers, self.forms.theta_range)
+        return scenes.energy_scales(self.numbers, self.forms.theta_range)
 
     @cached_property
     def width(self) -> Array:
@@ -129,8 +127,8 @@ class Tops:
         """The least error of each quantity that the truth can judge over the horizon, (n,).
 
         That of the axis and the attitude is the rounding of the closed form, which `symtop.run.reference.bounds`
-        states. Rows of the angles chart show phi and psi as doubles, whose rounding is an angle; it counts for all
-        rows.
+        states. Variants in the angles chart show phi and psi as doubles, whose rounding is an angle; it counts for all
+        variants.
         """
         turns = (np.abs(self.forms.phi_per_period) + np.abs(self.forms.psi_per_period)) * self.nutations
         grain = (np.abs(self.energy) + np.abs(self.numbers[:, 2])) / self.energy_scale

@@ -1,17 +1,17 @@
-"""What the study's datasets say: costs of all rows on all tops, and verdicts by horizon, target and stratum.
+"""What the study's datasets say: costs of all variants on all tops, and verdicts by horizon, target and stratum.
 
-The dataset is a tree. Groups "short" and "long" hold the rows over the two horizons (see `ladder`), "tops" what is
-known of the tops, "prices" the seconds of a force evaluation of each row (see `prices`). A cost is in one of:
+The dataset is a tree. Groups "short" and "long" hold the variants over the two horizons (see `ladder`), "tops" what is
+known of the tops, "prices" the seconds of a force evaluation of each variant (see `prices`). A cost is in one of:
 
     evaluations   force evaluations
     alone         force evaluations x seconds of one in a run by itself
     together      force evaluations x seconds of one in one call for many tops
 
-The seconds are without those of the call, of every row (see `prices`), and at the tolerance that reaches the target on
-a top where a row has one.
+The seconds are without those of the call, of every variant (see `prices`), and at the tolerance that reaches the
+target on a top where a variant has one.
 
-Rows are compared where they show the same quantity: the axis in every chart but the attitude chart of a method that has
-the axis chart, which steps the same axis, and the attitude in the charts that show it.
+Variants are compared where they show the same quantity: the axis in every chart but the attitude chart of a method
+that has the axis chart, which steps the same axis, and the attitude in the charts that show it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -50,29 +50,31 @@ class Cell(NamedTuple):
 
 
 class Costs(NamedTuple):
-    """Costs of rows on the tops of a cell."""
+    """Costs of variants on the tops of a cell."""
 
     names: list[str]
-    values: Array  # (rows, tops), inf where a row does not reach the target
-    halves: Array  # (2, rows): price of an evaluation by each process that timed it over the least, in the median
+    values: Array  # (variants, tops), inf where a variant does not reach the target
+    halves: Array  # (2, variants): price of an evaluation by each process that timed it over the least, in the median
 
     def of(self, name: str) -> Array:
-        """The costs of one row."""
+        """The costs of one variant."""
         return np.asarray(self.values[self.names.index(name)])
 
 
 class Standing(NamedTuple):
-    """How a row does in a cell."""
+    """How a variant does in a cell."""
 
     name: str
     solved: Share
-    slowdown: tuple[float, float, float]  # 10 %, median, 90 %: cost over the cheapest on each top that some row solves
+    slowdown: tuple[
+        float, float, float
+    ]  # 10 %, median, 90 %: cost over the cheapest on each top that some variant solves
     won: Share
     level: Share
 
 
 def horizons(data: xr.DataTree) -> list[str]:
-    """The groups of rows that are there."""
+    """The groups of variants that are there."""
     return [name for name in HORIZONS if name in data.children]
 
 
@@ -102,9 +104,10 @@ def stratum_of(data: xr.DataTree, horizon: str) -> Array:
 
 
 def price(data: xr.DataTree, names: list[str], unit: str, tolerances: Array) -> Array:
-    """What a force evaluation costs in a unit, at the least and by each process, at tolerances (rows, n): (3, rows, n).
+    """What a force evaluation costs in a unit, at the least and by each process: (3, variants, n).
 
-    Between the tolerances that were timed it is interpolated in logarithms; NaN is a row with a step, or no tolerance.
+    Between the tolerances that were timed it is interpolated in logarithms; NaN is a variant with a step, or no
+    tolerance.
     """
     if unit == "evaluations":
         return np.ones((3, *tolerances.shape))
@@ -121,7 +124,7 @@ def price(data: xr.DataTree, names: list[str], unit: str, tolerances: Array) -> 
 
 @of_one_dataset
 def costs(data: xr.DataTree, cell: Cell, unit: str) -> Costs:
-    """Costs of all rows that show a cell's quantity, on the tops that are asked."""
+    """Costs of all variants that show a cell's quantity, on the tops that are asked."""
     group = data[cell.horizon].to_dataset()[["cost", "met_at"]].isel(scene=0)
     asked = group.sel(quantity=cell.quantity, target=cell.target).transpose("variant", "member")
     values, met = asked["cost"].values, asked["met_at"].values
@@ -138,7 +141,7 @@ def costs(data: xr.DataTree, cell: Cell, unit: str) -> Costs:
 
 
 def standings(taken: Costs) -> list[Standing]:
-    """All rows of a cell, the one with the most wins first; then by ties, cost, and tops that are solved."""
+    """All variants of a cell, the one with the most wins first; then by ties, cost, and tops that are solved."""
     won, level = wins(taken.values)
     ratios = slowdowns(taken.values)
     solvable = int(np.isfinite(taken.values).any(axis=0).sum())
@@ -157,7 +160,7 @@ def standings(taken: Costs) -> list[Standing]:
 
 
 def widest(listed: Sequence[Standing]) -> Standing:
-    """The row that solves the most tops; of those with as many the first."""
+    """The variant that solves the most tops; of those with as many the first."""
     return max(listed, key=lambda one: one.solved.count)
 
 
@@ -184,7 +187,7 @@ def cells(data: xr.DataTree, quantity: str, among: tuple[str, ...] | None = None
 
 
 class Health(NamedTuple):
-    """Of one row over one horizon, by setting: runs judged, wrong ones, silent failures; (settings,)."""
+    """Of one variant over one horizon, by setting: runs judged, wrong ones, silent failures; (settings,)."""
 
     fixed_step: bool
     setting: Array  # steps a nutation, or tolerances
@@ -200,7 +203,7 @@ class Health(NamedTuple):
 
 
 def health(data: xr.DataTree, name: str, horizon: str = "short") -> Health:
-    """Runs, wrong runs and silent failures of a row at the settings at which (nearly) all members were judged."""
+    """Runs, wrong runs and silent failures of a variant at the settings at which (nearly) all members were judged."""
     asked = data[horizon].to_dataset()[["runs", "wrong", "silent", "setting", "control"]]
     group = asked.isel(scene=0).sel(variant=name)
     count = float(data["tops"]["known"].values.ravel()[: members(data, horizon)].sum())
@@ -211,8 +214,8 @@ def health(data: xr.DataTree, name: str, horizon: str = "short") -> Health:
     return Health(fixed, group["setting"].values[there], *(part.sum(axis=1) for part in numbers), numbers[-1])
 
 
-def judged_rows(data: xr.DataTree, horizon: str = "short") -> list[str]:
-    """The rows whose axis is judged, in the order of the registry."""
+def judged_variants(data: xr.DataTree, horizon: str = "short") -> list[str]:
+    """The variants whose axis is judged, in the order of the registry."""
     return costs(data, Cell(horizon, "axis", targets(data)[0]), "evaluations").names
 
 
@@ -225,7 +228,7 @@ def scored(
     run ("watched"). Runs between `EXPECTED` and `WRONG` are neither right nor wrong and are left out, and so are those
     that the guard's trial repeats whole: there it measures the error and forecasts nothing.
     """
-    group = data[horizon].to_dataset().isel(scene=0).sel(variant=names or judged_rows(data, horizon))
+    group = data[horizon].to_dataset().isel(scene=0).sel(variant=names or judged_variants(data, horizon))
     values, errors = group[score].values.ravel(), group["measured"].values.ravel()
     told = ~np.isnan(values) & ((errors <= EXPECTED) | (errors > WRONG))
     asked = told & ~(group["whole"].values.ravel() > 0.0)
@@ -234,7 +237,7 @@ def scored(
 
 def repeated(data: xr.DataTree, horizon: str, names: list[str] | None = None) -> Share:
     """Of the wrong runs that the guard was asked about, those that its trial repeats whole."""
-    group = data[horizon].to_dataset().isel(scene=0).sel(variant=names or judged_rows(data, horizon))
+    group = data[horizon].to_dataset().isel(scene=0).sel(variant=names or judged_variants(data, horizon))
     wrong = (group["measured"].values > WRONG) & ~np.isnan(group["foretold"].values)
     return Share(int((wrong & (group["whole"].values > 0.0)).sum()), int(wrong.sum()))
 

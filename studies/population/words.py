@@ -29,13 +29,13 @@ LEFT_OUT = {  # methods, by the reason
 }
 
 HOW_TO_READ = (
-    "A row is a method in one chart. The tops are drawn at random in six strata, or kinds: slow, fast, grazing a pole, "
-    "near the separatrix, hanging and sleeping. On each top a row runs from coarse settings to fine ones, and its cost "
-    "for an error is that at which it begins to meet it for good. A cost in seconds is force evaluations times the "
-    "measured price of one, alone or in a call for many tops. No run of the tops was timed: the price is the slope "
-    "between a short and a long run, without the call, at the tolerance that meets the error where the order of a row "
-    "follows its tolerance. The slowdown of a row on a top is its "
-    "cost over the least of all rows there. A row wins on a top if all others cost at least "
+    "A variant is a method in one chart. The tops are drawn at random in six strata, or kinds: slow, fast, grazing a "
+    "pole, near the separatrix, hanging and sleeping. On each top a variant runs from coarse settings to fine ones, "
+    "and its cost for an error is that at which it begins to meet it for good. A cost in seconds is force evaluations "
+    "times the measured price of one, alone or in a call for many tops. No run of the tops was timed: the price is "
+    "the slope between a short and a long run, without the call, at the tolerance that meets the error where the "
+    "order of a variant follows its tolerance. The slowdown of a variant on a top is its "
+    "cost over the least of all variants there. A variant wins on a top if all others cost at least "
     f"{TIE:g} times as much. Shares have 95 % intervals (Wilson) for the draw of the tops; times that are measured "
     "again move a close contest by more. A winner is sure if its lead is three standard errors with the prices of "
     "either of two processes that timed them. The last table has the rules of the runs and what is left out."
@@ -70,14 +70,14 @@ def budget(data: xr.DataTree, horizon: str) -> str:
 
 
 def winner_words(data: xr.DataTree, cell: Cell, unit: str = UNIT, *, spoken: bool = False) -> str:
-    """Who wins a cell, on what share of the tops that a row solves, and who is next; empty where nobody does."""
+    """Who wins a cell, on what share of the tops that a variant solves, and who is next; empty where nobody does."""
     taken, won = verdicts.best(data, cell, unit)
     if won is None:
         return ""
-    following = f", then {taken.names[won.next_row]} on {percent(won.next_share)}" if won.next_share.count else ""
+    following = f", then {taken.names[won.next_variant]} on {percent(won.next_share)}" if won.next_share.count else ""
     sure = "" if won.sure else ", a lead that may be chance or noise of the times"
     first = f"{taken.names[won.row]} on {percent(won.share)} ({interval(won.share)})"
-    return f"{first}{' of the tops that a row solves' if spoken else ''}{following}{sure}"
+    return f"{first}{' of the tops that a variant solves' if spoken else ''}{following}{sure}"
 
 
 def quantity_sentence(data: xr.DataTree, quantity: str) -> str:
@@ -96,14 +96,14 @@ def quantity_sentence(data: xr.DataTree, quantity: str) -> str:
     (first, most, share), *others = told
     rest = f" Otherwise it is {abridged([f'{name}, with {part}' for name, _, part in others])}." if others else ""
     return (
-        f"For the {quantity}, {first} is the cheapest row on the most tops in {most} of the "
-        f"{sum(map(len, shares.values()))} combinations of run length and error that some row reaches, with {share} of "
-        f"the tops that a row solves.{rest}"
+        f"For the {quantity}, {first} is the cheapest variant on the most tops in {most} of the "
+        f"{sum(map(len, shares.values()))} combinations of run length and error that some variant reaches, with "
+        f"{share} of the tops that a variant solves.{rest}"
     )
 
 
 def strata_sentence(data: xr.DataTree) -> str:
-    """How many rows win somewhere, and the strata whose winner is another than that of all tops."""
+    """How many variants win somewhere, and the strata whose winner is another than that of all tops."""
     owners: Counter[str] = Counter()
     others: dict[tuple[str, str], list[str]] = {}
     for target in verdicts.targets(data):
@@ -126,7 +126,7 @@ def strata_sentence(data: xr.DataTree) -> str:
         else "No kind of tops has, beyond doubt, another winner than all tops together."
     )
     return (
-        f"{len(owners)} rows win the {total} pairs of a kind of top and an axis error over "
+        f"{len(owners)} variants win the {total} pairs of a kind of top and an axis error over "
         f"{verdicts.nutations(data, 'short'):g} nutations: {most}. {differ}"
     )
 
@@ -136,7 +136,7 @@ class Hidden(NamedTuple):
 
     wrong: float  # runs
     everywhere: float  # share of all wrong runs that look healthy
-    fine: float  # among rows with a fixed step, of at least `FINE` steps a nutation
+    fine: float  # among variants with a fixed step, of at least `FINE` steps a nutation
     wrong_fine: float  # runs of these
     silent_fine: float  # of these, runs that look healthy
     kind: str  # of top with the most of them
@@ -146,7 +146,7 @@ class Hidden(NamedTuple):
 
 def hidden(data: xr.DataTree) -> Hidden:
     """Wrong runs that nothing warns of, of all and among small steps."""
-    each = [verdicts.health(data, name) for name in verdicts.judged_rows(data)]
+    each = [verdicts.health(data, name) for name in verdicts.judged_variants(data)]
     wrong, silent = sum(one.wrong.sum() for one in each), sum(one.silent.sum() for one in each)
     small = [one for one in each if one.fixed_step]
     missed = sum(one.wrong[one.setting >= FINE].sum() for one in small)
@@ -159,9 +159,9 @@ def hidden(data: xr.DataTree) -> Hidden:
 
 
 def hidden_by_steps(data: xr.DataTree) -> list[tuple[float, float, float]]:
-    """Steps a nutation, wrong runs with so many, and those of them that nothing warns of; rows with a fixed step."""
+    """Steps a nutation, wrong runs with so many, and those that nothing warns of; variants with a fixed step."""
     sums: dict[float, tuple[float, float]] = {}
-    for one in (verdicts.health(data, name) for name in verdicts.judged_rows(data)):
+    for one in (verdicts.health(data, name) for name in verdicts.judged_variants(data)):
         for step, wrong, silent in zip(one.setting, one.wrong, one.silent, strict=True) if one.fixed_step else ():
             before = sums.get(float(f"{step:.3g}"), (0.0, 0.0))
             sums[float(f"{step:.3g}")] = before[0] + float(wrong), before[1] + float(silent)
@@ -169,7 +169,7 @@ def hidden_by_steps(data: xr.DataTree) -> list[tuple[float, float, float]]:
 
 
 def silent_sentence(data: xr.DataTree) -> str:
-    """How many wrong runs nothing warns of, over all rows and among small steps."""
+    """How many wrong runs nothing warns of, over all variants and among small steps."""
     share = hidden(data)
     kind = (
         f", {share.of_kind:,.0f} of them on {share.kind} tops, which are {share.drawn:.1%} of the tops"
@@ -203,7 +203,7 @@ def guard_sentence(data: xr.DataTree) -> str:
     whole = " and ".join(percent(verdicts.repeated(data, horizon)) for horizon in verdicts.horizons(data))
     return (
         f"The guard tries a method on a piece of a run before it. At the {GUARDED_LEVELS} coarsest settings of each "
-        f"row it warned {', '.join(said)}. Wrong is over {WRONG:g} rad off, right less than {EXPECTED:g} rad. Runs "
+        f"variant it warned {', '.join(said)}. Wrong is over {WRONG:g} rad off, right less than {EXPECTED:g} rad. Runs "
         f"that the piece covers whole are left out, {whole} of the wrong ones."
     )
 
@@ -222,9 +222,9 @@ def effort_sentence(data: xr.DataTree) -> str:
     """How much was run."""
     parts = [data[horizon] for horizon in verdicts.horizons(data)]
     made, evaluated = (sum(float(np.nansum(part[name].values)) for part in parts) for name in ("made", "evaluated"))
-    rows = len({str(name) for part in parts for name in part["variant"].values})
+    variants = len({str(name) for part in parts for name in part["variant"].values})
     drawn = joined([span(data, horizon) for horizon in verdicts.horizons(data)])
-    return f"{rows} rows made {made:,.0f} runs of {evaluated:.2g} force evaluations in all, on {drawn}."
+    return f"{variants} variants made {made:,.0f} runs of {evaluated:.2g} force evaluations in all, on {drawn}."
 
 
 def sentences(data: xr.DataTree) -> list[str]:

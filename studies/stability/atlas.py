@@ -141,19 +141,19 @@ def maps(data: xr.Dataset, scene: str) -> dict[str, OutcomeMap]:
 
 
 def methods_of(data: xr.Dataset) -> dict[str, Integrator]:
-    """The integrators of a dataset that are registered, by the names of their rows."""
+    """The integrators of a dataset that are registered, by the names of their variants."""
     names = map(str, data["variant"].values)
     return {name: integrator(name) for name in names if split_name(name)[0] in integrators()}
 
 
 def accurate_everywhere(shown: Mapping[str, OutcomeMap]) -> list[str]:
-    """The rows that are accurate in every run, whose maps are all alike; empty if they are fewer than `ALIKE`."""
+    """The variants that are accurate in every run, whose maps are all alike; empty if they are fewer than `ALIKE`."""
     names = [name for name, one in shown.items() if not one.outcome.any()]
     return names if len(names) >= ALIKE else []
 
 
 def closed_forms(data: xr.Dataset, shown: Iterable[str]) -> list[str]:
-    """Those rows that are exact at any step, which are named apart from the others."""
+    """Those variants that are exact at any step, which are named apart from the others."""
     known = methods_of(data)
     return [name for name in shown if name in known and known[name].exact_steps]
 

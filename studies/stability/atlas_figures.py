@@ -1,4 +1,4 @@
-"""The drawings of the atlas: a page of small maps of outcomes, one a row ``method[chart]``, and one map enlarged.
+"""The drawings of the atlas: a page of small maps of outcomes, one a variant ``method[chart]``, and one map enlarged.
 
 Two signs tell outcomes apart in a small map: colours that readers with any common colour blindness can tell apart, and
 a hatch that is drawn into the map. The enlarged map has a word on every region that is large enough to hold one.
@@ -163,7 +163,7 @@ def _limits(axis: Any, cell: xr.Dataset, one: OutcomeMap, over: str) -> list[str
 
 
 def by_area(shown: Mapping[str, OutcomeMap]) -> list[str]:
-    """The rows of some maps, the largest accurate share first."""
+    """The variants of some maps, the largest accurate share first."""
     return sorted(shown, key=lambda name: -shown[name].shares[0])
 
 
@@ -171,8 +171,8 @@ def small_maps(data: xr.Dataset, scene: str, names: Sequence[str], over: str) ->
     """A page of the maps over a scene's spin or gap, in the given order, each with its name and accurate share.
 
     Of each map the part is drawn that all of them have, of which the shares are, over the whole panel: the share that
-    is printed is the share that is seen. Rows that are accurate everywhere have one panel together. The names of the
-    rows with the largest and the smallest share are bold, but for closed forms.
+    is printed is the share that is seen. Variants that are accurate everywhere have one panel together. The names of
+    the variants with the largest and the smallest share are bold, but for closed forms.
     """
     shown = common({name: one for name, one in maps(data, scene).items() if name in names})
     exact = closed_forms(data, names)
@@ -229,7 +229,7 @@ def accurate_means(scene: str) -> str:
 
 
 def listed(alike: Sequence[str]) -> str:
-    """The rows that share a panel; without their chart if all are on the axis."""
+    """The variants that share a panel; without their chart if all are on the axis."""
     on_axis = all(split_name(name)[1] == "axis" for name in alike)
     names = ", ".join(split_name(name)[0] if on_axis else name for name in alike)
     return f"Accurate everywhere{', all [axis]' if on_axis else ''}: {names}."
@@ -248,7 +248,7 @@ def _reach(values: Sequence[NDArray[np.float64]]) -> tuple[float, float]:
 
 
 def enlarged(data: xr.Dataset, family: str, name: str, message: str) -> Any:
-    """The two maps of one row, over spin and over the gap to a pole, with a word on every region."""
+    """The two maps of one variant, over spin and over the gap to a pole, with a word on every region."""
     both = {"spin": (family, maps(data, family)), "gap": ("grazing", maps(data, "grazing"))}
     both = {over: (scene, shown) for over, (scene, shown) in both.items() if name in shown}
     figure, axes = panels(1, len(both), width=WIDTH * max(len(both), 1.4) / 2, height=2.9)

@@ -30,7 +30,7 @@ EXCEPTIONS = 2  # methods at most that a sentence on all others names apart
 
 
 class Advice(NamedTuple):
-    """One line of the atlas: a row ``method[chart]``."""
+    """One line of the atlas: a variant ``method[chart]``."""
 
     integrator: str
     use: str
@@ -104,7 +104,7 @@ def ends(shown: Mapping[str, OutcomeMap]) -> tuple[str, str]:
 
 
 def _equals(names: Sequence[str]) -> str:
-    """Rows of one rank: the names of one or two, or how many they are."""
+    """Variants of one rank: the names of one or two, or how many they are."""
     return " and ".join(names) if len(names) < 3 else f"{len(names)} methods"
 
 
@@ -210,7 +210,7 @@ def _limit(data: xr.Dataset, family: str, name: str) -> str:
 
 
 def _charts(names: Iterable[str]) -> dict[str, list[str]]:
-    """The rows of the methods that have several."""
+    """The variants of the methods that have several."""
     rows: dict[str, list[str]] = {}
     for name in names:
         rows.setdefault(split_name(name)[0], []).append(name)
@@ -226,7 +226,7 @@ def summary(data: xr.Dataset, family: str) -> list[str]:
         silent = [one.silent for one in by_name.values() if math.isfinite(one.silent)]
         ends_well = f"{len(never)} of {counted(len(by_name))} never end a run early"
         if silent:
-            often = f"With the median row {np.median(silent):.0%} of inaccurate runs end without an error"
+            often = f"With the median variant {np.median(silent):.0%} of inaccurate runs end without an error"
             ends_well = f"{often}, whether or not they keep the energy, and {ends_well}"
         sentences.append(
             f"{ends_well}. That a run ends without an error says little: what energy, momenta and the guard notice is "
@@ -253,7 +253,7 @@ def _settled(part: xr.Dataset, by_name: Mapping[str, OutcomeMap]) -> str:
 
 
 def _reaches(data: xr.Dataset, family: str, by_name: Mapping[str, OutcomeMap]) -> str:
-    """The longest accurate steps on fast and on slow tops, from the least row to the best; closed forms apart."""
+    """The longest accurate steps on fast and on slow tops, from the least variant to the best; closed forms apart."""
     apart, parts = closed_forms(data, by_name), []
     for kind in ("fast", "slow"):
         reach = {
@@ -295,14 +295,14 @@ def _charts_apart(by_name: Mapping[str, OutcomeMap], family: str) -> str:
 
 
 def atlas_tables(data: xr.Dataset, family: str) -> list[Table]:
-    """When to use each row and when it fails, its shares of the map, and what the chart alone changes."""
+    """When to use each variant and when it fails, its shares of the map, and what the chart alone changes."""
     by_name, lines = maps(data, family), []
     for name, line in advice(data, family).items():
         one = by_name[name]
         shares = ("" if math.isnan(share) else f"{share:.0%}" for share in (one.shares[0], one.early, one.silent))
         lines.append([line.integrator, line.use, line.fails, *shares, _limit(data, family, name)])
     title = f"The atlas in words: {family} with its spin changed, {PERIODS:g} nutations"
-    header = ["row", "use it", "it fails", "accurate", "ended early", "inaccurate runs without an error",
+    header = ["variant", "use it", "it fails", "accurate", "ended early", "inaccurate runs without an error",
               f"small nutations first grow at a step of (nutation periods, {CURVE_STEPS} tried)"]  # fmt: skip
     made = [Table(title, header, lines)]
     if several := _charts(by_name):

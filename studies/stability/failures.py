@@ -25,9 +25,9 @@ from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.plan import OUTCOMES, Array, Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
+from symtop.model.charts import View
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, flat
-from symtop.model.view import View
 from symtop.run.linear_stability import trace, with_momenta
 
 RUNS_AWAY = 4.0  # times the displacement; an island that a resonance has bent is at most three times as long as wide

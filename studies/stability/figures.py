@@ -50,7 +50,8 @@ def _enlarged(data: xr.Dataset, family: str) -> Picture:
     figure = enlarged(data, family, name, message)
     what = "" if past is None else ", and right a fall of the scene grazing past a pole"
     text = (
-        f"How to read a map of the atlas: one row, method[chart], enlarged. Left the scene {family} over {PERIODS:g} "
-        f"nutation periods with another spin{what}; all else is held fixed. {advice(data, family)[name].sentence}"
+        f"How to read a map of the atlas: one variant, method[chart], enlarged. Left the scene {family} over "
+        f"{PERIODS:g} nutation periods with another spin{what}; all else is held fixed. "
+        f"{advice(data, family)[name].sentence}"
     )
     return Picture(f"atlas-{family}-enlarged", figure, text, f"Two maps of the outcomes of {name}, enlarged.")

@@ -56,14 +56,14 @@ def _picture(data: xr.Dataset, scene: str, name: str, draw: Callable[[Any, xr.Da
 
 
 def _each(data: xr.Dataset, variable: str, names: Sequence[str] = SHOWN) -> list[tuple[str, xr.Dataset]]:
-    """The rows of those names that have a value of a variable, with their cells."""
+    """The variants of those names that have a value of a variable, with their cells."""
     known = [name for name in names if name in data["variant"].values]
     cells = [(name, data.sel(variant=name)) for name in known]
     return [(name, cell) for name, cell in cells if np.isfinite(cell[variable].values).any()]
 
 
 def _pole(axis: Any, data: xr.Dataset) -> None:
-    """Errors of all rows of fixed step; a cross where those nearer to the pole have none, since the run ended early."""
+    """Errors of all variants of fixed step; a cross where those nearer to the pole have none: the run ended early."""
     ends, rows = {}, messages.at_pole(data)
     for name, (x, errors) in rows.items():
         y = np.maximum(errors, FLOOR)
@@ -89,9 +89,9 @@ def _pole(axis: Any, data: xr.Dataset) -> None:
 
 
 def _resonance(axis: Any, data: xr.Dataset) -> None:
-    """Rows whose step can turn the nutation by a third; those that lose a small displacement there have a ring."""
+    """Variants whose step can turn the nutation by a third; those that lose a small displacement there have a ring."""
     ends, ringed = {}, resonant(data)
-    tried = [str(row) for row in data["variant"].values[np.isfinite(data[Column.THIRD_TURN_PHASE].values)]]
+    tried = [str(variant) for variant in data["variant"].values[np.isfinite(data[Column.THIRD_TURN_PHASE].values)]]
     for name, cell in _each(data, Column.SURVIVING, tried):
         # the resonance lies between two points of the grid
         x = np.append(cell[Column.PHASE].values, float(cell[Column.THIRD_TURN_PHASE]))
@@ -109,7 +109,7 @@ def _resonance(axis: Any, data: xr.Dataset) -> None:
     axis.set(
         xlabel=r"step $h\omega$ ($\omega$: frequency of the nutation)", ylabel="all stay up to a displacement of (rad)"
     )
-    groups: dict[float, list[str]] = {}  # rows whose rings are at one step
+    groups: dict[float, list[str]] = {}  # variants whose rings are at one step
     for name, phase in sorted(ringed.items(), key=lambda one: one[1]):
         near = next((other for other in groups if abs(other - phase) < RINGED_TOGETHER), phase)
         groups.setdefault(near, []).append(name)
@@ -136,8 +136,8 @@ def _side(others: Sequence[float]) -> str:
 
 
 def _sleep(axis: Any, data: xr.Dataset) -> None:
-    rows = [str(name) for name in data["variant"].values if split_name(str(name))[0] in messages.SLEEPERS]
-    for name, cell in _each(data, Column.SLEEPING_THRESHOLD, rows):
+    variants = [str(name) for name in data["variant"].values if split_name(str(name))[0] in messages.SLEEPERS]
+    for name, cell in _each(data, Column.SLEEPING_THRESHOLD, variants):
         x, y = cell[Column.SLEEPING_STEP].values, cell[Column.SLEEPING_THRESHOLD].values
         axis.plot(x, y, **(line(name, 1.4) | {"ls": "none"}), label=name)
     x = np.linspace(0.02, 1.0, 60)

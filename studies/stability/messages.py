@@ -27,7 +27,7 @@ def of_mechanism(name: str, part: xr.Dataset) -> str:
 
 
 def at_pole(part: xr.Dataset) -> dict[str, tuple[Array, Array]]:
-    """Gaps, growing, and errors of every row of fixed step that is judged next to a pole and away from it."""
+    """Gaps, growing, and errors of every variant of fixed step that is judged next to a pole and away from it."""
     rows = {}
     for name, method in methods_of(part).items():
         cell = part.sel(variant=name)
@@ -40,7 +40,7 @@ def at_pole(part: xr.Dataset) -> dict[str, tuple[Array, Array]]:
 
 
 def lasts(name: str, gaps: Array, errors: Array) -> bool:
-    """Is it a row in angles whose runs do not all end early next to a pole?"""
+    """Is it a variant in angles whose runs do not all end early next to a pole?"""
     return split_name(name)[1] == "angles" and bool(np.isfinite(errors[gaps <= NEAR]).any())
 
 
@@ -73,8 +73,8 @@ def _resonances(part: xr.Dataset) -> str:
 
 def _sleeping(part: xr.Dataset) -> str:
     measured = part[Column.SLEEPING_THRESHOLD]
-    rows = [str(name) for name in part["variant"].values if split_name(str(name))[0] in SLEEPERS]
-    curves = {name: measured.sel(variant=name).dropna("rung").values for name in rows}
+    variants = [str(name) for name in part["variant"].values if split_name(str(name))[0] in SLEEPERS]
+    curves = {name: measured.sel(variant=name).dropna("rung").values for name in variants}
     ends = {name: float(curve[np.argmax(np.abs(curve - 2.0))]) for name, curve in curves.items() if curve.size}
     far = sorted((name for name in ends if abs(ends[name] - 2.0) > SHIFTED), key=lambda name: -ends[name])
     listed = ", ".join(f"{ends[name]:.2f} with {name}" for name in far)
@@ -96,19 +96,19 @@ def _separatrix(part: xr.Dataset) -> str:
 
 
 def _sampled(part: xr.Dataset) -> dict[str, tuple[float, float]]:
-    """Energy errors above rounding, sampled once a nutation and at every step, by row."""
+    """Energy errors above rounding, sampled once a nutation and at every step, by variant."""
     once, every = part[Column.ENERGY_ONCE].values, part[Column.ENERGY_EVERY].values
-    rows = zip(map(str, part["variant"].values), once, every, strict=True)
-    return {name: (float(a), float(b)) for name, a, b in rows if np.isfinite(a) and b > LEAST_ASKED}
+    variants = zip(map(str, part["variant"].values), once, every, strict=True)
+    return {name: (float(a), float(b)) for name, a, b in variants if np.isfinite(a) and b > LEAST_ASKED}
 
 
 def hidden_sampled(part: xr.Dataset) -> list[str]:
-    """The rows whose energy error is at rounding if it is sampled once a nutation."""
+    """The variants whose energy error is at rounding if it is sampled once a nutation."""
     return [name for name, (once, _) in _sampled(part).items() if once <= LEAST_SAMPLED]
 
 
 def worst_sampled(part: xr.Dataset) -> str:
-    """The row whose energy error looks too small by the largest factor; empty if none is seen."""
+    """The variant whose energy error looks too small by the largest factor; empty if none is seen."""
     seen = {name: every / once for name, (once, every) in _sampled(part).items() if once > LEAST_SAMPLED}
     return max(seen, key=lambda name: seen[name], default="")
 

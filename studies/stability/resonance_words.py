@@ -15,7 +15,7 @@ from symtop.run.linear_stability import GROWING
 from .tables import SOUGHT_STEPS, Column
 
 VERLET = "stormer-verlet[angles]"
-THIRDS = {  # the step that turns the nutation by a third, as h omega: two rows with a closed form
+THIRDS = {  # the step that turns the nutation by a third, as h omega: two variants with a closed form
     VERLET: "sqrt 3", "midpoint[angles]": "2 sqrt 3",
 }  # fmt: skip
 BARELY = 0.02  # rad: a top that is lost at a smaller displacement is lost to a resonance
@@ -23,7 +23,7 @@ NEXT = 1.05  # times the largest displacement up to which all stay, at most: the
 REVIVAL = 3.0  # times more survives past a resonance than in it; what stays dead beyond is no resonance
 
 
-def rows_with(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
+def variants_with(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
     """The integrators that have a value of a variable, by name."""
     return {
         str(name): part.isel(variant=k)
@@ -33,7 +33,7 @@ def rows_with(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
 
 
 def _ends(values: Mapping[str, float]) -> str:
-    """The least and the largest of some numbers, with their rows."""
+    """The least and the largest of some numbers, with their variants."""
     ranked = sorted(values, key=lambda name: values[name])
     said = [f"{values[name]:.4g} ({name})" for name in dict.fromkeys((ranked[0], ranked[-1]))]
     return f"from {' to '.join(said)}" if len(said) > 1 else f"at {said[0]}"
@@ -43,7 +43,7 @@ def limits(part: xr.Dataset) -> str:
     """Linear limits of the step, the methods that have none or only narrow windows, and those that show nothing."""
     phases = {
         name: float(np.fmin(cell[Column.LIMIT_PHASE], cell.get(Column.WINDOW_START, math.nan)))
-        for name, cell in rows_with(part, Column.LIMIT_PHASE).items()
+        for name, cell in variants_with(part, Column.LIMIT_PHASE).items()
     }  # a narrow window may come first
     free, narrow, parts = unlimited(part), only_windows(part), []
     if phases:
@@ -58,7 +58,7 @@ def limits(part: xr.Dataset) -> str:
     if not parts:
         return ""
     known = {*phases, *free, *narrow}
-    neither = [name for name in rows_with(part, Column.SOUGHT_PHASE) if name not in known]
+    neither = [name for name in variants_with(part, Column.SOUGHT_PHASE) if name not in known]
     rest = f" {counted(len(neither))} cannot be followed." if neither else ""
     return (
         f"Small nutations about a steady precession, of frequency omega, first grow, or it is lost, {'; '.join(parts)}."
@@ -74,7 +74,7 @@ def unlimited(part: xr.Dataset) -> dict[str, float]:
     """
     if Column.SOUGHT_PHASE not in part:
         return {}
-    turning, narrow = rows_with(part, Column.THIRD_TURN_PHASE), only_windows(part)
+    turning, narrow = variants_with(part, Column.THIRD_TURN_PHASE), only_windows(part)
     return {
         name: float(cell[Column.SOUGHT_PHASE])
         for name, cell in turning.items()
@@ -84,7 +84,7 @@ def unlimited(part: xr.Dataset) -> dict[str, float]:
 
 def only_windows(part: xr.Dataset) -> dict[str, tuple[float, float]]:
     """Methods whose nutations grow between the steps of the search only, with the ends of their first window."""
-    rows = rows_with(part, Column.WINDOW_START) if Column.WINDOW_START in part else {}
+    rows = variants_with(part, Column.WINDOW_START) if Column.WINDOW_START in part else {}
     return {
         name: (float(cell[Column.WINDOW_START]), float(cell[Column.WINDOW_END]))
         for name, cell in rows.items()
@@ -93,9 +93,9 @@ def only_windows(part: xr.Dataset) -> dict[str, tuple[float, float]]:
 
 
 def resonant(part: xr.Dataset) -> dict[str, float]:
-    """The linearly stable steps, as h omega, at which some small displacement is lost, and none just past, by row."""
+    """By variant the linearly stable steps (h omega) where some small displacement is lost, and none just past."""
     phases = {}
-    for name, cell in rows_with(part, Column.THIRD_TURN_PHASE).items():
+    for name, cell in variants_with(part, Column.THIRD_TURN_PHASE).items():
         at, past = float(cell[Column.SURVIVING_AT_THIRD_TURN]), float(cell[Column.SURVIVING_PAST_THIRD_TURN])
         if past > REVIVAL * at and NEXT * at < BARELY:
             phases[name] = float(cell[Column.THIRD_TURN_PHASE])

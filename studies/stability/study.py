@@ -7,21 +7,15 @@ import xarray as xr
 
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.registry import Integrator, integrator
-from symtop.runner.grid import grid_scenes, grid_variants
+from symtop.model.scenes import added_scenes
+from symtop.runner.grid import grid_variants
 from symtop.runner.study import Case, Study
 
 from . import figures, words
 from .tables import MECHANISMS, PERIODS, map_table
 
 FAMILY = "cusp"  # let go at theta = 0.8 with any spin
-LEFT_OUT = {
-    "the family of the cusp holds such tops, and a map of each method takes minutes": (
-        "spheroid", "goldstein", "goldstein-falling", "goldstein-rising", "loop", "wave", "fast", "steady",
-        "hairer-lubich-wanner", "simo-wong", "kinon-betsch", "bruls-cardona-arnold", "sleeping-unstable",
-    ),
-    "the scene of a mechanism": tuple(scene for scene in MECHANISMS if scene != "goldstein"),
-}  # fmt: skip
-NOT_SLEEPING = {  # rows that do not take part in the mechanism "sleeping"
+NOT_SLEEPING = {  # variants that do not take part in the mechanism "sleeping"
     "steps shrink towards the upright: millions in three samples, and the threshold of the motion": (
         "stormer-verlet-reversible[angles]",
     )
@@ -68,7 +62,7 @@ def axes(method: Integrator, steps: np.ndarray, values: np.ndarray, quick: bool)
 
 
 def cases(quick: bool) -> list[Case]:
-    """Maps of 200 steps by 120 spins and of 72 steps by 48 gaps for every row; then the scans of single mechanisms.
+    """Maps of 200 steps by 120 spins and of 72 steps by 48 gaps for every variant; then the scans of single mechanisms.
 
     Methods in lanes have ten times the cells, 632 by 379 and 228 by 152, and take about as long with them. An attitude
     chart beside an axis chart is left out: a map is judged by the axis, which both step alike.
@@ -84,7 +78,7 @@ def cases(quick: bool) -> list[Case]:
              "goldstein": {"steps": 100, "periods": 3, "step_size": 0.1, "tolerances": tolerances,
                            "solver_steps": 20_000 if quick else 100_000}}  # fmt: skip
     grid, left = [], {name for names in NOT_SLEEPING.values() for name in names}
-    for name in grid_scenes(LEFT_OUT):
+    for name in [FAMILY, *added_scenes()]:  # the family holds the other tops, and a map of each method takes minutes
         coarser = 1 if quick or name == FAMILY else 3
         for method in grid_variants("axis"):
             ladder, parameters = axes(method, steps[::coarser], spins[::coarser], quick)

@@ -17,12 +17,12 @@ from .atlas import NEAR, families, map_of, methods_of, pole_effect
 from .atlas_words import atlas_tables, summary
 from .failures import LONGEST, LOST, SEEN
 from .outcome_maps import CHECKED, SETTLED_STEPS, SETTLED_TOLERANCES
-from .resonance_words import VERLET, limits, only_windows, resonances, rows_with, unlimited
+from .resonance_words import VERLET, limits, only_windows, resonances, unlimited, variants_with
 from .tables import CURVE_STEPS, SOUGHT_PHASE, SOUGHT_STEPS, Column
 
 HOW_TO_READ = (
-    "A row is a method in one chart, method[chart], as rk4[axis]. A map has one cell a run. To the right the step or "
-    "the tolerance grows; upwards the spin r, or the gap delta between path and pole. Green is accurate. Pale green "
+    "A variant is a method in one chart, method[chart], as rk4[axis]. A map has one cell a run. To the right the step "
+    "or the tolerance grows; upwards the spin r, or the gap delta between path and pole. Green is accurate. Pale green "
     f"was not run: the top was accurate at every longer step over a factor of {SETTLED_STEPS:g}, or at every looser "
     f"tolerance over a factor of {SETTLED_TOLERANCES:g}; runs at {CHECKED} settings of a map check it. Yellow has "
     "bounded energy and a wrong phase. Hatched cells fail: they lose energy, cross a turning point of the true motion, "
@@ -41,7 +41,7 @@ EARLY = 1e-15, 1e-2  # rad, axis errors that predict the time next to a separatr
 
 
 def held_fixed(data: xr.Dataset, mechanism: str) -> str:
-    """Scene, step or tolerance, and horizon of a mechanism; charts are in the names of the rows."""
+    """Scene, step or tolerance, and horizon of a mechanism; charts are in the names of the variants."""
 
     def of(scene: str, *columns: str) -> list[float]:
         return [float(data[name].sel(scene=scene).max()) for name in columns]
@@ -62,11 +62,11 @@ def held_fixed(data: xr.Dataset, mechanism: str) -> str:
     else:
         step_size, steps = of("goldstein", Column.SOLVER_STEP, Column.SOLVER_STEPS)
         text = f"Scene goldstein, step {step_size:g} s, {steps:.0f} steps"
-    return f"{text}. A row is method[chart]."
+    return f"{text}. A variant is method[chart]."
 
 
 def halved_at_pole(part: xr.Dataset) -> dict[bool, list[bool]]:
-    """Of every row of fixed step, whether a pole halves its accurate step; by: does it work in angles?"""
+    """Of every variant of fixed step, whether a pole halves its accurate step; by: does it work in angles?"""
     halved: dict[bool, list[bool]] = {True: [], False: []}
     for name, method in methods_of(part).items():
         effect = pole_effect(map_of(part.sel(variant=name)))
@@ -82,7 +82,7 @@ def poles(part: xr.Dataset) -> str:
         return ""
     return (
         f"A pole closer than {NEAR:g} rad to the path at least halves the longest accurate step of {sum(halved[True])} "
-        f"of {len(halved[True])} rows of fixed step in the angles chart, and of {sum(halved[False])} of "
+        f"of {len(halved[True])} variants of fixed step in the angles chart, and of {sum(halved[False])} of "
         f"{len(halved[False])} in charts without poles. Each run is one fall past the pole, all else is held fixed."
     )
 
@@ -90,7 +90,7 @@ def poles(part: xr.Dataset) -> str:
 def sleepers(part: xr.Dataset) -> str:
     """The sleeping thresholds of methods that move it, beside their closed forms."""
     moved, methods = [], methods_of(part)
-    for name, cell in rows_with(part, Column.SLEEPING_THRESHOLD).items():
+    for name, cell in variants_with(part, Column.SLEEPING_THRESHOLD).items():
         if name in methods and (theory := methods[name].sleeps_from) is not None:
             good = np.isfinite(cell[Column.SLEEPING_THRESHOLD].values)
             h, measured = cell[Column.SLEEPING_STEP].values[good], cell[Column.SLEEPING_THRESHOLD].values[good]
@@ -105,10 +105,10 @@ def sleepers(part: xr.Dataset) -> str:
 
 
 def outlasting(part: xr.Dataset) -> list[str]:
-    """The rows with a run that stays accurate next to the separatrix longer than foreseen, by more than `OUTLASTS`."""
+    """Variants with a run that stays accurate next to the separatrix longer than predicted, by over `OUTLASTS`."""
     longer = (part[Column.HORIZON] - part[Column.PREDICTED_HORIZON]).transpose("variant", ...).values
-    rows = zip(map(str, part["variant"].values), longer, strict=True)
-    return [name for name, values in rows if np.max(values[np.isfinite(values)], initial=0.0) > OUTLASTS]
+    variants = zip(map(str, part["variant"].values), longer, strict=True)
+    return [name for name, values in variants if np.max(values[np.isfinite(values)], initial=0.0) > OUTLASTS]
 
 
 def lawful(part: xr.Dataset) -> xr.DataArray:
@@ -141,7 +141,7 @@ def horizons(part: xr.Dataset) -> str:
 
 
 def unreached(part: xr.Dataset) -> dict[str, int]:
-    """How many runs of a row the law applies to that never reach the error of which it speaks."""
+    """How many runs of a variant the law applies to that never reach the error of which it speaks."""
     without = lawful(part) & part[Column.HORIZON].isnull()
     count = without.sum([dim for dim in without.dims if dim != "variant"]).values
     return {str(name): int(k) for name, k in zip(part["variant"].values, count, strict=True) if k}
@@ -158,7 +158,7 @@ def _unreached(part: xr.Dataset) -> str:
 
 
 def _longer(part: xr.Dataset) -> str:
-    """Which rows outlast the prediction; empty if none does."""
+    """Which variants outlast the prediction; empty if none does."""
     apart = outlasting(part)
     if not apart:
         return ""
@@ -173,7 +173,7 @@ def absolute() -> str:
 def sampling(part: xr.Dataset) -> str:
     """What an energy error sampled once a nutation hides: no ratio is formed with a number at rounding.
 
-    A row of which the samples show all but a factor `HIDDEN` has an error that goes on from nutation to nutation.
+    A variant of which the samples show all but a factor `HIDDEN` has an error that goes on from nutation to nutation.
     """
     once, every = part[Column.ENERGY_ONCE].values, part[Column.ENERGY_EVERY].values
     good = np.isfinite(once) & (every > LEAST_ASKED)
@@ -205,7 +205,7 @@ def sampling(part: xr.Dataset) -> str:
 
 def solver(part: xr.Dataset) -> str:
     """The share of the solver in what an implicit method does to energy and momenta."""
-    for name, row in rows_with(part, Column.TEXTBOOK_ENERGY).items():
+    for name, row in variants_with(part, Column.TEXTBOOK_ENERGY).items():
         solved, one = float(row[Column.TEXTBOOK_ENERGY][-1]), float(row[Column.ONE_ITERATION_ENERGY])
         energy, momenta = row[Column.SOLVER_ENERGY].values, row[Column.SOLVER_MOMENTUM].values
         first = f"grows to {one:.1e}" if one > LOOSE * solved else f"stays at {one:.1e}"
@@ -275,5 +275,5 @@ def tables(data: xr.Dataset) -> list[Table]:
             if name in free:
                 texts[columns.index(limit)] = f"none of {SOUGHT_STEPS} steps up to {free[name]:g}"
             rows.append([name, *texts])
-    limits_of_all = Table("Limits in numbers", ["row", *(one[2] for one in columns)], rows)
+    limits_of_all = Table("Limits in numbers", ["variant", *(one[2] for one in columns)], rows)
     return [*shown, limits_of_all] if columns else shown

@@ -1,9 +1,9 @@
-"""Own compiled rows against heyoka's `taylor` in double precision, timed in one round, by scene, horizon and target.
+"""Own compiled variants against heyoka's `taylor` in double precision, timed in one round, by problem.
 
-Own is any compiled row that takes steps and is none of heyoka's three: `taylor`, which has double precision as the own
-rows have, and its two forms of longer arithmetic, which are no rivals and are told of only where they alone meet a
-target. Each side shows its fastest row in any chart. Rows whose step is the motion itself (`Integrator.exact_steps`)
-take no part in the study.
+Own is any compiled variant that takes steps and is none of heyoka's three: `taylor`, which has double precision as the
+own variants have, and its two forms of longer arithmetic, which are no rivals and are told of only where they alone
+meet a target. Each side shows its fastest variant in any chart. Variants whose step is the motion itself
+(`Integrator.exact_steps`) take no part in the study.
 """
 
 from typing import NamedTuple
@@ -23,16 +23,16 @@ FINE = 1e-9  # rad: errors up to it are fine
 
 
 class Ratio(NamedTuple):
-    """The fastest row of each side; no name, and NaN in place of a time, where none met the target."""
+    """The fastest variant of each side; no name, and NaN in place of a time, where none met the target."""
 
     row: str
     seconds: float
     rival: float  # seconds
-    longer: str  # the fastest of heyoka's rows in longer arithmetic
+    longer: str  # the fastest of heyoka's variants in longer arithmetic
 
     @property
     def value(self) -> float:
-        """The own time over the rival's: below 1 the own row is ahead."""
+        """The own time over the rival's: below 1 the own variant is ahead."""
         return self.seconds / self.rival
 
     @property
@@ -43,12 +43,12 @@ class Ratio(NamedTuple):
 
     @property
     def neither(self) -> bool:
-        """Did no row in double precision meet the target?"""
+        """Did no variant in double precision meet the target?"""
         return bool(np.isnan(self.seconds) and np.isnan(self.rival))
 
 
 def rivals(data: xr.Dataset) -> list[str]:
-    """The rows of the rival, one a chart that it has."""
+    """The variants of the rival, one a chart that it has."""
     return [name for name in ranking.ranked(data) if split_name(name)[0] == RIVAL]
 
 
@@ -66,7 +66,7 @@ def compared(data: xr.Dataset) -> dict[tuple[str, int, float], Ratio]:
 
 
 def _ratio(places: list[ranking.Place]) -> Ratio:
-    """The fastest of each side among the rows that meet a target, which come cheapest first."""
+    """The fastest of each side among the variants that meet a target, which come cheapest first."""
     sides: dict[str, ranking.Place] = {}
     for place in places:
         method = split_name(place.integrator)[0]
@@ -79,7 +79,7 @@ def _ratio(places: list[ranking.Place]) -> Ratio:
 
 
 def headline(data: xr.Dataset, spans: list[str]) -> str:
-    """How often own rows are ahead, and by how much to a fine error at each horizon; empty without the rival."""
+    """How often own variants are ahead, and by how much to a fine error at each horizon; empty without the rival."""
     ratios = compared(data)
     both = {key: ratio for key, ratio in ratios.items() if np.isfinite(ratio.value)}
     if not both:
@@ -87,9 +87,9 @@ def headline(data: xr.Dataset, spans: list[str]) -> str:
     ahead = sum(ratio.value <= 1.0 for ratio in both.values())
     mine, theirs = (sum(ratio.alone == side for ratio in ratios.values()) for side in ("own", RIVAL))
     said = (
-        f"The fastest own row takes no more time than heyoka's {joined(rivals(data))} (double precision) in {ahead} of "
-        f"{len(both)} combinations of scene, run length and error that both meet; own rows meet {mine} more, it "
-        f"{theirs or 'none'}."
+        f"The fastest own variant takes no more time than heyoka's {joined(rivals(data))} (double precision) in "
+        f"{ahead} of {len(both)} combinations of scene, run length and error that both meet; own variants meet {mine} "
+        f"more, it {theirs or 'none'}."
     )
     parts = []
     for far, span in enumerate(spans):
@@ -103,7 +103,7 @@ def headline(data: xr.Dataset, spans: list[str]) -> str:
 
 
 def table(data: xr.Dataset, spans: list[str]) -> Table:
-    """The ratios, with the rows that they belong to."""
+    """The ratios, with the variants that they belong to."""
     ratios = compared(data)
     rows = [
         [str(scene), span, *(_cell(ratios.get((str(scene), far, target))) for target in TARGETS)]
@@ -111,8 +111,8 @@ def table(data: xr.Dataset, spans: list[str]) -> Table:
         for far, span in enumerate(spans)
     ]
     return Table(
-        f"The fastest own row over heyoka's {RIVAL} in double precision, each in its fastest chart, timed in the same "
-        "rounds: ratio of the times, below 1 where the own row is ahead",
+        f"The fastest own variant over heyoka's {RIVAL} in double precision, each in its fastest chart, timed in the "
+        "same rounds: ratio of the times, below 1 where the own variant is ahead",
         ["scene", "horizon", *(f"axis error {target:.0e}" for target in TARGETS)],
         rows,
     )

@@ -1,4 +1,4 @@
-"""The closed form against the fastest row, from the times of one round: what an integrator is not needed for."""
+"""The closed form against the fastest variant, from the times of one round: what an integrator is not needed for."""
 
 from typing import NamedTuple
 
@@ -12,13 +12,13 @@ from symtop.runner.study import Table
 
 
 class Beside(NamedTuple):
-    """The fastest compiled row of one scene, horizon and target, and the closed form timed in the same rounds."""
+    """The fastest compiled variant of one scene, horizon and target, and the closed form timed in the same rounds."""
 
     scene: str
     far: int  # index of the horizon
     target: float
     row: str
-    seconds: float  # of the row
+    seconds: float  # of the variant
     closed_form: float  # seconds
 
     @property
@@ -28,7 +28,7 @@ class Beside(NamedTuple):
 
 
 def compared(data: xr.Dataset) -> list[Beside]:
-    """Every problem that a compiled row solved and the closed form was timed on."""
+    """Every problem that a compiled variant solved and the closed form was timed on."""
     names = [str(name) for name in data["variant"].values if name not in ranking.ranked(data)]
     if not names:
         return []
@@ -56,14 +56,14 @@ def headline(data: xr.Dataset, spans: list[str]) -> str:
                 f"{min(ratios):.2g} to {max(ratios):.2g} (median of all {len(ratios)}: {np.median(ratios):.2g}) {span}"
             )
     return (
-        f"The closed form takes less time than the fastest compiled row in {faster} of {len(pairs)} combinations of "
-        f"scene, run length and error. The row's time over that of the closed form is {joined(parts)}. The rows are "
-        "compared for what they do on problems without a closed form."
+        f"The closed form takes less time than the fastest compiled variant in {faster} of {len(pairs)} combinations "
+        f"of scene, run length and error. The variant's time over that of the closed form is {joined(parts)}. The "
+        "variants are compared for what they do on problems without a closed form."
     )
 
 
 def table(data: xr.Dataset, spans: list[str]) -> Table:
-    """The ratios: how many times less the closed form takes than the fastest row, by scene, horizon and target."""
+    """The ratios: how many times less the closed form takes than the fastest variant, by scene, horizon and target."""
     pairs = {(pair.scene, pair.far, pair.target): pair for pair in compared(data)}
     rows = [
         [str(scene), span, *(_cell(pairs.get((str(scene), far, target))) for target in TARGETS)]
@@ -71,7 +71,7 @@ def table(data: xr.Dataset, spans: list[str]) -> Table:
         for far, span in enumerate(spans)
     ]
     return Table(
-        "The closed form beside the fastest compiled row, timed in the same rounds: how many times less it takes",
+        "The closed form beside the fastest compiled variant, timed in the same rounds: how many times less it takes",
         ["scene", "horizon", *(f"axis error {target:.0e}" for target in TARGETS)],
         rows,
     )

@@ -1,7 +1,7 @@
 """Energy errors at equal run time of structure-preserving methods and classical ones, within one chart.
 
-The chart changes the energy error of a method as much as the method does, so that rows are compared only with rows of
-the same chart: the splittings with rk4 and taylor on (e, L), the discrete Lagrangians and the
+The chart changes the energy error of a method as much as the method does, so that variants are compared only with
+variants of the same chart: the splittings with rk4 and taylor on (e, L), the discrete Lagrangians and the
 compositions of Verlet with rk4 and rk45-compiled in Euler angles. A method preserves structure if it claims to be
 symplectic or symmetric. One that claims to conserve the energy itself is left out: its energy error is rounding or the
 solver's, whatever the step, and says nothing of what a bounded error is worth.
@@ -28,7 +28,7 @@ STEPS = 118.0  # a nutation, of the comparison at equal steps
 
 
 class Crossing(NamedTuple):
-    """Energy at equal time on a scene: the share of the common times at which the first of two rows is better."""
+    """Energy at equal time on a scene: the share of the common times at which the first of two variants is better."""
 
     scene: str
     share: float  # of the common range, in the logarithm of time
@@ -41,24 +41,24 @@ class Crossing(NamedTuple):
 
 @of_one_dataset
 def in_chart(data: xr.Dataset, chart: str) -> tuple[list[str], list[str]]:
-    """The compiled rows of a chart that are compared: the classical ones, and those that preserve structure."""
+    """The compiled variants of a chart that are compared: the classical ones, and those that preserve structure."""
     classic, structured = _all_in_chart(data, chart)
     return classic, [name for name in structured if not conserving(name)]
 
 
 def by_construction(data: xr.Dataset, chart: str) -> list[str]:
-    """The compiled rows of a chart that preserve structure and are left out, because they conserve the energy."""
+    """The compiled variants of a chart that preserve structure and are left out, because they conserve the energy."""
     return [name for name in _all_in_chart(data, chart)[1] if conserving(name)]
 
 
 def conserving(name: str) -> bool:
-    """Does a row claim to conserve the energy?"""
+    """Does a variant claim to conserve the energy?"""
     return split_name(name)[0] in integrators() and "energy" in (integrator(name).conserves or ())
 
 
 @of_one_dataset
 def _all_in_chart(data: xr.Dataset, chart: str) -> tuple[list[str], list[str]]:
-    """The classical compiled rows of a chart, and all that are symplectic or symmetric."""
+    """The classical compiled variants of a chart, and all that are symplectic or symmetric."""
     names = [str(name) for name in ranking.ranked(data)]
     over = [dim for dim in data["structured"].dims if dim != "variant"]
     structured = data["structured"].max(over)
@@ -72,12 +72,12 @@ def _all_in_chart(data: xr.Dataset, chart: str) -> tuple[list[str], list[str]]:
 
 
 def timed(data: xr.Dataset) -> list[str]:
-    """All rows of both charts of which every long run is timed: those that are left out of the comparison, too."""
+    """All variants of both charts of which every long run is timed: those that are left out of the comparison, too."""
     return [name for chart in CHARTS for names in _all_in_chart(data, chart) for name in names]
 
 
 def crossing(cell: xr.Dataset, first: str, second: str) -> Crossing | None:
-    """Compare the least energy error that each of two rows has for a time; None if their times do not overlap.
+    """Compare the least energy error that each of two variants has for a time; None if their times do not overlap.
 
     The error for a time is that of the most accurate run that takes no longer, joined by straight lines in the
     logarithms. `cell` is one scene and one horizon.
@@ -105,7 +105,7 @@ def crossing(cell: xr.Dataset, first: str, second: str) -> Crossing | None:
 
 @of_one_dataset
 def crossings(data: xr.Dataset, chart: str) -> dict[str, dict[str, list[Crossing]]]:
-    """All comparisons of a chart over the long horizon, by the classical row and by the other one."""
+    """All comparisons of a chart over the long horizon, by the classical variant and by the other one."""
     last = data[["seconds", "energy", "outcome"]].isel(horizon=-1)  # of these alone: a dataset has dozens
     cells = [last.sel(scene=name) for name in last["scene"].values]
     classic, structured = in_chart(data, chart)
@@ -116,9 +116,9 @@ def crossings(data: xr.Dataset, chart: str) -> dict[str, dict[str, list[Crossing
 
 
 def at_steps(runs: xr.Dataset, steps: float) -> tuple[float, float]:
-    """Energy error and force evaluations a step of a row at so many steps, on the lines between its runs in logarithms.
+    """Energy error and force evaluations a step of a variant at so many steps, between its runs in logarithms.
 
-    NaN if no two runs have that number between them. `runs` is one scene, one horizon and one row.
+    NaN if no two runs have that number between them. `runs` is one scene, one horizon and one variant.
     """
     x, y, work = (runs[name].values for name in ("steps", "energy", "force_evaluations"))
     good = np.isfinite(x) & (y > 0.0) & (runs["outcome"].values == "ok")
@@ -148,7 +148,7 @@ def growth_at_equal_settings(runs: xr.Dataset, quantity: str) -> float:
 
 
 def table(data: xr.Dataset) -> Table:
-    """Of every classical row: its comparisons by how they end, and the rows that are ahead or behind in all."""
+    """Of every classical variant: its comparisons by how they end, and the variants that are ahead or behind in all."""
     rows = []
     for chart in CHARTS:
         for classic, compared in crossings(data, chart).items():
@@ -164,22 +164,23 @@ def table(data: xr.Dataset) -> Table:
                 rows.append([classic, str(len(pairs)), *(str(kinds[kind]) for kind in KINDS), *ends])
     return Table(
         f"Energy errors over {float(data['horizon'].values[-1]):g} nutation periods at equal run times: comparisons of "
-        "a classical row with a structure-preserving one on a scene, by the run times at which the latter has less; "
-        "without rows that conserve the energy by construction, and without pairs that have no common run time",
+        "a classical variant with a structure-preserving one on a scene, by the run times at which the latter has "
+        "less; without variants that conserve the energy by construction, and without pairs that have no common run "
+        "time",
         ["against", "comparisons", *KINDS, "always less", "never less"],
         rows,
     )
 
 
 def _kind(one: Crossing) -> str:
-    """The run times at which the first row of a pair has less error."""
+    """The run times at which the first variant of a pair has less error."""
     if one.share in (0.0, 1.0):
         return KINDS[0] if one.share else KINDS[-1]
     return "in turns" if one.at_least == one.at_most else KINDS[1] if one.at_least else KINDS[2]
 
 
 def sentence(data: xr.Dataset, chart: str) -> str:
-    """How often structure-preserving rows have less energy error than the classical ones of their chart."""
+    """How often structure-preserving variants have less energy error than the classical ones of their chart."""
     counted = tallies(data, chart)
     if not counted:
         return ""
@@ -190,8 +191,8 @@ def sentence(data: xr.Dataset, chart: str) -> str:
     left = len(by_construction(data, chart))
     apart = f", without {left} that conserve{'s' * (left == 1)} the energy by construction," if left else ""
     return (
-        f"Structure-preserving rows in {CHARTS[chart]}{apart} have less energy error at every common run time in "
-        f"{joined(said)}. A comparison is two rows with a common run time on one scene over "
+        f"Structure-preserving variants in {CHARTS[chart]}{apart} have less energy error at every common run time in "
+        f"{joined(said)}. A comparison is two variants with a common run time on one scene over "
         f"{float(data['horizon'].values[-1]):g} nutation periods."
     )
 
@@ -202,7 +203,7 @@ def percent(share: float) -> str:
 
 
 class Tally(NamedTuple):
-    """Comparisons with one classical row: where a structure-preserving row has less energy error, and how many."""
+    """Comparisons with one classical variant: where a structure-preserving variant has less energy error."""
 
     always: int  # at every run time that both have
     partly: int
@@ -220,7 +221,7 @@ class Tally(NamedTuple):
 
 
 def tallies(data: xr.Dataset, chart: str) -> dict[str, Tally]:
-    """The comparisons of a chart, by the classical row; rows without any are left out."""
+    """The comparisons of a chart, by the classical variant; variants without any are left out."""
     counted = {}
     for classic, compared in crossings(data, chart).items():
         shares = [one.share for listed in compared.values() for one in listed]
@@ -231,7 +232,7 @@ def tallies(data: xr.Dataset, chart: str) -> dict[str, Tally]:
 
 
 def message(data: xr.Dataset, chart: str) -> str:
-    """Against which classical rows those that preserve structure mostly win at all run times, as a title."""
+    """Against which classical variants those that preserve structure mostly win at all run times, as a title."""
     counts = sorted(tallies(data, chart).items(), key=lambda one: -one[1].share)
     named = [(f"{split_name(name)[0]} ({percent(tally.share)})", tally.share) for name, tally in counts]
     most, few = [name for name, share in named if share >= 0.5], [name for name, share in named if share < 0.5]
@@ -247,7 +248,7 @@ def message(data: xr.Dataset, chart: str) -> str:
 
 
 def at_equal_steps(data: xr.Dataset, names: Sequence[str], scene: str) -> str:
-    """Energy errors of rows of one chart over the long horizon at the same steps; empty if they were not run there."""
+    """Energy errors of variants of one chart over the long horizon at the same steps; empty if not run there."""
     last = data.sel(scene=scene).isel(horizon=-1)
     periods = float(data["horizon"].values[-1])
     known = [name for name in names if name in last["variant"].values]

@@ -15,7 +15,7 @@ from symtop.runner.study import Picture
 
 from . import energy, words
 
-KINDS = (  # of a comparison: what the structure-preserving row has, the shade, and that of the number on it
+KINDS = (  # of a comparison: what the structure-preserving variant has, the shade, and that of the number on it
     ("less energy error at every run time", style.PURPLES[1], "white"),
     ("at some run times", "#ABABAB", "black"),
     ("at none", "#DDDDDD", "black"),
@@ -25,7 +25,7 @@ SMALL = {"fontsize": style.LEAST_TEXT, "color": "#444444"}
 
 
 def draw(data: xr.Dataset, chart: str) -> Picture:
-    """The classical rows of a chart among those that preserve structure: on one scene, and counted over all."""
+    """The classical variants of a chart among those that preserve structure: on one scene, and counted over all."""
     style.use()
     counts, (classic, structured) = energy.tallies(data, chart), energy.in_chart(data, chart)
     figure = plt.figure(figsize=(style.WIDTH, 4.6 + 0.28 * len(counts)))
@@ -50,14 +50,14 @@ def draw(data: xr.Dataset, chart: str) -> Picture:
         f"energy-{chart}",
         figure,
         f"Above, largest energy error {words.spans(data)[-1]} of {scene} against the time of a run, with finer steps "
-        "along a line. Grey: the symplectic or symmetric rows that are compared. Below, all comparisons, within one "
-        f"chart. {lost}{energy.sentence(data, chart)}",
-        f"Energy error against time for rows of the chart {chart}, and bars that count who has less error.",
+        "along a line. Grey: the symplectic or symmetric variants that are compared. Below, all comparisons, within "
+        f"one chart. {lost}{energy.sentence(data, chart)}",
+        f"Energy error against time for variants of the chart {chart}, and bars that count who has less error.",
     )
 
 
 def _example(data: xr.Dataset, chart: str) -> str:
-    """The first scene on which every classical row that was compared anywhere was compared; otherwise the first."""
+    """The first scene on which every classical variant that was compared anywhere was compared; otherwise the first."""
     every = [
         {one.scene for listed in compared.values() for one in listed}
         for compared in energy.crossings(data, chart).values()
@@ -67,7 +67,7 @@ def _example(data: xr.Dataset, chart: str) -> str:
 
 
 def _curves(axis: Any, cell: xr.Dataset, classic: list[str], structured: list[str]) -> None:
-    """Energy against time on one scene: classical rows in their colours, with their names, the others grey."""
+    """Energy against time on one scene: classical variants in their colours, with their names, the others grey."""
     axis.set(xscale="log", yscale="log", xlabel="time of a run (s)", ylabel="largest energy error (relative)")
     axis.set_title(
         f"one example, scene {cell['scene'].item()}: grey lines are the structure-preserving methods", loc="left"
@@ -91,7 +91,7 @@ def _curves(axis: Any, cell: xr.Dataset, classic: list[str], structured: list[st
 
 
 def _bars(axis: Any, counts: dict[str, energy.Tally], scenes: int, methods: int) -> None:
-    """A bar a classical row: its comparisons, by how often the structure-preserving row has less energy error."""
+    """A bar a classical variant: its comparisons, by how often the structure-preserving one has less energy error."""
     ordered = sorted(counts.items(), key=lambda one: -one[1].share)  # as the title has them
     for place, (_, tally) in enumerate(ordered):
         start = 0.0

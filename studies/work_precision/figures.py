@@ -1,4 +1,4 @@
-"""The figures of the work-precision study: fronts, the fastest rows, how much slower the others are, energy, parts."""
+"""The figures of the work-precision study: fronts, the fastest variants, the slowdown of the others, energy, parts."""
 
 from collections.abc import Sequence
 
@@ -18,7 +18,7 @@ MARKS = {"shape": ("o", "black", "black"), "nutation_lag": ("s", "white", VERMIL
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
-    """Fronts at both horizons, the fastest rows, the slowdown of all, energy in two charts, and parts of the error."""
+    """Fronts at both horizons, the fastest variants, the slowdown of all, energy in two charts, parts of the error."""
     return [
         fronts.draw(data, "front-short", 0, "seconds"),
         fronts.draw(data, "front-long", -1, "seconds"),
@@ -78,8 +78,8 @@ def _parts(data: xr.Dataset) -> Picture:
         "parts",
         figure,
         f"How the parts of the axis error on {scene['scene'].values} grow from {first} to {last} nutation periods at "
-        "equal step or tolerance, a line a row, method[chart]. Shape is the distance from the true path. The lags are "
-        "how far the run is behind or ahead of the truth in its nutation and in its precession. Large marks are "
+        "equal step or tolerance, a line a variant, method[chart]. Shape is the distance from the true path. The lags "
+        "are how far the run is behind or ahead of the truth in its nutation and in its precession. Large marks are "
         f"medians over the settings that were run at both and whose error is above {energy.ROUNDED:g} at the first; "
         "thin marks are each of them. A shape error that stays the same is a path that is kept, whatever the phase on "
         "it. The table of the growth has the medians.",

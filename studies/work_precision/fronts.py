@@ -36,13 +36,13 @@ class Front(NamedTuple):
     error: Any
     owners: list[str]
 
-    def of(self, rows: Sequence[str]) -> int:
-        """How many belong to some rows."""
-        return sum(owner in rows for owner in self.owners)
+    def of(self, variants: Sequence[str]) -> int:
+        """How many belong to some variants."""
+        return sum(owner in variants for owner in self.owners)
 
 
 def draw(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
-    """Every run of every compiled row, one panel a scene, with the front and the two rows that have most of it."""
+    """Every run of every compiled variant, one panel a scene, with the front and the two that have most of it."""
     data = data[[*COSTS, "axis", "axis_bound", "control", "implementation"]]  # of these alone: a dataset has dozens
     scenes = [str(scene) for scene in data["scene"].values]
     cells = {scene: data.sel(scene=scene).isel(horizon=far) for scene in scenes}
@@ -76,8 +76,8 @@ def draw(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
     whole = sum(owners.values())
     headline(figure, message(most, sum(owners[row] for row in most), whole, BEATEN[cost], words.spans(data)[far]))
     timed = (
-        " Only timed runs are shown: a row's cheapest for some error, and those of the comparison of energies. Dotted: "
-        "the closed form, which is not ranked. Of times below ten microseconds 2 to 4 are the call itself."
+        " Only timed runs are shown: a variant's cheapest for some error, and those of the comparison of energies. "
+        "Dotted: the closed form, which is not ranked. Of times below ten microseconds 2 to 4 are the call itself."
         if cost == "seconds"
         else " A high derivative, a kick and a stage count alike and take different times."
     )
@@ -86,9 +86,9 @@ def draw(data: xr.Dataset, name: str, far: int, cost: str) -> Picture:
         name,
         figure,
         f"Largest axis error {words.spans(data)[far]} against {COSTS[cost]}, one panel a scene. A grey line is a "
-        "compiled row whose step or tolerance varies along it. Marks joined by steps are the front: runs that no "
-        f"compiled row beats in both. Of its {whole} runs the most belong to {owned}. Grey band: below the error bound "
-        f"of the reference.{timed}",
+        "compiled variant whose step or tolerance varies along it. Marks joined by steps are the front: runs that no "
+        f"compiled variant beats in both. Of its {whole} runs the most belong to {owned}. Grey band: below the error "
+        f"bound of the reference.{timed}",
         f"Log-log work-precision plots of the axis error against {COSTS[cost]}, one panel a scene.",
     )
 
@@ -99,7 +99,7 @@ def power(target: float) -> str:
 
 
 def others(owners: Mapping[str, int], most: Sequence[str]) -> str:
-    """Whose the open circles of a front are: the rows that its title does not name, with the most runs first."""
+    """Whose the open circles of a front are: the variants that its title does not name, with the most runs first."""
     rest = {row: count for row, count in owners.items() if row not in most}
     ranked = sorted(rest, key=lambda row: -rest[row])
     if not ranked:
@@ -111,7 +111,7 @@ def others(owners: Mapping[str, int], most: Sequence[str]) -> str:
 
 
 def message(most: Sequence[str], count: int, whole: int, unit: str, span: str) -> str:
-    """How many runs of the fronts belong to the rows that have most of them."""
+    """How many runs of the fronts belong to the variants that have most of them."""
     if not most:
         return f"No method has a run {span}"
     return (
@@ -121,14 +121,14 @@ def message(most: Sequence[str], count: int, whole: int, unit: str, span: str) -
 
 
 def curve(runs: xr.Dataset, quantity: str, cost: str, floor: float) -> tuple[Any, Any]:
-    """The runs of one row from its coarsest setting to its finest."""
+    """The runs of one variant from its coarsest setting to its finest."""
     x, y = runs[cost].values, runs[quantity].values
     there = np.isfinite(x) & np.isfinite(y)
     return x[there], np.maximum(y[there], floor)
 
 
 def front(cell: xr.Dataset, cost: str, floor: float) -> Front:
-    """The front of some rows on a scene."""
+    """The front of some variants on a scene."""
     x, y = cell[cost].values, np.maximum(cell["axis"].values, floor)
     on = pareto(x, y)
     order = np.argsort(x[on])
@@ -137,7 +137,7 @@ def front(cell: xr.Dataset, cost: str, floor: float) -> Front:
 
 
 def _front(axis: Any, one: Front, most: Sequence[str]) -> None:
-    """The steps of a front, and a mark on each of its runs: that of its row if the title names it."""
+    """The steps of a front, and a mark on each of its runs: that of its variant if the title names it."""
     axis.step(one.cost, one.error, where="post", color="#444444", lw=0.8, zorder=2)
     owners = np.array(one.owners, dtype=object)
     for row in most:
@@ -150,7 +150,7 @@ def _front(axis: Any, one: Front, most: Sequence[str]) -> None:
 
 def _closed_form(axis: Any, cell: xr.Dataset) -> None:
     """The time of what takes no steps, as a dotted line."""
-    for row in (name for name in map(str, cell["variant"].values) if name not in ranking.ranked(cell)):
-        at = float(cell["seconds"].sel(variant=row).min())
+    for variant in (name for name in map(str, cell["variant"].values) if name not in ranking.ranked(cell)):
+        at = float(cell["seconds"].sel(variant=variant).min())
         if np.isfinite(at):
-            axis.axvline(at, color=look(row).color, ls=":", lw=1.0, zorder=1, label=CLOSED)
+            axis.axvline(at, color=look(variant).color, ls=":", lw=1.0, zorder=1, label=CLOSED)

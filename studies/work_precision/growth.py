@@ -13,12 +13,12 @@ ROWS = ("midpoint[angles]", "stormer-verlet[angles]", "takahashi-imada[axis]", "
 
 
 def rows_of(data: xr.Dataset) -> list[str]:
-    """Those of the rows that a dataset has."""
+    """Those of the variants that a dataset has."""
     return [row for row in ROWS if row in data["variant"].values]
 
 
 def table(data: xr.Dataset) -> Table:
-    """The median growth of each part of the error with each row, on the first scene."""
+    """The median growth of each part of the error with each variant, on the first scene."""
     scene, spans = data[[*PARTS, "setting_value"]].isel(scene=0), data["horizon"].values
     lines = []
     for row in rows_of(data):
@@ -28,4 +28,4 @@ def table(data: xr.Dataset) -> Table:
         f"Growth of the parts of the axis error on {scene['scene'].item()} from {spans[0]:g} to {spans[-1]:g} nutation "
         "periods at equal steps or tolerances, medians; not judged: at rounding or over budget"
     )
-    return Table(title, ["row", *(said.partition(" (")[0] for said in PARTS.values())], lines)
+    return Table(title, ["variant", *(said.partition(" (")[0] for said in PARTS.values())], lines)

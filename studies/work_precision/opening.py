@@ -18,9 +18,9 @@ USED = (*ranking.NEEDS, "axis", "chart", "structured", "energy", "steps", "force
 
 
 def opening(data: xr.Dataset) -> Opening:
-    """Which row to begin with, for each horizon and target.
+    """Which variant to begin with, for each horizon and target.
 
-    It is, of the compiled rows that meet the target on the most scenes, the one that is closest to the fastest.
+    It is, of the compiled variants that meet the target on the most scenes, the one that is closest to the fastest.
     """
     rows, sentences = [], []
     whole, data = data, data[[name for name in USED if name in data]]
@@ -45,12 +45,12 @@ def opening(data: xr.Dataset) -> Opening:
         listed = f", and {abridged([f'{name} in {count}' for name, count in others])}" if others else ""
         sentences.append(
             f"For the direction of the axis, begin with {first}. It is the first choice in {times} of the {len(rows)} "
-            f"lines of the table{listed}. The first choice meets the error on the most scenes and takes, of the rows "
-            "that do, the least time over the fastest."
+            f"lines of the table{listed}. The first choice meets the error on the most scenes and takes, of the "
+            "variants that do, the least time over the fastest."
         )
         sentences.append(
-            "A row is a method in one chart, timed as the bare compiled loop, at the coarsest step or tolerance that "
-            f"meets the error.{not_asked(data)}"
+            "A variant is a method in one chart, timed as the bare compiled loop, at the coarsest step or tolerance "
+            f"that meets the error.{not_asked(data)}"
         )
     steps = energy.at_equal_steps(data, COMPARED[:2], str(data["scene"].values[0]))
     sentences += [
@@ -58,7 +58,7 @@ def opening(data: xr.Dataset) -> Opening:
         "For your own scene and accuracy: symtop recommend SCENE --accuracy 1e-6; it also runs what it recommends.",
     ]
     header = ["horizon", "axis error (rad)", "begin with", "meets it on", "time over the fastest", "then"]
-    return Opening("Which integrator should I use?", sentences, Table("A row to begin with", header, rows))
+    return Opening("Which integrator should I use?", sentences, Table("A variant to begin with", header, rows))
 
 
 SHOWN = ("seconds", "force_evaluations", "axis", "step_size", "tolerance", "outcome")  # of a run, in a chart
@@ -90,7 +90,7 @@ def charts(data: xr.Dataset) -> list[Chart]:
 
 
 def _series(name: str, runs: dict[str, np.ndarray], cost: str) -> Series:
-    """The runs of a row that ended well, by their cost."""
+    """The runs of a variant that ended well, by their cost."""
     keep = np.flatnonzero(np.isfinite(runs[cost]) & np.isfinite(runs["axis"]) & (runs["outcome"] == "ok"))
     keep = keep[np.argsort(runs[cost][keep], kind="stable")]
     points = []

@@ -1,4 +1,4 @@
-"""Two pictures of who is the fastest: the winner of every cell, and how sure and how slow every row is."""
+"""Two pictures of who is the fastest: the winner of every cell, and how sure and how slow every variant is."""
 
 import textwrap
 from collections import Counter
@@ -22,7 +22,7 @@ LEVEL = 1.05  # times the least time: no more than it
 
 
 def winners(data: xr.Dataset) -> Picture:
-    """One line a scene, one column a target, one panel a horizon: the fastest row's colour and name."""
+    """One line a scene, one column a target, one panel a horizon: the fastest variant's colour and name."""
     from matplotlib.colors import to_rgb
 
     scenes = [str(name) for name in data["scene"].values]
@@ -73,33 +73,33 @@ def winners(data: xr.Dataset) -> Picture:
     return Picture(
         "winners",
         figure,
-        "The fastest compiled row on each scene for each axis error, each row at the coarsest step or tolerance found "
-        f"that meets the error. Most of the {len(met)} cells belong to {most}.{words.not_asked(data)} Pale and with a "
-        "tilde: its lead over at least one other row is within the noise. All times are measured; the closed form is "
-        f"not ranked. {_taking_part(data)}",
-        "Coloured cells naming the fastest row, a line a scene, a column an accuracy.",
+        "The fastest compiled variant on each scene for each axis error, each variant at the coarsest step or "
+        f"tolerance found that meets the error. Most of the {len(met)} cells belong to {most}.{words.not_asked(data)} "
+        "Pale and with a tilde: its lead over at least one other variant is within the noise. All times are measured; "
+        f"the closed form is not ranked. {_taking_part(data)}",
+        "Coloured cells naming the fastest variant, a line a scene, a column an accuracy.",
     )
 
 
 def _taking_part(data: xr.Dataset) -> str:
-    """How many rows were compared, and that another study compares fewer."""
+    """How many variants were compared, and that another study compares fewer."""
     ranked = ranking.ranked(data)
     rows = [row for row in words.of_implementation(data, "compiled") if row in ranked]
     more = [row for row in ("taylor-longdouble[axis]", "taylor-quad[axis]") if row in rows]
     beside = f", {' and '.join(more)} among them, which the study phase_diagram leaves out" if more else ""
-    return f"{len(rows)} rows take part{beside}."
+    return f"{len(rows)} variants take part{beside}."
 
 
 class Middle(NamedTuple):
-    """How one row fares over all targets that some row meets."""
+    """How one variant fares over all targets that some variant meets."""
 
     name: str
     met: int
-    ratio: float  # median time over the fastest row's, a target that is not met counting as infinite
+    ratio: float  # median time over the fastest variant's, a target that is not met counting as infinite
 
 
 def middles(merged: xr.DataArray) -> tuple[int, list[Middle]]:
-    """How many targets some row meets, and every row's share of them and median slowdown, in the order of `merged`."""
+    """How many targets some variant meets, each one's share of them and median slowdown, in the order of `merged`."""
     table = merged.transpose("variant", ...).values.reshape(merged.sizes["variant"], -1)
     table = table[:, np.isfinite(table).any(axis=0)]
     ratios = np.median(np.where(np.isfinite(table), table, np.inf), axis=1)
@@ -108,7 +108,7 @@ def middles(merged: xr.DataArray) -> tuple[int, list[Middle]]:
 
 
 def slowdown(data: xr.Dataset) -> Picture:
-    """How many targets every compiled row meets, and its time over the fastest one's, the median over all targets."""
+    """How many targets every compiled variant meets, and its median time over the fastest one's."""
     compiled = words.of_implementation(data, "compiled")
     names = [name for name in ranking.ranked(data) if name in compiled]
     costs = [ranking.relative_costs(data.isel(horizon=[far]), names) for far in range(data.sizes["horizon"])]
@@ -152,17 +152,18 @@ def slowdown(data: xr.Dataset) -> Picture:
     return Picture(
         "slowdown",
         figure,
-        f"Of {asked} targets, each an axis error on a scene over a horizon, how many every compiled row, "
+        f"Of {asked} targets, each an axis error on a scene over a horizon, how many every compiled variant, "
         "method[chart], meets with some step or tolerance within its budget (see the rules). Beside it, its time "
-        "over that of the fastest row, the median over all targets. Rows that meet most come first, and of these "
-        f"those that are closest to the fastest. The {slow} rows that miss half of the targets or more have no median "
-        "and are left out; the table on when to choose each row has them.",
-        "Bars of targets met and dots of the median slowdown, a line a row, the fastest and the surest in bold.",
+        "over that of the fastest variant, the median over all targets. Variants that meet most come first, and of "
+        "these "
+        f"those that are closest to the fastest. The {slow} variants that miss half of the targets or more have no "
+        "median and are left out; the table on when to choose each variant has them.",
+        "Bars of targets met and dots of the median slowdown, a line a variant, the fastest and the surest in bold.",
     )
 
 
 def _told(rows: Sequence[Middle]) -> list[Middle]:
-    """The rows of the title: the fastest in the median, and the one that meets most if that is another."""
+    """The variants of the title: the fastest in the median, and the one that meets most if that is another."""
     best, surest = min(rows, key=lambda row: row.ratio), max(rows, key=lambda row: row.met)
     if not np.isfinite(best.ratio):
         return []

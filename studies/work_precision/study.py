@@ -1,17 +1,18 @@
 """Which method is the fastest at the accuracy I need?
 
-Its rows are methods in one chart, every method in each chart that shows the axis, but not in the chart of the attitude
-where it has one of the axis alone: that shows the same axis, for about the same time or more, as the `reduction` study
-measures.
+Its variants are methods in one chart, every method in each chart that shows the axis, but not in the chart of the
+attitude where it has one of the axis alone: that shows the same axis, for about the same time or more, as the
+`reduction` study measures.
 
-Two rounds. First every row walks down to each target on every scene and over both horizons, all runs kept
-(`measure/work.py`). Then the rows of each scene are timed against each other
+Two rounds. First every variant walks down to each target on every scene and over both horizons, all runs kept
+(`measure/work.py`). Then the variants of each scene are timed against each other
 (`timing_rounds.py`). `tables.py` lists the variables; `measure/ranking.py` answers questions from them.
 """
 
 import xarray as xr
 
 from symtop.measure.settings import compared
+from symtop.model.scenes import TAGS
 from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
@@ -21,17 +22,11 @@ from .opening import charts, opening
 from .tables import errors_and_work, run_times
 from .timing_rounds import timed_runs
 
-LEFT_OUT = {  # timing all methods on a scene takes ten seconds
-    "goldstein is the same top, let go at another speed": ("goldstein-falling", "goldstein-rising"),
-    "loop is the same top, let go at another speed": ("cusp", "wave"),
-    "fast is such a top": ("simo-wong", "kinon-betsch"),
-    "no nutation: every target is wider than it": ("steady", "steady-fast"),
-    "close to a pole, like bruls-cardona-arnold": ("grazing",),
-    "unstable or nearly so: errors grow with the motion": ("sleeping", "sleeping-unstable", "separatrix"),
+LEFT_OUT = {  # tags of scenes, with the reason; timing all methods on a scene takes ten seconds
+    "repeats": "the same ranking shows",
+    "steady": "no nutation: every target is wider than it",
+    "unstable": "errors grow with the motion",
 }
-NOT_QUICK = {"left to the ordinary grid": (
-    "goldstein", "loop", "fast", "hairer-lubich-wanner", "bruls-cardona-arnold",
-)}  # fmt: skip
 PERIODS = ([10.0, 1000.0], [10.0, 100.0])  # in full, and quick
 BUDGET = {"compiled": 1e6, "python": 2.5e4}  # force evaluations of one run
 SOFTWARE = 4e4  # the same for arithmetic in software: quadruple precision costs 2 us an evaluation
@@ -42,9 +37,9 @@ EFFORT = (  # rounds and seconds of a batch, of all timed runs and of the conten
 
 
 def cases(quick: bool) -> list[Case]:
-    """Every row on every scene; python methods and quadruple precision within a smaller budget."""
+    """Every variant on every scene; python methods and quadruple precision within a smaller budget."""
     grid = []
-    for name in grid_scenes(LEFT_OUT | (NOT_QUICK if quick else {})):
+    for name in grid_scenes(TAGS if quick else LEFT_OUT):
         for method in compared("axis"):
             budget = (BUDGET[method.implementation] if method.speed == 1.0 else SOFTWARE) / (20.0 if quick else 1.0)
             grid.append(Case(name, method.name, {"periods": PERIODS[quick], "budget": budget}))
@@ -52,7 +47,7 @@ def cases(quick: bool) -> list[Case]:
 
 
 def follow_up(data: xr.Dataset) -> list[Case]:
-    """One case a scene that times its rows against each other."""
+    """One case a scene that times its variants against each other."""
     grid = []
     energies = energy.timed(data)
     periods = [float(value) for value in data["horizon"].values]
@@ -66,7 +61,7 @@ def follow_up(data: xr.Dataset) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """Errors and work of one row on a scene, or seconds of all of them."""
+    """Errors and work of one variant on a scene, or seconds of all of them."""
     return run_times(case) if case.timed else errors_and_work(case)
 
 

@@ -1,6 +1,6 @@
 """The two tables of the work-precision study.
 
-Dimensions: scene, integrator (a row, method[chart]), horizon (in nutation periods), setting (coarse to fine, each row
+Dimensions: scene, variant (method[chart]), horizon (in nutation periods), setting (coarse to fine, each variant
 its own), target (rad), batch.
 
     step_size or tolerance, setting_value, steps, force_evaluations, newton_iterations, outcome,     of one run
@@ -10,13 +10,13 @@ its own), target (rad), batch.
     nutation_period, precession_rate (and _bound)   relative errors of the mean frequencies
     shape, nutation_lag, precession_lag             parts of the axis error
     seconds, seconds_samples(batch), spread         time of one run, NaN if it was not timed, see `timing_rounds`
-    seconds_forecast                                what the row's other times foretell for it; drawn nowhere
-    first_call, implementation, chart, control,     of a row: seconds of its first run, "compiled" or "python", its
+    seconds_forecast                                what the variant's other times foretell for it; drawn nowhere
+    first_call, implementation, chart, control,     of a variant: seconds of its first run, "compiled" or "python", its
     structured                                      chart, "step_size", "tolerance" or "", 1 if symplectic or symmetric
-    set_up_seconds, sample_seconds                  seconds of a row without steps, NaN of the others
+    set_up_seconds, sample_seconds                  seconds of a variant without steps, NaN of the others
     stopped(horizon)                                why it tried nothing finer
     reached(horizon, target)                        "met", or why not: one of `work.STOPS`, `TOO_WIDE`, `CAPPED`, or
-                                                    the outcome of a row's runs if none ended well
+                                                    the outcome of a variant's runs if none ended well
     nutation_width                                  of a scene: angle between the turning points, rad
 """
 
@@ -31,7 +31,7 @@ from .timing_rounds import Effort, TimedRun, timing_rounds
 
 
 def errors_and_work(case: Case) -> xr.Dataset:
-    """Errors and counted work of one row on a scene, over all horizons."""
+    """Errors and counted work of one variant on a scene, over all horizons."""
     scene, periods, row = scenes.scene(case.scene), case.settings["periods"], integrator(case.integrator)
     table = work_table(scene, row, spans(scene, periods), case.settings["budget"])
     structured = bool(row.symplectic) or bool(row.symmetric)

@@ -1,13 +1,13 @@
-"""Times of many rows on one scene; most of the timing goes to those that may be the fastest.
+"""Times of many variants on one scene; most of the timing goes to those that may be the fastest.
 
-A run is timed if, of its row's runs that meet some target over some horizon, it has the fewest force evaluations; of
-the rows whose energy errors are compared at equal run time, every run over the last horizon is timed. No other run has
-a time, and no time is computed from others.
+A run is timed if, of its variant's runs that meet some target over some horizon, it has the fewest force evaluations;
+of the variants whose energy errors are compared at equal run time, every run over the last horizon is timed. No other
+run has a time, and no time is computed from others.
 
 All of them take part in a few rounds of short batches: in each round every run once, in random order. What serves the
 comparison of energies alone, over decades of time, has one round less, and a run of more than half of `PATIENCE` has
 two. The contenders for a target, those within `WITHIN` of the fastest compiled or plain Python one, then take part in
-further rounds of longer batches. Then each time is compared with what the row's other times foretell
+further rounds of longer batches. Then each time is compared with what the variant's other times foretell
 (`timing.forecasts`); one that misses that by a quarter (`MISSED`), has no forecast, or whose smallest sample no other
 comes near (`AGAIN`), is taken again. A time that still misses is kept with its forecast beside it, and a lead must
 then hold for both.
@@ -34,7 +34,7 @@ MANY = 1002  # samples that show what one of a closed form costs
 
 
 class TimedRun(NamedTuple):
-    """One run to be timed: of which row, over which horizon, and its place in the table of settings."""
+    """One run to be timed: of which variant, over which horizon, and its place in the table of settings."""
 
     name: str
     far: int  # index of the horizon
@@ -53,7 +53,7 @@ class Effort(NamedTuple):
 
 
 def timed_runs(data: xr.Dataset, compared: Collection[str] = ()) -> list[TimedRun]:
-    """The runs of one scene to be timed; of the rows in `compared`, all that ended well over the last horizon.
+    """The runs of one scene to be timed; of the variants in `compared`, all that ended well over the last horizon.
 
     `data` has dimensions integrator, horizon and setting.
     """
@@ -88,7 +88,7 @@ def contenders(runs: Sequence[TimedRun], cost: Mapping[TimedRun, float], kind: M
 
 
 def foretold(cost: Mapping[TimedRun, float], methods: Mapping[str, Integrator]) -> dict[TimedRun, float]:
-    """What the other times of its row foretell for every run; NaN where there are too few of them."""
+    """What the other times of its variant foretell for every run; NaN where there are too few of them."""
     expected: dict[TimedRun, float] = {}
     for name, method in methods.items():
         own = [run for run in cost if run.name == name]
@@ -106,8 +106,9 @@ def timing_rounds(
     """Seconds of the runs of a scene: dimensions integrator, horizon, setting, batch.
 
     Variables: ``seconds``; ``seconds_samples``, one column a round, NaN for the rounds that a run has no part in;
-    ``spread`` of the samples; ``seconds_forecast``, from the row's other runs; for each row ``first_call``; and for a
-    row that takes no steps ``set_up_seconds``, before the first sample, and ``sample_seconds``, for each of them.
+    ``spread`` of the samples; ``seconds_forecast``, from the variant's other runs; for each variant ``first_call``;
+    and for a variant that takes no steps ``set_up_seconds``, before the first sample, and ``sample_seconds``, for each
+    of them.
     """
     methods = {run.name: integrator(run.name) for run in runs}
 

@@ -14,10 +14,10 @@ class Trust(NamedTuple):
     """What is known of the times."""
 
     timed: int
-    forecast: int  # of them, those that the row's other times predict; it takes two others
+    forecast: int  # of them, those that the variant's other times predict; it takes two others
     rounds: int  # the least of a time
     measured: float  # the share of the times that are the smallest sample of that very run
-    miss: float  # median difference from the time that the row's other times predict
+    miss: float  # median difference from the time that the variant's other times predict
     differing: int  # times that differ by more than `MISSED`, though they were taken again
     noisy: int  # times without a second sample within `AGAIN` of the smallest
     margins: tuple[float, float]  # the least ratio that counts as a lead: the range over scenes and horizons
@@ -56,9 +56,9 @@ def sentence(data: xr.Dataset) -> str:
     least, most = known.margins
     rest = known.timed - known.forecast
     return (
-        f"{known.forecast} of the {known.timed} times were compared with the one that the row's other times predict: "
-        f"the median difference is {known.miss:.1%}."
-        f"{f' The other {rest} belong to rows with too few times to predict one.' if rest else ''}"
+        f"{known.forecast} of the {known.timed} times were compared with the one that the variant's other times "
+        f"predict: the median difference is {known.miss:.1%}."
+        f"{f' The other {rest} belong to variants with too few times to predict one.' if rest else ''}"
         f" A lead counts as larger than the noise only from a ratio of {least:.2f} to {most:.2f} on, by scene and run "
         "length."
     )
@@ -73,10 +73,10 @@ def table(data: xr.Dataset) -> Table:
         ["runs that ended well", str(int((data["outcome"] == "ok").sum())), ""],
         ["runs of these that were timed", str(known.timed), "only these are shown against seconds"],
         ["times of these with a predicted one beside them", str(known.forecast),
-         "the others have fewer than two times of their row and scene beside them, and were taken again"],
-        ["rounds of a time, at least", str(known.rounds), "each is with the other rows of its scene"],
+         "the others have fewer than two times of their variant and scene beside them, and were taken again"],
+        ["rounds of a time, at least", str(known.rounds), "each is with the other variants of its scene"],
         ["share of the times that are measured", f"{known.measured:.0%}", "none is computed from others"],
-        ["median difference from the predicted time", f"{known.miss:.1%}", "predicted from the row's other times"],
+        ["median difference from the predicted time", f"{known.miss:.1%}", "predicted from the variant's other times"],
         [f"times that differ from it by more than {MISSED:.0%}", str(known.differing),
          "they were taken again, and lead only if the predicted time leads, too"],
         [f"times without a second sample within {AGAIN:.0%} of the smallest", str(known.noisy),

@@ -14,33 +14,33 @@ from symtop.runner.study import Table
 
 from . import against_taylor, closed_form, energy, growth, trust, worth
 
-LEVEL = 3  # names of a list of level rows; the others are counted
+LEVEL = 3  # names of a list of level variants; the others are counted
 SHOWN = ("axis", "reached", "set_up_seconds", "sample_seconds")  # by the tables, beside what a ranking needs
 COMPARED = ("rk4[axis]", "takahashi-imada[axis]", "strang[axis]")  # energies at equal steps
 
 HOW_TO_READ = (
-    "A row is a method in one chart: angles (Euler angles), axis (the axis e and the angular momentum L) or attitude "
-    "(a quaternion and L). Choose the error that you accept on the vertical axis: the first curve to the right of it "
-    "is the fastest row. All rows of a panel have the same scene, run length and machine, and are called in the same "
-    "way. Each row has the coarsest steps or tolerances found that meet 1e-3, 1e-6, 1e-9 and 1e-12 rad. A force "
-    "evaluation is one evaluation of the equations of motion: a Newton iteration at one node, a kick, a stage, or one "
-    "derivative of a Taylor series. A row that is marked `budget` was stopped before it met the error, which says "
-    "nothing of what it could reach. The closed form, `exact`, is what errors are measured by, and is not ranked. The "
-    "table of rules, after the others, says which runs were made and timed."
+    "A variant is a method in one chart: angles (Euler angles), axis (the axis e and the angular momentum L) or "
+    "attitude (a quaternion and L). Choose the error that you accept on the vertical axis: the first curve to the "
+    "right of it is the fastest variant. All variants of a panel have the same scene, run length and machine, and are "
+    "called in the same way. Each variant has the coarsest steps or tolerances found that meet 1e-3, 1e-6, 1e-9 and "
+    "1e-12 rad. A force evaluation is one evaluation of the equations of motion: a Newton iteration at one node, a "
+    "kick, a stage, or one derivative of a Taylor series. A variant that is marked `budget` was stopped before it met "
+    "the error, which says nothing of what it could reach. The closed form, `exact`, is what errors are measured by, "
+    "and is not ranked. The table of rules, after the others, says which runs were made and timed."
 )
 RULES = {
-    "rows": "every method in each chart that shows the axis; not in attitude where the method has the axis chart, "
+    "variants": "every method in each chart that shows the axis; not in attitude where the method has the axis chart, "
     "because it shows the same axis there, for about the same time or more (see the study of the reduction)",
     "call": "the compiled loop from the start to the end of the run, without `simulate` around it",
     "errors that are asked": "those below the width of the nutation: a motion without any nutation meets the others",
-    "rows of the energy comparison": "compiled ones in axis or angles: rk4, rk45-compiled and taylor against the "
+    "variants of the energy comparison": "compiled ones in axis or angles: rk4, rk45-compiled and taylor against the "
     "symplectic or symmetric ones, without those that claim to conserve the energy by construction (the Gauss methods "
-    "and simo-wong), whose energy error is rounding or the solver's; two rows without a common run time on a scene "
+    "and simo-wong), whose energy error is rounding or the solver's; two variants without a common run time on a scene "
     "are no comparison there",
     "longest step": "as long as the method is accurate, up to 6 steps a run",
     "budget of a run": "a million force evaluations; 25 thousand in plain Python, 40 thousand in quadruple precision",
     "derivatives": "each of a Taylor series counts as a force evaluation, and costs more the higher it is",
-    "runs that are timed": "a row's cheapest in force evaluations for each error, and those of the comparison of "
+    "runs that are timed": "a variant's cheapest in force evaluations for each error, and those of the comparison of "
     "energy errors and of those that conserve the energy by construction; no time is computed from others",
     "what runs beside": "nothing, or the rounds of another scene on a core of its own, if a trial shows that a run "
     "there takes at most 1.05 times as long as alone: the attributes `timed_at_once` and `timed_slowdown` of a "
@@ -65,7 +65,7 @@ def of_implementation(data: xr.Dataset, kind: str) -> list[str]:
 
 
 def lead(won: ranking.Win) -> str:
-    """The fastest row at a target, its time, and the rows that are level with it or else its lead."""
+    """The fastest variant at a target, its time, and the variants that are level with it or else its lead."""
     parts = [won.best.integrator, seconds(won.best.cost)]
     if won.level:
         parts.append(f"tied with {abridged(won.level, LEVEL)}")
@@ -75,9 +75,9 @@ def lead(won: ranking.Win) -> str:
 
 
 def reasons(cell: xr.Dataset, target: float, names: Sequence[str] | None = None) -> str:
-    """Why rows do not meet a target, the most frequent reason first; empty if all do."""
-    rows = ranking.ranked(cell) if names is None else names
-    why = [str(value) for value in cell["reached"].sel(variant=rows, target=target).values]
+    """Why variants do not meet a target, the most frequent reason first; empty if all do."""
+    variants = ranking.ranked(cell) if names is None else names
+    why = [str(value) for value in cell["reached"].sel(variant=variants, target=target).values]
     count = Counter(reason for reason in why if reason not in ("met", CAPPED, ""))
     return ", ".join(reason for reason, _ in count.most_common())
 
@@ -95,7 +95,7 @@ def not_asked(data: xr.Dataset) -> str:
 
 
 def beside(data: xr.Dataset) -> str:
-    """What the rows without steps cost: they stand beside the ranking. Empty if there is none."""
+    """What the variants without steps cost: they stand beside the ranking. Empty if there is none."""
     ranked = ranking.ranked(data)
     said = []
     for name in (str(name) for name in data["variant"].values if name not in ranked):
@@ -110,7 +110,7 @@ def beside(data: xr.Dataset) -> str:
 
 
 def sentences(data: xr.Dataset) -> list[str]:
-    """The fastest rows, the closed form, heyoka's, the energies, plain Python, and what the times are worth."""
+    """The fastest variants, the closed form, heyoka's, the energies, plain Python, and what the times are worth."""
     wins = [won for won in ranking.winners(data).values() if won]
     said = [
         fastest(data, wins),
@@ -127,21 +127,22 @@ def sentences(data: xr.Dataset) -> list[str]:
 
 
 def fastest(data: xr.Dataset, wins: Sequence[ranking.Win]) -> str:
-    """Which rows win most of the combinations, and how many leads are sure."""
+    """Which variants win most of the combinations, and how many leads are sure."""
     if not wins:
-        return "No compiled row meets any of the errors."
+        return "No compiled variant meets any of the errors."
     (first, most), *others = Counter(won.best.integrator for won in wins).most_common()
     rest = f", followed by {abridged([f'{name} in {times}' for name, times in others], LEVEL)}" if others else ""
     alone = sum(not won.level and won.behind is None for won in wins)
     return (
-        f"{first} is the fastest row in {most} of the {len(wins)} combinations of scene, run length and error that a "
-        f"compiled row meets{rest}. In {sum(won.behind is not None and not won.level for won in wins)} the lead is "
-        f"larger than the noise{f', and in {alone} no other row meets the error' if alone else ''}." + not_asked(data)
+        f"{first} is the fastest variant in {most} of the {len(wins)} combinations of scene, run length and error "
+        f"that a compiled variant meets{rest}. In {sum(won.behind is not None and not won.level for won in wins)} the "
+        f"lead is larger than the noise{f', and in {alone} no other variant meets the error' if alone else ''}."
+        + not_asked(data)
     )
 
 
 def least_times(data: xr.Dataset) -> str:
-    """From where to where the times of the fastest rows lie at each run length, and their leads."""
+    """From where to where the times of the fastest variants lie at each run length, and their leads."""
     times: dict[int, list[float]] = {}
     leads = []
     for (_, far, _), won in ranking.winners(data).items():
@@ -151,26 +152,26 @@ def least_times(data: xr.Dataset) -> str:
     parts = [f"{seconds(min(values))} to {seconds(max(values))} {spans(data)[far]}" for far, values in times.items()]
     if not parts:
         return ""
-    said = f"The fastest row takes {joined(parts)}, by scene and error."
+    said = f"The fastest variant takes {joined(parts)}, by scene and error."
     if leads:
-        said += f" Where its lead is sure, the next row takes {min(leads):.1f} to {max(leads):.1f} times as long."
+        said += f" Where its lead is sure, the next variant takes {min(leads):.1f} to {max(leads):.1f} times as long."
     return said
 
 
 def plain_python(data: xr.Dataset) -> str:
-    """That the rows in plain Python are ranked among themselves; empty if there is none."""
+    """That the variants in plain Python are ranked among themselves; empty if there is none."""
     rows = of_implementation(data, "python")
     methods = list(dict.fromkeys(split_name(row)[0] for row in rows))
     return (
-        f"Only compiled rows are ranked. The {len(rows)} rows in plain Python, of {abridged(methods)}, are ranked "
-        "among themselves in a table of their own; compare them with the others by force evaluations."
+        f"Only compiled variants are ranked. The {len(rows)} variants in plain Python, of {abridged(methods)}, are "
+        "ranked among themselves in a table of their own; compare them with the others by force evaluations."
         if rows
         else ""
     )
 
 
 def tables(data: xr.Dataset) -> list[Table]:
-    """The fastest rows, every row's time, when to choose each, other comparisons, and what the times are worth."""
+    """The fastest variants, every variant's time, when to choose each, other comparisons, and the errors of times."""
     used = [name for name in (*ranking.NEEDS, *SHOWN) if name in data]
     cells = {
         (str(name), span): data[used].sel(scene=name).isel(horizon=far)  # of these alone: a dataset has dozens
@@ -182,18 +183,18 @@ def tables(data: xr.Dataset) -> list[Table]:
     for span in spans(data):
         here = {name: cell for (name, at), cell in cells.items() if at == span}
         rows = [[name, *_winners(cell, "compiled")] for name, cell in here.items()]
-        winners.append(Table(f"Fastest compiled row to an axis error (rad) {span}", ["scene", *header], rows))
-        chart = "in the chart that the row names, call of the compiled loop"
+        winners.append(Table(f"Fastest compiled variant to an axis error (rad) {span}", ["scene", *header], rows))
+        chart = "in the chart that the variant names, call of the compiled loop"
         everything.append(
             Table(
-                f"Time of every row to the same errors {span}, {chart}; in brackets why an error is not reached",
+                f"Time of every variant to the same errors {span}, {chart}; in brackets why an error is not reached",
                 ["scene", "variant", *header],
                 [[name, *row] for name, cell in here.items() for row in _every_time(cell)],
             )
         )
     if of_implementation(data, "python"):
         rows = [[*place, *_winners(cell, "python")] for place, cell in cells.items()]
-        title = "Fastest row in plain Python to an axis error (rad); in brackets why there is none"
+        title = "Fastest variant in plain Python to an axis error (rad); in brackets why there is none"
         everything.append(Table(title, ["scene", "horizon", *header], rows))
     return [
         *winners, energy.table(data), growth.table(data), *everything, worth.table(data),
@@ -203,7 +204,7 @@ def tables(data: xr.Dataset) -> list[Table]:
 
 
 def _winners(cell: xr.Dataset, implementation: str) -> list[str]:
-    """The fastest row of an implementation at every target, or why there is none."""
+    """The fastest variant of an implementation at every target, or why there is none."""
     rows = [row for row in of_implementation(cell, implementation) if row in ranking.ranked(cell)]
     asked, shown = ranking.targets(cell), []
     for target in TARGETS:
@@ -214,7 +215,7 @@ def _winners(cell: xr.Dataset, implementation: str) -> list[str]:
 
 
 def _every_time(cell: xr.Dataset) -> list[list[str]]:
-    """Every row of a scene and horizon: its time to each target, or why it has none."""
+    """Every variant of a scene and horizon: its time to each target, or why it has none."""
     rows, asked = ranking.ranked(cell), ranking.targets(cell)
     met = {target: {place.integrator: seconds(place.cost) for place in ranking.cheapest(cell, target)}
            for target in asked}  # fmt: skip

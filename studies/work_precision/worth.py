@@ -1,10 +1,10 @@
-"""When to choose each row, from the times of this study alone.
+"""When to choose each variant, from the times of this study alone.
 
-A problem is a scene, a horizon and a target. A row is worth choosing where it is the fastest compiled row or level with
-it (`ranking.win`) and within the `WITHIN` of it that the rounds of the timing tell apart: a row that is farther behind
-may pass for level because a round was disturbed. A row that never is has its best showing instead, the least ratio of
-its time to the fastest. What
-a row keeps of the motion beside the axis is not weighed here: that is in the claims and in the drift study.
+A problem is a scene, a horizon and a target. A variant is worth choosing where it is the fastest compiled variant or
+level with it (`ranking.win`) and within the `WITHIN` of it that the rounds of the timing tell apart: a variant that is
+farther behind may pass for level because a round was disturbed. A variant that never is has its best showing instead,
+the least ratio of its time to the fastest. What
+a variant keeps of the motion beside the axis is not weighed here: that is in the claims and in the drift study.
 """
 
 from collections import Counter
@@ -27,7 +27,7 @@ def _counted(values: list[str]) -> str:
 
 
 def choice(first: list[tuple[str, float]], ratios: np.ndarray) -> str:
-    """The sentence on a row that is first or level with the first on these scenes and targets, of so many ratios."""
+    """When to choose a variant that is first or level with the first on these problems, of so many ratios."""
     met = ratios[np.isfinite(ratios)]
     if not met.size:
         return NO_TARGET
@@ -38,7 +38,7 @@ def choice(first: list[tuple[str, float]], ratios: np.ndarray) -> str:
 
 
 def table(data: xr.Dataset) -> Table:
-    """Every compiled row: how often it wins, how far it is behind, and when to choose it."""
+    """Every compiled variant: how often it wins, how far it is behind, and when to choose it."""
     kind = data["implementation"]
     names = [row for row in ranking.ranked(data) if "compiled" in kind.sel(variant=row).values]
     wins = {problem: won for problem, won in ranking.winners(data).items() if won is not None}
@@ -60,5 +60,5 @@ def table(data: xr.Dataset) -> Table:
         shown = [f"{met.min():.2g}", f"{np.median(met):.2g}"] if met.size else ["", ""]
         said = choice([(scene, target) for scene, _, target in (*best, *level)], ratios)
         rows.append([name, str(len(best)), str(len(level)), f"{met.size} of {asked}", *shown, said])
-    title = "When to choose each compiled row, by the time to an axis error; times the fastest row's"
+    title = "When to choose each compiled variant, by the time to an axis error; times the fastest variant's"
     return Table(title, HEADER, rows)

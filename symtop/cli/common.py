@@ -4,24 +4,23 @@ import contextlib
 import errno
 import json
 import math
-import re
 import shutil
 import sys
 import tempfile
 import textwrap
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
 import click
 
 from symtop.core import files
-from symtop.core.errors import SymtopError, SymtopWarning, at_home, place, spare
+from symtop.core.errors import SymtopError, SymtopWarning, UnknownNameError, at_home, place, spare
 from symtop.core.signals import INTERRUPTED, told_apart
 
 LONGEST_NAME = 80  # characters of a file that are told
-FIGURES = (".png", ".svg", ".pdf")
+ENDINGS = {"figure": (".png", ".svg", ".pdf"), "card": (".html", ".htm"), "badge": (".svg",)}  # by option
 PLUGINS = "symtop.plugins"  # in the context of a command: plug-ins were given
 
 
@@ -44,6 +43,25 @@ class File(click.Path):
         return super().convert(str(at_home(value)) if home else value, param, ctx)
 
 
+def completing(kind: str) -> Callable[[click.Context, click.Parameter, str], list[str]]:
+    """Shell completion of the names of all scenes, integrators or studies; after a bracket, of variants, rk4[axis]."""
+    return lambda _, __, prefix: [name for name in _names(kind, prefix) if name.startswith(prefix)]
+
+
+def _names(kind: str, prefix: str) -> Iterable[str]:
+    if kind == "scenes":
+        from symtop.model.scenes import scenes
+
+        return scenes()
+    if kind == "studies":
+        from symtop.runner import scripts
+
+        return scripts.names()
+    from symtop.methods.framework import registry
+
+    return [variant.name for variant in registry.variants()] if "[" in prefix else registry.integrators()
+
+
 plugin_option = click.option(
     "--plugin", multiple=True, metavar="FILE", callback=_load_plugins, expose_value=False, is_eager=True,
     help="A Python file that registers integrators or scenes.",
@@ -58,16 +76,16 @@ results_option = click.option(
 class Group(click.Group):
     """Prints a SymtopError, or a file that cannot be used, as one sentence and exits with code 2; 130 after Ctrl-C.
 
-    Arguments are named as the options are.
+    A sentence names options in the place of arguments. A SymtopWarning is a line like those of the commands.
     """
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
         try:
-            with told_apart():
+            with told_apart(), _warnings_as_lines():
                 return super().invoke(ctx)
         except SymtopError as error:
-            warn(self._spoken(str(error), self.commands.get(ctx.invoked_subcommand or "")))
+            warn(_in_options(error, self.commands.get(ctx.invoked_subcommand or "")))
             ctx.exit(2)
         except KeyboardInterrupt:  # click's own answer is "Aborted!" and 1, which means that a case has failed
             warn("interrupted")
@@ -82,45 +100,41 @@ class Group(click.Group):
             warn(f"cannot use {name[:LONGEST_NAME]}{'...' if name[LONGEST_NAME:] else ''}: {error.strerror}")
             ctx.exit(2)
 
-    def _spoken(self, sentence: str, command: click.Command | None) -> str:
-        """A sentence about arguments as one about options, which ends with the command that lists what there is."""
-        parameters = [option for command in self.commands.values() for option in command.params]
-        options = {
-            str(option.name): max(option.opts, key=len) for option in parameters if isinstance(option, click.Option)
-        }
-        sentence = re.sub(r"(?<![\w'-])(step_size|per_nutation)(?![\w'])", lambda m: options[m[1]], sentence)
-        argued = rf"(?<![\w'-])((?:give|or|not|see) |^)({'|'.join(options)})(?= must|\)|,| = | or |$)"
-        sentence = re.sub(argued, lambda match: match[1] + options[match[2]], sentence)
-        unknown = re.match(r"(scene|integrator) '(.*)' is unknown; (did you mean )?", sentence)
-        if unknown is None:
-            return sentence
-        kind, name, near = unknown.groups()
-        if _is_of_the_other_kind(kind, name):
-            taken = {part.name for part in command.params if isinstance(part, click.Argument)} if command else set()
-            order = ", and the scene comes first" if taken >= {*OTHER} else ""
-            return f"{kind} {name!r} is unknown; it is the name of {OTHER[kind]}{order}"
-        return f"{sentence} (symtop {kind}s lists all)" if near else sentence
 
-
-OTHER = {"scene": "an integrator", "integrator": "a scene"}
-
-
-def _is_of_the_other_kind(kind: str, name: str) -> bool:
-    """Has somebody typed an integrator where a scene should stand, or a scene in place of an integrator?"""
+def _in_options(error: SymtopError, command: click.Command | None) -> str:
+    """An error's sentence with the options of a command, and what helps where a scene or an integrator is unknown."""
+    parameters = command.params if command is not None else []
+    sentence = error.renamed(
+        {str(one.name): max(one.opts, key=len) for one in parameters if isinstance(one, click.Option)}
+    )
+    if not isinstance(error, UnknownNameError) or error.parameters[0] not in ("scene", "integrator"):
+        return sentence
     from symtop.methods.framework.registry import integrators, split_name
     from symtop.model.scenes import scenes
 
-    return name in scenes() if kind == "integrator" else split_name(name)[0] in integrators()
+    (kind,), name = error.parameters, str(error.value)
+    if name in scenes() or split_name(name)[0] in integrators():
+        other = "an integrator" if kind == "scene" else "a scene"
+        both = {"scene", "integrator"} <= {one.name for one in parameters if isinstance(one, click.Argument)}
+        order = ", and the scene comes first" if both else ""
+        return f"{kind} {name!r} is unknown; it is the name of {other}{order}"
+    return f"{sentence} (symtop {kind}s lists all)"
 
 
-def tell_of_compiling() -> None:
-    """Say once, on a terminal and in its width, that kernels are being compiled."""
+@contextlib.contextmanager
+def _warnings_as_lines() -> Iterator[None]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", SymtopWarning)
+        others = warnings.showwarning
 
-    def tell() -> None:
-        files.on_cold.clear()
-        warn(files.COMPILING)
+        def show(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
+            if issubclass(category, SymtopWarning):
+                warn(str(message))
+            else:
+                others(message, category, *rest, **more)
 
-    files.on_cold[:] = [tell] if files.is_terminal(sys.stderr) else []
+        warnings.showwarning = show
+        yield
 
 
 def warn(sentence: str) -> None:
@@ -142,23 +156,6 @@ def _finite(content: Any) -> Any:
     return None if isinstance(content, float) and not math.isfinite(content) else content
 
 
-@contextlib.contextmanager
-def telling() -> Iterator[None]:
-    """What symtop warns of meanwhile is told as the commands tell it, and not as Python shows the warning."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", SymtopWarning)
-        others = warnings.showwarning
-
-        def tell(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
-            if issubclass(category, SymtopWarning):
-                warn(str(message))
-            else:
-                others(message, category, *rest, **more)
-
-        warnings.showwarning = tell
-        yield
-
-
 def say(sentence: str) -> None:
     """Print a sentence to the standard output."""
     click.echo(fitted(sentence, sys.stdout))
@@ -175,45 +172,33 @@ def fitted(text: str, stream: TextIO | None) -> str:
     )
 
 
-def figure_file(option: str, file: str | None) -> None:
-    """Refuse the name of a figure that has no known ending, or no folder to stand in."""
-    ending_in(option, file, FIGURES)
-    standing(option, file)
+def check_outputs(**files: str | None) -> None:
+    """Refuse, before a run, what cannot be written; `files` by the names of their options.
 
-
-def ending_in(option: str, file: str | None, endings: Sequence[str]) -> None:
-    """Refuse the name of a file that does not say what is written into it."""
-    if file is not None and Path(file).suffix.lower() not in endings:
-        raise SymtopError(f"{option} must be a file that ends in {' or '.join(endings)}, not {file!r}")
-
-
-def apart(**files: str | None) -> None:
-    """Refuse two outputs of one command, by their options' names, that are the same file: one would replace another."""
-    seen = dict[Path, str]()
-    for option, file in files.items():
-        other = option if file is None else seen.setdefault(Path(file).resolve(), option)
-        if other != option:
-            raise SymtopError(f"--{other} and --{option} must be two files, not both {file!r}")
-
-
-def standing(option: str, file: str | None) -> None:
-    """Refuse a folder, and a file whose folder is not there or not to be written to.
-
-    A result should have a place before a run.
+    An ending says what a file is, its folder is there, what it replaces is an earlier result, and no two are the same.
     """
-    if file is None:
-        return
-    if not (file and Path(file).absolute().parent.is_dir()):
-        raise SymtopError(f"{option} must be a file in a folder that is there, not {file!r}")
-    if place(option, file).is_dir():
-        raise SymtopError(f"{option} must be a file, not the folder {file!r}")
-    if option == "--output":
-        spare(Path(file))
-    try:
-        with tempfile.TemporaryFile(dir=place(option, file).absolute().parent):
-            pass
-    except OSError as error:
-        raise SymtopError(f"cannot write {file}: {error.strerror or error}") from error
+    options = dict[Path, str]()
+    for name, file in files.items():
+        if file is None:
+            continue
+        option, endings = f"--{name}", ENDINGS.get(name, ())
+        if endings and Path(file).suffix.lower() not in endings:
+            raise SymtopError(f"{option} must be a file that ends in {' or '.join(endings)}, not {file!r}")
+        if not (file and Path(file).absolute().parent.is_dir()):
+            raise SymtopError(f"{option} must be a file in a folder that is there, not {file!r}")
+        path = place(option, file).absolute()
+        if path.is_dir():
+            raise SymtopError(f"{option} must be a file, not the folder {file!r}")
+        if name == "output":
+            spare(path)
+        try:
+            with tempfile.TemporaryFile(dir=path.parent):
+                pass
+        except OSError as error:
+            raise SymtopError(f"cannot write {file}: {error.strerror or error}") from error
+        other = options.setdefault(path.resolve(), option)
+        if other != option:
+            raise SymtopError(f"{other} and {option} must be two files, not both {file!r}")
 
 
 def terminal_width() -> int:

@@ -2,8 +2,13 @@
 
 Each finding is healthy or says what to do. The self-check takes some seconds: published values of this problem, the
 closed form against heyoka's Taylor series, and one compiled method against the closed form.
+
+With ``--warm`` every kernel is compiled first, so that no run waits for the compiler later. A kernel is compiled when a
+run needs it that the cache does not hold: every method is run for two steps in each of its charts, alone and in an
+ensemble of two tops, beside the truth and its errors, in a process a core.
 """
 
+import concurrent.futures
 import importlib.metadata
 import importlib.util
 import math
@@ -15,11 +20,13 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import numpy as np
-from tqdm import tqdm
+import click
 
+from symtop.cli.common import as_text, json_option, results_option
+from symtop.core.errors import words_of
+from symtop.core.files import DAY, by_last_use, cache_root, size_of
 from symtop.core.progress import beating
 
 LEAST_SPACE = 500_000_000  # free bytes below which a full run of the studies may not fit on the disk
@@ -44,13 +51,15 @@ def examine(results: Path) -> list[Finding]:
         _python, _packages, _heyoka, _caches, lambda: _results(results), _tools, _self_check,
     ]  # fmt: skip
     findings = []
+    from tqdm import tqdm
+
     with beating(tqdm(total=len(checks), desc="checking", unit="check", disable=None, leave=False)) as bar:
         for check in checks:
             try:
                 findings += check()
             except Exception as error:  # noqa: BLE001  (one check that fails must not hide the others)
                 topic = check.__name__.strip("_").replace("_", " ")
-                findings.append(Finding(topic, _sentence(error), False, "report this with all of this page"))
+                findings.append(Finding(topic, words_of(error), False, "report this with all of this page"))
             bar.update()
     return findings
 
@@ -61,10 +70,6 @@ def page(findings: list[Finding]) -> str:
     lines = [f"{'ok ' if f.healthy else 'BAD'}  {f.topic.ljust(width)}  {f.result}" for f in findings]
     advice = [f"{finding.topic}: {finding.advice}" for finding in findings if not finding.healthy]
     return "\n".join([*lines, "", *(advice or ["No faults were found."])])
-
-
-def _sentence(error: Exception) -> str:
-    return " ".join(f"{type(error).__name__}: {error}".split())
 
 
 def _python() -> list[Finding]:
@@ -114,15 +119,13 @@ def _heyoka() -> list[Finding]:
             result, healthy = f"{-math.log10(epsilon):.1f} digits", precision != "longdouble" or epsilon < 1e-16
             advice = "long double is double on this machine: use precision='quad' where it matters"
         except Exception as error:  # noqa: BLE001
-            result, healthy = _sentence(error), False
+            result, healthy = words_of(error), False
             advice = f"this build of heyoka has no {precision}; the truth study leaves it out"
         findings.append(Finding(f"heyoka {precision}", result, healthy, advice))
     return findings
 
 
 def _caches() -> list[Finding]:
-    from symtop.core.files import DAY, by_last_use, cache_root, size_of
-
     root, yesterday = cache_root(), time.time() - DAY
     findings = [_writable("cache", root, "set SYMTOP_CACHE to a folder that can be written")]
     for name, kind, remedy in (("kernels", "kernel", "compiled again"), ("reference", "file", "computed again")):
@@ -165,6 +168,8 @@ def _tools() -> list[Finding]:
 
 def _self_check() -> list[Finding]:
     """Published values, and three ways to compute one motion, against each other."""
+    import numpy as np
+
     from symtop.measure.published import published_values
     from symtop.run.simulation import simulate
 
@@ -191,3 +196,110 @@ def _bytes(size: float) -> str:
             return f"{size:.0f} {unit}"
         size /= 1000.0
     return f"{size:.1f} GB"
+
+
+SCENE = "goldstein"
+PERIODS = 0.02  # of a nutation: the length of a run that compiles
+
+
+def _truth(_: str) -> None:
+    from symtop.core.lazy_kernel import LAZY
+    from symtop.model.scenes import scene
+    from symtop.run.reference.truth import reference
+    from symtop.run.simulation import simulate
+
+    for kernel in LAZY:
+        kernel.compile()
+    period = scene(SCENE).nutation_period
+    run = simulate(SCENE, "strang", step_size=period / 100.0, horizon=period, samples=3)
+    reference(SCENE, run["time"].values)
+
+
+def _alone(name: str) -> None:
+    from symtop.run.simulation import simulate
+
+    simulate(SCENE, name, **_two_steps(name))
+
+
+def _together(name: str) -> None:
+    from symtop.run.ensemble.ensemble import ensemble
+
+    ensemble([SCENE] * 2, name, **_two_steps(name), threads=1, quiet=True)
+
+
+def _two_steps(name: str) -> dict[str, Any]:
+    """The settings of two steps of a variant, or so."""
+    from symtop.methods.framework.registry import integrator
+    from symtop.model.scenes import scene
+
+    variant, span = integrator(name), PERIODS * scene(SCENE).nutation_period
+    (chart,) = variant.charts()
+    setting = variant.setting(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance))
+    observe = "attitude" if chart == "angles" else chart
+    return {**setting.kwargs(), "horizon": span, "samples": 2, "observe": observe}
+
+
+_RUNS: dict[str, Callable[[str], None]] = {"truth": _truth, "alone": _alone, "together": _together}
+
+
+def _run(task: tuple[str, str]) -> str:
+    """Do one of the runs; returns why it could not be done, or nothing."""
+    kind, name = task
+    try:
+        _RUNS[kind](name)
+    except Exception as error:  # noqa: BLE001  (one that fails must not keep the others from being compiled)
+        return f"{name or kind}: {words_of(error)}"
+    return ""
+
+
+def tasks() -> list[tuple[str, str]]:
+    """Every run that compiles something: what it is, and the variant ``method[chart]``."""
+    from symtop.methods.framework.registry import integrators
+
+    compiled = [method for method in integrators().values() if method.implementation in {"compiled", "heyoka"}]
+    names = [f"{method.name}[{chart}]" for method in compiled for chart in method.charts()]
+    return [("truth", ""), *(("alone", name) for name in names), *(("together", name) for name in names)]
+
+
+def kernels() -> int:
+    """How many kernels are kept on disk."""
+    return sum(1 for _ in (cache_root() / "kernels").glob("*"))
+
+
+def compile_all(jobs: int | None = None) -> tuple[int, list[str]]:
+    """Compile what is not on disk; returns how many kernels came to the cache, and which runs could not be done."""
+    from tqdm import tqdm
+
+    from symtop.core.parallel import context, cores
+
+    before, todo = kernels(), tasks()
+    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), context()) as pool:
+        reasons = []
+        with beating(tqdm(desc="compiling", total=len(todo), unit="run", disable=None, leave=False)) as bar:
+            for reason in pool.map(_run, todo):
+                reasons.append(reason)
+                bar.update()
+    return kernels() - before, list(filter(None, reasons))
+
+
+@click.command(short_help="Check the installation; say what to do about faults.")
+@results_option
+@click.option("--warm", is_flag=True, help="First compile every kernel, so that no later run waits for the compiler.")
+@json_option
+def doctor(results: str, warm: bool, as_json: bool) -> None:
+    """Check packages, caches, folders and a few computed numbers, and say what to do about each fault.
+
+    The exit code is 1 if there is a fault. It takes some seconds; with --warm, some minutes the first time.
+    """
+    if warm:
+        count, failed = compile_all()
+        click.echo(f"kernels compiled: {count}; every method was run in each of its charts", err=as_json)
+        for why in failed:
+            click.echo(f"  not run: {why}", err=True)
+    findings = examine(Path(results))
+    if as_json:
+        click.echo(as_text([finding._asdict() for finding in findings]))
+    else:
+        click.echo(page(findings))
+    if not all(finding.healthy for finding in findings):
+        sys.exit(1)

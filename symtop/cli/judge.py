@@ -1,15 +1,13 @@
-"""``symtop judge``: anybody's integrator against what it claims."""
+"""``symtop claims`` and ``symtop judge``: what an integrator claims, measured; one of symtop's or anybody's."""
 
 import sys
 
 import click
 
-from symtop.cli.common import File, apart, as_text, ending_in, json_option, plugin_option, standing, terminal_width
-from symtop.cli.completion import completing
+from symtop.cli.common import File, as_text, check_outputs, completing, json_option, plugin_option, say, terminal_width
+from symtop.core.progress import ticking
 
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
-
-PAGES, BADGES = (".html", ".htm"), (".svg",)
 
 
 @click.command(short_help="Judge an integrator of your own.")
@@ -66,11 +64,7 @@ def judge(
         if shown:
             click.echo(shown)
 
-    ending_in("--card", card, PAGES)
-    ending_in("--badge", badge, BADGES)
-    for option, file in (("--output", output), ("--card", card), ("--badge", badge)):
-        standing(option, file)
-    apart(output=output, card=card, badge=badge)
+    check_outputs(output=output, card=card, badge=badge)
     width = terminal_width()
     ledger = judged(
         target, form=form, chart=chart, scene=scene, order=order, symplectic=symplectic, symmetric=symmetric,
@@ -93,4 +87,42 @@ def judge(
             if file is not None:
                 click.echo(f"written to {write(ledger, file)}", err=as_json)
     if ledger.refuted:
+        sys.exit(1)
+
+
+@click.command(short_help="Measure what integrators claim about themselves.")
+@click.argument("names", nargs=-1, metavar="[INTEGRATOR]...", shell_complete=completing("integrators"))
+@click.option("--scene", default="spheroid", show_default=True, help="The scene to judge on.")
+@click.option("--quick", is_flag=True, help="Shorter runs, one chart.")
+@plugin_option
+@json_option
+def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> None:
+    """Measure every claim of each INTEGRATOR: order, symplecticity, symmetry, conserved quantities, cost.
+
+    The exit code is 1 if a claim is refuted. Without a name: the integrators of the plug-in, or all.
+
+    \b
+    symtop claims midpoint rk4
+    symtop claims --plugin my_methods.py
+    """
+    with ticking("loading"):
+        from symtop.judging.battery import judge as measured
+        from symtop.methods.framework import registry
+        from symtop.model import scenes
+
+        chosen = scenes.scene(scene)
+        added = [name for name in registry.integrators() if not registry.is_built_in(name)]
+    refuted, entries = False, []
+    for name in names or added or registry.integrators():
+        with ticking(f"measuring {name}"):
+            ledger = measured(registry.integrator(name), chosen, quick=quick)
+        refuted |= any(finding.verdict == "refuted" for finding in ledger.findings)
+        if as_json:
+            about = {"integrator": ledger.integrator, "scene": chosen.name}
+            entries += [{**about, **finding.plain()} for finding in ledger.findings]
+        else:
+            say("\n".join(ledger.sentences()))
+    if as_json:
+        click.echo(as_text(entries))
+    if refuted:
         sys.exit(1)

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from symtop.cli.common import as_text, facts, json_option, plugin_option, table, terminal_width
-from symtop.cli.completion import completing
+from symtop.cli.common import as_text, completing, facts, json_option, plugin_option, table, terminal_width
 from symtop.core.errors import SymtopError
 from symtop.report import tables
 

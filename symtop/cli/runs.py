@@ -1,15 +1,24 @@
-"""``symtop run``, ``long`` and ``claims``: one integrator on one scene, compared with the truth."""
+"""``symtop run``, ``long``, ``ensemble`` and ``explore``: one integrator on a scene or on many tops."""
 
 import math
 import sys
+from collections import Counter
 
 import click
 
-from symtop.cli.common import File, apart, as_text, figure_file, json_option, plugin_option, say, standing, table, warn
-from symtop.cli.completion import completing
-from symtop.core.errors import SymtopError
+from symtop.cli.common import File, as_text, check_outputs, completing, json_option, plugin_option, say, table, warn
+from symtop.core.errors import SymtopError, whole
+from symtop.core.progress import ticking
 
 SAME = 0.01  # a step that differs by more from the one asked for is told
+COMPARED = 100_000  # tops whose errors are shown, the first of the population: those of a million take 1 GB
+
+OUTCOME = {"ok": "reached the horizon"}  # which says nothing yet of their errors
+EXECUTION = {
+    "lanes": "32 tops at a time in vector registers (lanes)",
+    "compiled, one after another": "one top after another in compiled code",
+    "one call of Python for each": "one top after another, each by a call of Python",
+}
 
 
 @click.command(short_help="Run one integrator on one scene; show its errors.")
@@ -40,11 +49,7 @@ def run(
     symtop run spheroid "rk4[axis]" --step-size 0.01
     symtop run goldstein rk45 --tolerance 1e-9 --horizon 200 --output run.nc --figure run.png
     """
-    from symtop.core.progress import ticking
-
-    figure_file("--figure", figure)
-    standing("--output", output)
-    apart(output=output, figure=figure)
+    check_outputs(output=output, figure=figure)
     with ticking("running"):  # the packages are loaded under the clock, too
         from symtop.core import netcdf
         from symtop.measure.errors import QUANTITIES, errors_against
@@ -78,14 +83,13 @@ def run(
         findings = {**{name: data.attrs[name] for name in names}, "judgement": verdict._asdict(), "errors": largest}
         click.echo(as_text(findings))
     else:
-        told = data.attrs
-        method = told["integrator"]
-        row = method if method.endswith("]") else f"{method}[{told['chart']}]"
-        say(f"{row} on {chosen.name}: {told['outcome_message']}")
-        made = told["step_size"]
-        other = step_size is not None and abs(made / step_size - 1.0) > SAME
-        of = f" of {made:.6g}, for a whole number of them fills the horizon" if other else ""
-        say(f"{told['steps']} steps{of}, {told['force_evaluations']} force evaluations")
+        facts, method = data.attrs, data.attrs["integrator"]
+        variant = method if method.endswith("]") else f"{method}[{facts['chart']}]"
+        say(f"{variant} on {chosen.name}: {facts['outcome_message']}")
+        used = facts["step_size"]
+        other = step_size is not None and abs(used / step_size - 1.0) > SAME
+        of = f" of {used:.6g}, for a whole number of them fills the horizon" if other else ""
+        say(f"{facts['steps']} steps{of}, {facts['force_evaluations']} force evaluations")
         if data.attrs["outcome"] == "ok":
             say(f"judged against the truth: {verdict.words()}")
         for name, values in largest.items():
@@ -116,13 +120,8 @@ def long(
     \b
     symtop long spheroid stormer-verlet --steps 1e9 --output long.nc
     """
-    from symtop.core.progress import ticking
-
-    apart(output=output, checkpoint=checkpoint)
-    standing("--output", output)
-    standing("--checkpoint", checkpoint)
+    check_outputs(output=output, checkpoint=checkpoint)
     with ticking("loading"):
-        from symtop.core.errors import whole
         from symtop.model import scenes
         from symtop.run.long_run import PER_NUTATION, long_run
 
@@ -154,41 +153,106 @@ def long(
         sys.exit(3)
 
 
-@click.command(short_help="Measure what integrators claim about themselves.")
-@click.argument("names", nargs=-1, metavar="[INTEGRATOR]...", shell_complete=completing("integrators"))
-@click.option("--scene", default="spheroid", show_default=True, help="The scene to judge on.")
-@click.option("--quick", is_flag=True, help="Shorter runs, one chart.")
+@click.command(short_help="Run one integrator on many random tops.")
+@click.argument("integrator", shell_complete=completing("integrators"))
+@click.option("--members", type=int, default=1000, show_default=True, help="Number of tops.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the population.")
+@click.option("--kind", default="all", show_default=True, help="A stratum of the population, or all.")
+@click.option("--step-size", type=float, help="Step of a fixed-step method.")
+@click.option("--per-nutation", type=float, help="In place of a step: steps in a nutation period of each top.")
+@click.option("--tolerance", type=float, help="Tolerance of an adaptive method.")
+@click.option("--horizon", type=float, help="Time to run to.")
+@click.option("--nutations", type=float, help="In place of a horizon: nutation periods of each top.")
+@click.option("--samples", type=int, default=101, show_default=True, help="Number of samples of each top.")
+@click.option("--observe", help="nutation, axis or attitude; the axis by default.")
+@click.option("--variables", metavar="NAMES", help="What is kept over time, with commas; all by default.")
+@click.option("--budget", type=float, help="Most steps of a top, or force evaluations of an adaptive method.")
+@click.option("--threads", type=int, help="Threads; one a core by default.")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on this dask cluster.")
+@click.option("--output", "-o", type=File(), help="Stream the runs to this netCDF file.")
+@click.option("--figure", type=File(), help="Draw quantiles of the errors over time: .png, .svg or .pdf.")
 @plugin_option
 @json_option
-def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> None:
-    """Measure every claim of each INTEGRATOR: order, symplecticity, symmetry, conserved quantities, cost.
+def ensemble(
+    integrator: str, members: int, seed: int, kind: str, step_size: float | None, per_nutation: float | None,
+    tolerance: float | None, horizon: float | None, nutations: float | None, samples: int, observe: str | None,
+    variables: str | None, budget: float | None, threads: int | None, scheduler: str | None, output: str | None,
+    figure: str | None, as_json: bool,
+) -> None:  # fmt: skip
+    """Run one INTEGRATOR on tops of a random population and compare each with the exact motion.
 
-    The exit code is 1 if a claim is refuted. Without a name: the integrators of the plug-in, or all.
+    Each top has the bits of ``symtop run`` alone. With an output, tops are written as they are computed, and the same
+    command resumes a run that was interrupted. A top that fails fails alone; the exit code is 3 if all have failed.
 
     \b
-    symtop claims midpoint rk4
-    symtop claims --plugin my_methods.py
+    symtop ensemble --members 10000 --seed 1 strang --step-size 0.01 --horizon 20 -o runs.nc
+    symtop ensemble --kind grazing "gauss-4[axis]" --per-nutation 50 --nutations 10 --figure spread.png
     """
-    from symtop.core.progress import ticking
+    check_outputs(output=output, figure=figure)
+    whole("members", members, 1)  # which is n in Python
+    names = None if variables is None else [name.strip() for name in variables.split(",")]
+    with ticking("drawing tops"):
+        from symtop.measure.spread import LEVELS, QUANTITIES, largest, member_errors, spread
+        from symtop.run.ensemble import ensemble as runs
+        from symtop.run.ensemble.population import population
 
-    with ticking("loading"):
-        from symtop.judging.claims import judge
-        from symtop.methods.framework import registry
-        from symtop.model import scenes
+        tops = population(members, seed=seed, kind=kind)
+    compared = [name for name in QUANTITIES if names is None or name in names]
+    if figure is not None and not compared:
+        raise SymtopError("--figure needs axis or energy among --variables, whose errors it shows")
+    try:
+        data = runs.ensemble(
+            tops, integrator, step_size=step_size, per_nutation=per_nutation, tolerance=tolerance, horizon=horizon,
+            nutations=nutations, samples=samples, observe=observe, variables=names, budget=budget, path=output,
+            threads=threads, scheduler=scheduler,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        warn("interrupted" + ("" if output is None else "; the tops that were run are kept: the same command resumes"))
+        sys.exit(130)
+    few, shown = (part.isel(member=slice(0, COMPARED)) for part in (tops, data))
+    outcomes, steps = Counter(data["outcome"].values.tolist()), int(data["steps"].sum())
+    with ticking("comparing with the exact motion"):
+        if figure is not None:
+            from symtop.report import ensemble as picture
 
-        chosen = scenes.scene(scene)
-        added = [name for name in registry.integrators() if not registry.is_built_in(name)]
-    refuted, entries = False, []
-    for name in names or added or registry.integrators():
-        with ticking(f"measuring {name}"):
-            ledger = judge(registry.integrator(name), chosen, quick=quick)
-        refuted |= any(finding.verdict == "refuted" for finding in ledger.findings)
-        if as_json:
-            about = {"integrator": ledger.integrator, "scene": chosen.name}
-            entries += [{**about, **finding.plain()} for finding in ledger.findings]
-        else:
-            say("\n".join(ledger.sentences()))
+            picture.draw(few, shown, figure)
+        worst = {name: spread(largest(member_errors(few, shown, name))[:, None])[:, 0].tolist() for name in compared}
+    data.close()
     if as_json:
-        click.echo(as_text(entries))
-    if refuted:
-        sys.exit(1)
+        errors = {
+            name: {f"{level:g}": error for level, error in zip(LEVELS, worst[name], strict=True)} for name in worst
+        }
+        click.echo(as_text({"outcomes": outcomes, "steps": steps, "largest_errors": errors}))
+    else:
+        counts = ", ".join(f"{count} {OUTCOME.get(name, name)}" for name, count in outcomes.items())
+        execution = data.attrs["execution"]
+        say(f"{data.attrs['title']}: {counts}\n{steps} steps, computed {EXECUTION.get(execution, execution)}")
+        heading = [f"largest error, {few.sizes['member']} tops", *(f"{100.0 * level:g} %" for level in LEVELS)]
+        if worst:
+            click.echo(table(heading, [[QUANTITIES[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
+        for file in (output, figure):
+            if file is not None:
+                click.echo(f"written to {file}")
+    if "ok" not in outcomes:
+        sys.exit(3)
+
+
+@click.command(short_help="Open the explorer: one run in a browser, with sliders.")
+@click.option("--port", type=int, default=0, help="Port to listen on; a free one by default.")
+@click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
+@plugin_option
+def explore(port: int, no_browser: bool) -> None:
+    """Show one run beside the exact motion in a browser, with sliders for the top, the start and the step."""
+    import webbrowser
+
+    from symtop.core.signals import TerminatedError, ending_on_sigterm
+    from symtop.explore.server import address, serve
+
+    with ending_on_sigterm(), serve(port) as server:
+        click.echo(f"symtop explore: {address(server)} (Ctrl-C ends it)")
+        if not no_browser:
+            webbrowser.open(address(server))
+        try:
+            server.serve_forever()
+        except (KeyboardInterrupt, TerminatedError):
+            click.echo("")

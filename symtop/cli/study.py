@@ -1,30 +1,129 @@
-"""The command ``symtop study``: run several studies, show their status, or check them; ends with an exit code."""
+"""``symtop study``: run studies, show the state of their cases, or compute some again and compare."""
 
+import sys
+import textwrap
+import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from symtop.cli import study_messages
-from symtop.cli.common import as_text, warn
-from symtop.core.errors import SymtopError
+from symtop.cli.common import (
+    PLUGINS,
+    as_text,
+    completing,
+    json_option,
+    plugin_option,
+    results_option,
+    terminal_width,
+    warn,
+)  # fmt: skip
+from symtop.core.errors import SymtopError, positive
 from symtop.core.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
-from symtop.methods.framework.registry import integrator
-from symtop.runner import check, run, scripts, settled, status, store
-from symtop.runner.pools import Workers
-from symtop.runner.study import Study, StudyError
+from symtop.report.sentences import counted
+
+if TYPE_CHECKING:
+    from symtop.runner.pools import Workers
+    from symtop.runner.study import Study
 
 MOST_NAMED = 8  # integrators and scenes in a line of the status
+MOST_SENTENCES = 3  # of the findings of a study that has run
+Row = dict[str, Any]  # of the status: one case
 
 
-def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick: bool = False) -> list[Study]:
+@click.command(short_help="Run studies: datasets, figures and findings.")
+@click.argument("names", nargs=-1, shell_complete=completing("studies"))
+@click.option("--all", "every", is_flag=True, help="Run every study.")
+@click.option(
+    "--quick", is_flag=True, help="Coarse grids, a few seconds a study, into the folder quick of the results."
+)
+@click.option("--full", is_flag=True, help="The longest grid, for the studies that have one.")
+@click.option("--fresh", is_flag=True, help="Compute every case again; with --check, compare every case.")
+@click.option("--status", is_flag=True, help="Print the state of every case; compute nothing.")
+@click.option("--why", is_flag=True, help="With --status: what has changed, one line for all cases with that reason.")
+@click.option("--check", is_flag=True, help="Compute some stored cases again, in another folder, and compare.")
+@click.option("--only", metavar="METHOD,...", help="Cases of these methods alone, into the folder only of the results.")
+@click.option("--jobs", type=click.IntRange(1), help="Processes that compute cases; one a core by default.")
+@click.option("--scheduler", metavar="ADDRESS", help="Compute cases that are not timed on this dask cluster.")
+@click.option("--limit", type=float, metavar="SECONDS", help="Longest time of one case; an hour by default.")
+@results_option
+@json_option
+@plugin_option
+def study(
+    names: tuple[str, ...], every: bool, quick: bool, full: bool, fresh: bool, status: bool, why: bool, check: bool,
+    only: str | None, jobs: int | None, scheduler: str | None, limit: float | None, results: str, as_json: bool,
+) -> None:  # fmt: skip
+    """Run studies by NAME: datasets, figures and findings into the results folder.
+
+    NAME is the name of a study, or the path of a script of your own. Cases that are stored and up to date are not
+    computed again. A case that fails is recorded and the others are computed (exit code 1). A run that is interrupted
+    (exit code 130) or terminated (143) loses only the cases it was computing, and the same command resumes it. Two
+    runs may share a folder.
+
+    \b
+    symtop study convergence drift
+    symtop study --all --quick
+    symtop study convergence --quick --only my-rk --plugin my_methods.py
+    symtop study --all --status --why
+    symtop study convergence --scheduler tcp://10.0.0.1:8786
+    """
+    if why and not status:
+        raise SymtopError("--why must be given together with --status")
+    if quick and full:
+        raise SymtopError("--quick and --full must not be given together")
+    if names and every:
+        raise SymtopError(f"name studies or use --all, not both: {' '.join(names)} --all")
+    if status and (check or fresh):
+        other = "--check" if check else "--fresh"
+        raise SymtopError(f"--status and {other} must not be given together: --status computes nothing")
+    if limit is not None:
+        positive("limit", limit)
+    chosen = only.split(",") if only is not None else []
+    folder = Path(results, *filter(None, ("quick" * quick, "only" * bool(chosen))))
+    grid = {"quick": quick, "full": full}
+    whole = every and not (only or status or check or click.get_current_context().meta.get(PLUGINS))
+    if whole and not fresh and not scheduler and _nothing_to_do(folder, as_json, grid):
+        return
+    studies = choose(names, every=every, only=chosen, quick=quick)
+    if status:
+        sys.exit(show_status(studies, folder, why, as_json, grid))
+    from symtop.runner.pools import Workers
+
+    try:
+        with ending_on_sigterm(), Workers(jobs, scheduler) as workers:
+            if check:
+                code = check_all(workers, studies, folder, as_json, grid, everything=fresh)
+            else:
+                code = run_all(workers, studies, folder, as_json, grid, fresh=fresh, limit=limit, whole=whole)
+    except (KeyboardInterrupt, TerminatedError) as stop:
+        word, code = ("interrupted", INTERRUPTED) if isinstance(stop, KeyboardInterrupt) else ("terminated", TERMINATED)
+        warn(f"{word}; what was computed is kept, and the same command goes on from there")
+    sys.exit(code)
+
+
+def _nothing_to_do(results: Path, as_json: bool, grid: dict[str, bool]) -> bool:
+    """Is every study up to date? Then its findings are printed."""
+    from symtop.runner import settled
+
+    began = time.monotonic()
+    known = settled.findings(results, settled.grid_of(**grid))
+    if known is None:
+        return False
+    took = {"computed": 0, "seconds": time.monotonic() - began}
+    _end([_summary(findings | took, results, as_json) for findings in known], results, as_json)
+    return True
+
+
+def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick: bool = False) -> "list[Study]":
     """The studies of those names, each once, or all of them; of some integrators alone if `only` names them.
 
-    Of several studies those that have no case of these integrators are told of and left out.
+    Of several studies those that have no case of these integrators are left out, with a warning.
     """
-    _agree(names, every=every)
+    from symtop.methods.framework.registry import integrator
+    from symtop.runner import scripts
+
     chosen = scripts.names() if every else list(dict.fromkeys(names))
     if not chosen:
         raise SymtopError(f"name a study or use --all; known: {', '.join(scripts.names())}")
@@ -33,155 +132,153 @@ def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick
     studies = [scripts.load(name) for name in chosen]
     if not only:
         return studies
-    narrowed = [study.only(only) for study in studies]
-    without = dict[str, SymtopError]()
-    for study in narrowed:
+    kept, reasons = [], []
+    for narrowed in (one.only(only) for one in studies):
         try:
-            study.grid(quick=quick)
+            narrowed.grid(quick=quick)
+            kept.append(narrowed)
         except SymtopError as error:
-            without[study.name] = error
-    if len(without) == len(narrowed):
-        raise next(iter(without.values()))
-    for reason in without.values():
+            reasons.append(error)
+    if not kept:
+        raise reasons[0]
+    for reason in reasons:
         warn(f"{reason}; it is left out")
-    return [study for study in narrowed if study.name not in without]
-
-
-def _agree(names: Sequence[str], *, every: bool) -> None:
-    """Refuse options of which one would be ignored without a word."""
-    if names and every:
-        raise SymtopError(f"name studies or use --all, not both: {' '.join(names)} --all")
-    context = click.get_current_context(silent=True)
-    given = {} if context is None else context.params
-    for other in ("check", "fresh"):
-        if given.get("status") and given.get(other):
-            raise SymtopError(f"--status and --{other} must not be given together: --status computes nothing")
-
-
-def conduct(task: Callable[[Workers], int], jobs: int | None, scheduler: str | None) -> int:
-    """Do a task with workers; returns the exit code."""
-    try:
-        with ending_on_sigterm(), Workers(jobs, scheduler) as workers:
-            return task(workers)
-    except StudyError as error:  # said here: the names in it are no options of the command
-        warn(str(error))
-        return 2
-    except (KeyboardInterrupt, TerminatedError) as stop:
-        word, code = ("interrupted", INTERRUPTED) if isinstance(stop, KeyboardInterrupt) else ("terminated", TERMINATED)
-        warn(f"{word}; what was computed is kept, and the same command goes on from there")
-        return code
+    return kept
 
 
 def run_all(
-    workers: Workers, studies: list[Study], results: Path, fresh: bool, limit: float | None, as_json: bool,
-    whole: bool = False, **grid: bool,
+    workers: "Workers", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], *, fresh: bool,
+    limit: float | None, whole: bool,
 ) -> int:  # fmt: skip
     """Bring studies up to date, each concluded while the next one is computed; 1 if cases failed."""
     from symtop.report import style
+    from symtop.runner import settled
 
     made = settled.made_by(settled.grid_of(**grid)) if whole else ""  # before an edit of the code may change it
-    save = style.sketch if grid.get("quick") else style.publish  # quick figures are to look at, not to print
+    save = style.sketch if grid["quick"] else style.publish  # quick figures are to look at, not to print
     options = {"fresh": fresh, "limit": limit, "save": save, "beside": len(studies) > 1, **grid}
     ended = _in_order(workers, studies, results, options)
-    summaries = [study_messages.study(findings, results, as_json=as_json) for findings in ended]
+    summaries = [_summary(findings, results, as_json) for findings in ended]
     failed = any(summary["failures"] for summary in summaries)
     if whole and not failed:
         settled.note(results.resolve(), [study.name for study in studies], made)
-    study_messages.end(summaries, results, as_json=as_json)
+    _end(summaries, results, as_json)
     return 1 if failed else 0
 
 
 def _in_order(
-    workers: Workers, studies: list[Study], results: Path, options: dict[str, Any]
+    workers: "Workers", studies: "list[Study]", results: Path, options: dict[str, Any]
 ) -> Iterator[dict[str, Any]]:
     """The findings of studies in their order, while later ones are computed; then what stopped one, if any."""
-    begun: deque[tuple[Study, run.Begun]] = deque()
+    from symtop.runner import run, store
+    from symtop.runner.study import StudyError
+
+    waiting: deque[tuple[Any, Any]] = deque()  # studies, and what waits for their findings
     refused: list[SymtopError] = []
+
+    def findings() -> Iterator[dict[str, Any]]:
+        """Those of the first that waits; a study that has none, as one that compares methods, stops no other."""
+        try:
+            yield waiting[0][1]()
+        except StudyError as error:
+            refused.append(error)
+        waiting.popleft()
+
     try:
         for study in studies:
             try:
-                begun.append((study, run.begin(study, results, workers, **options)))
+                waiting.append((study, run.begin(study, results, workers, **options)))
             except SymtopError as error:
                 refused.append(error)
                 break
-            while len(begun) > 1 and begun[0][1].ready():
-                yield from _findings(begun[0][1], refused)
-                begun.popleft()
+            while len(waiting) > 1 and waiting[0][1].ready():
+                yield from findings()
         workers.finish()
-        while begun:
-            yield from _findings(begun[0][1], refused)
-            begun.popleft()
+        while waiting:
+            yield from findings()
     except BaseException:
         workers.close()
-        for study, _ in begun:
+        for study, _ in waiting:
             store.tidy(results.resolve(), study)
         raise
     if refused:
         raise refused[0]
 
 
-def _findings(ended: run.Begun, refused: list[SymtopError]) -> Iterator[dict[str, Any]]:
-    """The findings of a study; if it has none, as one that compares methods and was given one, the next ones go on."""
-    try:
-        findings = ended()
-    except StudyError as error:
-        refused.append(error)
-    else:
-        yield findings
+def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str, Any]:
+    """The summary of a study's findings, which are printed but for JSON: its first sentences, and where the rest is."""
+    verdict, name = findings["verdict"], findings["study"]
+    if not isinstance(verdict, list) or not all(isinstance(sentence, str) for sentence in verdict):
+        from symtop.runner.study import sentences  # xarray: half a second
+
+        sentences(name, lambda: verdict)  # refuses what older versions have stored
+    summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "verdict")}
+    summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
+    if not as_json:
+        drawn = counted(summary["figures"], "figure")
+        click.echo("{study}: {computed} of {cases} cases computed, {drawn}".format(drawn=drawn, **summary))
+        for sentence in verdict[:MOST_SENTENCES]:
+            click.echo(_indented(sentence, "  - "))
+        left = len(verdict) - MOST_SENTENCES
+        more = f", {counted(left, 'more finding')} in {name}.json" if left > 0 else ""
+        pictures = f"figures {results / 'figures' / name}-*{more}" if findings["pictures"] else more.lstrip(", ")
+        for line in filter(None, (f"dataset {results / name}.nc", pictures)):
+            click.echo(_indented(line, "  "))
+    for failure in findings["failures"]:
+        click.echo(f"  {failure}", err=True)
+    return summary
 
 
-def show_status(studies: list[Study], results: Path, why: bool, as_json: bool, **grid: bool) -> int:
-    """Show the state of every case, and with `why` the reason; 1 if some have failed."""
-    try:
-        states = {study.name: status.status(study, results, why=why, **grid) for study in studies}
-    except StudyError as error:
-        warn(str(error))
-        return 2
+def _end(summaries: Sequence[dict[str, Any]], results: Path, as_json: bool) -> None:
+    """Print what to do next, or all summaries as JSON."""
+    if as_json:
+        click.echo(as_text(summaries))
+    elif summaries:
+        click.echo(f"next: symtop report --results {results}, one page of all findings")
+
+
+def _indented(line: str, first: str) -> str:
+    """A line in as many as fit the terminal."""
+    return textwrap.fill(
+        line, terminal_width(), initial_indent=first, subsequent_indent="    ", break_on_hyphens=False,
+        break_long_words=False,
+    )  # fmt: skip
+
+
+def show_status(studies: "list[Study]", results: Path, why: bool, as_json: bool, grid: dict[str, bool]) -> int:
+    """Print the state of every case, and with `why` the reason; 1 if some have failed."""
+    from symtop.runner import status
+
+    states = {study.name: status.status(study, results, why=why, **grid) for study in studies}
     if as_json:
         click.echo(as_text(states))
     for name, rows in {} if as_json else states.items():
         counts = Counter(row["state"] for row in rows)
         click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in status.STATES if counts[state]))
-        open_rows = [row for row in rows if row["state"] != status.DONE]
-        for line in _grouped(open_rows) if why else _counted(open_rows):
-            click.echo(study_messages.indented(line, "  "))
+        groups: dict[str, list[Row]] = {}  # cases that share a line
+        for row in rows:
+            if row["state"] != status.DONE:
+                reasons = filter(None, (row["state"], row["message"] or ", ".join(row.get("why", []))))
+                groups.setdefault(": ".join(reasons), []).append(row)
+        for reason, group in groups.items():
+            count = f"{len(group)} " if why else ""
+            where = f"{_names(group, 'integrator')} on {_names(group, 'scene')}"
+            click.echo(_indented(f"{count}{reason}: {where}", "  "))
     return 1 if any(row["state"] == status.FAILED for rows in states.values() for row in rows) else 0
 
 
-def _counted(rows: list[dict[str, Any]]) -> list[str]:
-    """A line for each case that failed, and one for the stale and one for the missing ones of all scenes."""
-    failed = [row for row in rows if row["state"] == status.FAILED]
-    others = [[row for row in rows if row["state"] == state] for state in (status.STALE, status.MISSING)]
-    return [
-        *(f"failed: {row['integrator']} on {row['scene']}: {row['message']}" for row in failed),
-        *(
-            f"{group[0]['state']}: {_names(group, 'integrator')} on {_names(group, 'scene')}"
-            for group in others if group
-        ),
-    ]  # fmt: skip
-
-
-def _grouped(rows: list[dict[str, Any]]) -> list[str]:
-    """A line for all cases that share a state and its reasons."""
-    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
-    for row in rows:
-        groups.setdefault((row["state"], row["message"] or ", ".join(row["why"])), []).append(row)
-    return [
-        f"{len(group)} {state}: {reason}: {_names(group, 'integrator')} on {_names(group, 'scene')}"
-        for (state, reason), group in groups.items()
-    ]
-
-
-def _names(rows: list[dict[str, Any]], key: str) -> str:
+def _names(rows: list[Row], key: str) -> str:
     names = list(dict.fromkeys(row[key] for row in rows))
     more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
     return ", ".join(names[:MOST_NAMED]) + more
 
 
 def check_all(
-    workers: Workers, studies: list[Study], results: Path, everything: bool, as_json: bool, **grid: bool
+    workers: "Workers", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], *, everything: bool
 ) -> int:
     """Compute stored cases again and compare; 1 if anything is different."""
+    from symtop.runner import check
+
     checks = [check.check(study, results, workers, everything=everything, **grid) for study in studies]
     if not any(entry.stored for entry in checks):
         names = ", ".join(study.name for study in studies)

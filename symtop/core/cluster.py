@@ -23,7 +23,7 @@ def check_sent(address: object, work: object, name: str) -> None:
     """Refuse an address that is no text, and work of a method, `name`, that cannot be sent to other processes."""
     if not isinstance(address, str) or not address:
         must = "the address of a dask scheduler, such as 'tcp://host:8786'"
-        raise SymtopError(f"scheduler must be {must}, not {shown(address)}")
+        raise SymtopError(f"scheduler must be {must}, not {shown(address)}", "scheduler")
     try:
         from distributed.protocol import pickle
     except ImportError:
@@ -60,7 +60,7 @@ def connect(address: str) -> Any:
         client = None
         gc.collect()  # a client that never connected closes itself here, and not under a lock of the next one
         must = "the address of a dask scheduler that answers and has workers"
-        raise SymtopError(f"scheduler must be {must}, not {address!r} ({failure})")
+        raise SymtopError(f"scheduler must be {must}, not {address!r} ({failure})", "scheduler")
     return client
 
 

@@ -9,7 +9,7 @@ import difflib
 import math
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import TracebackType
 
@@ -23,12 +23,29 @@ MAGIC = (b"\x89HDF", b"CDF")  # the first bytes of netCDF files
 class SymtopError(ValueError):
     """An argument that symtop cannot use.
 
-    The message is one sentence that names the argument, the value it had and what is allowed.
-    The command line prints it without a traceback and exits with code 2.
+    The message is one sentence that names the argument, the value it had and what is allowed. `parameters` are the
+    names of arguments in the sentence, in whose places the command line writes its options.
+    The command line prints the sentence without a traceback and exits with code 2.
     """
 
-    def __init__(self, sentence: object = "") -> None:
+    def __init__(self, sentence: object = "", *parameters: str) -> None:
         super().__init__(" ".join(str(sentence).split()))  # some values print in many lines
+        self.parameters = parameters
+
+    def renamed(self, names: Mapping[str, str]) -> str:
+        """The sentence with other names for its parameters, those that `names` has."""
+        sentence = str(self)
+        for name in self.parameters:
+            sentence = sentence.replace(name, names.get(name, name), 1)
+        return sentence
+
+
+class UnknownNameError(SymtopError):
+    """A name, `value`, that is none of those that are known."""
+
+    def __init__(self, sentence: object = "", *parameters: str, value: object = None) -> None:
+        super().__init__(sentence, *parameters)
+        self.value = value
 
 
 class SymtopWarning(UserWarning):
@@ -47,13 +64,13 @@ def finite(name: str, value: object) -> float:
     """Return `value` as a float; refuse anything that is not one finite real number."""
     # float() would read a number in them
     if isinstance(value, (bool, str, bytes, bytearray)) or type(value).__name__ == "MaskedConstant":
-        raise SymtopError(f"{name} must be a finite number, not {shown(value)}")
+        raise SymtopError(f"{name} must be a finite number, not {shown(value)}", name)
     try:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
-        raise SymtopError(f"{name} must be a finite number, not {shown(value)}") from None
+        raise SymtopError(f"{name} must be a finite number, not {shown(value)}", name) from None
     if not math.isfinite(number):
-        raise SymtopError(f"{name} must be a finite number, not {number!r}")
+        raise SymtopError(f"{name} must be a finite number, not {number!r}", name)
     return number
 
 
@@ -61,7 +78,7 @@ def not_negative(name: str, value: object) -> float:
     """A finite number that is at least zero."""
     number = finite(name, value)
     if number < 0.0:
-        raise SymtopError(f"{name} must be at least 0, not {number!r}")
+        raise SymtopError(f"{name} must be at least 0, not {number!r}", name)
     return number
 
 
@@ -69,7 +86,7 @@ def positive(name: str, value: object) -> float:
     """Return `value` as a float; refuse anything that is not finite and above zero."""
     number = finite(name, value)
     if number <= 0.0:
-        raise SymtopError(f"{name} must be above zero, not {number!r}")
+        raise SymtopError(f"{name} must be above zero, not {number!r}", name)
     return number
 
 
@@ -77,9 +94,9 @@ def whole(name: str, value: object, least: int, most: float = math.inf) -> int:
     """Return `value` as an int; refuse anything that is not a whole number from `least` to `most`."""
     number = finite(name, value)
     if number != int(number) or number < least:
-        raise SymtopError(f"{name} must be a whole number of at least {least}, not {shown(value)}")
+        raise SymtopError(f"{name} must be a whole number of at least {least}, not {shown(value)}", name)
     if number > most:
-        raise SymtopError(f"{name} must be at most {most:g}, not {shown(value)}")
+        raise SymtopError(f"{name} must be at most {most:g}, not {shown(value)}", name)
     return int(number)
 
 
@@ -87,7 +104,7 @@ def truth(name: str, value: object) -> bool:
     """Return `value` if it is True or False, also NumPy's."""
     if type(value).__name__ in ("bool", "bool_"):
         return bool(value)
-    raise SymtopError(f"{name} must be True or False, not {shown(value)}")
+    raise SymtopError(f"{name} must be True or False, not {shown(value)}", name)
 
 
 def place(name: str, value: object) -> Path:
@@ -100,7 +117,7 @@ def place(name: str, value: object) -> Path:
             and all(len(part.encode(errors="replace")) <= LONGEST_PART for part in path.parts)
         ):
             return path
-    raise SymtopError(f"{name} must be the name of a file, not {shown(value)[:SHOWN]}")
+    raise SymtopError(f"{name} must be the name of a file, not {shown(value)[:SHOWN]}", name)
 
 
 def spare(path: Path) -> None:
@@ -133,7 +150,7 @@ def row(name: str, values: object) -> list[float]:
     except TypeError:  # nothing to go through, such as an array without dimensions
         entries = None
     if entries is None:
-        raise SymtopError(f"{name} must be a row of numbers, not {shown(values)}")
+        raise SymtopError(f"{name} must be a row of numbers, not {shown(values)}", name)
     return [finite(f"an entry of {name}", value) for value in entries]
 
 
@@ -141,7 +158,9 @@ def label(name: str, value: object) -> str:
     """Return `value` if it can name a scene or an integrator in a file, a table and a command."""
     if isinstance(value, str) and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}", value):
         return value
-    raise SymtopError(f"{name} must be 1 to 64 letters, digits or ._+- (a letter or digit first), not {shown(value)}")
+    raise SymtopError(
+        f"{name} must be 1 to 64 letters, digits or ._+- (a letter or digit first), not {shown(value)}", name
+    )
 
 
 def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
@@ -153,7 +172,7 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     hint = (
         f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known[:12])}{' ...' * (len(known) > 12)}"
     )
-    raise SymtopError(f"{name} {shown(value)} is unknown; {hint}")
+    raise UnknownNameError(f"{name} {shown(value)} is unknown; {hint}", name, value=value)
 
 
 LONGEST = 300  # characters of a stranger's words

@@ -9,15 +9,15 @@ from types import ModuleType
 from symtop.core.errors import SymtopError, at_home
 
 
-def python_file(path: str | Path, wanted: str) -> Path:
-    """A file by its path; SymtopError with the sentence `wanted` if it is not there."""
+def python_file(path: str | Path, name: str, wanted: str) -> Path:
+    """A file by its path; SymtopError that argument `name` must be what is `wanted` if it is not there."""
     try:
         file = at_home(path).resolve()
         if file.is_file():
             return file
     except (OSError, ValueError):  # a name that is too long, or holds a null character
         pass
-    raise SymtopError(f"{wanted}, not {str(path)!r}")
+    raise SymtopError(f"{name} must be {wanted}, not {str(path)!r}", name)
 
 
 class _Reader(SourceFileLoader):

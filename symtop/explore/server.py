@@ -191,7 +191,7 @@ def serve(port: int = 0) -> ThreadingHTTPServer:
     try:
         return Server(("127.0.0.1", port), Handler)
     except (OSError, OverflowError) as error:
-        raise SymtopError(f"port must be a free one between 0 and 65535, not {port!r}: {error}") from error
+        raise SymtopError(f"port must be a free one between 0 and 65535, not {port!r}: {error}", "port") from error
 
 
 def address(server: ThreadingHTTPServer) -> str:

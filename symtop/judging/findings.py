@@ -14,10 +14,6 @@ import xarray as xr
 
 from symtop.core.errors import SymtopError, shown
 
-CLAIMS = (
-    "order", "symplectic", "symmetric", "energy", "p_phi", "p_psi", "axis_length", "reported", "invariant", "explicit",
-    "work", "pole",
-)  # fmt: skip
 VERDICTS = ("confirmed", "refuted", "measured", "undecided", "inapplicable")
 LONGEST = 240  # characters of somebody else's error message
 
@@ -27,12 +23,34 @@ def spoken(claim: str) -> str:
     return claim if claim.startswith("p_") else claim.replace("_", " ")
 
 
+class Measured(NamedTuple):
+    """A measured value: a word (yes, drift, wrong limit), and a number with its 95 % interval and unit."""
+
+    kind: str = ""
+    number: float = math.nan
+    interval: float = math.nan
+    unit: str = ""
+    text: str = ""  # of the whole, where it is not "kind, number"
+
+    def __str__(self) -> str:
+        if self.text or math.isnan(self.number):
+            return self.text or self.kind
+        return f"{self.kind}, {self.number:.0e}".replace("0e+00", "0")
+
+    def __bool__(self) -> bool:
+        """Was anything measured?"""
+        return bool(str(self))
+
+
+NOTHING = Measured()
+
+
 class Finding(NamedTuple):
     """One cell of the ledger."""
 
     claim: str
     declared: str
-    measured: str
+    measured: Measured
     verdict: str
     why: str  # a clause that completes "CLAIM is VERDICT: ..."
     value: float = math.nan  # the number that the verdict rests on
@@ -45,9 +63,10 @@ class Finding(NamedTuple):
 
     def plain(self) -> dict[str, str | float | None]:
         """The finding as JSON can hold it: no number is null."""
+        values = self._asdict() | {"measured": str(self.measured)}
         return {
             name: None if isinstance(value, float) and not math.isfinite(value) else value
-            for name, value in self._asdict().items()
+            for name, value in values.items()
         }
 
 
@@ -68,7 +87,12 @@ def agreement(*, declared: bool | None, measured: bool | None) -> str:
 def undecided(claim: str, declared: str, why: str) -> Finding:
     """A claim that could not be judged; somebody else's long message is cut."""
     short = why if len(why) <= LONGEST else why[:LONGEST].rsplit(" ", 1)[0] + " ..."
-    return Finding(claim, declared, "", "undecided", short.rstrip("."))
+    return Finding(claim, declared, NOTHING, "undecided", short.rstrip("."))
+
+
+def inapplicable(claim: str, why: str, declared: str = "") -> Finding:
+    """A claim that cannot be asked, and why."""
+    return Finding(claim, declared, NOTHING, "inapplicable", why)
 
 
 @dataclass(frozen=True)
@@ -101,20 +125,18 @@ class Ledger:
 
     def dataset(self) -> xr.Dataset:
         """Dimensions ``claim``, ``setting`` (of the order), ``width`` (of the differencing), ``window`` (in time)."""
-        columns = {
-            name: ("claim", [getattr(finding, name) for finding in self.findings])
-            for name in ("declared", "measured", "verdict", "why", "value", "resolution")
-        }
+        columns = {name: ("claim", [getattr(one, name) for one in self.findings]) for name in Finding._fields[1:]}
+        columns["measured"] = ("claim", [str(one.measured) for one in self.findings])
         axes = {"step_size": "setting", "error": "setting", "fitted": "setting"}
         axes |= {"long_nutations": "window", "energy_change": "window"}
         traces = {
             name: ((axes.get(name, "width"),) if row.ndim else (), row.astype(float))
             for name, row in self.traces.items()
         }
-        return xr.Dataset({**columns, **traces}, coords={"claim": [finding.claim for finding in self.findings]})
+        return xr.Dataset({**columns, **traces}, coords={"claim": list(self)})
 
 
 def read(data: xr.Dataset) -> list[Finding]:
     """The findings of one integrator out of a dataset of the claims study."""
-    columns = ("claim", "declared", "measured", "verdict", "why", "value", "resolution")
-    return [Finding(*row) for row in zip(*(data[name].values.tolist() for name in columns), strict=True)]
+    rows = zip(*(data[name].values.tolist() for name in Finding._fields), strict=True)
+    return [Finding(*row)._replace(measured=Measured(text=row[2])) for row in rows]

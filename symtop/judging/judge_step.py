@@ -8,21 +8,20 @@ from typing import Any
 import xarray as xr
 
 from symtop.core.errors import SymtopError, one_of
-from symtop.judging import text_report, trajectory
-from symtop.judging.battery import Request, claimed
+from symtop.judging import sandbox, text_report, trajectory
+from symtop.judging.claims.subject import Request
 from symtop.judging.findings import Finding, Ledger
-from symtop.judging.sandbox import About, judged
-from symtop.judging.trajectory import is_trajectory
+from symtop.judging.sandbox import About
 from symtop.methods.framework.registry import ENERGY_ERRORS
 from symtop.model.charts import CHARTS
 from symtop.model.scenes import Scene, scene as find_scene
 
-Told = Callable[[About | Finding], object]
+Listener = Callable[[About | Finding], object]
 
 
 @dataclass(frozen=True)
-class Judged(Ledger):
-    """The findings on a step that came through a socket; shown as the screen of the command."""
+class StepLedger(Ledger):
+    """The findings on a step that came through an adapter; shown as the report of the command."""
 
     about: About
     implied: frozenset[str] = frozenset()  # claims that follow from those that were made
@@ -39,8 +38,8 @@ def judge(
     target: Any, *, form: str | None = None, chart: str = "axis", scene: "str | Scene" = "spheroid",
     order: int | None = None, symplectic: bool | None = None, symmetric: bool | None = None,
     explicit: bool | None = None, conserves: Collection[str] | None = None, energy: str | None = None,
-    adaptive: bool = False, quick: bool = False, tell: Told | None = None,
-) -> Judged:  # fmt: skip
+    adaptive: bool = False, quick: bool = False, tell: Listener | None = None,
+) -> StepLedger:  # fmt: skip
     """Judge anything that steps: its order, structure, invariants and drift on the top, beside what is claimed of it.
 
     `target` is one of (`form` says which where it does not show)
@@ -64,26 +63,26 @@ def judge(
     process of its own: one that hangs or crashes costs a verdict and says so. `quick` takes ten seconds at most.
     `tell` is handed what is judged and then each finding, as they are made.
 
-    Returns a `Judged`: ``ledger["order"]`` is a finding, ``print(ledger)`` shows all of them, ``ledger.dataset()`` is
-    the same as a Dataset, ``ledger.refuted`` names the claims that are false. Raises SymtopError for a target that
-    cannot be loaded and claims that make no sense.
+    Returns a `StepLedger`: ``ledger["order"]`` is a finding, ``print(ledger)`` shows all of them,
+    ``ledger.dataset()`` is the same as a Dataset, ``ledger.refuted`` names the claims that are false. Raises
+    SymtopError for a target that cannot be loaded and claims that make no sense.
     """
     one_of("chart", chart, CHARTS)
     if energy not in ENERGY_ERRORS:
-        raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {energy!r}")
+        raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {energy!r}", "energy")
     claims = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
     request = Request(
         target, form, chart, adaptive, find_scene(scene), quick,
         claims | {"conserves": conserves, "energy_error": energy},
     )  # fmt: skip
-    made = claimed(request)  # claims that make no sense are refused before anything is loaded
-    if form is None and is_trajectory(target):
+    made = request.claimed()  # claims that make no sense are refused before anything is loaded
+    if form is None and trajectory.is_trajectory(target):
         others = {order, symplectic, symmetric, explicit}
         return _states(target, request.scene, made.conserves or frozenset(), energy, tell, others)
     findings: list[Finding] = []
     traces: dict[str, Any] = {}
     about = None
-    for event in judged(request):
+    for event in sandbox.run(request):
         if isinstance(event, About):
             about = event
         else:
@@ -95,12 +94,12 @@ def judge(
     if about is None:
         raise SymtopError("it cannot be judged: its process ended before it was open")
     implied = {"time"} | ({"energy"} if energy is None and "energy" not in (conserves or ()) else set())
-    return Judged(about.name, request.scene.name, tuple(findings), traces, about, frozenset(implied))
+    return StepLedger(about.name, request.scene.name, tuple(findings), traces, about, frozenset(implied))
 
 
 def _states(
-    target: Any, scene: Scene, conserves: Collection[str], energy: str | None, tell: Told | None, others: set[Any]
-) -> Judged:
+    target: Any, scene: Scene, conserves: Collection[str], energy: str | None, tell: Listener | None, others: set[Any]
+) -> StepLedger:
     """The findings on a trajectory."""
     if others != {None}:
         raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
@@ -111,4 +110,4 @@ def _states(
         tell(about)
         for one in shown:
             tell(one)
-    return Judged(name, scene.name, tuple(shown), {}, about)
+    return StepLedger(name, scene.name, tuple(shown), {}, about)

@@ -1,4 +1,4 @@
-"""The screen of a judged step: a line a claim, the reasons that matter, and what the method is in one sentence."""
+"""The report of a judged step: a line a claim, the reasons that matter, and what the method is in one sentence."""
 
 import math
 import textwrap
@@ -28,7 +28,7 @@ def line(finding: Finding, width: int = WIDTH) -> str:
     """A finding in one line, and its reason below where it is no plain number; empty if nobody asked what cannot be."""
     if finding.verdict == "inapplicable" and not finding.declared:
         return ""
-    cells = (spoken(finding.claim), finding.declared or "-", finding.measured or "-", finding.verdict)
+    cells = (spoken(finding.claim), finding.declared or "-", str(finding.measured) or "-", finding.verdict)
     columns = "".join(_cut(cell, size) for cell, size in zip(cells, COLUMNS.values(), strict=True))
     shown = columns + _number(finding)
     if finding.verdict in ("confirmed", "measured") and ";" not in (finding.why if finding.claim == "calls" else ""):
@@ -54,9 +54,9 @@ def described(findings: Sequence[Finding]) -> str:
     by_claim = {one.claim: one for one in findings}
     words = [_order(by_claim)]
     for claim, yes in (("symplectic", "symplectic"), ("symmetric", "reversible")):
-        answer = by_claim[claim].measured.partition(",")[0] if claim in by_claim else ""
+        answer = by_claim[claim].measured.kind if claim in by_claim else ""
         words += [yes] if answer == "yes" else [f"not {yes}"] if answer == "no" else []
-    kinds = {name: by_claim[name].measured.partition(",")[0] for name in KEPT if name in by_claim}
+    kinds = {name: by_claim[name].measured.kind for name in KEPT if name in by_claim}
     kept = [KEPT[name] for name, kind in kinds.items() if kind == "kept"]
     lost = [KEPT[name] for name, kind in kinds.items() if kind in ("drift", "growing", "random walk")]
     bounded = [KEPT[name] for name, kind in kinds.items() if kind == "bounded"]
@@ -73,10 +73,9 @@ def _order(by_claim: Mapping[str, Finding]) -> str:
     one = by_claim.get("order")
     if one is None or not one.measured:
         return ""
-    first = one.measured.split(" ", 1)[0]
-    if one.measured.startswith("wrong limit"):
+    if one.measured.kind == "wrong limit":
         return "converges to another motion"
-    number = float(first)
+    number = one.measured.number
     return f"order {round(number)}" if abs(number - round(number)) < 0.3 else f"order {number:.1f}"
 
 

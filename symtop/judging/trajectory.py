@@ -25,13 +25,13 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home
-from symtop.judging.claims_long import KEPT, Constant
-from symtop.judging.findings import Finding, undecided
+from symtop.judging.claims.long_run import KEPT, Constant
+from symtop.judging.findings import NOTHING, Finding, Measured, undecided
 from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import errors
 from symtop.measure.trajectory import completed, refuse_other_scene, sampled
+from symtop.model.charts import space_energy
 from symtop.model.scenes import Scene
-from symtop.model.view import space_energy
 
 FILES = (".csv", ".txt", ".dat", ".nc")
 VECTORS = {"axis": ("ex", "ey", "ez"), "quaternion": ("qw", "qx", "qy", "qz"), "momentum": ("Lx", "Ly", "Lz")}
@@ -148,8 +148,9 @@ def _error(name: str, time: np.ndarray, apart: xr.Dataset) -> Finding:
     why = f"largest error {largest:.1e} rad in {time.size} samples up to t = {time[-1]:.4g}"
     if seen is not None and math.isfinite(seen.exponent):
         why += f", growing as t^{seen.exponent:.2f} +- {seen.exponent_interval:.2f} ({seen.law})"
-    law = f", {seen.law}" if seen is not None and seen.law not in ("undecided", "not judged") else ""
-    return Finding(f"{name}_error", "", f"{largest:.0e} rad{law}", "measured", why, largest, bound)
+    law = seen.law if seen is not None and seen.law not in ("undecided", "not judged") else ""
+    measured = Measured(law, largest, unit="rad", text=f"{largest:.0e} rad{law and ', '}{law}")
+    return Finding(f"{name}_error", "", measured, "measured", why, largest, bound)
 
 
 def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, scene: Scene) -> Finding:
@@ -161,14 +162,15 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     largest, off = seen.changed.largest, abs(values[0] - true) / scale
     why = f"largest relative change {largest:.1e} in {time.size} samples; it begins {off:.1e} from the scene's"
     kind = seen.kind if time.size >= FEWEST else "kept" if largest <= seen.floor else "unknown"
+    measured, verdict = Measured(kind, largest), "undecided"
     if kind == "unknown":
-        return Finding(name, declared, "", "undecided", f"{why}; no law of growth to judge it by", largest, seen.floor)
-    if kind != "kept":
-        why += f", growth exponent {seen.changed.exponent:.2f} +- {seen.changed.exponent_interval:.2f}"
-    holds = {"kept": kind == "kept" or largest <= seen.floor, "bounded": not seen.grows}.get(declared)
-    if declared == "bounded" and seen.grows is None:
-        return Finding(
-            name, declared, "", "undecided", f"{why}, which leaves open whether it grows", largest, seen.floor
-        )
-    verdict = "measured" if holds is None else "confirmed" if holds else "refuted"
-    return Finding(name, declared, f"{kind}, {largest:.0e}", verdict, why, largest, seen.floor)
+        measured, why = NOTHING, f"{why}; no law of growth to judge it by"
+    else:
+        if kind != "kept":
+            why += f", growth exponent {seen.changed.exponent:.2f} +- {seen.changed.exponent_interval:.2f}"
+        holds = {"kept": kind == "kept" or largest <= seen.floor, "bounded": not seen.grows}.get(declared)
+        if declared == "bounded" and seen.grows is None:
+            measured, why = NOTHING, f"{why}, which leaves open whether it grows"
+        else:
+            verdict = "measured" if holds is None else "confirmed" if holds else "refuted"
+    return Finding(name, declared, measured, verdict, why, largest, seen.floor)

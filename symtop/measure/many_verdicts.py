@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT, DRIFTING, FEWEST, GROWING, NO_GAP, WRONG_REGIME, barriers
 from symtop.methods.framework.plan import NOT_FINITE
-from symtop.model import effective
-from symtop.model.exact import motion_samples
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model import top
+from symtop.model.exact import samples
+from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.scenes import Scene
 from symtop.model.top import flat
 
@@ -93,7 +93,7 @@ def judge_runs(
 def _kernel() -> Any:  # noqa: C901  (one loop, read in one piece)
     from symtop.core.jit import compile_kernel, register_jitable  # numba
 
-    true_axis, potential = register_jitable(motion_samples._axis), register_jitable(effective.effective_potential)
+    true_axis, potential = register_jitable(samples._axis), register_jitable(top.effective_potential)
 
     @register_jitable
     def axis_of(state):  # type: ignore[no-untyped-def]

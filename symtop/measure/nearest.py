@@ -1,10 +1,10 @@
-"""How rows, methods in one chart, served the random tops that are nearest to a scene, from a stored population study.
+"""How variants, methods in one chart, served the random tops nearest to a scene, from a stored population study.
 
     regime     four numbers without units that fix the motion of the axis: cos(theta) at both turning points, and asinh
                of p_psi and p_phi over sqrt(I1 |mgl|). A top with mgl < 0 moves as one with -mgl whose axis is named the
                other way round: cos(theta) and p_psi change sign, p_phi does not
     distance   Euclid's, to a top or to its mirror image, in which both momenta change sign
-    served     the seconds of a row, alone, are at most `WITHIN` times the least of all rows on the same top
+    served     the seconds of a variant, alone, are at most `WITHIN` times the least of all variants on the same top
 
 The dataset is that of `studies/population`. Of its costs, which are 60 MB for 10,000 tops, the part of one horizon, one
 quantity and one target is read.
@@ -29,16 +29,16 @@ SHOWN_AS = {"theta": "axis"}  # quantities that the study has under another name
 
 
 class Near(NamedTuple):
-    """How many of the nearest tops each row served, at one target of a quantity over one horizon."""
+    """How many of the nearest tops each variant served, at one target of a quantity over one horizon."""
 
-    served: dict[str, int]  # by row; the most first, then the cheapest in the median
+    served: dict[str, int]  # by variant; the most first, then the cheapest in the median
     tops: int
     quantity: str
     target: float
     nutations: float
 
     def words(self, row: str) -> str:
-        """What the nearest tops say of a row."""
+        """What the nearest tops say of a variant."""
         return (
             f"{row} was the cheapest or within {WITHIN:g} times the cheapest on {self.served[row]} of the {self.tops} "
             f"nearest random tops ({self.quantity} {self.target:.0e} over {self.nutations:g} nutations)."
@@ -63,7 +63,7 @@ def distances(regimes: np.ndarray, numbers: np.ndarray) -> np.ndarray:
 
 
 def nearest(file: Path, scene: Scene, quantity: str, accuracy: float, horizon: float) -> Near | None:
-    """The rows that served the tops nearest to a scene; None where the study is not stored or has no answer.
+    """The variants that served the tops nearest to a scene; None where the study is not stored or has no answer.
 
     The target and the horizon of the study are those nearest to `accuracy` and to `horizon` in logarithms. Raises
     SymtopError for a file that is damaged or of an older version.

@@ -1,13 +1,13 @@
-"""Which row, a method in one chart, is the fastest at an accuracy, and whether its lead is more than noise.
+"""Which variant, a method in one chart, is the fastest at an accuracy, and whether its lead is more than noise.
 
-The cost of a target is that of a row's cheapest timed run that meets it: the smallest of its samples, because noise
-only adds. A lead is sure if it would be found again. The last `MOST_ROUNDS` rounds that both rows took part in are
+The cost of a target is that of a variant's cheapest timed run that meets it: the smallest of its samples, because noise
+only adds. A lead is sure if it would be found again. The last `MOST_ROUNDS` rounds that both variants took part in are
 dealt to two halves, and in each half the ratio of the smallest samples is at least a margin (`margin`), which comes
-from the noise of the scene's own times. Each row has met its smallest sample again (`timing.met_again`). And if a time
-misses its forecast by more than `MISSED`, the forecast leads too. Otherwise the two are level, unless they are `FAR`
-apart: every sample of the one is that many times every sample of the other, whatever rounds they were taken in.
+from the noise of the scene's own times. Each variant has met its smallest sample again (`timing.met_again`). And if a
+time misses its forecast by more than `MISSED`, the forecast leads too. Otherwise the two are level, unless they are
+`FAR` apart: every sample of the one is that many times every sample of the other, whatever rounds they were taken in.
 
-Only rows that take steps are ranked. The closed form is what errors are measured by, and its cost is that of its
+Only variants that take steps are ranked. The closed form is what errors are measured by, and its cost is that of its
 constants, whatever the horizon: it stands beside the rankings. A target that is wider than the nutation is not asked.
 """
 
@@ -27,13 +27,13 @@ FAR = 3.0  # no spell of a machine that is shared by seven processes made a time
 
 
 class Place(NamedTuple):
-    """A row's cheapest run that meets a target."""
+    """A variant's cheapest run that meets a target."""
 
     cost: float  # seconds
     integrator: str
     setting: int
     samples: np.ndarray  # seconds, one a round; NaN for a round without it
-    forecast: float  # seconds, from the row's other runs; NaN if there are too few
+    forecast: float  # seconds, from the variant's other runs; NaN if there are too few
 
     @property
     def doubtful(self) -> bool:
@@ -49,7 +49,7 @@ class Lead(NamedTuple):
 
 
 class Win(NamedTuple):
-    """The fastest row at one target, the rows that are level with it, and the lead over the first behind them."""
+    """The fastest variant at one target, those that are level with it, and the lead over the first behind them."""
 
     best: Place
     level: tuple[str, ...]
@@ -58,7 +58,7 @@ class Win(NamedTuple):
 
 
 def ranked(data: xr.Dataset) -> list[str]:
-    """The rows that take steps."""
+    """The variants that take steps."""
     names = data["variant"].values
     control = data["control"].transpose("variant", ...).values.reshape(len(names), -1)
     return [
@@ -75,7 +75,7 @@ def targets(cell: xr.Dataset) -> list[float]:
 
 
 def cheapest(cell: xr.Dataset, target: float, quantity: str = "axis", implementation: str | None = None) -> list[Place]:
-    """The cheapest timed run of each ranked row that meets a target, cheapest first.
+    """The cheapest timed run of each ranked variant that meets a target, cheapest first.
 
     `cell` is one scene and one horizon of the study's dataset.
     """
@@ -98,9 +98,9 @@ def cheapest(cell: xr.Dataset, target: float, quantity: str = "axis", implementa
 def margin(cell: xr.Dataset) -> float:
     """The ratio of two times of one scene and horizon from which on it is more than noise.
 
-    Nine of ten times lie closer to what the other times of their row foretell than some distance; both times of a ratio
-    may be off by it. On a quiet machine it is 0.02 to 0.12. With seven busy processes on two cores it is 0.1 to 1.4,
-    and there a fixed margin of 1.1 called 2 of 7 winners that did not win again.
+    Nine of ten times lie closer to what the other times of their variant foretell than some distance; both times of a
+    ratio may be off by it. On a quiet machine it is 0.02 to 0.12. With seven busy processes on two cores it is 0.1 to
+    1.4, and there a fixed margin of 1.1 called 2 of 7 winners that did not win again.
     """
     miss = np.abs(cell["seconds"].values / cell["seconds_forecast"].values - 1.0)
     miss = miss[np.isfinite(miss)]
@@ -128,7 +128,7 @@ def lead(first: Place, second: Place, least: float = MARGIN) -> Lead:
 
 
 def win(cell: xr.Dataset, target: float, implementation: str = "compiled") -> Win | None:
-    """The fastest compiled (or plain Python) row at a target, or None if none met it."""
+    """The fastest compiled (or plain Python) variant at a target, or None if none met it."""
     places = cheapest(cell, target, implementation=implementation)
     if not places:
         return None
@@ -153,9 +153,9 @@ def winners(data: xr.Dataset) -> dict[tuple[str, int, float], Win | None]:
 
 
 def relative_costs(data: xr.Dataset, among: list[str]) -> xr.DataArray:
-    """Seconds of every ranked row's cheapest run to each target, over the least that any row of `among` needs.
+    """Seconds of every ranked variant's cheapest run to each target, over the least that any variant of `among` needs.
 
-    Dimensions target, integrator, problem; a problem is a scene with a horizon. Infinite where a row does not meet the
+    Dimensions target, variant, problem; a problem is a scene with a horizon. Infinite where a variant does not meet the
     target, or none of `among` does; NaN where the target is not asked.
     """
     names, data = ranked(data), data[["axis", *NEEDS]]
@@ -176,9 +176,9 @@ def relative_costs(data: xr.Dataset, among: list[str]) -> xr.DataArray:
 
 
 def leaders(ratios: xr.DataArray, count: int) -> list[str]:
-    """The rows that meet the targets on the most problems, and of these first those that come closest to the best.
+    """The variants that meet the targets on the most problems, and of these first those that come closest to the best.
 
-    How close a row comes is the mean of 1/ratio over problems and targets.
+    How close a variant comes is the mean of 1/ratio over problems and targets.
     """
     met = np.isfinite(ratios.transpose("variant", ...).values).reshape(ratios.sizes["variant"], -1).sum(axis=1)
     merit = (1.0 / ratios).mean(("target", "problem")).values

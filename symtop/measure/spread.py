@@ -12,8 +12,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError, one_of
-from symtop.model import charts, scales
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model import charts, scenes
+from symtop.model.exact.closed_form import ClosedForms
 from symtop.run.ensemble.inputs import read_members
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ def _errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array:
             truth = ClosedForms(numbers).axis(np.where(asked, times, 0.0))
             errors = charts.axis_distance(values, truth)
         else:
-            unit = scales.energy_scale(numbers, ClosedForms(numbers).theta_range)
+            unit = scenes.energy_scales(numbers, ClosedForms(numbers).theta_range)
             errors = np.abs(values - values[:, :1]) / unit[:, None]
     known = np.isfinite(truth).all(axis=2) if quantity == "axis" else True
     return np.where(asked & known, np.where(np.isfinite(errors), errors, np.inf), np.nan)

@@ -6,19 +6,33 @@ follows from a formula, the formula stands beside it.
 
 import functools
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from symtop.core.code_hash import by_name
 from symtop.core.errors import SymtopError, finite, label, one_of, positive, shown
 from symtop.core.numbers import EPSILON, TINY
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.charts import Array
+from symtop.model.top import BISECTIONS, Angles, SymmetricTop, effective_force, effective_potential, effective_stiffness
 
 if TYPE_CHECKING:
     from symtop.model.exact.closed_form import ClosedForm
 
 OBSERVABLES = ("nutation", "axis", "attitude")
 UNITS = ("", "SI")
+TAGS = {  # by which studies choose; a scene without any is in every study
+    "ordinary": "an ordinary nutation, such as spheroid and goldstein show",
+    "mild": "nutates less than spheroid, so that a defect of a method shows less",
+    "repeats": "another scene shows such a motion: the same top let go at another speed, or a top of the same kind",
+    "family": "a member of a family over a parameter",
+    "fast": "a small nutation of a fast top, where a step is limited by the spin",
+    "steady": "a steady precession: there is no nutation",
+    "near_pole": "passes so close to a pole that the angles chart fails",
+    "unstable": "unstable or nearly so: errors grow with the motion",
+}
 STEADY = 1e4  # times its rounding: a nutation of less energy is a steady precession
 SHORTEST = 1e-100  # horizon
 NEXT_TO_POLE = 1e-9  # rad; V is not evaluated nearer to a pole, where it has a limit and 0/0
@@ -32,7 +46,7 @@ def horizon_of(value: object) -> float:
     """
     horizon = positive("horizon", value)
     if horizon < SHORTEST:
-        raise SymtopError(f"horizon must be at least {SHORTEST:g}, not {horizon!r}")
+        raise SymtopError(f"horizon must be at least {SHORTEST:g}, not {horizon!r}", "horizon")
     return horizon
 
 
@@ -41,7 +55,8 @@ class Scene:
     """A top, its start and a horizon; `observes` names the smallest thing the scene is watched for.
 
     ``nutation`` is theta alone, ``axis`` the direction of the axis, ``attitude`` the whole orientation. `units` is "SI"
-    if the parameters are in SI units, and decides the units in datasets.
+    if the parameters are in SI units, and decides the units in datasets. Studies leave out scenes by their `tags`, any
+    of `TAGS`.
     """
 
     name: str
@@ -51,6 +66,7 @@ class Scene:
     purpose: str = field(default="", metadata={"words": True})
     observes: str = "attitude"
     units: str = field(default="", metadata={"words": True})  # "SI", or empty: any consistent units
+    tags: Iterable[str] = field(default=(), metadata={"words": True})
 
     def __post_init__(self) -> None:
         label("name", self.name)
@@ -61,6 +77,9 @@ class Scene:
         object.__setattr__(self, "horizon", horizon_of(self.horizon))
         one_of("observes", self.observes, OBSERVABLES)
         one_of("units", self.units, UNITS)
+        if isinstance(self.tags, str) or not isinstance(self.tags, Iterable):
+            raise SymtopError(f"tags must be a list of names, not {shown(self.tags)}")
+        object.__setattr__(self, "tags", tuple(sorted({one_of("tags", tag, TAGS) for tag in self.tags})))
 
     @property
     def nutation_period(self) -> float:
@@ -136,15 +155,17 @@ def closed_form(scene: Scene) -> "ClosedForm":
     return _closed_form(scene.top, scene.start)
 
 
-def spinning(spin: float, precession: float = 0.0, *, name: str = "", purpose: str = "") -> Scene:
+def spinning(
+    spin: float, precession: float = 0.0, *, name: str = "", purpose: str = "", tags: Iterable[str] = ()
+) -> Scene:
     """The family over spin: I1 = 2, I3 = 1, mgl = 2, let go at theta = 0.8 with w3 = `spin` and a precession."""
     theta, w3, turn = 0.8, finite("spin", spin), finite("precession", precession)
     start = Angles(theta=theta, phi_dot=turn, psi_dot=w3 - turn * math.cos(theta))
     words = purpose or f"let go at theta = {theta} with a spin of {w3:g}"
-    return Scene(name or f"spinning-{w3:.12g}", SymmetricTop(2.0, 1.0, 2.0), start, 20.0, words)
+    return Scene(name or f"spinning-{w3:.12g}", SymmetricTop(2.0, 1.0, 2.0), start, 20.0, words, tags=["family", *tags])
 
 
-def grazing(delta: float, *, name: str = "", purpose: str = "") -> Scene:
+def grazing(delta: float, *, name: str = "", purpose: str = "", tags: Iterable[str] = ()) -> Scene:
     """The family over the gap p_phi - p_psi = `delta`: a fall towards the upper pole that misses it by 1.1 delta.
 
     I1 = I3 = mgl = p_psi = 1, p_phi = 1 + delta, theta = 1, theta' = -1.2; the horizon is one nutation. The axis passes
@@ -155,10 +176,10 @@ def grazing(delta: float, *, name: str = "", purpose: str = "") -> Scene:
     precession = (gap + 2.0 * math.sin(0.5 * theta) ** 2) / math.sin(theta) ** 2  # (p_phi - p_psi cos) / I1 sin^2
     start = Angles(theta=theta, theta_dot=-1.2, phi_dot=precession, psi_dot=1.0 - precession * cosine)
     words = purpose or f"passes the upper pole with p_phi - p_psi = {gap:g}"
-    return Scene(name or f"grazing-{gap:.12g}", SymmetricTop(1.0, 1.0, 1.0), start, 4.22, words)
+    return Scene(name or f"grazing-{gap:.12g}", SymmetricTop(1.0, 1.0, 1.0), start, 4.22, words, tags=["family", *tags])
 
 
-def sleeping(spin: float, tilt: float = 1e-3, *, name: str = "", purpose: str = "") -> Scene:
+def sleeping(spin: float, tilt: float = 1e-3, *, name: str = "", purpose: str = "", tags: Iterable[str] = ()) -> Scene:
     """The family of tops let go almost upright: I1 = I3 = mgl = 1, w3 = `spin`, theta = `tilt`.
 
     The upright top is stable for I3 w3 >= 2 sqrt(I1 mgl), here for spin >= 2; below, a tilt grows at the rate
@@ -166,10 +187,10 @@ def sleeping(spin: float, tilt: float = 1e-3, *, name: str = "", purpose: str = 
     """
     w3 = finite("spin", spin)
     words, start = purpose or f"let go almost upright with a spin of {w3:g}", Angles(theta=tilt, psi_dot=w3)
-    return Scene(name or f"sleeping-{w3:.12g}", SymmetricTop(1.0, 1.0, 1.0), start, 60.0, words)
+    return Scene(name or f"sleeping-{w3:.12g}", SymmetricTop(1.0, 1.0, 1.0), start, 60.0, words, tags=["family", *tags])
 
 
-def steady(spin: float, *, name: str = "", purpose: str = "") -> Scene:
+def steady(spin: float, *, name: str = "", purpose: str = "", tags: Iterable[str] = ()) -> Scene:
     """The family of steady precessions: I1 = 2, I3 = 1, mgl = 2, theta = 60 degrees, w3 = `spin`, the slow branch.
 
     The rate is the smaller root of I1 Omega^2 cos(theta) - I3 w3 Omega + mgl = 0, which needs I3 w3 >= 2 sqrt 2 here.
@@ -183,7 +204,14 @@ def steady(spin: float, *, name: str = "", purpose: str = "") -> Scene:
         )
     precession = 2.0 * top.mgl / (momentum + math.sqrt(room))
     start = Angles(theta=theta, phi_dot=precession, psi_dot=w3 - precession * math.cos(theta))
-    return Scene(name or f"steady-{w3:.12g}", top, start, 20.0, purpose or f"steady precession at a spin of {w3:g}")
+    return Scene(
+        name or f"steady-{w3:.12g}",
+        top,
+        start,
+        20.0,
+        purpose or f"steady precession at a spin of {w3:g}",
+        tags=["family", *tags],
+    )
 
 
 def _separatrix() -> Scene:
@@ -195,13 +223,13 @@ def _separatrix() -> Scene:
     g, root = math.sqrt(top.mgl / top.I1), math.sqrt(3.0)
     start = Angles(math.pi / 3.0, phi_dot=2.0 * g / root, psi_dot=(3.0 * top.I1 - top.I3) * g / (top.I3 * root))
     purpose = "rises towards the upright for ever: every disturbance grows as exp(g t/2), and no step saves a long run"
-    return Scene("separatrix", top, start, 20.0 / g, purpose)
+    return Scene("separatrix", top, start, 20.0 / g, purpose, tags=["near_pole", "unstable"])
 
 
-def _goldstein(name: str, theta_dot: float, purpose: str) -> Scene:
+def _goldstein(name: str, theta_dot: float, purpose: str, *tags: str) -> Scene:
     """a = p_psi/I1 = 2.5, b = p_phi/I1 = 1.7: phi' = (b - a u)/(1 - u^2), psi' = a I1/I3 - phi' u, u = cos 43 deg."""
     start = Angles(math.radians(43.0), 0.0, 0.0, theta_dot, -0.2760228916930134, 5.201870363571313)
-    return Scene(name, SymmetricTop(2.0, 1.0, 2.0), start, 70.0, purpose)
+    return Scene(name, SymmetricTop(2.0, 1.0, 2.0), start, 70.0, purpose, tags=["mild", *tags])
 
 
 # The notebook prints alpha = 2 E1/I1 = 1.6 and a release at rest; alpha = 1.6 means this rate instead of zero.
@@ -215,7 +243,7 @@ def _kinon_betsch() -> Scene:
     spin = (top.I1 * precession**2 * math.cos(theta) + top.mgl) / (top.I3 * precession)
     start = Angles(theta=theta, phi_dot=precession, psi_dot=spin - precession * math.cos(theta))
     purpose = "steady precession of a small real gyroscope, a published benchmark"
-    return Scene("kinon-betsch", top, start, 2.0, purpose, units="SI")
+    return Scene("kinon-betsch", top, start, 2.0, purpose, units="SI", tags=["steady"])
 
 
 @functools.lru_cache(maxsize=1)
@@ -227,29 +255,37 @@ def _catalogue() -> dict[str, Scene]:
               Angles(theta=0.4, phi=0.1, psi=0.1, theta_dot=0.1, phi_dot=10.0, psi_dot=0.1), 8.0,
               "the notebook's first top: violent nutation from 23 to 99 degrees", units="SI"),
         _goldstein("goldstein", 0.0, "the notebook's second top, released at rest (alpha = 1.4981)"),
-        _goldstein("goldstein-falling", -_ALPHA_RATE, f"{printed} falling at first"),
-        _goldstein("goldstein-rising", _ALPHA_RATE, f"{printed} rising at first"),
-        spinning(10.0, name="cusp", purpose="released from rest: the axis comes to rest again at each cusp"),
-        spinning(10.0, -0.3, name="loop", purpose="started against its precession: the axis draws loops"),
-        spinning(10.0, 0.1, name="wave", purpose="started along its precession: the axis draws a wave"),
+        _goldstein("goldstein-falling", -_ALPHA_RATE, f"{printed} falling at first", "repeats"),
+        _goldstein("goldstein-rising", _ALPHA_RATE, f"{printed} rising at first", "repeats"),
+        spinning(10.0, name="cusp", purpose="released from rest: the axis comes to rest again at each cusp",
+                 tags=["ordinary", "mild", "repeats"]),
+        spinning(10.0, -0.3, name="loop", purpose="started against its precession: the axis draws loops",
+                 tags=["ordinary", "mild"]),
+        spinning(10.0, 0.1, name="wave", purpose="started along its precession: the axis draws a wave",
+                 tags=["ordinary", "mild", "repeats"]),
         Scene("fast", usual, Angles(theta=0.5, psi_dot=100.0), 8.0,
-              "a very fast spin: 64 small nutations, gravity a perturbation of the free top"),
+              "a very fast spin: 64 small nutations, gravity a perturbation of the free top", tags=["fast"]),
         Scene("steady", usual, Angles(theta=math.pi / 3.0, phi_dot=1.0, psi_dot=2.5), 20.0,
-              "exactly steady precession: whatever nutates here is error"),
+              "exactly steady precession: whatever nutates here is error", tags=["steady"]),
         Scene("hairer-lubich-wanner", SymmetricTop(0.5, 1.0, 1.0),
               Angles(theta=math.acos(0.6), phi=2.0 * math.atan(2.0), theta_dot=0.4, phi_dot=2.5, psi_dot=-1.1), 30.0,
-              "the flat top of Geometric Numerical Integration, figure VII.5.3"),
+              "the flat top of Geometric Numerical Integration, figure VII.5.3", tags=["ordinary", "mild"]),
         Scene("simo-wong", SymmetricTop(5.0, 1.0, 20.0), Angles(theta=0.05, psi_dot=50.0), 10.0,
-              "a fast top almost upright, the benchmark of structural dynamics"),
+              "a fast top almost upright, the benchmark of structural dynamics", tags=["fast", "repeats"]),
         _kinon_betsch(),
         Scene("bruls-cardona-arnold", SymmetricTop(15.234375, 0.46875, 147.15),
               Angles(theta=math.pi / 2, phi=math.pi, psi=math.pi / 2, phi_dot=-4.61538, psi_dot=150.0), 2.0,
-              "a published benchmark that grazes the lower pole at 0.00004 degrees: no place for angles", units="SI"),
+              "a published benchmark that grazes the lower pole at 0.00004 degrees: no place for angles", units="SI",
+              tags=["near_pole"]),
         grazing(1e-3, name="grazing",
-                purpose="passes the upper pole at 0.06 degrees: a step in angles may jump over it"),
-        sleeping(2.5, name="sleeping", purpose="let go almost upright and fast enough to stay there (threshold 2)"),
-        sleeping(1.9, name="sleeping-unstable", purpose="let go almost upright and too slow: it falls and rises again"),
-        steady(20.0, name="steady-fast", purpose="steady precession of a fast top: a large step makes it nutate"),
+                purpose="passes the upper pole at 0.06 degrees: a step in angles may jump over it",
+                tags=["near_pole", "repeats"]),
+        sleeping(2.5, name="sleeping", purpose="let go almost upright and fast enough to stay there (threshold 2)",
+                 tags=["near_pole", "unstable"]),
+        sleeping(1.9, name="sleeping-unstable", purpose="let go almost upright and too slow: it falls and rises again",
+                 tags=["near_pole", "unstable"]),
+        steady(20.0, name="steady-fast", purpose="steady precession of a fast top: a large step makes it nutate",
+               tags=["fast", "steady"]),
         _separatrix(),
     ]
     # fmt: on
@@ -298,3 +334,49 @@ def scene(name: "str | Scene") -> Scene:
         return name
     catalogue = scenes()
     return catalogue[one_of("scene", name, catalogue)]
+
+
+# energies and scales of many tops, of rows of numbers as `symtop.model.top.flat` has them
+
+
+def start_momenta(numbers: Array) -> tuple[Array, Array, Array, Array]:
+    """p_phi, p_psi, p_phi - p_psi and p_phi + p_psi of the starts, each (n,)."""
+    I1, I3, _, theta, _, _, _, phi_dot, psi_dot = numbers.T
+    p_psi = I3 * (psi_dot + phi_dot * np.cos(theta))
+    sin_x, cos_x = np.sin(0.5 * theta), np.cos(0.5 * theta)
+    swing = 4.0 * I1 * phi_dot * (sin_x * cos_x) ** 2
+    north, south = swing - 2.0 * p_psi * sin_x**2, swing + 2.0 * p_psi * cos_x**2
+    return swing + p_psi * np.cos(theta), p_psi, north, south
+
+
+def start_energies(numbers: Array) -> Array:
+    """Total energy of the starts, (n,)."""
+    I1, I3, mgl, theta, _, _, theta_dot, phi_dot, psi_dot = numbers.T
+    across = theta_dot**2 + (phi_dot * np.sin(theta)) ** 2
+    total: Array = 0.5 * I1 * across + 0.5 * I3 * (psi_dot + phi_dot * np.cos(theta)) ** 2 + mgl * np.cos(theta)
+    return total
+
+
+def energy_scales(numbers: Array, theta_range: Array) -> Array:
+    """`Scene.energy_scale` of all, (n,); `theta_range` (n, 2) holds the turning points, rad.
+
+    The lowest place of V lies between the turning points and is found by bisection of its slope.
+    """
+    I1, mgl = numbers[:, 0], numbers[:, 2]
+    _, _, north, south = start_momenta(numbers)
+    low, high = np.clip(theta_range.T, NEXT_TO_POLE, math.pi - NEXT_TO_POLE)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        falls = effective_force(middle, north, south, I1, mgl)[0] < 0.0
+        low, high = np.where(falls, middle, low), np.where(falls, high, middle)
+    lowest = 0.5 * (low + high)
+    start = np.clip(numbers[:, 3], NEXT_TO_POLE, math.pi - NEXT_TO_POLE)
+    depth = (
+        0.5 * I1 * numbers[:, 6] ** 2
+        + effective_potential(start, north, south, I1, mgl)
+        - effective_potential(lowest, north, south, I1, mgl)
+    )
+    swing = 0.5 * np.maximum(effective_stiffness(lowest, north, south, I1, mgl), 0.0)
+    rounding = STEADY * EPSILON * (np.abs(start_energies(numbers)) + np.abs(mgl))
+    kinds = [depth > rounding, swing > rounding, np.abs(mgl) > rounding]
+    return np.asarray(np.select(kinds, [depth, swing, np.abs(mgl)], TINY))

@@ -1,4 +1,4 @@
-"""The heavy symmetric (Lagrange) top: its parameters, energy, momenta and effective potential.
+"""The heavy symmetric (Lagrange) top: its parameters, starts, energy, momenta and effective potential.
 
 Euler angles z-x-z: phi precession, theta nutation, psi spin; the axis of the top is
 ``e = (sin theta sin phi, -sin theta cos phi, cos theta)``. The Lagrangian is
@@ -19,7 +19,14 @@ subtraction, exact to rounding at both poles and free of branches:
     V''    = (F'^2 + F F'') / (4 I1) - mgl cos theta
     phi'   = (north / sin^2 x + south / cos^2 x) / (4 I1),      psi' = p_psi/I3 - phi' cos theta
 
-Units are any consistent set. Source: Goldstein, Classical Mechanics, section 5.7; the half-angle form
+A start may also be a quaternion with an angular velocity w in the body frame, whose third axis is that of the top,
+
+    theta' = w1 cos psi - w2 sin psi,    phi' sin theta = w1 sin psi + w2 cos psi,    psi' = w3 - phi' cos theta.
+
+At a pole phi and psi are not told apart; psi is then chosen such that w1 sin psi + w2 cos psi vanishes, so that phi' is
+zero and the rates hold all of w.
+
+Units are any consistent set. Source: Goldstein, Classical Mechanics, sections 4.4, 4.9 and 5.7; the half-angle form
 is the partial-fraction split of ``(b - a u)/(1 - u^2)`` that Klein and Sommerfeld use.
 """
 
@@ -29,12 +36,120 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from symtop.core.errors import SymtopError, finite, not_negative, positive
+import numpy as np
+
+from symtop.core.errors import SymtopError, finite, not_negative, positive, row
 from symtop.core.jit_functions import inlined, shared
 from symtop.core.numbers import newton_between
-from symtop.model import starts
-from symtop.model.effective import effective_force, effective_potential, effective_stiffness
 
+Rates = tuple[float, float, float, float, float, float]  # theta, phi, psi and their rates
+UNIT = 1e-6  # a quaternion or an axis may differ from unit length by this
+
+
+def vector(name: str, value: object, size: int) -> list[float]:
+    """A row of so many finite numbers."""
+    numbers = row(name, value)
+    if len(numbers) != size:
+        raise SymtopError(f"{name} must be {size} numbers, not {len(numbers)}")
+    return numbers
+
+
+def unit(name: str, value: object, size: int) -> list[float]:
+    """A row of numbers of unit length, brought to it exactly."""
+    numbers = vector(name, value, size)
+    length = math.sqrt(math.fsum(number * number for number in numbers))
+    if abs(length - 1.0) > UNIT:
+        raise SymtopError(f"{name} must have unit length, not {length:.9g}")
+    return [number / length for number in numbers]
+
+
+def body_frame(quaternion: Sequence[float], space: Sequence[float]) -> list[float]:
+    """A vector of the space frame in the body frame: q* v q."""
+    w, x, y, z = quaternion
+    a, b, c = space
+    # v + 2 r x (r x v - w v), r the vector part
+    p, q, s = y * c - z * b - w * a, z * a - x * c - w * b, x * b - y * a - w * c
+    return [a + 2.0 * (y * s - z * q), b + 2.0 * (z * p - x * s), c + 2.0 * (x * q - y * p)]
+
+
+def from_body_rates(quaternion: Sequence[float], rates: Sequence[float]) -> Rates:
+    """Euler angles and their rates of a unit quaternion (w, x, y, z) and an angular velocity in the body frame."""
+    w, x, y, z = quaternion
+    theta = 2.0 * math.atan2(math.hypot(x, y), math.hypot(w, z))
+    total, difference = 2.0 * math.atan2(z, w), 2.0 * math.atan2(y, x)  # phi + psi and phi - psi
+    return _euler_angles(min(theta, math.pi), total, difference, rates)
+
+
+def from_axis_and_momentum(axis: Sequence[float], momentum: Sequence[float], I1: float, I3: float) -> Rates:
+    """Euler angles and their rates of a unit axis and an angular momentum in the space frame, with psi = 0.
+
+    Two axes of the body are e1 = (cos phi, sin phi, 0) and e2 = e x e1 where psi = 0.
+    """
+    ex, ey, ez = axis
+    theta, phi = math.atan2(math.hypot(ex, ey), ez), math.atan2(ex, -ey) if ex or ey else 0.0
+    c, s = math.cos(phi), math.sin(phi)
+    across = momentum[0] * c + momentum[1] * s
+    up = (ex * s - ey * c) * momentum[2] - ez * (momentum[0] * s - momentum[1] * c)  # L . (e x e1)
+    along = math.fsum(e * part for e, part in zip(axis, momentum, strict=True))
+    return _euler_angles(theta, phi, phi, (across / I1, up / I1, along / I3))
+
+
+def _euler_angles(theta: float, total: float, difference: float, rates: Sequence[float]) -> Rates:
+    """Angles and rates from theta, phi + psi, phi - psi and the body's angular velocity."""
+    w1, w2, w3 = rates
+    sine = math.sin(theta)
+    if theta in (0.0, math.pi) or sine == 0.0:
+        psi = -math.atan2(w2, w1)
+        phi = total - psi if theta == 0.0 else difference + psi
+        return theta, phi, psi, math.hypot(w1, w2), 0.0, w3
+    phi, psi = 0.5 * (total + difference), 0.5 * (total - difference)
+    c, s = math.cos(psi), math.sin(psi)
+    phi_dot = (w1 * s + w2 * c) / sine
+    return theta, phi, psi, w1 * c - w2 * s, phi_dot, w3 - phi_dot * math.cos(theta)
+
+
+@inlined
+def effective_force(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
+    """Return ``V'(theta)``, ``phi'`` and ``cos theta``: all that one kick of the reduced top needs.
+
+    Works on floats and on arrays, and compiles as it stands. Costs one sine and one cosine.
+    """
+    return half_angle_force(np.sin(0.5 * theta), np.cos(0.5 * theta), north, south, I1, mgl)
+
+
+@inlined
+def half_angle_force(sin_x: Any, cos_x: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
+    """`effective_force` from the sine and cosine of theta/2, however a kernel comes by them."""
+    up = north / (sin_x * sin_x)
+    down = south / (cos_x * cos_x)
+    tilt = sin_x * cos_x  # sin(theta)/2, and F = tilt (up + down)
+    slope = tilt * ((up + down) * (down - up) / (8.0 * I1) - 2.0 * mgl)
+    return slope, (up + down) / (4.0 * I1), cos_x * cos_x - sin_x * sin_x
+
+
+@inlined
+def effective_stiffness(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
+    """Return ``V''(theta)``; at a steady precession ``sqrt(V''/I1)`` is the nutation frequency."""
+    sin_x = np.sin(0.5 * theta)
+    cos_x = np.cos(0.5 * theta)
+    up = north / (sin_x * sin_x)
+    down = south / (cos_x * cos_x)
+    tilt = sin_x * cos_x
+    slope = 0.5 * (down - up)
+    bend = 0.5 * (down * sin_x / cos_x + up * cos_x / sin_x)
+    return (slope * slope + tilt * (up + down) * bend) / (4.0 * I1) - mgl * (cos_x * cos_x - sin_x * sin_x)
+
+
+@inlined
+def effective_potential(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
+    """Return ``V(theta)``, without the constant ``p_psi^2 / 2 I3``."""
+    sin_x = np.sin(0.5 * theta)
+    cos_x = np.cos(0.5 * theta)
+    lever = north * cos_x / sin_x + south * sin_x / cos_x
+    return lever * lever / (8.0 * I1) + mgl * (cos_x * cos_x - sin_x * sin_x)
+
+
+NUMBERS = ("I1", "I3", "mgl", "theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")  # that are a top and a start
 LARGEST = 1e40  # of any parameter or rate, and one over the smallest inertia: squares of squares stay finite
 BISECTIONS = 60  # of an interval of cosines at most 2 wide: to the last place
 
@@ -84,10 +199,10 @@ class Angles:
         """
         if omega_body is not None and omega_space is not None:
             raise SymtopError("give omega_body or omega_space, not both")
-        q, name = starts.unit("quaternion", quaternion, 4), "omega_body" if omega_space is None else "omega_space"
+        q, name = unit("quaternion", quaternion, 4), "omega_body" if omega_space is None else "omega_space"
         given = omega_body if omega_space is None else omega_space
-        omega = starts.vector(name, (0.0, 0.0, 0.0) if given is None else given, 3)
-        return cls(*starts.from_body_rates(q, omega if omega_space is None else starts.body_frame(q, omega)))
+        omega = vector(name, (0.0, 0.0, 0.0) if given is None else given, 3)
+        return cls(*from_body_rates(q, omega if omega_space is None else body_frame(q, omega)))
 
     @classmethod
     def from_axis(cls, top: "SymmetricTop", axis: Sequence[float], angular_momentum: Sequence[float]) -> "Angles":
@@ -95,8 +210,8 @@ class Angles:
 
         They leave the turn about the axis open: psi is zero, except at a pole.
         """
-        e, L = starts.unit("axis", axis, 3), starts.vector("angular_momentum", angular_momentum, 3)
-        return cls(*starts.from_axis_and_momentum(e, L, top.I1, top.I3))
+        e, L = unit("axis", axis, 3), vector("angular_momentum", angular_momentum, 3)
+        return cls(*from_axis_and_momentum(e, L, top.I1, top.I3))
 
     @property
     def spin(self) -> float:
@@ -105,7 +220,7 @@ class Angles:
 
 
 def flat(top: "SymmetricTop", at: Angles) -> tuple[float, ...]:
-    """A top and a start as nine plain numbers: I1, I3, mgl, theta, phi, psi, theta', phi', psi'."""
+    """A top and a start as nine plain numbers, in the order of `NUMBERS`."""
     return top.I1, top.I3, top.mgl, at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot
 
 

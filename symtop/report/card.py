@@ -18,7 +18,7 @@ import numpy as np
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home
 from symtop.judging.findings import Finding, spoken
-from symtop.judging.judge_step import Judged
+from symtop.judging.judge_step import StepLedger
 from symtop.judging.text_report import described
 from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels
 
@@ -28,7 +28,7 @@ LONGEST = 72  # letters of what a badge says
 SIGNS = {"confirmed": "✓", "refuted": "✗", "measured": "=", "undecided": "?", "inapplicable": "–"}
 
 
-def figures(ledger: Judged) -> tuple[Any, Any]:
+def figures(ledger: StepLedger) -> tuple[Any, Any]:
     """Two figures: errors over the step size, and the change of the energy over the long run."""
     (first, order), (second, energy) = (panels(1, 1, width=4.8, height=3.1) for _ in range(2))
     _order(order[0, 0], ledger)
@@ -44,7 +44,7 @@ def _drawn(figure: Any) -> str:
     return drawn.getvalue().partition("<svg")[2]
 
 
-def _order(axis: Any, ledger: Judged) -> None:
+def _order(axis: Any, ledger: StepLedger) -> None:
     traces, finding = ledger.traces, ledger["order"]
     axis.set(title=f"order: {finding.measured or 'not measured'}", xlabel="step size", ylabel="error at the end (rad)")
     steps, errors = (np.asarray(traces.get(name, [])) for name in ("step_size", "error"))
@@ -71,7 +71,7 @@ def _integer(slope: float) -> int | None:
     return round(slope) if 0.5 < slope < 99.0 else None
 
 
-def _energy(axis: Any, ledger: Judged) -> None:
+def _energy(axis: Any, ledger: StepLedger) -> None:
     traces, finding = ledger.traces, ledger["energy"]
     axis.set(
         title=f"energy: {finding.measured or 'not measured'}", xlabel="time (nutations)",
@@ -96,7 +96,7 @@ def _nothing(axis: Any, finding: Finding) -> None:
     axis.set(xticks=[], yticks=[])
 
 
-def card(ledger: Judged, path: str | Path) -> Path:
+def card(ledger: StepLedger, path: str | Path) -> Path:
     """Write the card, an HTML page; SymtopError for a trajectory and a place that cannot be written to."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -123,7 +123,7 @@ def _row(finding: Finding) -> dict[str, str]:
     return {name: str(value) for name, value in cells.items()}
 
 
-def badge(ledger: Judged) -> str:
+def badge(ledger: StepLedger) -> str:
     """The badge: what the method is, in green without a claim that is refuted, in vermillion with one."""
     refuted = [spoken(one.claim) for one in ledger.findings if one.verdict == "refuted"]
     words = f"refuted: {', '.join(refuted)}" if refuted else described(ledger.findings).partition(";")[0]
@@ -146,7 +146,7 @@ def badge(ledger: Judged) -> str:
     return "\n".join(parts) + "\n"
 
 
-def write_badge(ledger: Judged, path: str | Path) -> Path:
+def write_badge(ledger: StepLedger, path: str | Path) -> Path:
     """Write the badge as an SVG file; SymtopError if the folder cannot be written to."""
     return _written(badge(ledger), path)
 

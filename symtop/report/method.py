@@ -19,7 +19,7 @@ from symtop.run.reference.truth import reference
 TERMS = {  # of the answers, with what they mean
     "nutation": "one nod of the axis between its two inclinations; its period T is the unit of steps and run lengths",
     "axis": "the direction of the top; its error is the angle between where it is and where it should be, in radians",
-    "row": "a method in one chart: a method integrates other variables in each, and differs in error and cost",
+    "variant": "a method in one chart: a method integrates other variables in each, and differs in error and cost",
     "[angles]": "the method integrates Euler's angles, which are singular where the axis is vertical",
     "[axis]": "the method integrates the direction of the axis and the angular momentum, which are singular nowhere",
     "[attitude]": "the method integrates a quaternion, the whole orientation, and the angular momentum",

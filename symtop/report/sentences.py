@@ -15,11 +15,11 @@ def abridged(names: Sequence[str], most: int = FEW) -> str:
     return joined(names) if len(names) <= most else f"{', '.join(names[:most])} and {len(names) - most} more"
 
 
-def counted(count: int, noun: str = "row") -> str:
-    """So many things: ``1 row``, ``12 rows``."""
+def counted(count: int, noun: str = "variant") -> str:
+    """So many things: ``1 variant``, ``12 variants``."""
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
-def few(names: Sequence[str], noun: str = "row", most: int = FEW) -> str:
+def few(names: Sequence[str], noun: str = "variant", most: int = FEW) -> str:
     """The names, if they are at most so many; otherwise how many there are."""
     return ", ".join(names) if len(names) <= most else counted(len(names), noun)

@@ -36,7 +36,7 @@ class Look(NamedTuple):
     color: str
     marker: str
     size: float = 4.0
-    fill: str = "full"  # of the marker, matplotlib's fillstyle: the chart of a row
+    fill: str = "full"  # of the marker, matplotlib's fillstyle: the chart of a variant
     dash: Any = "-"  # of the line: the family
 
 
@@ -119,7 +119,7 @@ FILLS = {"angles": "none", "axis": "full", "attitude": "left"}  # of a marker, b
 
 
 def look(name: str) -> Look:
-    """Colour and marker of an integrator, or of a row: the marker of ``rk4[angles]`` is open, of ``rk4[axis]`` full.
+    """Colour and marker of an integrator or a variant: the marker of ``rk4[angles]`` is open, of ``rk4[axis]`` full.
 
     Those that ship with symtop have a fixed look. An added one gets a shade of its family and a marker that no shipped
     one of these shades has; which of them depends on its name alone, not on what else is registered.
@@ -141,7 +141,7 @@ def look(name: str) -> Look:
 
 
 def line(name: str, scale: float = 1.0) -> dict[str, Any]:
-    """What ``plot`` needs to draw an integrator or a row: colour, line, and marker of `scale` times its size."""
+    """What ``plot`` needs to draw an integrator or a variant: colour, line, and marker of `scale` times its size."""
     one = look(name)
     return {"color": one.color, "ls": one.dash, "marker": one.marker, "fillstyle": one.fill, "ms": scale * one.size}
 

@@ -31,9 +31,9 @@ from symtop.core.numbers import EPSILON, TINY, sign_changes
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan, Run
 from symtop.methods.framework.registry import Integrator
+from symtop.model.charts import View, axis_of
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
-from symtop.model.view import View, axis_of
 
 NUDGE = 1e-6  # rad: nonlinear terms are 1e-12 of the linear ones, rounding 1e-10
 SINGLE_NUDGE = 1e-3  # rad, of a method in single precision: rounding is 1e-4

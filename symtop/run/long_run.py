@@ -34,8 +34,8 @@ from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.loop import Loop, Position
 from symtop.methods.framework.plan import OK, OUTCOMES, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
+from symtop.model.charts import View
 from symtop.model.scenes import Scene, scene as find_scene
-from symtop.model.view import View
 from symtop.run import modified_energy as modified
 from symtop.run.guard.guard import MOST_STEPS
 
@@ -141,7 +141,7 @@ def long_run(
     chosen, method = find_scene(scene), find_integrator(integrator)
     count, h = whole("steps", steps, 1), positive("step_size", step_size)
     if count > MOST_STEPS:
-        raise SymtopError(f"steps must be at most {MOST_STEPS}, not {count}")
+        raise SymtopError(f"steps must be at most {MOST_STEPS}, not {count}", "steps")
     _, solver = chart_of(method)
     assert isinstance(solver.loop, Loop)  # noqa: S101
     loop = solver.loop if compensated else solver.loop.plain()
@@ -231,7 +231,7 @@ class _Book:
         own = cache_root() / "runs" / f"{identity}.nc"
         self.own = file is True
         if not isinstance(file, bool) and place("checkpoint", file).is_dir():
-            raise SymtopError(f"checkpoint must be a file, not the folder {str(file)!r}")
+            raise SymtopError(f"checkpoint must be a file, not the folder {str(file)!r}", "checkpoint")
         self.file = own if file is True else None if file is False else place("checkpoint", file)
         self.identity = identity
         self.saved = time.monotonic()
@@ -246,7 +246,8 @@ class _Book:
             return start, []
         if data.attrs.get("identity") != self.identity:
             raise SymtopError(
-                f"checkpoint {self.file} belongs to another run or version; remove it or name another file"
+                f"checkpoint {self.file} belongs to another run or version; remove it or name another file",
+                "checkpoint",
             )
         values = iter([float(value) for value in data["position"].values])
         state, low = (tuple(next(values) for _ in start.state) for _ in range(2))
@@ -299,9 +300,11 @@ class _Book:
     def apart(self, output: Path) -> Path:
         """The file for the result, refused if it is a folder or the checkpoint, which is removed at the end."""
         if output.is_dir():
-            raise SymtopError(f"output must be a file, not the folder {str(output)!r}")
+            raise SymtopError(f"output must be a file, not the folder {str(output)!r}", "output")
         if self.file is not None and output.absolute() == self.file.absolute():
-            raise SymtopError(f"output and checkpoint must be two files, not both {str(output)!r}")
+            raise SymtopError(
+                f"output and checkpoint must be two files, not both {str(output)!r}", "output", "checkpoint"
+            )
         spare(output)
         return output
 

@@ -23,8 +23,8 @@ from typing import NamedTuple
 import numpy as np
 
 from symtop.methods.framework.registry import Integrator, integrator
+from symtop.model.charts import View, axis_of
 from symtop.model.scenes import Scene
-from symtop.model.view import View, axis_of
 
 Array = np.ndarray
 HARMONICS = 40

@@ -21,11 +21,9 @@ from symtop.core.over_time import over_time
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator, integrator
-from symtop.model.continuous import continuous
-from symtop.model.readings import readings
+from symtop.model.charts import View, continuous, readings
 from symtop.model.scenes import OBSERVABLES, Scene, closed_form, horizon_of, scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import View
 from symtop.run.guard.forecast import repeats
 from symtop.run.guard.guard import MOST_STEPS, warning
 
@@ -98,8 +96,7 @@ def check_formula(method: Integrator, words: str, step: object, tolerance: objec
     if not method.fixed_step and not method.adaptive:
         for name, value in ((words, step), ("tolerance", tolerance)):
             if value is not None:
-                neither = "give neither a step nor a tolerance"
-                raise SymtopError(f"{method.name} has nothing to tune: {neither}, not {name} = {shown(value)}")
+                raise SymtopError(f"{method.name} has nothing to tune: leave out {name} = {shown(value)}", name)
 
 
 def make_plan(
@@ -110,24 +107,36 @@ def make_plan(
     period = scene.nutation_period
     if method.fixed_step:
         if tolerance is not None:
-            raise SymtopError(f"{method.name} has a fixed step: give step_size, not tolerance = {shown(tolerance)}")
+            raise SymtopError(
+                f"{method.name} has a fixed step: give step_size, not tolerance = {shown(tolerance)}",
+                "step_size",
+                "tolerance",
+            )
         if step_size is None:
             proposal = likely_step(scene, method, horizon, USUAL)
-            raise SymtopError(f"{method.name} has a fixed step and needs step_size, for example {proposal:.1g}")
+            raise SymtopError(
+                f"{method.name} has a fixed step and needs step_size, for example {proposal:.1g}", "step_size"
+            )
         step = positive("step_size", step_size)
         if step > horizon:
-            raise SymtopError(f"step_size must be at most the horizon {horizon!r}, not {step!r}")
+            raise SymtopError(f"step_size must be at most the horizon {horizon!r}, not {step!r}", "step_size")
         most = MOST_STEPS if budget is None else budget
         if horizon / step > most:
             raise SymtopError(
-                f"step_size {step!r} asks for {horizon / step:.3g} steps; the limit is {most:.3g} (see budget)"
+                f"step_size {step!r} asks for {horizon / step:.3g} steps; the limit is {most:.3g} (see budget)",
+                "step_size",
+                "budget",
             )
         steps = max(1, round(horizon / step))
         _, marks, dithered = sample_times(horizon, samples, period, steps)
         return Plan.steps(horizon / steps, marks, horizon), dithered
     check_formula(method, "step_size", step_size, tolerance)
     if step_size is not None:
-        raise SymtopError(f"{method.name} chooses its own steps: give tolerance, not step_size = {shown(step_size)}")
+        raise SymtopError(
+            f"{method.name} chooses its own steps: give tolerance, not step_size = {shown(step_size)}",
+            "tolerance",
+            "step_size",
+        )
     bound = method.check_tolerance(tolerance) if method.adaptive else math.nan
     swings = horizon * max(1.0 / period, math.sqrt(abs(scene.top.mgl) / scene.top.I1) / (2.0 * math.pi))
     if method.adaptive and swings > MOST_SWINGS:
@@ -149,7 +158,7 @@ def simulate(
     where the chart does not show them), ``axis(time, component)``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, and
     ``quaternion`` where the chart has one. Samples after a failure are NaN; ``outcome``, ``outcome_message`` and
     ``reached_time`` say what happened, ``guard`` what was expected to. `observe` ("nutation", "axis", "attitude";
-    default: what the scene is watched for) picks the smallest chart of the integrator that shows it; a row, such as
+    default: what the scene is watched for) picks the smallest chart of the integrator that shows it; a variant, such as
     ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows every step. A whole number of
     steps fills the horizon, the one nearest to horizon/step_size: the attribute ``step_size`` is the step made.
 

@@ -21,7 +21,7 @@ _owners: dict[str, Path] = {}  # of an integrator or a scene: its plug-in
 
 def load(path: str | Path) -> list[str]:
     """Run a plug-in file once; what it registers, whose names are returned, is then known to studies and commands."""
-    file = python_file(path, "plugin must be a Python file")
+    file = python_file(path, "plugin", "a Python file")
     if file in _loaded:
         return _registered_by(file)
     before = [*integrators().values(), *scenes().values()]

@@ -58,7 +58,7 @@ def names() -> list[str]:
 def file_of(name: str) -> Path:
     """The script of a study: a shipped one by its name, or any by its path, which ends in .py."""
     if name.endswith(".py"):
-        return python_file(name, "study must be a name or a Python file that is there")
+        return python_file(name, "study", "a name or a Python file that is there")
     return _elsewhere.get(name) or folder() / one_of("study", name, names()) / "study.py"
 
 

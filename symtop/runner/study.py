@@ -131,7 +131,7 @@ class Opening(NamedTuple):
 class Case:
     """One cell of a study's grid: an integrator on a scene, with settings that JSON can hold.
 
-    A case may measure several integrators against each other: then its dataset has a dimension ``integrator``,
+    A case may measure several integrators against each other: then its dataset has a dimension ``variant``,
     `integrator` names them together and ``settings["integrators"]`` lists them.
     A study that measures several different things puts each into a `group` of its own: the study's dataset is then an
     `xarray.DataTree` with one dataset a group (see `store.combine`), each over the scenes and integrators that it has.
@@ -172,7 +172,7 @@ class Case:
 
     @property
     def label(self) -> str:
-        """A name that is safe in a file: ``spheroid--rk4@axis`` for the row rk4[axis]."""
+        """A name that is safe in a file: ``spheroid--rk4@axis`` for the variant rk4[axis]."""
         parts = "--".join(filter(None, (self.scene, self.integrator, self.group)))
         return parts.replace("/", "_").replace("[", "@").replace("]", "")
 
@@ -228,7 +228,7 @@ class Study:
         return None
 
     def only(self, names: Collection[str]) -> "Study":
-        """The same study with the cases of some methods, or rows, alone; SymtopError if it has none of them.
+        """The same study with the cases of some methods, or variants, alone; SymtopError if it has none of them.
 
         A case that measures several integrators against each other stays whole if one of them is asked for, and one of
         the closed form, which others are measured by, stays in any case.

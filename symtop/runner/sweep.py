@@ -61,10 +61,10 @@ def sweep(
     """Run integrators on scenes at several steps or tolerances and return errors, work and outcomes as one dataset.
 
     Methods of fixed step take every `step_size`, or a nutation period over every `per_nutation`; adaptive ones take
-    every `tolerance`; a formula, such as ``exact``, runs once. `scenes` and `integrators` are names, rows such as
+    every `tolerance`; a formula, such as ``exact``, runs once. `scenes` and `integrators` are names, variants such as
     ``rk4[axis]``, records, or lists of them. `horizon` and `observe` are those of `simulate`.
 
-    Dimensions ``scene``, ``integrator``, ``setting`` (in the order given). Variables, each over all three:
+    Dimensions ``scene``, ``variant``, ``setting`` (in the order given). Variables, each over all three:
 
         axis, attitude, theta, energy, p_phi, p_psi    largest error over the run (units as in `symtop.errors`)
         axis_end ...                                   error at the horizon

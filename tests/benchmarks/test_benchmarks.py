@@ -12,7 +12,7 @@ from symtop.methods.framework.fixed_step import inside
 from symtop.methods.framework.many import Many
 from symtop.methods.framework.registry import methods
 from symtop.model import charts
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.exact.closed_form import ClosedForms
 from symtop.report import page
 from symtop.runner import store
 

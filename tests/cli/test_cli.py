@@ -163,7 +163,7 @@ def test_a_folder_is_no_output_and_nothing_is_computed_for_it(words, computes, t
     [
         (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
         (["recommend", "spheroid", "--accuracy", "1e-3"], "symtop.advise.recommend"),
-        (["claims", "strang", "--quick"], "symtop.judging.claims.judge"),
+        (["claims", "strang", "--quick"], "symtop.judging.battery.judge"),
     ],
 )
 def test_ctrl_c_is_neither_a_failed_case_nor_bad_input(words, called, monkeypatch):
@@ -365,7 +365,7 @@ def test_a_row_is_named_once_and_a_file_written_once(tmp_path, monkeypatch):
     assert (done.exit_code, list(tmp_path.iterdir())) == (2, [])
     assert "--output and --figure must be two files" in done.output
     done = CliRunner().invoke(main, ["run", "spheroid", "exact", "--step-size", "0.1"])
-    assert "give neither a step nor a tolerance, not --step-size = 0.1" in done.output
+    assert "leave out --step-size = 0.1" in done.output
 
 
 def test_what_recommend_needs_is_one_of_two():

@@ -1,14 +1,17 @@
-"""``symtop doctor``: no fault here, and each fault that can be made is found, named and given advice."""
+"""``symtop doctor``: no fault here, and each fault that can be made is found; ``--warm`` compiles every method."""
 
 import importlib.metadata
 import json
+import shutil
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
+import symtop
 from symtop.cli import doctor
 from symtop.cli.main import main
+from symtop.core.files import cache_root
 from symtop.measure import published
 
 
@@ -101,6 +104,42 @@ def test_a_check_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path
     assert "OSError: the tools are gone" in done.output
 
 
-@pytest.mark.parametrize(("size", "said"), [(0, "0 B"), (1500, "2 kB"), (3e7, "30 MB"), (2e9, "2.0 GB")])
-def test_sizes_are_readable(size, said):
-    assert doctor._bytes(size) == said
+def test_every_compiled_method_is_run_in_each_of_its_charts():
+    todo = doctor.tasks()
+    for kind in ("alone", "together"):
+        names = [name for what, name in todo if what == kind]
+        assert len(names) == len(set(names))
+        for method in symtop.integrators().values():
+            variants = {f"{method.name}[{chart}]" for chart in method.charts()}
+            assert variants <= set(names) if method.implementation != "python" else not variants & set(names)
+
+
+def test_a_run_that_fails_is_named(monkeypatch):
+    monkeypatch.setattr(doctor, "tasks", lambda: [("alone", "strang[axis]"), ("alone", "no-such-method[axis]")])
+    _, failed = doctor.compile_all(jobs=1)
+    assert [why.partition(":")[0] for why in failed] == ["no-such-method[axis]"]
+
+
+@pytest.mark.slow
+def test_kernels_are_on_disk_afterwards(monkeypatch, tmp_path):
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
+    monkeypatch.setattr(doctor, "tasks", lambda: [("alone", "strang[axis]")])
+    count, _ = doctor.compile_all(jobs=1)
+    assert count == doctor.kernels() >= 1
+    assert doctor.compile_all(jobs=1)[0] == 0
+
+
+@pytest.mark.slow
+def test_all_of_them_are_compiled_once(monkeypatch, tmp_path):
+    """From the kernels that other tests have left, less an eighth: all of them take six minutes."""
+    (cache_root() / "kernels").mkdir(parents=True, exist_ok=True)
+    shutil.copytree(cache_root() / "kernels", tmp_path / "kernels")
+    for folder in sorted((tmp_path / "kernels").iterdir())[::8]:
+        shutil.rmtree(folder)
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
+    done = CliRunner().invoke(main, ["doctor", "--warm", "--results", str(tmp_path / "r")])
+    assert done.exit_code == 0, done.output
+    assert doctor.kernels() > 100
+    assert "not run" not in done.output
+    again = CliRunner().invoke(main, ["doctor", "--warm", "--results", str(tmp_path / "r")])
+    assert "kernels compiled: 0;" in again.output

@@ -6,8 +6,8 @@ import pytest
 from click.testing import CliRunner
 
 import symtop
-from symtop.cli.engine_advice import SETTINGS, i_use
 from symtop.cli.main import main
+from symtop.cli.recommend import SETTINGS, i_use
 from symtop.methods.framework.registry import engines
 
 
@@ -20,19 +20,19 @@ def test_every_setting_has_a_map_and_every_map_of_the_engines_a_setting():
 
 @pytest.mark.slow
 def test_mujoco_is_told_its_best_setting_and_the_gain_of_another_method():
-    said = i_use("mujoco", "goldstein", step_size=0.025, horizon=10.0)
-    assert said.errors["Euler"] == pytest.approx(0.61, abs=0.01)
-    assert said.best == "RK4 of 4.0"
-    assert said.advice is not None
-    assert said.advice.expected_error <= said.errors[said.best]
-    assert said.gain > 1.0
-    assert "Its best setting is RK4 of 4.0" in str(said)
+    advice = i_use("mujoco", "goldstein", step_size=0.025, horizon=10.0)
+    assert advice.errors["Euler"] == pytest.approx(0.61, abs=0.01)
+    assert advice.best == "RK4 of 4.0"
+    assert advice.advice is not None
+    assert advice.advice.expected_error <= advice.errors[advice.best]
+    assert advice.gain > 1.0
+    assert "Its best setting is RK4 of 4.0" in str(advice)
 
 
 def test_an_engine_without_a_gyroscopic_term_has_nothing_to_match():
-    said = i_use("havok", "goldstein", horizon=10.0)
-    assert said.advice is None
-    assert "nothing to match" in str(said)
+    advice = i_use("havok", "goldstein", horizon=10.0)
+    assert advice.advice is None
+    assert "nothing to match" in str(advice)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from terminal import recorded
 
 import symtop
-from symtop.cli import completion
+from symtop.cli.common import completing
 from symtop.cli.main import main
 from symtop.measure.verdicts import ACCURATE
 from symtop.run.guard.guard import EXPECTED
@@ -163,19 +163,15 @@ def test_figures_come_in_three_kinds_and_are_the_same_again(ending, head, tmp_pa
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
-def test_completion_lists_names_once_and_again_if_a_file_changes(tmp_path, monkeypatch):
-    monkeypatch.setattr(completion, "cache_root", lambda: tmp_path)
-    heard = []
-    listed = completion._listed
-    monkeypatch.setattr(completion, "_listed", lambda: heard.append(1) or listed())
-    first = completion.names()
-    assert completion.names() == first == listed()
-    assert len(heard) == 1
-    (tmp_path / "names.json").write_text("{", encoding="utf-8")  # damaged
-    assert completion.names() == first
-    monkeypatch.setattr(completion, "__version__", "0")
-    completion.names()
-    assert len(heard) == 3
+@pytest.mark.parametrize(
+    ("kind", "prefix", "some"),
+    [("scenes", "sph", "spheroid"), ("integrators", "mid", "midpoint"), ("integrators", "rk4[", "rk4[axis]"),
+     ("studies", "conv", "convergence")],
+)  # fmt: skip
+def test_completion_lists_names_that_begin_as_what_is_typed(kind, prefix, some):
+    names = completing(kind)(None, None, prefix)
+    assert some in names
+    assert all(name.startswith(prefix) for name in names)
 
 
 def test_a_cold_kernel_is_announced_once(monkeypatch):

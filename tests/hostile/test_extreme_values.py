@@ -10,8 +10,7 @@ import pytest
 
 import symtop
 from symtop.core.numbers import real_numbers
-from symtop.model.exact.closed_form import ClosedForm
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.exact.closed_form import ClosedForm, ClosedForms
 
 ODD_TIMES = [
     10**400, [10**400], 1j, [1j], np.array([1.0 + 0j]), {1: 2}, {}, {0.0}, "abc", "1", ["1"], b"1", np.array(["1"]),

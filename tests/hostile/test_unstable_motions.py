@@ -10,7 +10,7 @@ import pytest
 import symtop
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForm
-from symtop.model.exact.precise_form import PreciseForm
+from symtop.model.exact.digits import PreciseForm
 from symtop.model.top import flat
 from symtop.run.guard import guard
 from symtop.run.reference.sensitivity import conditioning, departure

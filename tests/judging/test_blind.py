@@ -177,7 +177,7 @@ def test_time_that_is_summed_in_single_precision_is_caught(tmp_path):
 def test_without_a_claim_it_says_the_order_that_a_step_has_and_not_the_slope():
     ledger = symtop.judge(WRONG.rounded_triple, quick=True)
     assert ledger.refuted == []
-    assert ledger["order"].measured == "2 by its h^3 term"
+    assert str(ledger["order"].measured) == "2 by its h^3 term"
     assert described(ledger.findings).startswith("order 2, not symplectic, reversible, keeps ")
 
 

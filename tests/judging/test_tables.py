@@ -3,17 +3,24 @@
 import pytest
 
 import symtop
-from symtop.judging.claims_series import order
-from symtop.judging.claims_table import table_of
+from symtop.judging.claims.order import measure, table_of
+from symtop.judging.claims.subject import Subject
 from symtop.methods.splitting import composition
 
 SPHEROID = symtop.scene("spheroid")
+
+
+def order(method):
+    """The finding on the order."""
+    return measure(Subject(method, SPHEROID, quick=True))[0]
+
+
 B = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
 
 def test_a_table_that_is_off_by_a_billionth_is_refuted_before_any_run():
     off = symtop.runge_kutta("off", ((), (0.5,), (0.0, 0.5), (1e-9, 0.0, 1.0 - 1e-9)), B, order=4)
-    found = order(off, SPHEROID, {}, quick=True)
+    found = order(off)
     assert found.verdict == "refuted"
     assert found.why.startswith(
         "its table misses a condition of order 3 by 8.3e-11 (slopes show it from steps of 2e-05"
@@ -23,7 +30,7 @@ def test_a_table_that_is_off_by_a_billionth_is_refuted_before_any_run():
 @pytest.mark.parametrize(("claimed", "verdict"), [(4, "confirmed"), (None, "measured"), (5, "refuted")])
 def test_a_right_table_is_said_to_be_so(claimed, verdict):
     method = symtop.runge_kutta("classical", ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), B, order=claimed)
-    found = order(method, SPHEROID, {}, quick=True)
+    found = order(method)
     assert found.verdict == verdict
     said = (
         "its table misses a condition of order 5 by" if claimed == 5 else "its table meets the conditions up to order 4"
@@ -42,7 +49,7 @@ def test_a_splitting_that_is_off_is_refuted_before_any_run(off, verdict):
     method = symtop.composition(
         "triple", (outer, inner, outer), (outer / 2, half, half, outer / 2), chart="space", order=4
     )
-    finding = order(method, SPHEROID, {}, quick=True)
+    finding = order(method)
     assert finding.verdict == verdict
     said = (
         "meets the conditions up to order 4 to"

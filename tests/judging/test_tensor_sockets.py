@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.judging.adapters.choice import opened
-from symtop.judging.adapters.tensors import field_of
+from symtop.judging.adapters.batch_step import field_of
+from symtop.judging.adapters.choice import open_target
 from symtop.methods.framework.equations import FORMULATIONS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -158,10 +158,10 @@ def heun(f, t, y, h):
 )
 def test_what_is_not_installed_is_named(package, form):
     with pytest.raises(symtop.SymtopError, match=f"form {form} needs the package {package}, which is not installed"):
-        opened(heun, form, "axis")
+        open_target(heun, form, "axis")
 
 
 @pytest.mark.parametrize("form", [pytest.param("torch", marks=needs("torch")), pytest.param("jax", marks=needs("jax"))])
 def test_the_angles_are_refused(form):
     with pytest.raises(symtop.SymtopError, match=f"must be axis or attitude for the form {form}, not 'angles'"):
-        opened(heun, form, "angles")
+        open_target(heun, form, "angles")

@@ -11,9 +11,8 @@ from symtop.measure.verdicts import VERDICTS, verdict
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
-from symtop.model.charts import axis_distance
+from symtop.model.charts import View, axis_distance
 from symtop.model.scenes import closed_form, grazing, scene
-from symtop.model.view import View
 
 SAMPLES = 41
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import symtop
-from symtop.judging.claims import judge
+from symtop.judging.battery import judge
 from symtop.measure.settings import compared
 from symtop.methods.engines.engines import SINGLE
 from symtop.methods.framework import registry

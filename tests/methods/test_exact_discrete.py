@@ -13,7 +13,7 @@ from symtop.methods.framework.fixed_step import inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian.oscillators import Map, exact_map, momentum, on_oscillators
 from symtop.model import charts
-from symtop.model.exact.precise_form import PreciseForm
+from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import closed_form
 
 METHOD = symtop.integrator("exact-discrete")

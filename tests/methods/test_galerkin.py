@@ -9,7 +9,7 @@ from symtop.measure.conservation import trend
 from symtop.measure.step_map import StepMap, angles_at, one_step, return_miss, symplectic_defect
 from symtop.methods.framework.angles import reduced
 from symtop.methods.lagrangian import galerkin as kernel
-from symtop.model.effective import effective_force, effective_stiffness
+from symtop.model.top import effective_force, effective_stiffness
 from tests.conftest import random_scenes
 from tests.methods.test_integrators import fitted
 

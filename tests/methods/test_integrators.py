@@ -91,7 +91,7 @@ def explicit_euler(top, start, plan):
     """Order 1, not symplectic, not symmetric: what the structure tests must catch."""
     par, (theta, p, phi, psi) = reduced(top, start)
     from symtop.methods.framework.plan import Run
-    from symtop.model.effective import effective_force
+    from symtop.model.top import effective_force
 
     h = plan.step_size
     for _ in range(int(plan.marks[-1])):

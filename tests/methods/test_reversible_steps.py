@@ -17,9 +17,8 @@ from symtop.methods.framework.plan import Plan
 from symtop.methods.splitting import reversible
 from symtop.methods.splitting.reversible import Reversible
 from symtop.model import charts
-from symtop.model.effective import effective_force, effective_potential
 from symtop.model.scenes import closed_form, grazing
-from symtop.model.top import Angles
+from symtop.model.top import Angles, effective_force, effective_potential
 
 METHOD = symtop.integrator("stormer-verlet-reversible")
 SOLVER = METHOD.solvers["angles"]

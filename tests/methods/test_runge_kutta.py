@@ -411,7 +411,7 @@ def test_taylor_in_three_precisions():
 def test_extended_precision_is_not_lost_on_the_way():
     hy = pytest.importorskip("heyoka")
     from symtop.methods.taylor.heyoka import propagate
-    from symtop.model.view import space_momenta
+    from symtop.model.charts import space_momenta
 
     scene = symtop.scene("spheroid")
     flight = propagate("axis", "quad", 1e-35, scene.top, scene.start, np.array([0.0, 4.0]))

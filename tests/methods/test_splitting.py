@@ -152,7 +152,7 @@ def extended_error(table, scene, steps):
     from mpmath import mp, workdps
 
     from symtop.methods.taylor.heyoka import start_numbers
-    from symtop.model.exact.precise_form import PreciseForm
+    from symtop.model.exact.digits import PreciseForm
 
     wide = np.longdouble
     h = wide(8) / steps

@@ -14,20 +14,9 @@ from benchmarks import accuracy
 from benchmarks.accuracy import LIMITS, deviation, short
 from benchmarks.families import REGIMES, tops
 from symtop.core.errors import SymtopError
-from symtop.model.exact import (
-    closed_form,
-    half_angles,
-    motion_constants,
-    motion_layout as at,
-    motion_sums,
-    moving_axis,
-    quad_double,
-    theta_functions,
-    turning_points,
-)
+from symtop.model.exact import closed_form, constants, elliptic, layout as at, quad_double, turning_points
 from symtop.model.exact.closed_form import ClosedForm
-from symtop.model.exact.precise_constants import precise_constants
-from symtop.model.exact.precise_form import PreciseForm
+from symtop.model.exact.digits import PreciseForm, precise_constants
 from symtop.model.scenes import grazing, scene, sleeping
 from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.run.reference.bounds import ROUNDING
@@ -39,7 +28,7 @@ SEPARATRIX = SymmetricTop(1.0, 0.5, -1.0), Angles(0.0, theta_dot=2.0)
 def test_constants_are_those_of_forty_digits_in_every_regime():
     for top, start in tops(2, seed=21):
         ours, status = short(top, start)
-        assert status == moving_axis.DONE
+        assert status == constants.DONE
         apart = deviation(ours, precise_constants(top, start))
         assert (apart <= LIMITS).all(), (top, start, apart)
         assert apart[0] <= ours[at.RATE_ERROR]
@@ -55,7 +44,7 @@ def _double(monkeypatch):
         "square": lambda a: (a[0] * a[0], 0.0),
         "root": lambda a: (math.sqrt(max(a[0], 0.0)), 0.0),
     }
-    for module in (turning_points, theta_functions, half_angles, moving_axis, motion_constants, quad_double.dd):
+    for module in (turning_points, elliptic, constants, quad_double.dd):
         for name, function in short.items():
             if hasattr(module, name):
                 monkeypatch.setattr(module, name, function)
@@ -67,10 +56,10 @@ def test_double_arithmetic_in_place_of_double_double_is_seen(monkeypatch):
         assert (deviation(short(top, start)[0], precise) <= LIMITS).all()
         with monkeypatch.context() as patch:
             _double(patch)
-            patch.setattr(motion_constants, "RATE", math.inf)
-            patch.setattr(motion_constants, "VALUE", math.inf)
+            patch.setattr(constants, "RATE", math.inf)
+            patch.setattr(constants, "VALUE", math.inf)
             ours, status = short(top, start)
-        assert status == moving_axis.UNMET or deviation(ours, precise)[0] > 1e-18
+        assert status == constants.UNMET or deviation(ours, precise)[0] > 1e-18
 
 
 def test_the_bound_sends_tops_to_quad_double_that_need_it(monkeypatch):
@@ -86,14 +75,12 @@ def test_the_bound_sends_tops_to_quad_double_that_need_it(monkeypatch):
         true = precise_constants(top, start)
         assert (deviation(ours, true) <= LIMITS).all()
         with monkeypatch.context() as patch:
-            patch.setattr(motion_constants, "long_sums", motion_sums.short_sums)
-            patch.setattr(motion_constants, "RATE", math.inf)
-            patch.setattr(motion_constants, "VALUE", math.inf)
+            patch.setattr(constants, "long_sums", turning_points.short_sums)
+            patch.setattr(constants, "RATE", math.inf)
+            patch.setattr(constants, "VALUE", math.inf)
             rounded, status = short(top, start)
-        assert (
-            status != moving_axis.DONE or max(rounded[at.RATE_ERROR], rounded[at.VALUE_ERROR]) > motion_constants.RATE
-        )
-        wrong += status != moving_axis.DONE or (deviation(rounded, true) > LIMITS).any()
+        assert status != constants.DONE or max(rounded[at.RATE_ERROR], rounded[at.VALUE_ERROR]) > constants.RATE
+        wrong += status != constants.DONE or (deviation(rounded, true) > LIMITS).any()
     assert longer >= 4
     assert wrong >= 1
 
@@ -103,7 +90,7 @@ def test_the_arithmetic_is_recorded():
     steady = scene("steady")
     long = ClosedForm(steady.top, steady.start).provenance
     assert long.arithmetic == "quad-double"
-    assert 0.0 <= long.rate_error < motion_constants.RATE
+    assert 0.0 <= long.rate_error < constants.RATE
     top = SymmetricTop(1.0, 0.5, 1.0)
     far = ClosedForm(top, Angles(1.0, 3e12, 0.2, 0.3, 0.4, 0.5))
     assert far.provenance.arithmetic == "40 digits"
@@ -121,7 +108,7 @@ def test_the_arithmetic_is_recorded():
 def test_the_last_resort_gives_the_same_motion(named, monkeypatch):
     times = np.linspace(-20.0, 1e3, 301)
     ours = ClosedForm(named.top, named.start)
-    monkeypatch.setattr(motion_constants, "motion_constants", lambda *_: moving_axis.UNMET)
+    monkeypatch.setattr(constants, "motion_constants", lambda *_: constants.UNMET)
     monkeypatch.setattr(closed_form._build, "ready", lambda _: False)
     digits = ClosedForm(named.top, named.start)
     assert ours.provenance.arithmetic != digits.provenance.arithmetic == "40 digits"
@@ -144,7 +131,7 @@ def test_compiled_and_interpreted_functions_give_the_same_bits():
         closed_form._build.compiled(np.array([flat(top, start)]), out)
         plain[at.STATUS] = status
         assert out.tobytes() == plain.tobytes()
-        if status != moving_axis.DONE:
+        if status != constants.DONE:
             continue
         for view, width in enumerate(closed_form.WIDTHS):
             shape = (1, width, times.size) if view in closed_form.ROWS else (1, times.size, width)
@@ -170,9 +157,9 @@ def test_values_at_the_ends_of_the_range_end_in_a_status(numbers):
     closed_form.compile_now()
     plain, out = [0.0] * at.SIZE, np.empty((1, at.SIZE))
     failed = closed_form._build.compiled(np.array([numbers]), out)
-    status = motion_constants.motion_constants(*numbers, plain)
+    status = constants.motion_constants(*numbers, plain)
     assert out[0, at.STATUS] == status
-    assert failed == (status != moving_axis.DONE)
+    assert failed == (status != constants.DONE)
     assert status in closed_form.REASONS
 
 

@@ -13,11 +13,10 @@ from symtop.core.lazy_kernel import LazyKernel
 from symtop.methods.framework.plan import Plan
 from symtop.methods.library import exact
 from symtop.model import charts
+from symtop.model.charts import space_momenta
 from symtop.model.exact import closed_form
-from symtop.model.exact.closed_form import ClosedForm
-from symtop.model.exact.closed_forms import NUMBERS, ClosedForms
+from symtop.model.exact.closed_form import NUMBERS, ClosedForm, ClosedForms
 from symtop.model.top import Angles, SymmetricTop, flat
-from symtop.model.view import space_momenta
 from tests.model.test_closed_form import SEPARATRIX
 
 TIMES = np.array([0.0, 0.3, -17.1, 1e3, 1e6])

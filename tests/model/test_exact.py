@@ -22,7 +22,7 @@ from symtop.model.charts import (
     space_state,
 )
 from symtop.model.exact.closed_form import ClosedForm
-from symtop.model.exact.precise_form import PreciseForm
+from symtop.model.exact.digits import PreciseForm
 from symtop.model.top import Angles, SymmetricTop
 from tests.model.theta_functions import theta_quaternion
 

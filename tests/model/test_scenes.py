@@ -25,6 +25,19 @@ def test_what_users_write_is_escaped_and_whole():
     assert "<script>" not in html
 
 
+@pytest.mark.parametrize("scene", symtop.scenes().values(), ids=symtop.scenes())
+def test_tags_say_what_the_motion_does(scene):
+    low, high = closed_form(scene).theta_range
+    assert ("steady" in scene.tags) == (high - low < 1e-6)
+    assert ("near_pole" in scene.tags) == (low < 2e-3 or high > math.pi - 2e-3)
+
+
+@pytest.mark.parametrize("tags", ["steady", ["staedy"], 5, [["steady"]]])
+def test_a_tag_that_no_study_knows_is_refused(tags):
+    with pytest.raises(symtop.SymtopError, match="tags"):
+        symtop.Scene("mine", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0), 1.0, tags=tags)
+
+
 @pytest.mark.parametrize("delta", [1e-1, 1e-3, -1e-3, 1e-6])
 def test_grazing_misses_the_pole_by_eleven_tenths_of_its_gap(delta):
     where = grazing(delta)

@@ -7,7 +7,7 @@ import pytest
 from conftest import random_scenes
 
 import symtop
-from symtop.model import charts, starts
+from symtop.model import charts, top
 
 POLES = [((1.0, 0.0, 0.0, 0.0), 0.0), ((0.0, 1.0, 0.0, 0.0), math.pi), ((0.6, 0.0, 0.0, 0.8), 0.0)]
 
@@ -109,4 +109,4 @@ def test_bad_input_is_one_sentence(call, says):
 
 def test_a_vector_is_turned_as_its_matrix_says():
     q = np.array([0.5, -0.5, 0.1, math.sqrt(0.49)])
-    np.testing.assert_allclose(starts.body_frame(q, (1.0, 2.0, -3.0)), matrix(q).T @ [1.0, 2.0, -3.0], atol=1e-15)
+    np.testing.assert_allclose(top.body_frame(q, (1.0, 2.0, -3.0)), matrix(q).T @ [1.0, 2.0, -3.0], atol=1e-15)

@@ -69,7 +69,7 @@ def test_the_potential_keeps_its_digits_at_a_pole_where_the_textbook_form_does_n
         p_phi = top.I1 * start.phi_dot * mpmath.sin(t) ** 2 + p_psi * mpmath.cos(t)
         exact = (p_phi - p_psi * mpmath.cos(t)) ** 2 / (2 * top.I1 * mpmath.sin(t) ** 2) + top.mgl * mpmath.cos(t)
         exact_rate = (p_phi - p_psi * mpmath.cos(t)) / (top.I1 * mpmath.sin(t) ** 2)
-    from symtop.model.effective import effective_force
+    from symtop.model.top import effective_force
 
     assert top.potential(theta, momenta) == pytest.approx(float(exact), rel=4e-15)
     rate = effective_force(theta, momenta.north, momenta.south, top.I1, top.mgl)[1]

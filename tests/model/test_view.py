@@ -6,8 +6,7 @@ import pytest
 import symtop
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
-from symtop.model.charts import CHARTS, DIMENSIONS
-from symtop.model.view import View, axis_of, space_momenta
+from symtop.model.charts import CHARTS, DIMENSIONS, View, axis_of, space_momenta
 from symtop.run.reference.truth import reference
 
 TOP, START = symtop.scene("spheroid").top, symtop.scene("spheroid").start

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpmath import elliprf, elliprj, mp, mpf, polyroots, workdps
 
-from symtop.model.exact.weierstrass import differences, half_period, r_j, roots
+from symtop.model.exact.elliptic import differences, half_period, r_j, roots
 
 
 def exact_roots(g2, g3):

@@ -6,8 +6,8 @@ import xml.etree.ElementTree as ET
 import pytest
 
 import symtop
-from symtop.judging.findings import Finding
-from symtop.judging.judge_step import Judged
+from symtop.judging.findings import Finding, Measured
+from symtop.judging.judge_step import StepLedger
 from symtop.judging.sandbox import About
 from symtop.report.card import badge, card, figures, write_badge
 
@@ -22,7 +22,7 @@ def ledger():
 
 
 def handmade(*findings, name="mine"):
-    return Judged(name, "spheroid", findings, {}, About(name, "axis", "python", 0.0))
+    return StepLedger(name, "spheroid", findings, {}, About(name, "axis", "python", 0.0))
 
 
 def test_the_card_is_one_page_with_two_figures_and_every_verdict(ledger, tmp_path):
@@ -50,7 +50,8 @@ def test_the_energy_of_the_card_is_that_of_the_long_run(ledger):
 
 def test_a_card_without_measurements_says_why(tmp_path):
     nothing = handmade(
-        Finding("order", "4", "", "undecided", "no <luck>"), Finding("energy", "", "", "undecided", "it stopped")
+        Finding("order", "4", Measured(), "undecided", "no <luck>"),
+        Finding("energy", "", Measured(), "undecided", "it stopped"),
     )
     page = card(nothing, tmp_path / "card.html").read_text(encoding="utf-8")
     assert "no &lt;luck&gt;" in page
@@ -63,7 +64,10 @@ def test_the_badge_says_what_is_refuted_or_what_the_method_is(ledger, tmp_path):
     root = ET.fromstring(file.read_text(encoding="utf-8"))
     words = [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")]
     assert words == ["symtop", "refuted: symplectic, energy"]
-    good = handmade(Finding("order", "2", "2.000 +- 0.001", "confirmed", "a <b>", 2.0, 0.05), name="<mine>")
+    good = handmade(
+        Finding("order", "2", Measured("slope", 2.0, 0.001, text="2.000 +- 0.001"), "confirmed", "a <b>", 2.0, 0.05),
+        name="<mine>",
+    )
     assert "order 2" in badge(good)
     assert "refuted" not in badge(good)
     ET.fromstring(badge(good))

@@ -226,7 +226,7 @@ def test_every_method_and_term_of_the_answer_is_glossed(browser):
     named = {split_name(word)[0] for word in re.findall(r"[a-z0-9-]+\[(?:axis|angles|attitude)\]", answer)}
     assert named
     assert named <= set(glossed)
-    assert {"row", "[axis]"} <= set(glossed)
+    assert {"variant", "[axis]"} <= set(glossed)
 
 
 def test_no_request_leaves_the_page(browser):

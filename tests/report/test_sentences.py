@@ -20,6 +20,6 @@ def test_a_long_list_is_cut_off_and_counted():
 
 def test_few_things_are_named_and_many_are_counted():
     assert few(["a", "b"]) == "a, b"
-    assert few(list("abcde")) == "5 rows"
+    assert few(list("abcde")) == "5 variants"
     assert few(list("abc"), "scene", 2) == "3 scenes"
     assert counted(1, "top") == "1 top"

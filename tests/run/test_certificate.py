@@ -9,7 +9,7 @@ import pytest
 import symtop
 from benchmarks.families import tops
 from symtop.model import charts
-from symtop.model.exact import closed_form as forms, motion_layout as at
+from symtop.model.exact import closed_form as forms, layout as at
 from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.scenes import Scene, closed_form, scene, scenes
 from symtop.model.top import Angles, SymmetricTop

@@ -9,7 +9,7 @@ import xarray as xr
 import symtop
 from symtop.methods.framework.lanes import W
 from symtop.methods.framework.many import members_of
-from symtop.model.exact.closed_forms import NUMBERS, ClosedForms
+from symtop.model.exact.closed_form import NUMBERS, ClosedForms
 from symtop.run.ensemble import chunks
 from symtop.run.sampling import nutation_periods, schedule
 from symtop.run.simulation import sample_times
@@ -434,7 +434,7 @@ def test_an_ensemble_for_a_cluster_is_refused_before_it_is_sent(tmp_path):
      ("strang[axis]", {"per_nutation": 0.3}, "per_nutation must be at least 0.5.* not 0.3 as of member 0"),
      ("strang[axis]", {"per_nutation": 20, "nutations": 1e308}, "nutations must be fewer"),
      ("exact", {"nutations": None, "horizon": 1e300}, r"horizon must be at most 1e\+100, not 1e\+300"),
-     ("exact", {"per_nutation": 5}, "nothing to tune: give neither a step nor a tolerance, not per_nutation = 5"),
+     ("exact", {"per_nutation": 5}, "nothing to tune: leave out per_nutation = 5"),
      ("exact", {"step_size": 0.1}, "not step_size = 0.1"),
      ("exact", {"tolerance": 0.1}, "not tolerance = 0.1")],
 )  # fmt: skip

@@ -13,7 +13,7 @@ import symtop
 from symtop.measure.timing import timings
 from symtop.methods.framework.registry import methods
 from symtop.model import charts
-from symtop.model.readings import axes
+from symtop.model.charts import axes
 from symtop.model.scenes import closed_form, grazing, steady
 from symtop.run.guard import forecast, guard
 from symtop.run.guard.forecast import Probe, grown, landmarks

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.judging.claims import judge
+from symtop.judging.battery import judge
 from symtop.methods.framework import registry
 from symtop.methods.lagrangian.discrete_lagrangian import is_midpoint
 from symtop.methods.lagrangian.galerkin import is_galerkin

@@ -5,7 +5,7 @@ import pytest
 
 import symtop
 from symtop.core.netcdf import content_hash
-from symtop.model.exact.closed_forms import NUMBERS, ClosedForms
+from symtop.model.exact.closed_form import NUMBERS, ClosedForms
 from symtop.run.ensemble import population as populations
 from symtop.run.ensemble.population import STRATA, population, sine_cosine
 

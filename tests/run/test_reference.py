@@ -16,7 +16,7 @@ from mpmath import mp, mpf, workdps
 import symtop
 from symtop.model import charts
 from symtop.model.exact import closed_form
-from symtop.model.exact.precise_form import PreciseForm
+from symtop.model.exact.digits import PreciseForm
 from symtop.run.reference.certificate import Certificate
 from symtop.run.reference.independent_checks import check_times, flown, integrate, precise_attitude
 from symtop.run.reference.truth import UNCERTIFIED, _cache_path, reference as reference_function

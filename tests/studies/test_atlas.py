@@ -155,7 +155,7 @@ def test_cells_that_were_not_run_are_pale_and_counted():
     left = sum((~each.made).sum() for each in atlas.maps(data, "cusp").values())
     assert said.startswith(f"Of the 240 cells of these maps {left / 240:.0%} were not run")
     assert said.endswith(f"{int(data[Column.CHECKS].sum())} runs of such tops check this, and none is inaccurate.")
-    data[Column.REFUTED] += 1.0  # of each of the two rows
+    data[Column.REFUTED] += 1.0  # of each of the two variants
     assert atlas_words.summary(data, "cusp")[-1].endswith("check this; 2 tops failed and ran at every setting.")
     drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-steps"]
     assert atlas_figures.SETTLED["step_size"] in {text.get_text() for text in drawn.figure.legends[0].get_texts()}
@@ -246,9 +246,9 @@ def test_a_resonance_is_said_to_lose_some_displacement_and_not_every_larger_one(
         for name, value in ((Column.SURVIVING_AT_THIRD_TURN, at), (Column.SURVIVING_PAST_THIRD_TURN, 0.2)):
             data[name] = data[Column.THIRD_TURN_PHASE] * 0.0 + value
         part = data.sel(scene="steady-fast")
-        assert ("with 1 of 1 row a top is lost at some displacement of at most 0.02 rad" in words.resonances(part)) is (
-            said
-        )
+        assert (
+            "with 1 of 1 variant a top is lost at some displacement of at most 0.02 rad" in words.resonances(part)
+        ) is (said)
         assert ("lose a top at some displacement of at most 0.02 rad" in messages.of_mechanism("resonances", part)) is (
             said
         )
@@ -269,7 +269,7 @@ def test_the_caption_of_a_page_names_the_methods_without_a_limit():
 def hand_made(
     words, control=(0.01, 0.1, 1.0), parameter=(0.3, 0.6, 5.0, 10.0), knob_name="step_size", scene_name="cusp"
 ):
-    """A dataset with one integrator's map, from rows of words."""
+    """A dataset with one integrator's map, from variants of words."""
     outcome = np.array([[VERDICTS.index(word) for word in line] for line in words], dtype=np.uint8)
     data = xr.Dataset(
         {
@@ -341,7 +341,7 @@ def test_the_two_charts_of_a_method_are_compared_and_one_alone_is_not():
              for name, rows in (("rk4[angles]", [[A, L, L]] * 4), ("rk4[axis]", [[A, A, L]] * 4))]  # fmt: skip
     said = " ".join(atlas_words.summary(store.combine(cells), "cusp"))
     assert "matters most for rk4: accurate in 33% with rk4[angles] and 67% with rk4[axis] of the map of cusp" in said
-    assert "0 of 2 rows never end a run early" in said
+    assert "0 of 2 variants never end a run early" in said
     every, charts = atlas_words.atlas_tables(store.combine(cells), "cusp")
     assert list(charts.rows) == [["rk4", "33%", "67%"]]
     assert [row[3:6] for row in every.rows] == [["33%", "67%", "0%"], ["67%", "33%", "0%"]]
@@ -350,7 +350,7 @@ def test_the_two_charts_of_a_method_are_compared_and_one_alone_is_not():
 
 
 def test_rows_that_reach_less_than_the_smallest_step_are_the_least_and_are_counted():
-    """On slow tops (the first two rows of a map) one of two methods is inaccurate at the smallest step already."""
+    """On slow tops (the first two variants of a map) one of two methods is inaccurate at the smallest step already."""
     cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", variant="midpoint", drop=True))
              for name, rows in (("rk4[axis]", [[B, B, B]] * 2 + [[A, A, B]] * 2), ("strang[axis]", [[A, A, B]] * 4),
                                 ("gauss-2[axis]", [[A, B, B]] * 4))]  # fmt: skip
@@ -362,18 +362,18 @@ def test_rows_that_reach_less_than_the_smallest_step_are_the_least_and_are_count
     without = store.combine([*cells, (Case("cusp", "rk45[axis]"), hand_made([[A, B, B]] * 4, knob_name="tolerance").sel(
         scene="cusp", variant="midpoint", drop=True))])  # fmt: skip
     assert said.endswith("in nutation periods.")
-    assert atlas_words.summary(without, "cusp")[0].endswith("Not counted: 1 row without a fixed step.")
+    assert atlas_words.summary(without, "cusp")[0].endswith("Not counted: 1 variant without a fixed step.")
 
 
 def test_a_row_without_an_inaccurate_run_has_no_share_of_them():
     cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", variant="midpoint", drop=True))
              for name, rows in (("rk4[axis]", [[A, B, L]] * 4), ("strang[axis]", [[A, A, A]] * 4))]  # fmt: skip
     assert math.isnan(atlas.maps(store.combine(cells), "cusp")["strang[axis]"].silent)
-    assert "With the median row 50% of inaccurate runs end" in atlas_words.summary(store.combine(cells), "cusp")[-1]
+    assert "With the median variant 50% of inaccurate runs end" in atlas_words.summary(store.combine(cells), "cusp")[-1]
     (table,) = atlas_words.atlas_tables(store.combine(cells), "cusp")
     assert [row[5] for row in table.rows] == ["50%", ""]
     right = atlas_words.summary(store.combine(cells[1:]), "cusp")[-1]
-    assert right.startswith("1 of 1 row never end a run early")
+    assert right.startswith("1 of 1 variant never end a run early")
 
 
 def test_a_pole_that_spoils_is_named():
@@ -434,7 +434,7 @@ def test_a_page_of_small_maps_shows_every_row_once_in_the_order_of_its_accurate_
     assert list(drawn) == ["atlas-cusp-enlarged", "atlas-cusp-steps", "atlas-cusp-tolerances"]
     titles = [axis.get_title() for axis in drawn["atlas-cusp-steps"].figure.axes if axis.get_visible()]
     assert titles == ["rk4\n[axis] 67%", "strang\n[axis] 33%"]
-    assert "2 rows" in drawn["atlas-cusp-steps"].caption
+    assert "2 variants" in drawn["atlas-cusp-steps"].caption
     (title,) = (axis.get_title() for axis in drawn["atlas-cusp-tolerances"].figure.axes if axis.get_visible())
     assert title == "rk45\n[axis] 33%"
     assert "to the right the tolerance" in drawn["atlas-cusp-tolerances"].caption

@@ -1,4 +1,4 @@
-"""The convergence study: rows are methods in charts, adaptive methods stand beside them, verdicts follow one rule."""
+"""The convergence study: variants, adaptive methods beside them, and one rule for verdicts."""
 
 import math
 import re
@@ -9,8 +9,8 @@ import xarray as xr
 from symtop_studies.convergence import figures, study, tables, words
 
 import symtop
-from symtop.judging.claims_order import measured_order
-from symtop.judging.findings import CLAIMS
+from symtop.judging.battery import CLAIMS
+from symtop.judging.claims.order import measured_order
 from symtop.measure.order import BESIDE, order_verdict
 from symtop.methods.framework.registry import integrator, methods, split_name, variants
 from symtop.report import style

@@ -10,12 +10,12 @@ from symtop.measure.conservation import CONSTANTS
 NAMES = ["strang[axis]", "gauss-4[axis]", "rk4[axis]", "rk4[angles]", "radau[angles]"]
 SIZES = {"energy": [1e-4, 1e-15, 1e-3, 1e-2, 1e-6], "p_phi": [0.0, 0.0, 0.0, 1e-5, 1e-6], "p_psi": [0.0] * 5}
 SLOPES = {"energy": [0.0, 0.5, 1.0, 1.0, 0.0], "p_phi": [0.0, 0.0, 0.0, 1.0, 1.0], "p_psi": [0.0] * 5}
-PHASE = [[1.0, 1.04], [0.4, 1.5], [2.0, 1.9], [2.0, 2.2], [1.0, 2.0]]  # by row and scene
+PHASE = [[1.0, 1.04], [0.4, 1.5], [2.0, 1.9], [2.0, 2.2], [1.0, 2.0]]  # by variant and scene
 
 
 @pytest.fixture
 def histories():
-    """Five rows on two scenes: two hold everything, one loses the energy, one that and p_phi, one p_phi."""
+    """Five variants on two scenes: two hold everything, one loses the energy, one that and p_phi, one p_phi."""
     both = {
         f"{one}_{part}": np.repeat(np.array(values, float)[:, None], 2, axis=1)
         for one in CONSTANTS

@@ -33,7 +33,7 @@ def measured():
 
 
 def test_every_map_of_an_engine_has_a_row_that_shows_the_axis():
-    names = study.row_names()
+    names = study.variant_names()
     assert {integrator(name).method for name in names} == {*engines(), *(row.split("[")[0] for row in study.COMPARED)}
     assert not any(name.endswith("[angles]") for name in names)
 
@@ -72,7 +72,7 @@ def test_what_is_said_of_engines_is_short_and_every_map_has_a_line_of_a_table(me
     said = words.verdict(measured)
     assert max(map(len, said)) <= 320
     assert words.by_order(measured) == {0: ["no-gyro[axis]"], 1: ["mujoco-euler[axis]"]}  # single precision apart
-    assert words.ordered(measured).endswith("(1 row).")
+    assert words.ordered(measured).endswith("(1 variant).")
     assert " Without a gyroscopic term: " in words.ordered(measured)
     assert " Order 1: " in words.ordered(measured)
     assert words.in_single_precision(measured).startswith("In single precision shorter steps stop helping")

@@ -24,10 +24,9 @@ from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator, methods
 from symtop.methods.lagrangian.discrete_lagrangian import rule_of
 from symtop.model import charts, scenes
-from symtop.model.effective import effective_force
+from symtop.model.charts import View, axis_of
 from symtop.model.scenes import Scene, closed_form, grazing, sleeping
-from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import View, axis_of
+from symtop.model.top import Angles, SymmetricTop, effective_force
 from symtop.run.linear_stability import (
     few_steps,
     linear_limits,
@@ -277,7 +276,7 @@ def test_methods_without_a_shift_keep_the_threshold(name):
 def test_every_row_of_fixed_step_is_scanned_for_sleep_but_those_that_are_left_out():
     left = {name for names in study.NOT_SLEEPING.values() for name in names}
     fixed = {row.name for row in grid_variants("axis") if row.fixed_step}
-    assert left < fixed  # a name that no row has would leave nothing out
+    assert left < fixed  # a name that no variant has would leave nothing out
     for quick in (True, False):
         assert {case.integrator for case in study.cases(quick) if case.scene == "sleeping"} == fixed - left
 

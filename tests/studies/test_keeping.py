@@ -1,4 +1,4 @@
-"""What it costs to keep the phase: the law of a row goes through its measurement and foretells another one."""
+"""What it costs to keep the phase: the law of a variant goes through its measurement and foretells another one."""
 
 import numpy as np
 import pytest

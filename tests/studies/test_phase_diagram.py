@@ -131,7 +131,7 @@ def test_the_diagram_says_which_rows_take_part():
                          coords={"scene": ["spheroid"], "variant": names})  # fmt: skip
     tree = xr.DataTree.from_dict({tables.LADDERS: ladders})
     said = words.part_sentence(tree)
-    assert said.startswith("3 rows take part.")
+    assert said.startswith("3 variants take part.")
     assert "as taylor-longdouble and taylor-quad" in said
     assert words.parts_table(tree).rows == [
         [names[0], *["yes"] * 3],
@@ -198,7 +198,7 @@ def test_a_check_whose_coarser_run_fails_takes_the_finer_one():
 
 
 def test_every_setting_has_its_own_price(data):
-    """Of a row whose order follows the tolerance; steps have one price."""
+    """Of a variant whose order follows the tolerance; steps have one price."""
     at = np.array([1e-2, 1e-5, 1e-12])
     adaptive, fixed = (tables.price(data, name, at) for name in ("series-adaptive[axis]", "strang[axis]"))
     assert adaptive.shape == fixed.shape == (3,)

@@ -95,7 +95,7 @@ def test_a_win_is_beyond_ties():
     assert won.tolist() == [[False, True, False], [False, False, True], [False, False, False]]
     assert level.tolist() == [[True, True, False], [True, False, True], [False, False, False]]
     first = winner(table)
-    assert (first.row, first.share, first.next_row, first.next_share) == (0, Share(1, 3), 1, Share(1, 3))
+    assert (first.row, first.share, first.next_variant, first.next_share) == (0, Share(1, 3), 1, Share(1, 3))
     assert not first.sure
     assert winner(np.full((3, 4), INF)) is None
 
@@ -224,7 +224,7 @@ def test_targets_are_asked_where_they_mean_something(tops):
     assert asked["axis"][1:].mean() > 0.95
 
 
-# ---- a row on the tops -----------------------------------------------------------------------------------------------
+# ---- a method on the tops --------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -304,7 +304,7 @@ def test_the_grid_has_every_compiled_row_and_says_what_it_leaves_out():
 def tree(costs_by_row, price=None, met_at=None):
     """A dataset of the study with these costs (tops,) of the axis at 1e-3, all tops of one stratum.
 
-    A row has the prices (2,) of the halves, or those at the tolerances 1e-2 and 1e-6, (2, 2); `met_at` (tops,) by row.
+    A method has the prices (2,) of the halves, or those at the tolerances 1e-2 and 1e-6, (2, 2).
     """
     names, table = list(costs_by_row), np.array(list(costs_by_row.values()))
     price = dict.fromkeys(names, (1.0, 1.0)) | (price or {})
@@ -316,7 +316,7 @@ def tree(costs_by_row, price=None, met_at=None):
         coords={"scene": ["population"], "variant": names, "quantity": ["axis"], "target": [1e-3]},
     )  # fmt: skip
     about = xr.Dataset({"stratum_place": ("member", np.zeros(table.shape[1]))}, coords={"stratum": ["slow"]})
-    halves = np.array([np.broadcast_to(price[name], (2, 2)) for name in names])  # rows, tolerances, halves
+    halves = np.array([np.broadcast_to(price[name], (2, 2)) for name in names])  # variants, tolerances, halves
     prices = xr.Dataset(
         {"alone_by": (("scene", "variant", "priced_at"), halves.min(axis=2)[np.newaxis]),
          "alone_by_half": (("scene", "variant", "priced_at", "half"), halves[np.newaxis])},
@@ -354,7 +354,7 @@ def test_the_cheaper_of_two_processes_counts_and_both_must_agree():
 
 
 def test_prices_that_are_measured_again_differ_in_times_alone():
-    """A row in lanes and one without; a check of stored results looks at everything but times."""
+    """A variant in lanes and one without; a check of stored results looks at everything but times."""
     one, other = (prices(["strang[axis]", "kahan[axis]"], 9, 2e-3) for _ in range(2))
     assert (one["together"] < 0.5 * one["alone"]).values.tolist() == [True, False]
     assert differences(one, other) == []
@@ -372,7 +372,7 @@ def test_a_price_is_a_slope_whatever_a_call_costs():
 
 @pytest.mark.parametrize("name", ["series-adaptive[axis]", "strang[axis]"])
 def test_a_call_that_is_dearer_makes_no_evaluation_dearer(name, monkeypatch):
-    """A solver that waits for 0.2 ms before it runs, of a row with a tolerance and of one with a step."""
+    """A solver that waits for 0.2 ms before it runs, of a variant with a tolerance and of one with a step."""
 
     def waiting(*args):
         end = time.perf_counter() + 2e-4
@@ -406,7 +406,7 @@ def test_rows_whose_order_follows_the_tolerance_are_timed_at_several():
     assert by[0, 0] > 1.2 * by[0, -1]
     assert np.ptp(by[1]) == 0.0
     assert np.array_equal(timed["alone"].values, timed["alone_by"].sel(priced_at=pricing.TOLERANCE).values)
-    assert (timed["together"] != timed["alone"]).all()  # tops of such rows share a call
+    assert (timed["together"] != timed["alone"]).all()  # tops of such variants share a call
 
 
 def test_an_evaluation_costs_what_it_does_at_the_tolerance_that_meets_the_target():
@@ -452,7 +452,7 @@ def test_the_opening_says_which_row_meets_the_error_on_more_tops():
         assert ("b meets 1e-03 rad over 10 nutations on 100.0% of all tops, and a on 60.0%" in said) == bool(row)
         taken = verdicts.costs(data, Cell("short", "axis", 1e-3), "alone")
         assert verdicts.widest(verdicts.standings(taken)).name == (row or "a")
-        assert "of the tops that a row solves" in words.quantity_sentence(data, "axis")
+        assert "of the tops that a variant solves" in words.quantity_sentence(data, "axis")
 
 
 def test_standings_of_known_costs():
@@ -537,7 +537,7 @@ def test_two_seeds_agree_on_every_sure_winner():
 
 @pytest.mark.slow
 def test_two_seeds_agree_on_every_sure_winner_of_all_rows():
-    rows = [row.name for row in study.compiled_rows() if not study.has_twin(row)]
+    rows = [row.name for row in study.compiled_variants() if not study.has_twin(row)]
     compare_seeds(1000, rows)
 
 
@@ -598,7 +598,7 @@ def test_the_silent_runs_at_small_steps_are_told_by_kind_of_top(quick_results):
     data = netcdf.read_any(quick_results / "population.nc")
     share, group = words.hidden(data), data["short"].to_dataset().isel(scene=0)
     counts = dict.fromkeys(verdicts.strata(data), 0.0)
-    for name in verdicts.judged_rows(data):
+    for name in verdicts.judged_variants(data):
         one = group.sel(variant=name)
         if str(one["control"].values) == "step_size":
             fine = one["silent"].isel(level=np.flatnonzero(one["setting"].values >= words.FINE))
@@ -621,7 +621,7 @@ def test_the_wrong_runs_by_steps_are_those_of_the_rows_with_a_fixed_step(quick_r
     fine = [(wrong, silent) for step, wrong, silent in each if step >= words.FINE]
     assert sum(wrong for wrong, _ in fine) == share.wrong_fine
     assert sum(silent for _, silent in fine) == pytest.approx(share.fine * share.wrong_fine)
-    assert sum(wrong for _, wrong, _ in each) < share.wrong  # adaptive rows have no steps a nutation
+    assert sum(wrong for _, wrong, _ in each) < share.wrong  # adaptive variants have no steps a nutation
 
 
 @pytest.mark.parametrize("quantity", ["axis", "attitude", "energy"])
@@ -632,7 +632,7 @@ def test_advice_counts_the_nearest_tops_of_the_quick_results(quick_results, quan
     assert (near.quantity, near.target) == (quantity, 1e-6)
     counts = list(near.served.values())
     assert counts == sorted(counts, reverse=True)
-    assert 20 <= counts[0] <= 50  # some row is near the cheapest on most of them
+    assert 20 <= counts[0] <= 50  # some variant is near the cheapest on most of them
     assert counts[-1] <= 5  # and some on hardly any
     advice = symtop.recommend(scene, accuracy=1e-6, quantity=quantity, horizon=20.0, results=quick_results)
     assert "of the 50 nearest random tops" in advice.nearest

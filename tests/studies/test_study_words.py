@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.drift import behaviours, messages, rows, tables, words
+from symtop_studies.drift import behaviours, messages, tables, variants, words
 from symtop_studies.drift.histories import run_history
 from symtop_studies.drift.study import TOLERANCE, cases
 from symtop_studies.stability import words as stability_words
 from symtop_studies.truth import tables as truth_tables, words as truth_words
 
 import symtop
-from symtop.judging.claims_long import KEPT, Constant
+from symtop.judging.claims.long_run import KEPT, Constant
 from symtop.measure import conservation, published
 
 
@@ -47,7 +47,7 @@ def test_runs_over_a_part_of_the_horizon_are_named():
 
 
 def histories(**changes):
-    """Rows with the largest changes of p_phi that are given, at rounding in everything else; the last is adaptive."""
+    """Largest changes of p_phi as given, at rounding in everything else; the last is adaptive."""
     names = ["rk4[angles]", "rk4[axis]", "strang[axis]", "strang[attitude]", "rk45[angles]", "taylor[axis]"]
     sizes = [changes.get(name.replace("[", "_").rstrip("]"), 1e-15) for name in names]
     per_row = {
@@ -60,23 +60,23 @@ def histories(**changes):
 
 
 def test_what_a_chart_does_is_not_said_of_the_method():
-    said = rows.charts_apart(histories(rk4_angles=1.5e-4, rk4_axis=0.0))
+    said = variants.charts_apart(histories(rk4_angles=1.5e-4, rk4_axis=0.0))
     assert "p_phi changes by 1.5e-04 with rk4[angles] and by exactly 0 with rk4[axis]" in said
     assert "strang" not in said
     assert said.endswith("It matters more than 2-fold for 1 of 2 methods that have two charts.")
-    (table,) = rows.charts_table(histories(rk4_angles=1.5e-4, rk4_axis=0.0))
+    (table,) = variants.charts_table(histories(rk4_angles=1.5e-4, rk4_axis=0.0))
     assert list(table.rows) == [["p_phi", "rk4", "1.5e-04", "exactly 0", ""]]
     for alike in ({"rk4_angles": 1.5e-4, "rk4_axis": 1.2e-4}, {"rk4_angles": 1e-14, "rk4_axis": 0.0}):
-        assert "The chart alone" not in rows.charts_apart(histories(**alike))
-        assert rows.charts_table(histories(**alike)) == []
+        assert "The chart alone" not in variants.charts_apart(histories(**alike))
+        assert variants.charts_table(histories(**alike)) == []
 
 
 def test_every_tolerance_is_stated_and_a_default_says_that_it_is_one():
-    said = rows.setting(histories())
+    said = variants.setting(histories())
     assert "100 nutations of spheroid, 118 steps a nutation or tolerance 1e-08 (rk45[angles])." in said
     assert said.endswith("taylor[axis] keeps its default tolerance, the rounding of the arithmetic.")
     cells = [histories().sel(scene="spheroid", variant=name) for name in ("rk4[axis]", "rk45[angles]", "taylor[axis]")]
-    assert [rows.used(cell) for cell in cells] == [
+    assert [variants.used(cell) for cell in cells] == [
         "118.00 steps a nutation", "tolerance 1.0e-08", "tolerance 2.2e-18 (its default: rounding)",
     ]  # fmt: skip
 
@@ -142,10 +142,10 @@ def test_what_is_said_of_the_phase_follows_from_its_exponents():
     said = behaviours.phase_sentence(data)
     assert said.startswith("The phase error grows as t with strang. It grows faster with rk4, taylor, and is largest")
     assert "largest with rk4 (t^2.09 and t^1.90, to 1 rad)." in said
-    assert said.endswith("With mixed no one power fits all scenes. With 1 row none is seen.")
+    assert said.endswith("With mixed no one power fits all scenes. With 1 variant none is seen.")
     assert "exact" not in said
     lost = data.assign(phase_exponent=data["phase_exponent"].where(data["variant"] != "mixed"))
-    assert behaviours.phase_sentence(lost).endswith("With 1 row none is seen. With 1 row no power was fitted.")
+    assert behaviours.phase_sentence(lost).endswith("With 1 variant none is seen. With 1 variant no power was fitted.")
     groups = behaviours.phases(data)
     assert {word: [one.row for one in group] for word, group in groups.items()} == {
         behaviours.STEADY: ["strang"], behaviours.FASTER: ["rk4", "taylor"], behaviours.UNCLEAR: ["mixed"],
@@ -154,7 +154,7 @@ def test_what_is_said_of_the_phase_follows_from_its_exponents():
 
 
 def fast_rows(**energy):
-    """Three rows whose phase error grows as t^2, the last over a fiftieth of the horizon; largest energy, exponent."""
+    """Three whose phase error grows as t^2, the last over a fiftieth of the horizon; largest energy, exponent."""
     given = {"rk4[axis]": (1e-3, 1.0), "taylor[axis]": (1e-15, 0.5), "radau[angles]": (1e-6, 0.0)} | energy
     sizes, powers = zip(*given.values(), strict=True)
     per_row = {
@@ -170,12 +170,12 @@ def fast_rows(**energy):
 
 def test_a_phase_that_grows_faster_is_not_laid_to_an_energy_that_does_not_drift():
     assert behaviours.faster_sentence(fast_rows()) == (
-        "Of 3 rows whose phase error grows faster than t, the energy drifts with 1; it has a bounded error with 1 "
+        "Of 3 variants whose phase error grows faster than t, the energy drifts with 1; it has a bounded error with 1 "
         "(radau[angles] over 2% of the horizon); it is at rounding with 1 (taylor[axis]: phase errors below 1e-09 rad, "
         "which may be rounding)."
     )
     drifting = behaviours.faster_sentence(fast_rows(**{"taylor[axis]": (1e-3, 1.0), "radau[angles]": (1e-3, 1.0)}))
-    assert drifting == "Of 3 rows whose phase error grows faster than t, the energy drifts with 3."
+    assert drifting == "Of 3 variants whose phase error grows faster than t, the energy drifts with 3."
     steady = fast_rows()
     assert behaviours.faster_sentence(steady.assign(phase_exponent=steady["phase_exponent"] * 0.5)) == ""
 
@@ -199,10 +199,11 @@ def test_an_energy_error_that_no_sample_sees_is_below_rounding_and_no_ratio_of_a
         coords={"variant": ["yoshida-4", "stormer-verlet", "rkmk-se3-2", "gauss-4"]},
     )  # fmt: skip
     sentence = stability_words.sampling(part)
-    assert "errors of 2 of 3 rows look more than 10 times too small" in sentence
+    assert "errors of 2 of 3 variants look more than 10 times too small" in sentence
     assert ": 1 below rounding, 1 up to 5e+04 times (stormer-verlet)." in sentence
     assert (
-        "Those of 1 row drift and look at most 1.5 times too small. 1 row with errors up to 1e-12 are not" in sentence
+        "Those of 1 variant drift and look at most 1.5 times too small. 1 variant with errors up to 1e-12 are not"
+        in sentence
     )
     assert "e+08" not in sentence
 
@@ -215,7 +216,7 @@ def test_a_walk_of_rounding_is_held_against_one_half(power, agreeing):
     }
     sentence = words.walks(cells)
     assert f"as n^{min(power, 0.5):.2f} to n^{max(power, 0.5):.2f} in n steps" in sentence
-    assert f"with {agreeing} of 2 rows that agrees with the 1/2 of a random walk" in sentence
+    assert f"with {agreeing} of 2 variants that agrees with the 1/2 of a random walk" in sentence
     assert "drift 40 to 100 times as far" in sentence
 
 
@@ -262,11 +263,11 @@ def test_a_loss_that_is_off_by_a_fifth_was_not_predicted():
 
     assert "right to 3% for 2 of 2" in sentence(1.01, 0.97)
     assert "Off by more" not in sentence(1.01, 0.97)
-    assert "for 1 of 2 rows. Off by more than 10%: method-1 (20% off)" in sentence(1.01, 1.2)
+    assert "for 1 of 2 variants. Off by more than 10%: method-1 (20% off)" in sentence(1.01, 1.2)
     assert "predicts when the phase error reaches 0.01 rad, 2.5 times as late" in sentence(1.01)
     assert "right to" not in sentence(1.3)
     unreached = sentence(1.01, math.nan)
-    assert unreached.endswith("for 1 of 2 rows. Not reached by the end of a run: method-1.")
+    assert unreached.endswith("for 1 of 2 variants. Not reached by the end of a run: method-1.")
     assert "Off by more" not in unreached
     known = {"method-0": xr.Dataset({"short": 100.0, "measured": 250.0, "ratio": 1.01})}
     assert words.predictions(known, left=["rk4[axis]"]).endswith("No prediction was possible for: rk4[axis].")
@@ -344,7 +345,7 @@ def test_the_truth_study_counts_the_bounds_that_an_error_exceeds(bound, holding)
 
 
 def test_the_fates_of_all_rows_are_counted_in_a_sentence_and_listed_in_tables():
-    """Two rows at rounding, one that bounds its error, one that loses the constant: a sentence of one line for many."""
+    """Two methods at rounding, one that bounds its error, one that loses the constant."""
     sizes = {"strang": (1e-15, 0.5), "cayley": (2e-15, 0.5), "verlet": (1e-4, 0.0), "rk4": (1e-2, 1.0)}
     columns = {}
     for constant in conservation.CONSTANTS:
@@ -358,8 +359,8 @@ def test_the_fates_of_all_rows_are_counted_in_a_sentence_and_listed_in_tables():
     data = xr.Dataset(columns, coords={"variant": list(sizes), "scene": ["spheroid"]})
     data = data.assign(outcome=(("variant", "scene"), [["ok"]] * 4))
     assert behaviours.constant_sentence(data, "p_phi") == (
-        "Of 4 rows, the relative change of p_phi is no more than rounding with 2 (up to 2.0e-15), stays bounded over "
-        "the run with 1 (up to 1.0e-04, verlet), and grows in time with 1 (up to 1.0e-02, rk4)."
+        "Of 4 variants, the relative change of p_phi is no more than rounding with 2 (up to 2.0e-15), stays bounded "
+        "over the run with 1 (up to 1.0e-04, verlet), and grows in time with 1 (up to 1.0e-02, rk4)."
     )
     counts, every = behaviours.tables(data)
     assert list(counts.rows[0]) == ["energy", "at rounding", "2", "1.0e-15", "strang", "2.0e-15", "cayley"]

@@ -229,7 +229,7 @@ def test_times_that_no_other_predicts_are_told_apart(timed_study):
     assert rest >= least > 0
     said = trust.sentence(lone)
     assert said.startswith(f"{whole - rest} of the {whole} times were compared with the one")
-    assert f"The other {rest} belong to rows with too few times" in said
+    assert f"The other {rest} belong to variants with too few times" in said
     full = timed_study.assign(seconds_forecast=timed_study["seconds"])
     assert "The other" not in trust.sentence(full)
 

@@ -1,13 +1,13 @@
-"""What every socket gives: something that steps a state of one formulation, and its record for the battery.
+"""What every adapter gives: something that steps a state of one formulation, and its record for the battery.
 
-A `Stepper` marches a state by steps of h and shows it at marks. The momenta of its runs are read off the states here
-and never asked from it, so that it cannot report others than it has.
+The momenta of the runs of a `Stepper` are read off its states here and never asked from it, so that it cannot report
+others than it has.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,9 @@ from symtop.methods.framework.plan import NOT_FINITE, OK, Array, Plan, Run
 from symtop.methods.framework.registry import Integrator, Solver
 from symtop.model.top import Angles, SymmetricTop
 
+Marks = NDArray[np.int64]
+LOOK = 64  # steps from one look at whether the state is finite to the next
+
 
 class March(NamedTuple):
     """A state at the marks, shape (marks, dimension), NaN after a failure, and the force evaluations; 0 if unknown."""
@@ -26,19 +29,32 @@ class March(NamedTuple):
     evaluations: int
 
 
-class Stepper(Protocol):
-    """Something that steps. `adaptive` is its solver at a tolerance where it chooses its steps, and None where not."""
+class Stepper:
+    """Something that steps."""
 
     name: str
     chart: str  # of its states; "nutation" for (theta, p_theta), which no solver of the registry shows
     form: Formulation
-    implementation: str  # compiled or python: how much it is run
-    adaptive: Solver | None
-    own_loop: bool  # is a run of many steps a loop of its own?
+    implementation = "python"  # or compiled: how much it is run
+    adaptive: Solver | None = None  # its solver at a tolerance, where it chooses its steps
+    own_loop = False  # is a run of many steps a loop of its own?
+    wrote = False  # has it changed its input?
 
-    def march(self, top: SymmetricTop, par: Any, y: Array, h: float, marks: NDArray[np.int64]) -> March:
+    def march(self, top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state after marks[0], marks[1], ... steps of h from y."""
-        ...
+        raise NotImplementedError
+
+
+def repeat(once: Callable[[int, Any], Any], y: Any, marks: Marks, show: Callable[[Any], Array] = np.asarray) -> Array:
+    """The states at the marks as `show` has them, of steps y = once(k, y); NaN once a state is not finite."""
+    states, done = np.full((marks.size, show(y).size), np.nan), 0
+    for place, mark in enumerate(marks):
+        for k in range(done, int(mark)):
+            if k % LOOK == 0 and not np.isfinite(show(y)).all():
+                return states
+            y = once(k, y)
+        done, states[place] = int(mark), show(y)
+    return states
 
 
 def label_of(text: str) -> str:
@@ -46,8 +62,13 @@ def label_of(text: str) -> str:
     return re.sub(r"[^A-Za-z0-9._+-]+", "-", text).strip("-._+")[:64] or "step"
 
 
+def function_name(function: Callable[..., Any]) -> str:
+    """The name of a function, or of the class of something that is called like one."""
+    return getattr(function, "__name__", type(function).__name__)
+
+
 @dataclass(frozen=True)
-class SocketSolver:
+class AdapterSolver:
     """The solver of the registry around a stepper, which can also go on from any of its states."""
 
     stepper: Stepper
@@ -68,12 +89,11 @@ class SocketSolver:
 
     def onward(self, top: SymmetricTop, start: Angles, steps: Sequence[float]) -> Run:
         """The end of steps of these lengths, each a run of its own from the state where the last one ended."""
-        form = self.stepper.form
-        par, state = form.prepare(top, start)
+        par, state = self.stepper.form.prepare(top, start)
         y = np.array(state, dtype=float)
         for h in steps:
-            y = self.stepper.march(top, par, y.copy(), h, np.array([1])).states[0]
-        return as_run(form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
+            y = self._once(top, par, y.copy(), h)
+        return as_run(self.stepper.form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
 
     def there_and_back(self, top: SymmetricTop, start: Angles, h: float) -> Run:
         """The end of a step of h and one from there with all rates reversed: for what makes no step of -h."""
@@ -81,10 +101,14 @@ class SocketSolver:
         par, state = form.prepare(top, start)
         turned = np.ones(len(state))
         turned[-3 if turned.size > 2 else -1 :] = -1.0  # L, w, the rates or p_theta
-        y = turned * self.stepper.march(top, par, np.array(state, dtype=float), h, np.array([1])).states[0]
+        y = turned * self._once(top, par, np.array(state, dtype=float), h)
         back, _ = form.prepare(top, reversed_rates(start))
-        y = turned * self.stepper.march(top, back, y, h, np.array([1])).states[0]
+        y = turned * self._once(top, back, y, h)
         return as_run(form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
+
+    def _once(self, top: SymmetricTop, par: Any, y: Array, h: float) -> Array:
+        end: Array = self.stepper.march(top, par, y, h, np.array([1])).states[0]
+        return end
 
 
 def integrator(stepper: Stepper, **claims: Any) -> Integrator:
@@ -93,9 +117,9 @@ def integrator(stepper: Stepper, **claims: Any) -> Integrator:
     return Integrator(
         name=stepper.name,
         family="other",
-        summary="given through a socket",
-        solvers={chart: SocketSolver(stepper) if stepper.adaptive is None else stepper.adaptive},
-        control="step_size" if stepper.adaptive is None else "tolerance",
+        summary="given through an adapter",
+        solvers={chart: stepper.adaptive or AdapterSolver(stepper)},
+        control="tolerance" if stepper.adaptive else "step_size",
         implementation=stepper.implementation,
         **claims,
     )

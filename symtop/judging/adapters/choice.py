@@ -1,4 +1,4 @@
-"""From what a user gives to the socket that it fits."""
+"""From what a user gives to the adapter that it fits."""
 
 import inspect
 import sys
@@ -41,7 +41,7 @@ def form_of(target: Any) -> str:
     return "shared" if path.endswith(LIBRARIES) else "program"
 
 
-def opened(target: Any, form: str | None, chart: str, *, adaptive: bool = False) -> Stepper:
+def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = False) -> Stepper:
     """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command.
 
     Raises SymtopError for anything that is none of these, or that cannot be loaded.
@@ -57,8 +57,6 @@ def opened(target: Any, form: str | None, chart: str, *, adaptive: bool = False)
     if kind == "diffrax" or is_solver(thing):
         return DiffraxSolver(thing, chart, name)
     if isinstance(thing, type):
-        if not callable(getattr(thing, "step", None)):
-            raise SymtopError(f"a class must be derived from scipy.integrate.OdeSolver, not {thing.__name__}")
         return ScipySolver(thing, chart, adaptive=adaptive)
     if kind == "scipy" or adaptive:
         raise SymtopError(f"form scipy, and a tolerance, need a class derived from OdeSolver, not {thing!r}")
@@ -85,7 +83,7 @@ def _takes(thing: Any, arguments: int) -> bool:
 def _from_file(target: str | Path) -> tuple[Any, str]:
     """What FILE.py:NAME names, and its name; without a name the function ``step``."""
     path, _, name = str(target).partition(":")
-    file = python_file(path, "a step must be FILE.py:NAME with a file that is there")
+    file = python_file(path, "a step", "FILE.py:NAME with a file that is there")
     with door(f"the file {file.name}"):
         sys.path.insert(0, str(file.parent))  # what stands beside it, as Python has it for a script
         module = execute(f"symtop_judged_{Path(file).stem}", file)

@@ -5,24 +5,19 @@ asks for them; its own memory (a last slope, a second state) goes with it throug
 finder with tolerances of its own, for there is no step control to take them from.
 """
 
-import contextlib
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError
-from symtop.judging.adapters.adapter import March, label_of
-from symtop.judging.adapters.tensors import double_precision, field_of, library, on_these_charts
-from symtop.judging.heartbeat import pulse
+from symtop.judging.adapters.adapter import March, Marks, Stepper, label_of
+from symtop.judging.adapters.batch_step import COMPILING, double_precision, field_of, library, on_these_charts
+from symtop.judging.heartbeat import heartbeat
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
-from symtop.methods.framework.registry import Solver
 from symtop.model.top import SymmetricTop
 
 MOST = 20_000  # steps of one call
-COMPILING = 60.0  # seconds that a first call may take besides
 
 
 def is_solver(thing: Any) -> bool:
@@ -31,11 +26,10 @@ def is_solver(thing: Any) -> bool:
     return "diffrax" in bases and hasattr(thing, "term_structure")
 
 
-class DiffraxSolver:
+class DiffraxSolver(Stepper):
     """A stepper around the solver."""
 
     implementation = "compiled"
-    adaptive: Solver | None = None
     own_loop = True
 
     def __init__(self, solver: Any, chart: str, name: str = "") -> None:
@@ -50,30 +44,27 @@ class DiffraxSolver:
         self.solver, self.chart = solver, on_these_charts("diffrax", chart)
         self.form = FORMULATIONS[chart]
         self.name = label_of(name or type(solver).__name__)
-        self._needs_tolerances()
+        finder = getattr(solver, "root_finder", None)
+        if finder is not None and not isinstance(getattr(finder, "rtol", 0.0), (int, float)):
+            raise SymtopError(
+                f"{type(solver).__name__} must have a root finder with tolerances of its own, such as "
+                "root_finder=diffrax.VeryChord(rtol=1e-12, atol=1e-12): a fixed step has none"
+            )
         self._begin, self._run = self._compiled()
         self._fresh = True  # nothing is compiled yet
 
-    def _needs_tolerances(self) -> None:
-        finder = getattr(self.solver, "root_finder", None)
-        if finder is not None and not isinstance(getattr(finder, "rtol", 0.0), (int, float)):
-            raise SymtopError(
-                f"{type(self.solver).__name__} must have a root finder with tolerances of its own, such as "
-                "root_finder=diffrax.VeryChord(rtol=1e-12, atol=1e-12): a fixed step has none"
-            )
-
-    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: NDArray[np.int64]) -> March:
+    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks; NaN where the solver says that a step failed."""
         states, done = np.full((marks.size, y.size), np.nan), 0
         with double_precision(self.jax):
             more = COMPILING if self._fresh else 0.0
-            with _told(self.name, h, more):
+            with heartbeat.call(h, more):
                 at = self.jax.numpy.asarray(y)
                 memory = self._begin(par, at, h)
             for place, mark in enumerate(marks):
                 while done < mark:
                     some = min(MOST, int(mark) - done)
-                    with _told(self.name, h, more):
+                    with heartbeat.call(h, more):
                         at, memory = self._run(par, at, memory, done * h, h, some)
                         self.jax.block_until_ready(at)
                     self._fresh, more, done = False, 0.0, done + some
@@ -102,16 +93,3 @@ class DiffraxSolver:
             return jax.lax.fori_loop(0, count, once, (y, memory))
 
         return jax.jit(begin), jax.jit(run)
-
-
-@contextlib.contextmanager
-def _told(name: str, h: float, seconds: float) -> Iterator[None]:
-    """A call of somebody else's code: its pulse, and what it raises as one sentence."""
-    pulse.begin(h, seconds)
-    try:
-        yield
-    except Exception as error:  # (somebody else's code)
-        words = " ".join(str(error).split())
-        raise SymtopError(f"a step of {name} raises {type(error).__name__}: {words}") from error
-    finally:
-        pulse.end()

@@ -18,14 +18,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError, at_home
-from symtop.judging.adapters.adapter import March, label_of
-from symtop.judging.heartbeat import pulse
+from symtop.judging.adapters.adapter import March, Marks, Stepper, label_of
+from symtop.judging.heartbeat import heartbeat
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
-from symtop.methods.framework.registry import Solver
 from symtop.model.top import SymmetricTop
 
 WORDS = 100  # characters of what a program says when it fails
@@ -33,11 +31,9 @@ SHORT = 1e-3  # relative: digits that a program may leave out
 SLACK = 5.0  # times the seconds that earlier runs make one expect
 
 
-class Program:
+class Program(Stepper):
     """A stepper around a command."""
 
-    implementation = "python"
-    adaptive: Solver | None = None
     own_loop = True
 
     def __init__(self, command: str, chart: str) -> None:
@@ -48,7 +44,7 @@ class Program:
         self.name = label_of(Path(self.words[0]).name)
         self.seconds_a_step = 0.0  # of the slowest run so far
 
-    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: NDArray[np.int64]) -> March:
+    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks; SymtopError if the program fails or writes anything else."""
         stride = max(int(np.gcd.reduce(marks)), 1)
         last = int(marks[-1])
@@ -65,26 +61,27 @@ class Program:
 
     def _answer(self, line: str, h: float, steps: int) -> bytes:
         expected = SLACK * self.seconds_a_step * steps
-        seconds = pulse.patience + expected
-        pulse.begin(h, expected + seconds)
-        began = time.monotonic()
+        seconds = heartbeat.patience + expected
+        with heartbeat.call(h, expected + seconds):
+            began = time.monotonic()
+            out = self._output(line, seconds, f"{steps} steps of {h:.3g}")
+        if steps > 0:
+            self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps) if steps > 50 else 0.0
+        return out
+
+    def _output(self, line: str, seconds: float, what: str) -> bytes:
         with subprocess.Popen(  # noqa: S603  (the command is the user's)
             self.words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True
         ) as process:
             try:
-                out, said = process.communicate(line.encode(), timeout=seconds)
+                out, errors = process.communicate(line.encode(), timeout=seconds)
             except subprocess.TimeoutExpired:
                 with contextlib.suppress(OSError):
                     os.killpg(process.pid, signal.SIGKILL)
-                raise SymtopError(
-                    f"{self.name} had not ended {seconds:.0f} s after it was asked for {steps} steps of {h:.3g}"
-                ) from None
-        pulse.end()
+                raise SymtopError(f"{self.name} had not ended {seconds:.0f} s after it was asked for {what}") from None
         if process.returncode != 0:
-            words = " ".join(said.decode(errors="replace").split())[-WORDS:]
+            words = " ".join(errors.decode(errors="replace").split())[-WORDS:]
             raise SymtopError(f"{self.name} ended with code {process.returncode}: {words or 'it said nothing'}")
-        if steps > 0:
-            self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps) if steps > 50 else 0.0
         return out
 
 

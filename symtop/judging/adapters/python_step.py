@@ -12,19 +12,15 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError
-from symtop.judging.adapters.adapter import March, label_of
-from symtop.judging.heartbeat import pulse
+from symtop.judging.adapters.adapter import March, Marks, Stepper, function_name, label_of, repeat
+from symtop.judging.heartbeat import heartbeat
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
-from symtop.methods.framework.registry import Solver
 from symtop.model.top import SymmetricTop
 
 Field = Callable[[float, Array], Array]
-Marks = NDArray[np.int64]
-LOOK = 64  # steps from one look at whether the state is finite to the next
 
 
 class Equations:
@@ -44,58 +40,45 @@ class Equations:
             return np.full(np.shape(y), np.nan)
 
 
-class Guarded:
-    """Steps of somebody's function, looked at as they come; `wrote` tells that it has changed its input."""
+class FunctionStep(Stepper):
+    """A stepper around somebody's function, whose results are checked as they come."""
 
     def __init__(self, function: Callable[..., Any], name: str = "") -> None:
         self.function = function
-        self.name = label_of(name or getattr(function, "__name__", type(function).__name__))
-        self.wrote = False
+        self.name = label_of(name or function_name(function))
 
     def steps(self, once: Callable[[float, Array], Any], t: float, y: Array, h: float, marks: Marks) -> Array:
         """The states at the marks, from a time t on; `once(t, y)` asks the function for one step of h."""
-        states, done = np.full((marks.size, y.size), np.nan), 0
-        for place, mark in enumerate(marks):
-            for k in range(done, int(mark)):
-                if k % LOOK == 0 and not np.isfinite(y).all():
-                    return states
-                y = self._checked(once, t + k * h, y, h, first=k == 0)
-            done, states[place] = int(mark), y
-        return states
 
-    def _checked(self, once: Callable[[float, Array], Any], t: float, y: Array, h: float, *, first: bool) -> Array:
-        before = y.copy() if first else y
-        pulse.begin(h)
-        try:
-            after = once(t, y)
-        except Exception as error:  # (somebody else's code)
-            if np.isfinite(y).all():
-                raise SymtopError(f"a step of h = {h:.3g} raises {type(error).__name__}: {error}") from error
-            after = np.full(y.shape, np.nan)
-        pulse.end()
-        if first and not np.array_equal(before, y):
-            self.wrote = True
-        return state_like(before, after, "step")
+        def checked(k: int, y: Array) -> Array:
+            before = y.copy() if k == 0 else y
+            try:
+                with heartbeat.call(h):
+                    after = once(t + k * h, y)
+            except SymtopError:
+                if np.isfinite(y).all():
+                    raise
+                after = np.full(y.shape, np.nan)
+            self.wrote = self.wrote or (k == 0 and not np.array_equal(before, y))
+            return state_like(before, after, "step")
+
+        return repeat(checked, y, marks)
 
 
-class PythonStep(Guarded):
+class PythonStep(FunctionStep):
     """A stepper around the function."""
-
-    implementation = "python"
-    adaptive: Solver | None = None
-    own_loop = False
 
     def __init__(self, function: Callable[..., Any], chart: str, name: str = "") -> None:
         super().__init__(function, name)
         self.chart, self.form = chart, FORMULATIONS[chart]
 
-    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: NDArray[np.int64]) -> March:
+    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks."""
         f = Equations(self.chart, par)
         states = self.along(f, 0.0, y, h, marks)
         return March(states, f.calls)
 
-    def along(self, f: Field, t: float, y: Array, h: float, marks: NDArray[np.int64]) -> Array:
+    def along(self, f: Field, t: float, y: Array, h: float, marks: Marks) -> Array:
         """The states at the marks for any right-hand side, from a time t on."""
         return self.steps(lambda at, state: self.function(f, at, state, h), t, y, h, marks)
 

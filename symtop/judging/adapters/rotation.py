@@ -8,22 +8,18 @@ momentum in space, L = R(q) inertia w, is made of both, R(q) with q at length on
 as an axis that is not a unit vector.
 """
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError
-from symtop.judging.adapters.adapter import March, label_of
-from symtop.judging.adapters.python_step import LOOK, state_like
-from symtop.judging.heartbeat import pulse
+from symtop.judging.adapters.adapter import March, Marks
+from symtop.judging.adapters.python_step import FunctionStep, state_like
 from symtop.methods.framework.equations import FORMULATIONS, Formulation
 from symtop.methods.framework.plan import Array
-from symtop.methods.framework.registry import Solver
 from symtop.methods.framework.space import ended_space, on_attitude
+from symtop.model.charts import space_momenta
 from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import space_momenta
 
 
 class Body(NamedTuple):
@@ -68,43 +64,27 @@ ROTATION = Formulation(
 )
 
 
-class RotationStep:
-    """A stepper around the function."""
+class RotationStep(FunctionStep):
+    """A stepper around the function; the torques that it asks for are its force evaluations."""
 
-    implementation, chart, form = "python", "attitude", ROTATION
-    adaptive: Solver | None = None
-    own_loop = False
+    chart, form = "attitude", ROTATION
 
-    def __init__(self, function: Callable[..., Any], name: str = "") -> None:
-        self.function = function
-        self.name = label_of(name or getattr(function, "__name__", type(function).__name__))
-
-    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: NDArray[np.int64]) -> March:
-        """The state at the marks; the torques that it asks for are its force evaluations."""
-        asked, down = 0, np.array([0.0, 0.0, -par.mgl])
+    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
+        """The state at the marks."""
+        calls, down = 0, np.array([0.0, 0.0, -par.mgl])
 
         def torque(q: Any) -> Array:
-            nonlocal asked
-            asked += 1
+            nonlocal calls
+            calls += 1
             moment: Array = np.cross([0.0, 0.0, 1.0], to_body(np.asarray(q, dtype=float), down))
             return moment
 
-        states, done = np.full((marks.size, 7), np.nan), 0
-        for place, mark in enumerate(marks):
-            for k in range(done, int(mark)):
-                if k % LOOK == 0 and not np.isfinite(y).all():
-                    return March(states, asked)
-                pulse.begin(h)
-                after = self.function(y[:4].copy(), y[4:].copy(), h, par.inertia.copy(), torque)
-                pulse.end()
-                y = _joined(y, after)
-            done, states[place] = int(mark), y
-        return March(states, asked)
+        def once(_: float, y: Array) -> Array:
+            after = self.function(y[:4].copy(), y[4:].copy(), h, par.inertia.copy(), torque)
+            if not isinstance(after, (tuple, list)) or len(after) != 2:
+                raise SymtopError(f"step must return q and w, a pair, not {type(after).__name__}")
+            parts = zip((y[:4], y[4:]), after, strict=True)
+            return np.concatenate([state_like(part, value, "step") for part, value in parts])
 
-
-def _joined(before: Array, after: Any) -> Array:
-    """(q, w) as one state; SymtopError if it is no such pair."""
-    if not isinstance(after, (tuple, list)) or len(after) != 2:
-        raise SymtopError(f"step must return q and w, a pair, not {type(after).__name__}")
-    q, w = (state_like(part, value, "step") for part, value in zip((before[:4], before[4:]), after, strict=True))
-    return np.concatenate([q, w])
+        states = self.steps(once, 0.0, y, h, marks)
+        return March(states, calls)

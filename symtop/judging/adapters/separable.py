@@ -16,14 +16,12 @@ from typing import Any
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.adapters.adapter import March
-from symtop.judging.adapters.python_step import Guarded, Marks
+from symtop.judging.adapters.adapter import March, Marks
+from symtop.judging.adapters.python_step import FunctionStep
 from symtop.methods.framework.angles import chart_outcome, reduced
 from symtop.methods.framework.equations import Formulation
 from symtop.methods.framework.plan import Array
-from symtop.methods.framework.registry import Solver
-from symtop.model.effective import effective_force
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, SymmetricTop, effective_force
 
 
 def _no_field(*_: Any) -> Any:
@@ -45,26 +43,25 @@ def _momenta(par: Any, states: Array) -> tuple[Array, Array]:
 REDUCED = Formulation(_no_field, lambda y: chart_outcome(y[0]), _no_field, _begin, None, _momenta)
 
 
-class SeparableStep(Guarded):
+class SeparableStep(FunctionStep):
     """A stepper around the function; a call of dV is a force evaluation."""
 
-    implementation, chart, form = "python", "nutation", REDUCED
-    adaptive: Solver | None = None
-    own_loop = False
+    chart, form = "nutation", REDUCED
 
     def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks."""
-        asked = 0
+        calls = 0
 
         def dT(p_theta: Any) -> Any:
             return p_theta / par.I1
 
         def dV(theta: Any) -> Any:
-            nonlocal asked
-            asked += 1
+            nonlocal calls
+            calls += 1
             try:
                 return effective_force(theta, par.north, par.south, par.I1, par.mgl)[0]
             except (OverflowError, ZeroDivisionError, ValueError):  # at a pole, or at infinity
                 return np.nan
 
-        return March(self.steps(lambda _, state: self.function(state, h, dT, dV), 0.0, y, h, marks), asked)
+        states = self.steps(lambda _, state: self.function(state, h, dT, dV), 0.0, y, h, marks)
+        return March(states, calls)

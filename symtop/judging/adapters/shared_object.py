@@ -11,14 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError, at_home
-from symtop.judging.adapters.adapter import March, label_of
-from symtop.judging.heartbeat import pulse
+from symtop.judging.adapters.adapter import March, Marks, Stepper, label_of
+from symtop.judging.heartbeat import heartbeat
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
-from symtop.methods.framework.registry import Solver
 from symtop.model.top import SymmetricTop
 
 MOST = 20_000  # steps of one call, so that a call that hangs is told from a long run
@@ -27,11 +25,10 @@ GUARD, MARK = 8, -1.2345e-67  # doubles behind the state that must stay as they 
 Doubles = ctypes.POINTER(ctypes.c_double)
 
 
-class SharedObject:
+class SharedObject(Stepper):
     """A stepper around one function of a library."""
 
     implementation = "compiled"
-    adaptive: Solver | None = None
     own_loop = True
 
     def __init__(self, path: str | Path, chart: str, symbol: str = "step") -> None:
@@ -48,7 +45,7 @@ class SharedObject:
         self.function.argtypes = [Doubles, ctypes.c_double, Doubles, ctypes.c_long]
         self.function.restype = None
 
-    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: NDArray[np.int64]) -> March:
+    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks; SymtopError if it writes beyond its state or into the parameters."""
         numbers, size = np.array([top.I1, top.I3, top.mgl]), y.size
         par, room = numbers.copy(), np.full(size + GUARD, MARK)
@@ -57,9 +54,8 @@ class SharedObject:
         for place, mark in enumerate(marks):
             while done < mark:
                 some = min(MOST, int(mark) - done)
-                pulse.begin(h)
-                self.function(room.ctypes.data_as(Doubles), h, par.ctypes.data_as(Doubles), some)
-                pulse.end()
+                with heartbeat.call(h):
+                    self.function(room.ctypes.data_as(Doubles), h, par.ctypes.data_as(Doubles), some)
                 done += some
             states[place] = room[:size]
             if not np.isfinite(room[:size]).all():

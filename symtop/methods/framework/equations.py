@@ -24,9 +24,8 @@ from symtop.methods.framework import angles, space
 from symtop.methods.framework.angles import BareTop, field_angles
 from symtop.methods.framework.plan import OUTCOMES, Array, Run
 from symtop.methods.framework.space import SpaceTop, field_attitude, field_axis
-from symtop.model.charts import CHARTS
+from symtop.model.charts import CHARTS, space_momenta
 from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import space_momenta
 
 
 class Formulation(NamedTuple):

@@ -42,9 +42,8 @@ from symtop.core.errors import (
 )
 from symtop.core.signals import is_of_user
 from symtop.methods.framework.plan import Plan, Run
-from symtop.model.charts import DIMENSIONS
+from symtop.model.charts import DIMENSIONS, View
 from symtop.model.top import Angles, Momenta, SymmetricTop
-from symtop.model.view import View
 
 Array = NDArray[np.float64]
 Solver = Callable[[SymmetricTop, Angles, Plan], Run]
@@ -171,7 +170,8 @@ class Integrator:
             raise SymtopError(f"{self.name} is adaptive and needs a tolerance, for example 1e-6")
         if value < self.least_tolerance or value >= 1.0:
             raise SymtopError(
-                f"tolerance of {self.name} must be at least {self.least_tolerance:.3g} and below 1, not {value!r}"
+                f"tolerance of {self.name} must be at least {self.least_tolerance:.3g} and below 1, not {value!r}",
+                "tolerance",
             )
         return finite("tolerance", value)
 

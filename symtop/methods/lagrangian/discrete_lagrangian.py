@@ -42,8 +42,8 @@ from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Corre
 from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.registry import Array, Integrator
 from symtop.methods.lagrangian.quadrature import RULES, Quadrature, quadrature
+from symtop.model.charts import View
 from symtop.model.top import Momenta
-from symtop.model.view import View
 
 NOTHING = -0.0  # where a sum begins: adding to it is no operation; adding to +0 is one, as -0 + 0 = 0
 NONE_OPENED = (NOTHING,) * 6

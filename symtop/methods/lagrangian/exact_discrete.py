@@ -3,7 +3,7 @@
 In the chart of `oscillators`, with Z_n = exp(-i n delta) chi(n h) and s = |Z|^2,
 
     Z_{n+1} + Z_{n-1} = 2 A Z_n/(1 + B s_n)        A = sqrt((P - e1)(P - e2)(P - e3)/D^3),  B = -sigma/D,  D = P - b
-    P = wp(h) (`symtop.model.exact.weierstrass`)         delta = sigma J int_0^h dt/(wp(t) - b) = sigma J R_J(P - e_i,
+    P = wp(h) (`symtop.model.exact.elliptic`)         delta = sigma J int_0^h dt/(wp(t) - b) = sigma J R_J(P - e_i,
     D)/3
 
 for each of the two oscillators: McMillan's map in a plane. Why: chi(t+h) (wp(t) - wp(h)) has poles of order 2 at most

@@ -38,7 +38,7 @@ import numpy as np
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.preparation import Preparation, Scaled
 from symtop.methods.framework.space import with_spin
-from symtop.model.exact.weierstrass import differences, half_period, r_j, roots
+from symtop.model.exact.elliptic import differences, half_period, r_j, roots
 from symtop.model.top import Angles, SymmetricTop
 
 

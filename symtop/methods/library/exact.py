@@ -5,8 +5,7 @@ Source: Klein and Sommerfeld, Theory of the Top, chapter 6; see `symtop.model.ex
 
 from symtop.methods.framework.plan import Array, Plan, Run
 from symtop.methods.framework.registry import Integrator
-from symtop.model.exact.closed_form import ClosedForm
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.exact.closed_form import ClosedForm, ClosedForms
 from symtop.model.top import Angles, SymmetricTop
 
 

@@ -22,9 +22,8 @@ from symtop.methods.framework.lanes import Lanes
 from symtop.methods.framework.loop import driver
 from symtop.methods.framework.registry import Array
 from symtop.methods.splitting.loop import Composition, compose, composed, stages
-from symtop.model.effective import half_angle_force
-from symtop.model.top import Momenta
-from symtop.model.view import View
+from symtop.model.charts import View
+from symtop.model.top import Momenta, half_angle_force
 
 
 @register_jitable

@@ -50,8 +50,8 @@ from symtop.methods.framework.registry import Array
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, observe_attitude, observe_axis, with_spin
 from symtop.methods.splitting.loop import Composition, compose, composed, stages
 from symtop.methods.splitting.rotor import EXACT, half_square, rotor, without_branch
+from symtop.model.charts import View, space_energy
 from symtop.model.top import Momenta, SymmetricTop, mean_nutation, nutation_cubic, turning_cosines
-from symtop.model.view import View, space_energy
 
 
 def scale(rule: Any, top: Any, at: Any, h: float) -> Any:

@@ -28,8 +28,8 @@ from symtop.core.multiprecision import context
 from symtop.methods.framework.plan import Plan, Run
 from symtop.methods.framework.registry import Array, Integrator, Solver
 from symtop.model import charts
+from symtop.model.charts import space_momenta
 from symtop.model.top import Angles, SymmetricTop
-from symtop.model.view import space_momenta
 
 START_DIGITS = 60  # of the multiprecision that a start is converted in
 EPSILON = float(np.finfo(np.float64).eps)

@@ -14,8 +14,17 @@ from typing import TypeVar
 
 from symtop.core.jit_functions import inlined, shared, two_product
 from symtop.model.exact import double_double as dd
-from symtop.model.exact.double_double import HALF_PI, DoubleDouble, ordered_sum, two_sum
-from symtop.model.exact.elementary import ARCS, FACTORIALS, NODES, PER, PER2
+from symtop.model.exact.double_double import (
+    ARCS,
+    FACTORIALS,
+    HALF_PI,
+    NODES,
+    PER,
+    PER2,
+    DoubleDouble,
+    ordered_sum,
+    two_sum,
+)
 
 QuadDouble = tuple[float, float, float, float]
 Number = TypeVar("Number", DoubleDouble, QuadDouble)

@@ -23,9 +23,9 @@ from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, OUTCOMES, 
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
 from symtop.model import charts
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.charts import View
+from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import SymmetricTop
-from symtop.model.view import View
 from symtop.run.sampling import Schedule, nutation_periods, schedule
 
 Array = NDArray[np.float64]

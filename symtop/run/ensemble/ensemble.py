@@ -21,7 +21,7 @@ from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
 from symtop.core.progress import beating
 from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
-from symtop.model.exact.motion_samples import LONGEST_TIME
+from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run.ensemble.chunked_output import streaming
 from symtop.run.ensemble.chunks import RAISED, SHOWN, Job
@@ -172,11 +172,13 @@ def _shown(variables: Iterable[str] | None, chart: str) -> tuple[str, ...]:
     if variables is None:
         return SHOWN[chart]
     if isinstance(variables, str) or not isinstance(variables, Iterable):
-        raise SymtopError(f"variables must be a list of names, not {variables!r}")
+        raise SymtopError(f"variables must be a list of names, not {variables!r}", "variables")
     wanted = list(variables)
     for name in wanted:
         if name not in SHOWN[chart]:
-            raise SymtopError(f"variables in the {chart} chart are {', '.join(SHOWN[chart])}, not {name!r}")
+            raise SymtopError(
+                f"variables in the {chart} chart are {', '.join(SHOWN[chart])}, not {name!r}", "variables"
+            )
     return tuple(name for name in SHOWN[chart] if name in wanted)
 
 
@@ -203,20 +205,26 @@ class _Asked(NamedTuple):
         """Refuse settings that exclude each other or are not what the method has."""
         for one, other in (("step_size", "per_nutation"), ("horizon", "nutations")):
             if getattr(self, one) is not None and getattr(self, other) is not None:
-                raise SymtopError(f"give {one} or {other}, not both")
+                raise SymtopError(f"give {one} or {other}, not both", one, other)
         words, step = next(
             ((name, value) for name, value in zip(self._fields[:2], self[:2], strict=True) if value is not None),
             ("step_size", None),
         )
         if method.fixed_step and self.tolerance is not None:
             raise SymtopError(
-                f"{method.name} has a fixed step: give step_size, not tolerance = {shown(self.tolerance)}"
+                f"{method.name} has a fixed step: give step_size, not tolerance = {shown(self.tolerance)}",
+                "step_size",
+                "tolerance",
             )
         if method.fixed_step and step is None:
-            raise SymtopError(f"{method.name} has a fixed step and needs step_size or per_nutation")
+            raise SymtopError(
+                f"{method.name} has a fixed step and needs step_size or per_nutation", "step_size", "per_nutation"
+            )
         check_formula(method, words, step, self.tolerance)
         if not method.fixed_step and step is not None:
-            raise SymtopError(f"{method.name} chooses its own steps: give tolerance, not {words} = {shown(step)}")
+            raise SymtopError(
+                f"{method.name} chooses its own steps: give tolerance, not {words} = {shown(step)}", "tolerance", words
+            )
 
 
 def _job(
@@ -236,7 +244,9 @@ def _job(
     elif asked.horizon is not None:
         horizon = for_each("horizon", asked.horizon, n, names)
     if horizon is None:
-        raise SymtopError("these members have no horizon of their own: give horizon or nutations")
+        raise SymtopError(
+            "give horizon or nutations: these members have no horizon of their own", "horizon", "nutations"
+        )
     horizon_of(float(horizon.min()))
     _check_ends(horizon, asked, names)
     steps = bounds = None
@@ -256,9 +266,11 @@ def _check_ends(horizon: Array, asked: "_Asked", names: Any) -> None:
     for i in np.flatnonzero(horizon > LONGEST_TIME)[:1]:
         if asked.nutations is not None:
             raise SymtopError(
-                f"nutations must be fewer: they take {called(names, i)} beyond a time of {LONGEST_TIME:g}"
+                f"nutations must be fewer: they take {called(names, i)} beyond a time of {LONGEST_TIME:g}", "nutations"
             )
-        raise SymtopError(f"horizon must be at most {LONGEST_TIME:g}, not {horizon[i]!s} as of {called(names, i)}")
+        raise SymtopError(
+            f"horizon must be at most {LONGEST_TIME:g}, not {horizon[i]!s} as of {called(names, i)}", "horizon"
+        )
 
 
 def _periods(numbers: Array, names: Any) -> Array:
@@ -267,7 +279,9 @@ def _periods(numbers: Array, names: Any) -> Array:
     endless = np.flatnonzero(~np.isfinite(period))
     if endless.size:
         raise SymtopError(
-            f"per_nutation and nutations count nutation periods, and that of {called(names, endless[0])} is endless"
+            f"per_nutation and nutations count nutation periods, and that of {called(names, endless[0])} is endless",
+            "per_nutation",
+            "nutations",
         )
     return period
 
@@ -278,7 +292,9 @@ def _parts(period: Array, counted: Array, horizon: Array, names: Any) -> Array:
         step: Array = period / counted
     for i in np.flatnonzero(step > horizon)[:1]:
         least = f"{period[i] / horizon[i]:.4g}, a step within the horizon"
-        raise SymtopError(f"per_nutation must be at least {least}, not {counted[i]:.4g} as of {called(names, i)}")
+        raise SymtopError(
+            f"per_nutation must be at least {least}, not {counted[i]:.4g} as of {called(names, i)}", "per_nutation"
+        )
     return step
 
 
@@ -288,10 +304,13 @@ def _steps(step: Array, horizon: Array, most: float, names: Any) -> NDArray[np.i
         ratio = horizon / step
     for i in np.flatnonzero(step > horizon)[:1]:
         raise SymtopError(
-            f"step_size must be at most the horizon, not {step[i]!s} of {horizon[i]!s} as of {called(names, i)}"
+            f"step_size must be at most the horizon, not {step[i]!s} of {horizon[i]!s} as of {called(names, i)}",
+            "step_size",
         )
     for i in np.flatnonzero(ratio > most)[:1]:
-        raise SymtopError(f"{called(names, i)} asks for {ratio[i]:.3g} steps; the limit is {most:.3g} (see budget)")
+        raise SymtopError(
+            f"{called(names, i)} asks for {ratio[i]:.3g} steps; the limit is {most:.3g} (see budget)", "budget"
+        )
     return np.maximum(1, np.rint(ratio)).astype(np.int64)
 
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, positive, shown
-from symtop.model.exact.closed_forms import NUMBERS, checked
+from symtop.model.exact.closed_form import checked_numbers
 from symtop.model.scenes import OBSERVABLES, Scene, scene
-from symtop.model.top import flat
+from symtop.model.top import NUMBERS, flat
 
 Array = NDArray[np.float64]
 
@@ -92,7 +92,9 @@ def _from_dataset(data: xr.Dataset) -> Members:
     }
     if "member" in data.indexes and "member" in data.dims:
         labels["member"] = _plain(data.indexes["member"])
-    return Members(checked(numbers, labels.get("member")), None, "axis", str(data.attrs.get("units", "")), labels)
+    return Members(
+        checked_numbers(numbers, labels.get("member")), None, "axis", str(data.attrs.get("units", "")), labels
+    )
 
 
 def _check_names(data: xr.Dataset) -> None:

@@ -38,13 +38,13 @@ from numpy.typing import NDArray
 
 from symtop.core import netcdf
 from symtop.core.errors import one_of, whole
+from symtop.model.top import NUMBERS
 
 MOST = 1e9  # members
 
 Array = NDArray[np.float64]
 
 DRAWS = 16  # uniform numbers a member: a new quantity must not move those that are there
-NUMBERS = ("I1", "I3", "mgl", "theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
 BLOCK = 1 << 16  # members drawn at a time
 
 

@@ -23,7 +23,7 @@ from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan, Run
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model import charts
-from symtop.model.readings import axes
+from symtop.model.charts import axes
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.reference.sensitivity import SMALL, departure

@@ -22,7 +22,7 @@ import numpy as np
 from symtop.core.numbers import EPSILON, TINY
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForm
-from symtop.model.exact.motion_constants import RATE
+from symtop.model.exact.constants import RATE
 from symtop.model.scenes import Scene, closed_form
 
 ROUNDING = {"theta": 2e-15, "axis": 2e-15, "attitude": 4e-15, "phi": 2e-15, "psi": 2e-15}  # rad

@@ -114,7 +114,7 @@ def check_times(scene: Scene, horizon: float) -> charts.Array:
 @functools.lru_cache(maxsize=8)
 def precise_form(top: SymmetricTop, start: Angles, digits: int) -> Any:
     """The closed form in so many digits."""
-    from symtop.model.exact.precise_form import PreciseForm
+    from symtop.model.exact.digits import PreciseForm
 
     return PreciseForm(top, start, digits)
 

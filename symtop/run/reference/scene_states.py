@@ -1,7 +1,7 @@
 """States of scenes to 30 digits: a test set for integrators of other people.
 
 Ten times a scene, from a tenth of its horizon to all of it, written with six digits. The states are those of the closed
-form in 40 digits (`symtop.model.exact.precise_form`), from the top, the start and the times as they are stored in
+form in 40 digits (`symtop.model.exact.digits`), from the top, the start and the times as they are stored in
 doubles, so that a program that reads the printed numbers as doubles has the same problem. Angles are z-x-z, phi and
 psi unwrapped; quaternions are (w, x, y, z) from body to space, and their sign is continued from the start.
 """
@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.core import netcdf
-from symtop.model.exact.precise_form import PreciseForm
+from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import Scene
 
 DIGITS, WORKING = 30, 40  # printed, and computed

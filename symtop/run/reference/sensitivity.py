@@ -13,7 +13,7 @@ import numpy as np
 from symtop.core.errors import SymtopError
 from symtop.core.numbers import EPSILON
 from symtop.model import charts
-from symtop.model.exact.closed_forms import ClosedForms
+from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.scenes import Scene
 from symtop.model.top import flat
 

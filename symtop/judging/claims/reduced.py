@@ -12,28 +12,25 @@ from typing import Any
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging import claims_long as long
-from symtop.judging.adapters.adapter import SocketSolver
+from symtop.judging.adapters.adapter import AdapterSolver
 from symtop.judging.adapters.separable import SeparableStep
-from symtop.judging.claims_constants import of_run
-from symtop.judging.claims_order import NUTATIONS, Order, settings_shown
-from symtop.judging.claims_series import SHOWN, ChartSeries, weighed
-from symtop.judging.claims_structure import ONE_MAP, structure_of
-from symtop.judging.findings import Finding
+from symtop.judging.claims import long_run as long
+from symtop.judging.claims.constants import of_run, traces_of
+from symtop.judging.claims.order import NUTATIONS, Order, settings_shown, weighed
+from symtop.judging.claims.series import ChartSeries
+from symtop.judging.claims.structure import ONE_MAP, structure_of
+from symtop.judging.claims.subject import FEWEST, STEPS, Subject
+from symtop.judging.findings import Finding, inapplicable
 from symtop.measure.order import order as order_of
 from symtop.measure.step_map import SHARE, StepMap, angles_at, coarsest, generic_start, restart_gap
 from symtop.measure.step_series import step_series
 from symtop.methods.framework.plan import NOT_FINITE, OK, OUTCOMES, Array, Run, sentence
-from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, Momenta
-
-Traces = dict[str, np.ndarray]
 
 CHART = "nutation"
 COARSEST, RUNS = 17, 13  # steps of the shortest run of the order, and how many runs
 BOUND = 1e-14  # of the closed form at the end of such a run
-NOT_HERE = "a map of (theta, p_theta) does not show it"
 
 
 @dataclass(frozen=True)
@@ -53,12 +50,12 @@ class Plane(StepMap):
     @property
     def onward(self) -> Any:
         """Steps of given lengths, each from the state where the last one ended."""
-        return SocketSolver(self.stepper).onward
+        return AdapterSolver(self.stepper).onward
 
     @property
     def there_and_back(self) -> Any:
         """A step, and one from its end with p_theta reversed."""
-        return SocketSolver(self.stepper).there_and_back
+        return AdapterSolver(self.stepper).there_and_back
 
     def scaled(self, state: Array, _phi: float, _psi: float) -> Array:
         """A state as Y."""
@@ -87,36 +84,39 @@ class Plane(StepMap):
         return 1.0
 
 
-def plane(method: Integrator, stepper: SeparableStep, scene: Scene) -> tuple[Plane, Angles]:
+def plane(subject: Subject) -> tuple[Plane, Angles]:
     """The map at a step so large that its structure shows, and the point to judge it at."""
-    start, unit = generic_start(scene), scene.momentum_scale
-    momenta = scene.top.momenta(start)
-    trial = Plane(method, CHART, scene.top, unit, SHARE * scene.time_scale(), stepper, momenta)
+    scene, start = subject.scene, generic_start(subject.scene)
+    h, momenta = SHARE * scene.time_scale(), scene.top.momenta(start)
+    trial = Plane(subject.method, CHART, scene.top, scene.momentum_scale, h, subject.stepper, momenta)
     coarse: Any = coarsest(trial, start)
     return coarse, start
 
 
-def measure(
-    stage: str, method: Integrator, stepper: SeparableStep, scene: Scene, steps: tuple[float, float], traces: Traces
-) -> list[Finding]:
-    """The findings of a stage; `steps` is how many the longest run of the order and the long run have at most."""
-    finest, longest = steps
-    if stage == "order":
-        return [order(method, stepper, scene, finest, traces)]
-    if stage == "structure":
-        return list(structure_of({CHART: lambda: plane(method, stepper, scene)}, method, traces).values())
-    if stage == "constants":
-        run = long_run(stepper, scene, round(longest))
-        traces["steps_run"], traces["nutations_run"] = np.array(run.steps), np.array(run.nutations)
-        traces["long_nutations"], traces["energy_change"] = run.energy
-        return list(of_run(method, run).values())
-    return [Finding(stage, "", "", "inapplicable", NOT_HERE)]
+def not_shown(_: Subject) -> list[Finding]:
+    """The findings on what the plane does not show."""
+    return [inapplicable(claim, "a map of (theta, p_theta) does not show it") for claim in ("time", "pole")]
 
 
-def order(method: Integrator, stepper: SeparableStep, scene: Scene, finest: float, traces: Traces) -> Finding:
+def structure(subject: Subject) -> list[Finding]:
+    """The findings on symplectic and symmetric."""
+    return structure_of({CHART: lambda: plane(subject)}, subject)
+
+
+def constants(subject: Subject) -> list[Finding]:
+    """What a long run shows."""
+    steps = min(subject.long_steps or STEPS, long.QUICK_STEPS if subject.quick else STEPS)
+    run = long_run(subject.stepper, subject.scene, round(steps))
+    subject.traces.update(traces_of(run))
+    return of_run(subject.method, run)
+
+
+def order(subject: Subject) -> list[Finding]:
     """The finding on the order: the slope of the errors at the end of runs, and the power series of a step."""
+    method, scene, stepper = subject.method, subject.scene, subject.stepper
     horizon = NUTATIONS * scene.time_scale()
-    counts = np.unique(np.rint(np.geomspace(COARSEST, max(finest, 4 * COARSEST), RUNS)).astype(np.int64))
+    finest = max(subject.finest or FEWEST, 4 * COARSEST)
+    counts = np.unique(np.rint(np.geomspace(COARSEST, finest, RUNS)).astype(np.int64))
     truth = closed_form(scene)(np.array([horizon]))
     end = np.array([float(truth.theta[0]), scene.top.I1 * float(truth.theta_dot[0])])
     par, state = stepper.form.prepare(scene.top, scene.start)
@@ -128,12 +128,12 @@ def order(method: Integrator, stepper: SeparableStep, scene: Scene, finest: floa
     omega = 2.0 * math.pi / scene.time_scale()
     fit = order_of(step_size, error, bound, omega, method.order, symmetric=method.symmetric)
     fitted = Order(scene.name, step_size, error, bound, {CHART: fit}, CHART, True)
-    traces["step_size"], traces["error"], traces["fitted"] = settings_shown(fitted, SHOWN)
-    step, start = plane(method, stepper, scene)
+    subject.traces.update(settings_shown(fitted))
+    step, start = plane(subject)
     one_map = restart_gap(step, start) <= ONE_MAP
     series = ChartSeries(CHART, step_series(step, start, scene.time_scale())) if one_map else None
     slopes = f"slopes {CHART} {fit} on {scene.name}" if math.isfinite(fit.slope) else "no slope"
-    return weighed(method.order, fitted, series, slopes)
+    return [weighed(method.order, fitted, series, slopes)]
 
 
 def long_run(stepper: SeparableStep, scene: Scene, steps: int) -> long.LongRun:

@@ -16,14 +16,14 @@ import numpy as np
 
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import Stepper
-from symtop.judging.findings import Finding
+from symtop.judging.claims.subject import Subject
+from symtop.judging.findings import Finding, Measured, inapplicable
 from symtop.measure.step_map import generic_start
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles
 
 SHARE = 0.0137  # of a nutation: the step that is called
 SAME = 1e-13  # relative: what threads may leave between two calls
-A_FUNCTION = "a function"
 REPEATS, SECONDS = 250, 0.3  # calls with the same arguments, or as many as there is time for
 NOTHING, STANDS = 1e-8, 1e-6  # a step of so little moves a state by less than this, relative
 FAR = 200.0  # times the step: one that most methods do not survive
@@ -33,20 +33,29 @@ MISSED = 0.2  # of a step: a method of several steps starts anew with less
 ELSEWHERE = 0.3  # rad and units of the rates, from the start that is called
 
 
-def calls(stepper: Stepper, scene: Scene) -> Finding:
+def measure(subject: Subject) -> list[Finding]:
     """The finding on the calls; refuted if a step is not a function of its arguments."""
+    if not subject.method.fixed_step:
+        return [inapplicable("calls", "it has no step of a given length")]
+    return [_calls(subject.stepper, subject.scene)]
+
+
+def _refuted(kind: str, why: str, value: float = math.nan, resolution: float = SAME) -> Finding:
+    return Finding("calls", "a function", Measured(kind), "refuted", why, value, resolution)
+
+
+def _calls(stepper: Stepper, scene: Scene) -> Finding:
     h, start = SHARE * scene.time_scale(), generic_start(scene)
 
     def once(at: Angles, step: float) -> Any:
         par, state = stepper.form.prepare(scene.top, at)
         return stepper.march(scene.top, par, np.array(state), step, np.array([1])).states[0]
 
-    names = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
-    other = Angles(*(getattr(start, name) * (1.0 - ELSEWHERE) for name in names))
+    other = Angles(*(getattr(start, name) * (1.0 - ELSEWHERE) for name in Angles.__slots__))
     first = once(start, h)
     if not np.isfinite(first).all():
-        what = "NaN" if np.isnan(first).any() else "infinity"
-        return Finding("calls", A_FUNCTION, f"returns {what}", "refuted", f"a step of h = {h:.3g} returns {what}")
+        kind = f"returns {'NaN' if np.isnan(first).any() else 'infinity'}"
+        return _refuted(kind, f"a step of h = {h:.3g} {kind}", resolution=math.nan)
     again, third = once(start, h), once(start, h)
     count, differs = (0, 0.0) if stepper.own_loop else _repeated(lambda: once(start, h), third)
     once(other, h)
@@ -57,29 +66,27 @@ def calls(stepper: Stepper, scene: Scene) -> Finding:
     if twice > SAME:
         why = f"two calls with the same arguments differ by {twice:.1e}"
         why = why if np.isfinite(twice) else "of calls with the same arguments one returns NaN and another does not"
-        return Finding("calls", A_FUNCTION, "not repeatable", "refuted", why, twice, SAME)
+        return _refuted("not repeatable", why, twice)
+    keeps = "it keeps something between calls"
     if later > SAME:
-        why = f"it keeps something between calls: after a step elsewhere the same call differs by {later:.1e}"
-        return Finding("calls", A_FUNCTION, "keeps state", "refuted", why, later, SAME)
+        return _refuted("keeps state", f"{keeps}: after a step elsewhere the same call differs by {later:.1e}", later)
     if differs > SAME:
-        why = f"it keeps something between calls: call {count} with the same arguments differs by {differs:.1e}"
-        return Finding("calls", A_FUNCTION, "keeps state", "refuted", why, differs, SAME)
+        why = f"{keeps}: call {count} with the same arguments differs by {differs:.1e}"
+        return _refuted("keeps state", why, differs)
     still = np.array(stepper.form.prepare(scene.top, other)[1])
     moved = _apart(still, _alike(stepper.chart, still, once(other, NOTHING * h)))
     if moved > STANDS:
-        why = (
-            f"it keeps something of its first start: from another one, a step of {NOTHING * h:.0e} moves by {moved:.1e}"
-        )
-        return Finding("calls", A_FUNCTION, "keeps state", "refuted", why, moved, STANDS)
-    told = _told(stepper, first)
+        why = f"it keeps something of its first start: from another one, a step of {NOTHING * h:.0e} moves by "
+        return _refuted("keeps state", f"{why}{moved:.1e}", moved, STANDS)
+    traits = _traits(stepper, first)
     if stepper.own_loop:
         missed, why = _steps_missed(stepper, scene, h / 10.0)
         if missed > MISSED:
-            return Finding("calls", A_FUNCTION, "miscounts steps", "refuted", why, missed, MISSED)
-        told |= {"remembers": why} if missed > REMEMBERED else {}
-    told |= _backwards(lambda step: once(start, step), h)
-    why = "; ".join(["a call gives the same numbers again, and after a step elsewhere", *told.values()])
-    return Finding("calls", "", ", ".join(told) or A_FUNCTION, "measured", why, later, SAME)
+            return _refuted("miscounts steps", why, missed, MISSED)
+        traits |= {"remembers": why} if missed > REMEMBERED else {}
+    traits |= _backwards(lambda step: once(start, step), h)
+    why = "; ".join(["a call gives the same numbers again, and after a step elsewhere", *traits.values()])
+    return Finding("calls", "", Measured(", ".join(traits) or "a function"), "measured", why, later, SAME)
 
 
 def _repeated(call: Callable[[], Any], state: Any) -> tuple[int, float]:
@@ -137,9 +144,9 @@ def _backwards(once: Callable[[float], Any], h: float) -> dict[str, str]:
     return {}
 
 
-def _told(stepper: Stepper, state: Any) -> dict[str, str]:
-    """What else is to be told of a call: in two words, and in a clause."""
-    single = np.isfinite(state).all() and (state == state.astype(np.float32)).all()
-    return ({"changes its input": "it writes to its input"} if getattr(stepper, "wrote", False) else {}) | (
-        {"single precision": "its numbers are those of single precision"} if single else {}
-    )
+def _traits(stepper: Stepper, state: Any) -> dict[str, str]:
+    """What else a call is like: in two words, and in a clause."""
+    traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}
+    if (state == state.astype(np.float32)).all():
+        traits["single precision"] = "its numbers are those of single precision"
+    return traits

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.judging.findings import Finding
+from symtop.judging.claims.subject import Subject, declared
+from symtop.judging.findings import Finding, Measured
 from symtop.measure.errors import errors_against
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
@@ -61,14 +62,9 @@ def passages(method: Integrator) -> list[Passage]:
     return rows
 
 
-def pole_claim(method: Integrator) -> str:
-    """What follows from the charts that a method works in."""
-    return "no pole" if set(method.solvers) & {"axis", "attitude"} else ""
-
-
-def pole(method: Integrator) -> Finding:
-    """The finding on the pole."""
-    declared, passed = pole_claim(method), passages(method)
+def measure(subject: Subject) -> list[Finding]:
+    """The finding on the pole; of a bare step it is measured alone, for its chart may be the simplest and no claim."""
+    claim, passed = "" if subject.stepper else declared(subject.method, "pole"), passages(subject.method)
     sentence = "; ".join(
         f"{one.chart}: passes, off by {one.error:.0e} and {one.finer:.0e} with finer steps" if one.passes
         else f"{one.chart}: ends there ({one.outcome})" if one.outcome != "ok"
@@ -77,11 +73,11 @@ def pole(method: Integrator) -> Finding:
     )  # fmt: skip
     judged = [one for one in passed if one.chart != "angles"] or passed
     words = ["passes" if one.passes else "wrong" if one.outcome == "ok" else "ends there" for one in judged]
-    measured = ", ".join(dict.fromkeys(words))
-    worst = max(one.finer for one in judged)
-    if not declared:
-        return Finding("pole", declared, measured, "measured", sentence, worst, POLE_RIGHT)
-    if any(one.outcome not in ("ok", "left_chart", "not_finite") for one in judged):
-        return Finding("pole", declared, measured, "undecided", sentence, worst, POLE_RIGHT)
-    verdict = "confirmed" if all(one.passes for one in judged) else "refuted"
-    return Finding("pole", declared, measured, verdict, sentence, worst, POLE_RIGHT)
+    if not claim:
+        verdict = "measured"
+    elif any(one.outcome not in ("ok", "left_chart", "not_finite") for one in judged):
+        verdict = "undecided"
+    else:
+        verdict = "confirmed" if all(one.passes for one in judged) else "refuted"
+    measured = Measured(", ".join(dict.fromkeys(words)))
+    return [Finding("pole", claim, measured, verdict, sentence, max(one.finer for one in judged), POLE_RIGHT)]

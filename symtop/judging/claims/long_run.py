@@ -31,9 +31,9 @@ from symtop.measure.increments import Difference, from_increments
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator
+from symtop.model.charts import space_momenta
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop
-from symtop.model.view import space_momenta
 from symtop.run.simulation import as_dataset, make_plan
 
 Array = NDArray[np.float64]

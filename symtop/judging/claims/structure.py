@@ -10,13 +10,10 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import NamedTuple
 
-import numpy as np
-
 from symtop.core.errors import SymtopError
-from symtop.judging.findings import Finding, agreement, undecided, yes_no
+from symtop.judging.claims.subject import Subject
+from symtop.judging.findings import NOTHING, Finding, Measured, agreement, undecided, yes_no
 from symtop.measure import step_map as maps
-from symtop.methods.framework.registry import Integrator
-from symtop.model.scenes import Scene
 from symtop.model.top import Angles
 
 SYMPLECTIC = 1e-9  # a smaller defect of the bracket is none
@@ -37,17 +34,14 @@ class _Chart(NamedTuple):
     why: str
 
 
-def structure(
-    method: Integrator, scene: Scene, traces: dict[str, np.ndarray], *, quick: bool = False
-) -> dict[str, Finding]:
+def measure(subject: Subject) -> list[Finding]:
     """The findings on symplectic and symmetric."""
-    names = method.charts()[-1:] if quick else method.charts()
-    return structure_of({chart: partial(maps.step_map, method, chart, scene) for chart in names}, method, traces)
+    names = subject.method.charts()[-1:] if subject.quick else subject.method.charts()
+    steps = {chart: partial(maps.step_map, subject.method, chart, subject.scene) for chart in names}
+    return structure_of(steps, subject)
 
 
-def structure_of(
-    steps: Mapping[str, Callable[[], tuple[maps.StepMap, Angles]]], method: Integrator, traces: dict[str, np.ndarray]
-) -> dict[str, Finding]:
+def structure_of(steps: Mapping[str, Callable[[], tuple[maps.StepMap, Angles]]], subject: Subject) -> list[Finding]:
     """The findings from the map of a step in each chart, with the point to judge it at; a map may refuse to be made."""
     brackets, returns = [], []
     for chart, made in steps.items():
@@ -56,7 +50,7 @@ def structure_of(
             defect = maps.symplectic_defect(step, start)
             gap = maps.restart_gap(step, start)
             brackets.append(_bracket(chart, defect, gap))
-            traces["defect_width"], traces["bracket_defect"] = defect.widths, defect.raw
+            subject.traces.update(defect_width=defect.widths, bracket_defect=defect.raw)
         except SymtopError as error:
             brackets.append(_unknown(chart, error))
             returns.append(_unknown(chart, error))
@@ -65,10 +59,11 @@ def structure_of(
             returns.append(_returned(chart, maps.return_miss(step, start), gap))
         except SymtopError as error:
             returns.append(_unknown(chart, error))
-    return {
-        "symplectic": _over_charts("symplectic", method.symplectic, brackets),
-        "symmetric": _over_charts("symmetric", method.symmetric, returns),
-    }
+    method = subject.method
+    return [
+        _over_charts("symplectic", method.symplectic, brackets),
+        _over_charts("symmetric", method.symmetric, returns),
+    ]
 
 
 def _unknown(chart: str, error: SymtopError) -> _Chart:
@@ -104,8 +99,8 @@ def _over_charts(claim: str, declared: bool | None, by_chart: list[_Chart]) -> F
         agreeing = [one for one in by_chart if one.answer is answer]
         if agreeing:
             worst = max(agreeing, key=lambda one: one.value if math.isfinite(one.value) else -1.0)
-            words = {True: f"yes, {worst.value:.0e}", False: f"no, {worst.value:.0e}", None: ""}[answer]
+            measured = NOTHING if answer is None else Measured(yes_no(answer), worst.value)
             verdict = agreement(declared=declared, measured=answer)
             why = f"{worst.why}, in the {worst.chart} chart"
-            return Finding(claim, yes_no(declared), words, verdict, why, worst.value, worst.resolution)
+            return Finding(claim, yes_no(declared), measured, verdict, why, worst.value, worst.resolution)
     return undecided(claim, yes_no(declared), "no chart could be tried")

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from symtop.core.jit_functions import inlined, shared, two_product
-from symtop.model.exact import motion_layout as at
+from symtop.model.exact import layout as at
 from symtop.model.exact.double_double import two_sum, whole_part
 
 MOTION, QUATERNION, AXIS, MOMENTUM, STATE, TURNS, RUN = range(7)  # what `samples` fills in

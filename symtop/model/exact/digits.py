@@ -26,18 +26,82 @@ Conventions where angles are singular. If the axis passes exactly through a pole
 dropped, and phi and psi jump by pi there and back in turn. If the axis stands on a pole only phi + psi (phi - psi
 at the lower one) has a meaning, and the other twist alone gives phi' = +-a/2.
 
+Inputs are read without rounding: a float is the exact binary fraction it stores, a string the exact decimal it shows.
+`precise_constants` rounds a form once to the constants of `symtop.model.exact.closed_form`, which are checked against
+them and fall back on them.
+
 Sources: Klein and Sommerfeld, Theory of the Top, chapter 6 (theta functions); Goldstein, Classical Mechanics,
 section 5.7; Carlson, Numerical Algorithms 10 (1995) 13. Not a numerical integration: the error does not grow with
 time, except that a time of 10^k periods costs k of the 30 guard digits.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any, Generic, NamedTuple, TypeVar
 
+import numpy as np
+
 from symtop.core.errors import SymtopError, whole
-from symtop.model.exact.exact_numbers import rational, rationals, real_roots
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.charts import Array
+from symtop.model.exact import layout as at
+from symtop.model.top import NUMBERS, Angles, SymmetricTop
+
+
+def rationals(top: SymmetricTop | Sequence[Any], start: Angles | Sequence[Any]) -> list[list[Fraction]]:
+    """Parameters and start as exact fractions, checked against the model."""
+    body = [top.I1, top.I3, top.mgl] if isinstance(top, SymmetricTop) else list(top)
+    state = [getattr(start, name) for name in NUMBERS[3:]] if isinstance(start, Angles) else list(start)
+    if len(body) != 3 or len(state) != 6:
+        raise SymtopError(
+            f"the closed form takes (I1, I3, mgl) and six angles and rates, not {len(body)} and {len(state)} numbers"
+        )
+    values = [rational(name, value) for name, value in zip(NUMBERS, [*body, *state], strict=True)]
+    SymmetricTop(*map(float, values[:3]))
+    Angles(*map(float, values[3:]))
+    return [values[:3], values[3:]]
+
+
+def rational(name: str, value: Any) -> Fraction:
+    """The exact value of a float, integer, fraction, decimal string or mpf."""
+    from mpmath.libmp import to_rational
+
+    try:
+        if hasattr(value, "_mpf_"):
+            return Fraction(*map(int, to_rational(value._mpf_)))
+        return Fraction(value if isinstance(value, str | int | Fraction) else float(value))
+    except (TypeError, ValueError, OverflowError, ZeroDivisionError):
+        raise SymtopError(f"{name} must be a finite number or a decimal string, not {value!r}") from None
+
+
+def real_roots(ctx: Any, c0: Any, c1: Any, c2: Any, c3: Any) -> tuple[Any, ...]:
+    """Roots of c0 + c1 x + c2 x^2 + c3 x^3, all real, x1 <= 0 <= x2 <= x3; c0, c3 >= 0. Infinite x3 if c3 = 0.
+
+    A double root at 0 is returned as x1 = x2 = 0 wherever the third lies.
+    """
+    if c0 == 0 and c1 == 0:
+        return ctx.zero, ctx.zero, -c2 / c3 if c3 else ctx.inf
+    if c3 == 0:
+        return *quadratic_roots(ctx, c0, c1, c2), ctx.inf
+    if c0 == 0:
+        return tuple(sorted([ctx.zero, *quadratic_roots(ctx, c1, c2, c3)]))
+    shift = c2 / (3 * c3)
+    p, q = c1 / c3 - 3 * shift**2, 2 * shift**3 - shift * c1 / c3 + c0 / c3
+    radius = ctx.sqrt(max(-p / 3, 0))
+    angle = ctx.acos(min(max(1.5 * q / (p * radius), -1), 1)) / 3 if radius else ctx.zero
+    roots = [2 * radius * ctx.cos(angle - 2 * ctx.pi * k / 3) - shift for k in range(3)]
+    for _ in range(5):  # Newton: near a double or triple root the cosines keep only a half or a quarter of the digits
+        slopes = [c1 + x * (2 * c2 + 3 * x * c3) for x in roots]
+        values = [c0 + x * (c1 + x * (c2 + x * c3)) for x in roots]
+        roots = [x - v / s if s else x for x, v, s in zip(roots, values, slopes, strict=True)]
+    return tuple(sorted(roots))
+
+
+def quadratic_roots(ctx: Any, c0: Any, c1: Any, c2: Any) -> list[Any]:
+    """Real roots of c0 + c1 x + c2 x^2 in order, without cancellation."""
+    root = ctx.sqrt(max(c1 * c1 - 4 * c0 * c2, 0))
+    q = -(c1 + (root if c1 > 0 else -root)) / 2
+    return sorted([q / c2, c0 / q])
+
 
 GUARD_DIGITS, MOST_DIGITS = 30, 20_000  # the latter resolves relative gaps between roots down to 1e-5000
 
@@ -311,3 +375,127 @@ def _plain(value: Any) -> Any:
     from mpmath import mp
 
     return mp.make_mpf(value._mpf_)
+
+
+DIGITS = 40
+
+# sin((2n+1)x)/sin x, cos((2n+1)x)/cos x, cos 2nx and sin 2nx/(sin x cos x) in powers of cos 2x
+_SINES = ((1, 0, 0, 0), (1, 2, 0, 0), (-1, 2, 4, 0), (-1, -4, 4, 8))
+_COSINES = ((1, 0, 0, 0), (-1, 2, 0, 0), (-1, -2, 4, 0), (1, -4, -4, 8))
+_EVEN_COSINES = ((1, 0, 0, 0), (0, 1, 0, 0), (-1, 0, 2, 0), (0, -3, 0, 4))
+_EVEN_SINES = ((0, 0, 0, 0), (2, 0, 0, 0), (0, 4, 0, 0), (-2, 0, 8, 0))
+
+
+def precise_constants(top: SymmetricTop, start: Angles, form: PreciseForm | None = None) -> Array:
+    """The array of constants, from a form that there is or from one of `DIGITS` digits.
+
+    Raises `SymtopError` if the axis comes within 1e-145 of a pole that it does not meet.
+    """
+    form, out = form or PreciseForm(top, start, digits=DIGITS), np.zeros(at.SIZE)
+    ctx, curve = form.ctx, form.curve
+    out[at.ARITHMETIC], out[at.UPRIGHT], out[at.I1] = at.DIGITS, form.facing > 0, top.I1
+    out[at.P_PSI], out[at.W3] = float(form.p_psi), float(form.p_psi / form.I3)
+    out[at.ENERGY], out[at.P_PHI] = float(form.energy), float(form.p_phi)
+    out[at.PERIOD] = float(form.nutation_period)
+    out[at.PHI_PER_PERIOD], out[at.PSI_PER_PERIOD] = float(form.phi_per_period), float(form.psi_per_period)
+    out[at.THETA_LOW], out[at.THETA_HIGH] = float(form.theta_range[0]), float(form.theta_range[1])
+    if form.climbs:
+        out[at.KIND], out[at.SCALE], out[at.FLOOR_SIGN] = at.CLIMBS, float(form.Omega), float(form.floor_sign)
+    elif curve.swing:
+        if any(0 < gap < 1e-290 for gap in (curve.floor.low, curve.crown.high, curve.m1)):
+            raise SymtopError(
+                f"the axis must meet a pole or miss it by 1e-145 (PreciseForm takes less), not as {start!r}"
+            )
+        _expand(form, out)
+    else:
+        rest = (ctx.sqrt(curve.floor.low / 2), ctx.sqrt(curve.crown.low / 2), form.phi_rate)
+        out[[at.REST_DOWN, at.REST_UP, at.REST_RATE]] = [float(value) for value in rest]
+
+    leading = [(angle - lag) / 2 for angle, lag in zip(form.angles0, form.lags0, strict=True)]
+    phi0, psi0 = sum(leading), form.facing * (leading[0] - leading[1])
+    turn = 2 * ctx.pi
+    _put_line(out, at.PHI_LINE, form.phi_rate, phi0)
+    _put_line(out, at.PSI_LINE, form.psi_rate, psi0)
+    halves = ((rate / 2, start) for rate, start in zip(form.mean_rates, leading, strict=True))
+    for place, (rate, begun) in zip(
+        (at.PHI_TURNS, at.DOWN_TURNS, at.UP_TURNS), ((form.phi_rate, phi0), *halves), strict=True
+    ):
+        _put_line(out, place, rate / turn, begun / turn - ctx.nint(begun / turn))
+    return out
+
+
+def _expand(form: PreciseForm, out: Array) -> None:
+    """Coefficients about the turning points u1 (near the floor) and u2 (near the crown), scaled to moduli of 1."""
+    ctx, curve, hyperbolic = form.ctx, form.curve, bool(form.m > 0.5)
+    signs = [float(ctx.sign(pole.twist)) for pole in curve[:2]]
+    out[at.KIND], out[at.HYPERBOLIC], out[at.FLOOR_SIGN] = at.MOVES, hyperbolic, float(form.floor_sign)
+    out[at.SIGN_DOWN], out[at.SIGN_UP], out[at.MAY_STOP] = *signs, signs[0] * signs[1] < 0.0
+    out[at.TWIST_DOWN], out[at.TWIST_UP] = (float(ctx.sqrt(abs(pole.twist)) / 2) for pole in curve[:2])
+    _put_line(out, at.QUARTERS, form.Omega / form.K, form.tau0 / form.K)
+    period, other = (form.K1, form.K) if hyperbolic else (form.K, form.K1)
+    nome = ctx.exp(-ctx.pi * other / period) if form.m else ctx.zero
+    heights = [ctx.pi * height / (2 * period) for height in form.zero_heights()]
+    halves = [(_hyperbolic_halves if hyperbolic else _trigonometric_halves)(ctx, y, nome) for y in heights]
+    growths = [float(ctx.pi / 2 - (y if hyperbolic else 0)) for y in heights]
+    scale, bend = ctx.pi * form.K / (2 * period), _series(_SINES, _weights(ctx, nome))
+    out[at.SCALE] = float(scale)
+    _put(out, at.BEND, bend, 1)
+    floor, crown = curve.floor, curve.crown
+    for near, frame, side, least, most, grows in (
+        (0, at.FLOOR, 1, floor.low, crown.low, 1),
+        (1, at.CROWN, -1, crown.high, floor.high, form.m1),
+    ):
+        near_real, near_imag, _, _ = halves[near]
+        _, _, far_real, far_imag = halves[1 - near]
+        depth = curve.swing * grows * (form.K / scale) ** 2  # abs(u - u_near) = depth angle^2
+        near_unit = ctx.sqrt(least / 2) / sum(near_real) if least else ctx.sqrt(depth / 2) / sum(near_imag)
+        far_unit = ctx.sqrt(most / 2) / sum(far_real)
+        _put(out, frame + at.NEAR_REAL, near_real, near_unit)
+        _put(out, frame + at.NEAR_IMAG, near_imag, near_unit)
+        _put(out, frame + at.FAR_REAL, far_real, far_unit)
+        _put(out, frame + at.FAR_IMAG, far_imag, far_unit)
+        out[frame + at.NEAR_GROWTH], out[frame + at.FAR_GROWTH] = growths[near], growths[1 - near]
+        out[frame + at.STEEPNESS] = float(-side * form.Omega * depth * scale / form.K / sum(bend))
+        out[frame + at.LEAN] = float((floor.twist * crown[1 + near] + crown.twist * floor[1 + near]) / 2)  # b - a u
+        out[frame + at.LEANING] = float(-side * form.facing * form.a * depth / sum(bend) ** 2)
+        out[frame + at.THROUGH] = least == 0
+
+
+def _trigonometric_halves(ctx: Any, y: Any, nome: Any) -> tuple[list[Any], ...]:
+    """i theta_1(z - i y), then theta_2(z - i y): factors of cos z and i sin z, as polynomials in cos 2z."""
+    cosh = [w * ctx.cosh((2 * n + 1) * y) for n, w in enumerate(_weights(ctx, nome))]
+    sinh = [w * ctx.sinh((2 * n + 1) * y) for n, w in enumerate(_weights(ctx, nome))]
+    near = _series(_COSINES, sinh), _series(_SINES, cosh)
+    return *near, _series(_COSINES, map(abs, cosh)), _series(_SINES, map(abs, sinh))
+
+
+def _hyperbolic_halves(ctx: Any, y: Any, nome: Any) -> tuple[list[Any], ...]:
+    """theta_1(y + i s), factors of cosh s and i sinh s, then theta_4(y + i s), of 1 and i sinh s cosh s; in cosh 2s."""
+    odd = _weights(ctx, nome)
+    even = [2 * (-1) ** n * nome ** (n * n) if n else ctx.one for n in range(4)]
+    return (
+        _series(_COSINES, (w * ctx.sin((2 * n + 1) * y) for n, w in enumerate(odd))),
+        _series(_SINES, (w * ctx.cos((2 * n + 1) * y) for n, w in enumerate(odd))),
+        _series(_EVEN_COSINES, (w * ctx.cos(2 * n * y) for n, w in enumerate(even))),
+        _series(_EVEN_SINES, (-w * ctx.sin(2 * n * y) for n, w in enumerate(even))),
+    )
+
+
+def _weights(ctx: Any, nome: Any) -> list[Any]:  # of theta_1 without its factor 2 q^(1/4)
+    return [(-1) ** n * nome ** (n * (n + 1)) if n else ctx.one for n in range(4)]
+
+
+def _series(basis: tuple[tuple[int, ...], ...], weights: Iterable[Any]) -> list[Any]:
+    weighted = ([weight * power for power in powers] for weight, powers in zip(weights, basis, strict=True))
+    return [sum(column) for column in zip(*weighted, strict=True)]
+
+
+def _put(out: Array, place: int, values: list[Any], unit: Any) -> None:
+    out[place : place + 4] = [float(unit * value) for value in values]
+
+
+def _put_line(out: Array, place: int, rate: Any, start: Any) -> None:
+    """A rate and a start, each as the two doubles nearest to it."""
+    for i, value in enumerate((rate, start)):
+        out[place + 2 * i] = float(value)
+        out[place + 2 * i + 1] = float(value - float(value))

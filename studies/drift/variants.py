@@ -1,4 +1,4 @@
-"""What the histories ran with, and what the chart alone changes: sentences that compare rows of one method."""
+"""What the histories ran with, and what the chart alone changes: sentences that compare variants of one method."""
 
 import itertools
 import math
@@ -20,7 +20,7 @@ APART = 2.0  # times: two charts of one method differ by more than this, one of 
 
 
 def without_repeats(histories: xr.Dataset) -> xr.Dataset:
-    """The rows that are drawn and told of: no attitude chart beside an axis chart, whose numbers it repeats."""
+    """The variants that are drawn and told of: no attitude chart beside an axis chart, whose numbers it repeats."""
     names = list(map(str, histories["variant"].values))
     repeats = {name.replace("[axis]", "[attitude]") for name in names if name.endswith("[axis]")}
     return histories.sel(variant=[name for name in names if name not in repeats])
@@ -44,7 +44,7 @@ def setting(histories: xr.Dataset) -> str:
 
 
 def _tolerances(histories: xr.Dataset) -> tuple[dict[str, float], dict[str, float]]:
-    """The tolerances of rows that ran at their own default, and those that were given, by row."""
+    """The tolerances of variants that ran at their own default, and those that were given, by variant."""
     own: dict[str, float] = {}
     given: dict[str, float] = {}
     columns = (histories[name].max("scene").values for name in ("tolerance", "own_tolerance"))
@@ -68,9 +68,9 @@ class Pair(NamedTuple):
     """One constant in two charts of one method: the largest change over all scenes in each."""
 
     constant: str
-    worse: str  # name of a row
+    worse: str  # name of a variant
     better: str
-    change: float  # relative, of the worse row
+    change: float  # relative, of the worse variant
     other: float  # of the better one
 
 

@@ -1,0 +1,129 @@
+"""What is judged: a registered integrator or a bare step, with the scene, its claims and how far its runs may go.
+
+How much a bare step may run follows from the seconds that it takes, so that a method in Python is judged in a minute
+and a compiled one in seconds; the findings name the steps that were run. A registered integrator runs as far as its
+implementation is given by default.
+"""
+
+import time
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.core.errors import SymtopError
+from symtop.judging.adapters.adapter import Stepper, integrator
+from symtop.judging.adapters.choice import open_target
+from symtop.judging.adapters.separable import SeparableStep
+from symtop.judging.findings import yes_no
+from symtop.measure.conservation import CONSTANTS as MOTION
+from symtop.measure.step_map import generic_start
+from symtop.methods.framework.registry import Integrator
+from symtop.model.scenes import Scene
+
+CONSTANTS = (*MOTION, "axis_length")
+LONG, SLOPES = (16.0, 2.5), (8.0, 1.5)  # seconds of a long run and of the runs of the order; the second with --quick
+STEPS = 1_000_000  # most steps of a long run
+SAMPLES = 4000  # intervals of a long run: a program that writes every so many steps needs a multiple
+FINEST = {"compiled": 2e5, "python": 1e4}  # most steps of a run of the order
+FEWEST = 300  # steps of the longest run of the order, however slow
+LADDER = 2.5  # times the steps of the longest run: what all of them take
+ENOUGH = 0.03  # seconds after which the time of a step is known
+
+
+@dataclass(frozen=True)
+class Subject:
+    """An integrator with its claims; what a figure shows of its measurements goes into `traces`."""
+
+    method: Integrator
+    scene: Scene
+    quick: bool = False
+    stepper: Any = None  # a `Stepper`, of a bare step
+    seconds_a_step: float = 0.0
+    traces: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def in_plane(self) -> bool:
+        """Is it a map of (theta, p_theta)?"""
+        return isinstance(self.stepper, SeparableStep)
+
+    @property
+    def long_steps(self) -> float | None:
+        """The most steps of a long run; None for what an implementation is given."""
+        if not self.seconds_a_step:
+            return None
+        steps = min(LONG[self.quick] / self.seconds_a_step, STEPS)
+        return SAMPLES * round(steps / SAMPLES) if steps > SAMPLES else steps
+
+    @property
+    def finest(self) -> float | None:
+        """The most steps of a run of the order; None for what an implementation is given."""
+        if not self.seconds_a_step:
+            return None
+        steps = min(SLOPES[self.quick] / self.seconds_a_step / LADDER, FINEST[self.method.implementation])
+        return max(steps, FEWEST)
+
+
+class Request(NamedTuple):
+    """A bare step as it was given, and the claims that are made for it."""
+
+    target: Any
+    form: str | None
+    chart: str
+    adaptive: bool
+    scene: Scene
+    quick: bool
+    claims: dict[str, Any]
+
+    def claimed(self) -> Integrator:
+        """The claims as a record without a step, checked before anything is loaded; SymtopError for nonsense."""
+
+        def refuse(*_: Any) -> Any:
+            raise SymtopError("these are claims alone, without a step to run")
+
+        return Integrator("claims", "other", "", {self.chart: refuse}, **self.claims)
+
+    def open(self) -> Subject:
+        """Load the step and time it; SymtopError if it cannot be loaded or makes no step."""
+        stepper = open_target(self.target, self.form, self.chart, adaptive=self.adaptive)
+        method = integrator(stepper, **self.claims)
+        seconds = seconds_a_step(stepper, self.scene) if method.fixed_step else 0.0
+        return Subject(method, self.scene, self.quick, stepper, seconds)
+
+
+def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
+    """Seconds a step, from runs of more and more steps; what a run costs at its start is left out."""
+    par, state = stepper.form.prepare(scene.top, generic_start(scene))
+    h, start = scene.time_scale() / 1000.0, np.array(state)
+
+    def seconds(steps: int) -> float:
+        began = time.perf_counter()
+        stepper.march(scene.top, par, start.copy(), h, np.array([steps]))
+        return time.perf_counter() - began
+
+    first, steps = min(seconds(1), seconds(1)), 1
+    while True:
+        steps *= 4
+        taken = seconds(steps)
+        if taken - first > max(ENOUGH, first) or steps > 1e7:  # what a start costs scatters as much as it costs
+            return max(taken - first, 1e-9) / steps
+
+
+def declared(method: Integrator, claim: str) -> str:
+    """What a method says of a claim, in a word; empty if nothing.
+
+    Nothing claimed of the energy means what the other claims imply: kept if it is among the conserved quantities,
+    bounded if the method is symplectic and its step fixed (Benettin, Giorgilli, J. Stat. Phys. 74 (1994) 1117).
+    """
+    conserves = method.conserves or frozenset()
+    if claim == "energy" and method.energy_error is not None:
+        return method.energy_error
+    if claim == "energy" and "energy" not in conserves:
+        return "bounded" if method.symplectic and method.fixed_step else ""
+    if claim in CONSTANTS:
+        return "kept" if claim in conserves else ""
+    if claim == "invariant":
+        return ", ".join(sorted(conserves - set(CONSTANTS)))
+    if claim == "pole":
+        return "no pole" if set(method.solvers) & {"axis", "attitude"} else ""
+    return yes_no(getattr(method, "order" if claim == "time" else claim, None))
