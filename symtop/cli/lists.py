@@ -62,11 +62,16 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, eng
         click.echo(tables.table(*tables.columns(records)))
         return
     short: list[Record] = [
-        {"name": method.name, "order": str(method.order or "?"), "flags": _flags(method), "summary": method.summary}
+        {
+            "name": method.name, "order": str(method.order or "?"), "flags": _flags(method),
+            "needs": method.needs or "?", "summary": method.summary,
+        }
         for method in methods
-    ]
+    ]  # fmt: skip
     chosen = None if name is None else _described(methods[0])
-    note = f"flags: {FLAGS}. One in full: symtop integrators NAME; in one chart: NAME[CHART]."
+    needs = "; ".join(f"{name}, {words}" for name, words in registry.NEEDS.items())
+    note = f"flags: {FLAGS}. needs, the weakest thing that suffices: {needs}."
+    note += " One in full: symtop integrators NAME; in one chart: NAME[CHART]."
     _show(records, short, chosen, _integrator_page, note, wide, as_json)
 
 

@@ -55,9 +55,20 @@ FAMILIES = (
 )  # fmt: skip
 IMPLEMENTATIONS = ("compiled", "python")
 ENERGY_ERRORS = ("kept", "bounded", None)
+NEEDS = {  # the weakest thing that suffices for a method, whatever its kernel makes use of
+    "derivative": "f(t, y) at any state",
+    "expression": "f as a formula",
+    "lagrangian": "the Lagrangian of coordinates and velocities",
+    "kicks": "the torque at an attitude, and the free motion",
+    "group": "the torque, the inertia and the group of rotations",
+    "this-top": "the equations or constants of this very top",
+    "solution": "the motion itself",
+}
+INNER_LOOPS = ("scalar", "vector registers", "heyoka", "Python", None)
 ALLOWED: dict[str, tuple[Any, ...]] = {
     **dict.fromkeys(("explicit", "symplectic", "symmetric"), (True, False, None)), "exact_steps": (True, False),
     "control": ("step_size", "tolerance", None), "energy_error": ENERGY_ERRORS,
+    "needs": (*NEEDS, None), "general": (True, False, None), "inner_loop": INNER_LOOPS,
 }  # fmt: skip
 KINDS: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("summary", "reference", "about"), (str, "text")), "same_steps_as": (str | None, "a name or None"),
@@ -100,7 +111,8 @@ class Integrator:
 
     `solvers` maps a chart (angles, axis, attitude) to a function. `control` is what a user turns: ``step_size``,
     ``tolerance`` or nothing. `implementation` says what executes the inner loop, so that languages are never ranked
-    against each other unsaid. `summary` is a line about it, `about` a paragraph; the built-in ones have theirs from
+    against each other unsaid, and `inner_loop` how. `needs` is one of `NEEDS`; `general` says whether the method exists
+    for a body without symmetry; None where nobody has said so. `summary` is a line about it, `about` a paragraph; the built-in ones have theirs from
     `about.md`. Raises SymtopError for a field that makes no sense.
     """
 
@@ -124,6 +136,9 @@ class Integrator:
     exact_steps: bool = False  # a step of any size is the motion itself but for rounding: there is no order
     same_steps_as: str | None = None  # a compiled integrator that takes the same steps
     speed: float = 1.0  # of a step, in units of others of its implementation: 0.002 for arithmetic in software
+    needs: str | None = field(default=None, metadata={"words": True})
+    general: bool | None = field(default=None, metadata={"words": True})
+    inner_loop: str | None = field(default=None, metadata={"words": True})
     about: str = field(default="", repr=False, compare=False, metadata={"words": True})  # a paragraph: what it is, when
 
     def __post_init__(self) -> None:
@@ -221,9 +236,12 @@ class Integrator:
             "order": "unknown" if self.order is None else str(self.order),
             **{trait: _CLAIM[getattr(self, trait)] for trait in ("explicit", "symplectic", "symmetric")},
             "conserves": "unknown" if self.conserves is None else ", ".join(sorted(self.conserves)) or "nothing",
+            "needs": self.needs or "unknown",
+            "general": _CLAIM[self.general],
             "charts": ", ".join(self.charts()),
             "control": self.control or "none",
             "implementation": self.implementation,
+            "inner loop": self.inner_loop or "unknown",
             "summary": self.summary,
         }
 
@@ -252,7 +270,8 @@ def _load() -> None:
             module = importlib.import_module(f"symtop.methods.{_BUILT_IN[len(_loaded)]}")
             _loaded.append(module.__name__)
             for entry in module.built_in():
-                told = replace(entry, about=entry.about or paragraphs().get(entry.name, ""))
+                about, inner = entry.about or paragraphs().get(entry.name, ""), entry.inner_loop or "scalar"
+                told = replace(entry, about=about, inner_loop=inner)
                 _registry.setdefault(entry.name, told)
                 _shipped.add(entry.name)
             if hasattr(module, "missing"):

@@ -307,7 +307,7 @@ def built_in() -> list[Integrator]:
             order=4, explicit=False,
             symplectic=True, symmetric=True,
             conserves=frozenset({"p_phi", "p_psi"}),
-            reference="marsden-west-2001",
+            reference="marsden-west-2001", needs="lagrangian", general=True,
         )
     ]  # fmt: skip
 

@@ -244,5 +244,7 @@ def built_in() -> list[Integrator]:
             conserves=frozenset(),
             least_tolerance=LEAST_TOLERANCE,
             reference="dormand-prince-1980",
+            needs="derivative",
+            general=True,
         )
     ]

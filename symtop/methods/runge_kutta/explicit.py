@@ -284,7 +284,7 @@ def runge_kutta(
             for chart, form in FORMULATIONS.items()
         },
         order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
-        reference=reference,
+        reference=reference, needs="derivative", general=True,
     )  # fmt: skip
 
 

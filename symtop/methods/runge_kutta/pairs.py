@@ -141,6 +141,7 @@ class Pair(NamedTuple):
             name=name, family="runge-kutta", summary=f"{self.summary} {chosen}, compiled", solvers=solvers,
             control=control, order=self.order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
             least_tolerance=LEAST_TOLERANCE if control == "tolerance" else 0.0, reference=self.reference,
+            needs="derivative", general=True,
         )  # fmt: skip
 
 

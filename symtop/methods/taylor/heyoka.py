@@ -235,6 +235,6 @@ def _entry(precision: str, solvers: dict[str, Solver]) -> Integrator:
         control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
         least_tolerance=epsilon / 1000.0,
         default_tolerance=epsilon / 100.0,
-        reference="biscani-izzo-2021",
+        reference="biscani-izzo-2021", needs="expression", general=True, inner_loop="heyoka",
         speed=0.002 if precision == "quad" else 1.0,
     )  # fmt: skip
