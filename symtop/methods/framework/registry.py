@@ -112,8 +112,8 @@ class Integrator:
     `solvers` maps a chart (angles, axis, attitude) to a function. `control` is what a user turns: ``step_size``,
     ``tolerance`` or nothing. `implementation` says what executes the inner loop, so that languages are never ranked
     against each other unsaid, and `inner_loop` how. `needs` is one of `NEEDS`; `general` says whether the method exists
-    for a body without symmetry; None where nobody has said so. `summary` is a line about it, `about` a paragraph; the built-in ones have theirs from
-    `about.md`. Raises SymtopError for a field that makes no sense.
+    for a body without symmetry; None where nobody has said so. `summary` is a line about it, `about` a paragraph; the
+    built-in ones have theirs from `about.md`. Raises SymtopError for a field that makes no sense.
     """
 
     name: str
