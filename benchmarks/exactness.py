@@ -20,7 +20,7 @@ import numpy as np
 
 import symtop
 from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.loop import Loop, driver
+from symtop.methods.framework.loop import Loop, kernel_loop
 from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian import exact_discrete
 from symtop.methods.lagrangian.oscillators import exact_map
@@ -119,7 +119,7 @@ def of_edges() -> Iterator[str]:
 
 def forgetful() -> Loop:
     """The loop of the map, with sums in one double."""
-    return driver(exact_discrete.begin, _forgetting, exact_discrete.observe, exact_discrete.enter,
+    return kernel_loop(exact_discrete.begin, _forgetting, exact_discrete.observe, exact_discrete.enter,
                   exact_discrete.present_axis, accumulate_plainly)  # fmt: skip
 
 

@@ -9,12 +9,17 @@ Names are imported on first use, so that ``import symtop`` costs nothing; type c
 import importlib
 from typing import TYPE_CHECKING
 
+from symtop.core import old_paths as old_paths
+
 if TYPE_CHECKING:
     from symtop.advise import Advice as Advice, recommend as recommend
     from symtop.core.errors import SymtopError as SymtopError, SymtopWarning as SymtopWarning
     from symtop.judging.judge_step import judge as judge
     from symtop.measure.errors import errors as errors
+    from symtop.methods.framework.angles import chart_outcome as chart_outcome, on_angles as on_angles
     from symtop.methods.framework.equations import field as field
+    from symtop.methods.framework.fixed_step import FixedStep as FixedStep
+    from symtop.methods.framework.loop import kernel_loop as kernel_loop
     from symtop.methods.framework.plan import Plan as Plan, Run as Run
     from symtop.methods.framework.registry import (
         Integrator as Integrator,
@@ -23,6 +28,7 @@ if TYPE_CHECKING:
         integrators as integrators,
         register as register,
     )
+    from symtop.methods.framework.space import on_attitude as on_attitude, on_axis as on_axis
     from symtop.methods.lagrangian.discrete_lagrangian import discrete_lagrangian as discrete_lagrangian
     from symtop.methods.runge_kutta.explicit import runge_kutta as runge_kutta
     from symtop.methods.splitting.composition import composition as composition
@@ -48,9 +54,13 @@ _NAMES = {  # by the module that holds them
     "judging.judge_step": "judge",
     "measure.errors": "errors",
     "methods.lagrangian.discrete_lagrangian": "discrete_lagrangian",
+    "methods.framework.angles": "chart_outcome on_angles",
     "methods.framework.equations": "field",
+    "methods.framework.fixed_step": "FixedStep",
+    "methods.framework.loop": "kernel_loop",
     "methods.framework.plan": "Plan Run",
     "methods.framework.registry": "Integrator citation integrator integrators register",
+    "methods.framework.space": "on_attitude on_axis",
     "methods.runge_kutta.explicit": "runge_kutta",
     "methods.taylor.series": "series",
     "methods.splitting.composition": "composition",

@@ -3,7 +3,7 @@
 `ORDER` is the rule. A module imports modules of its own row's room and of the rows below; two rooms in one row do not
 import each other. Statements inside functions count as well as those at the top, and so do those under TYPE_CHECKING,
 except in circles: what only a type checker reads cannot go round in one. ``from symtop import __version__`` is allowed
-everywhere. Strings count because an arrow may hide in one: see `strings`.
+everywhere. Strings that name a module count, too.
 """
 
 import ast
@@ -148,29 +148,15 @@ def strangers(modules: dict[str, Module]) -> list[str]:
 
 
 def strings(modules: dict[str, Module]) -> list[str]:
-    """Strings of the package, docstrings aside, that hide an arrow.
-
-    Those are the dotted name of a module above (with or without ``symtop.``), the bare name of a room above that is
-    compared, joined to a path or collected, and a path to a file or folder of another room.
-    """
+    """Strings of the package, docstrings aside, that are the dotted name of a module above."""
     complaints = []
     for module in modules.values():
         if module.room == "studies" or module.name in NAMED or module.room not in FLOOR:
             continue
         above = {name for name, other in modules.items() if FLOOR.get(other.room, 99) > FLOOR[module.room]} - {"symtop"}
         above |= {name.removeprefix("symtop.") for name in above if name.count(".") > 1}
-        paths = {
-            "/".join(other.name.split(".")[1:]) + ending
-            for other in modules.values()
-            if other.room not in (module.room, "face") and other.name.count(".") > 1
-            for ending in ("", ".py")
-        }
-        for text, line in _literals(module.tree):
-            plain = text.strip("/.").removeprefix("symtop/")
-            if text.strip(".") in above or plain in paths:
-                complaints.append(f"{module.name}:{line} names {text!r}")
-        rooms = {room for room, floor in FLOOR.items() if floor > FLOOR[module.room]}
-        complaints += [f"{module.name}:{line} names the room {text!r}" for text, line in _places(module.tree, rooms)]
+        named = ((text, line) for text, line in _literals(module.tree) if text.strip(".") in above)
+        complaints += [f"{module.name}:{line} names {text!r}" for text, line in named]
     return sorted(set(complaints))
 
 
@@ -180,22 +166,6 @@ def _literals(tree: ast.Module) -> Iterator[tuple[str, int]]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
             yield node.value, node.lineno
-
-
-def _places(tree: ast.Module, rooms: set[str]) -> Iterator[tuple[str, int]]:
-    """Names of rooms used as folders: joined with ``/``, compared with a part of a path, or listed with others."""
-    every = set(FLOOR)
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Tuple | ast.List | ast.Set) and len(node.elts) > 1:
-            texts = [part.value for part in node.elts if isinstance(part, ast.Constant)]
-            if every.issuperset(texts) and rooms.intersection(texts) and len(texts) == len(node.elts):
-                yield ", ".join(map(str, texts)), node.lineno
-        joined = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div)
-        text = ast.unparse(node) if isinstance(node, ast.Compare) else ""
-        if joined or ".name" in text or ".parts" in text or ".parent" in text:
-            for part in ast.walk(node):
-                if isinstance(part, ast.Constant) and part.value in rooms:
-                    yield str(part.value), part.lineno
 
 
 def in_the_root(modules: dict[str, Module]) -> list[str]:
@@ -247,10 +217,7 @@ def small(tmp_path):
         "symtop/model/hint.py": "import typing\nif typing.TYPE_CHECKING:\n    from symtop.model.hinted import x\n",
         "symtop/model/hinted.py": "import symtop.model.hint\n",
         "symtop/methods/kernel.py": "def show():\n    import matplotlib.pyplot\n",
-        "symtop/run/hidden.py": '"""report.page"""\nHOME = "report.page"\nFILE = "report/page.py"\n',
-        "symtop/run/folder.py": "def old(path):\n    return path.parent.name == 'measure'\n",
-        "symtop/run/listed.py": "UPPER = ('runner', 'report')\n",
-        "symtop/run/word.py": "TEXT = 'measure'\nWORDS = ('run', 'measure', 'energy')\n",
+        "symtop/run/hidden.py": '"""report.page"""\nHOME = "report.page"\nWORD = "report"\n',
         "symtop/judging/__init__.py": "",
         "symtop/runner/beside.py": "import symtop.judging\n",
         "symtop/report/page.py": "from symtop_studies.drift import study\n",
@@ -282,10 +249,5 @@ def test_a_circle_of_files_is_reported(small):
 
 def test_other_faults_are_reported(small):
     assert strangers(small) == ["symtop.methods.kernel:2 imports matplotlib.pyplot"]
-    assert strings(small) == [
-        "symtop.run.folder:2 names the room 'measure'",
-        "symtop.run.hidden:2 names 'report.page'",
-        "symtop.run.hidden:3 names 'report/page.py'",
-        "symtop.run.listed:1 names the room 'runner, report'",
-    ]
+    assert strings(small) == ["symtop.run.hidden:2 names 'report.page'"]
     assert in_the_root(small) == ["__init__", "extra"]

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from symtop_studies.convergence.tables import TARGET, least_work, named_variants
 
 from symtop.measure.growth import tops
 from symtop.methods.framework.registry import split_name
@@ -12,7 +13,6 @@ from symtop.report.figures import SMALLEST, error_band
 from symtop.report.style import FIRM, LEAST_TEXT, few_ticks, headline, legend_below, line, look, number, panels
 from symtop.runner.study import Picture
 
-from .named import TARGET, least_work, named_variants
 from .tables import (
     HISTORY_STEPS,
     LARGE,

@@ -4,6 +4,7 @@ The dataset has the columns of `symtop.measure.accuracy.error_table`, over ``sce
 ``rk4[axis]``) and ``setting``, and ``horizon`` over the first two.
 """
 
+from collections.abc import Mapping
 from itertools import product
 from typing import NamedTuple
 
@@ -169,3 +170,27 @@ def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Effici
         inside = cell[MAIN].values[used].min() <= error <= cell[MAIN].values[used].max()
         foretold[name, label] = Efficiency(work, not inside)
     return foretold
+
+
+TARGET = 1e-6  # rad, the axis error at which costs are compared
+
+
+def named_variants(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
+    """The five named methods on the first scene, without a chart that another covers, and their labels."""
+    named = [name for name in map(str, data["variant"].values) if split_name(name)[0] in NAMED]
+    names = [name for name in named if name.replace("[attitude]", "[axis]") not in named or "[attitude]" not in name]
+    return data.sel(variant=names).isel(scene=0), merged(data.sel(variant=names), MAIN)
+
+
+def least_work(part: xr.Dataset, labels: Mapping[str, str]) -> list[tuple[str, float]]:
+    """What each variant pays for an error below `TARGET`: force evaluations per nutation, the least first.
+
+    `part` is one scene.
+    """
+    paid, scene = {}, str(part["scene"].values)
+    for name in labels:
+        cell = part.sel(variant=name)
+        work = evaluations_a_nutation(cell, scene)[cell[MAIN].values <= TARGET]
+        if work.size:
+            paid[name] = float(np.min(work))
+    return sorted(paid.items(), key=lambda one: one[1])

@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from symtop_studies.convergence.tables import TARGET, least_work, named_variants
 
 from symtop.measure.order import BESIDE
 from symtop.methods.framework.registry import split_name
 from symtop.report.sentences import abridged, joined
 from symtop.runner.study import Table
 
-from .named import TARGET, least_work, named_variants
 from .tables import MAIN, OTHERS, Judged, Pairs, adaptive, declared_order, fits, judged, tolerance_fits
 
 QUOTED = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]")  # whose error constants are quoted

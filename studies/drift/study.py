@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable
 
 import xarray as xr
+from symtop_studies.drift.runs import rounding, run_history, windows
 
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.scenes import TAGS, Scene, scene
@@ -12,8 +13,6 @@ from symtop.runner.grid import grid_scenes, grid_variants
 from symtop.runner.study import Case, Study
 
 from . import figures, words
-from .histories import run_history
-from .long_runs import rounding, windows
 from .phase_loss import MOST_STEPS, SHORT, TARGET, phase_loss
 from .tables import HISTORIES, HORIZONS, ROUNDINGS, WINDOWS
 

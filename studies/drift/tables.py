@@ -4,7 +4,7 @@ The dataset is a tree of four groups, each over ``scene`` and ``variant``; these
 
     histories   a million steps of every method          `symtop.measure.conservation.history`
     windows     10^8 steps of four methods               `symtop.run.long_run.long_run`
-    rounding    ensembles of runs of the same four       `long_runs.rounding`
+    rounding    ensembles of runs of the same four       `runs.rounding`
     horizons    loss of phase of the fixed-step methods  `phase_loss.phase_loss`
 """
 

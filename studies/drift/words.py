@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 import xarray as xr
+from symtop_studies.drift.runs import PLAIN_MEMBERS
 
 from symtop.measure.conservation import CONSTANTS
 from symtop.report.sentences import counted, few
@@ -13,7 +14,6 @@ from symtop.run.long_run import PER_NUTATION, SAMPLES
 from symtop.runner.study import Table
 
 from . import behaviours
-from .long_runs import PLAIN_MEMBERS
 from .messages import strayed
 from .phase_loss import LOST
 from .tables import HISTORIES, HORIZONS, ROUNDINGS, WINDOWS, by_integrator, losses, rounding, worst_behaviour

@@ -71,5 +71,4 @@ STUDY = Study(
     pictures=figures.pictures,
     tables=listed.tables,
     verdict=words.verdict,
-    uses=lambda case: [case.integrator],
 )

@@ -9,10 +9,7 @@ one is a kernel of its own: symplectic Euler on the reduced top, order 1.
 import numpy as np
 
 import symtop
-from symtop.methods.framework.angles import chart_outcome, reduced
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import driver
-from symtop.methods.splitting.angles import force_angles
+from symtop import chart_outcome
 
 # A discrete Lagrangian is a quadrature rule: nodes and weights. Two Gauss points:
 left, right = 0.5 - 3**0.5 / 6, 0.5 + 3**0.5 / 6
@@ -36,25 +33,29 @@ def begin(par, rule, state, h):  # noqa: D103
 
 
 def increment(par, rule, state, carry, h):
-    """p1 = p0 - h V'(theta0), theta1 = theta0 + h p1/I1; phi and psi move with the force."""
-    slope, precession, turn = force_angles(par, state, (0.0, 0.0, 0.0, 0.0))
-    dp = -h * slope
-    step = (h * (state[1] + dp) / par.I1, dp, h * precession, h * (par.p_psi / par.I3 - turn))
-    return step, carry, 1, chart_outcome(state[0] + step[0])
+    """p1 = p0 - h V'(theta0), theta1 = theta0 + h p1/I1; phi and psi move at the rates of the start."""
+    theta, p = state[0], state[1]
+    sine, cosine = np.sin(theta), np.cos(theta)
+    p_phi = 0.5 * (par.north + par.south)  # north = p_phi - p_psi, south = p_phi + p_psi
+    precession = (p_phi - par.p_psi * cosine) / (par.I1 * sine * sine)
+    dp = h * sine * (par.mgl - precession * (par.p_psi - par.I1 * precession * cosine))
+    step = (h * (p + dp) / par.I1, dp, h * precession, h * (par.p_psi / par.I3 - precession * cosine))
+    return step, carry, 1, chart_outcome(theta + step[0])
 
 
 def observe(par, rule, before, dstate, h):
-    """Undo the step's own formulas: phi' = (p_phi - p_psi c)/(I1 s^2), psi' = p_psi/I3 - phi' c at theta0."""
+    """Both momenta from the increments, by the step's own formulas at theta0."""
     sine, cosine = np.sin(before[0]), np.cos(before[0])
     precession, spin = dstate[2] / h, dstate[3] / h
     p_psi = par.I3 * (spin + precession * cosine)
     return par.I1 * precession * sine * sine + p_psi * cosine, p_psi
 
 
-solver = FixedStep(driver(begin, increment, observe), (0.0,), reduced, 1, implicit=False)
+loop = symtop.kernel_loop(begin, increment, observe)
 symtop.register(
     symtop.Integrator(
-        name="symplectic-euler", family="other", summary="kick then drift, order 1", solvers={"angles": solver},
+        name="symplectic-euler", family="other", summary="kick then drift, order 1",
+        solvers={"angles": symtop.FixedStep(loop, (0.0,), symtop.on_angles, 1, implicit=False)},
         order=1, explicit=True, symplectic=True, symmetric=False, conserves=frozenset({"p_phi", "p_psi"}),
     )
 )  # fmt: skip

@@ -24,7 +24,7 @@ import numpy as np
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.angles import accelerations, with_rates
-from symtop.methods.framework.loop import March, Marks, driver
+from symtop.methods.framework.loop import March, Marks, kernel_loop
 from symtop.methods.lagrangian.quadrature import RULES, quadrature
 from symtop.methods.lagrangian.unreduced import begin, observe, unreduced_step, with_momenta
 from symtop.methods.library.scipy_ivp import integrated
@@ -69,7 +69,7 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     return unreduced_step(_inertia, _momenta, par, rule, state, carry, h)
 
 
-march = driver(begin, increment, observe)
+march = kernel_loop(begin, increment, observe)
 
 
 def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Marks) -> March:

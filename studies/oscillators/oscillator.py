@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.lagrangian.quadrature import RULES, quadrature
 from symtop.model.charts import Array
 
@@ -134,7 +134,7 @@ def legendre(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     return first * dstate[0] + rule.left * push, last * dstate[0] - rule.right * push
 
 
-_march = driver(_begin, _increment, legendre)
+_march = kernel_loop(_begin, _increment, legendre)
 
 
 def discrete_path(

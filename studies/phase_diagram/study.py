@@ -78,5 +78,4 @@ STUDY = Study(
     tables=words.tables,
     verdict=words.sentences,
     follow_up=follow_up,
-    uses=lambda case: case.settings.get("integrators", [case.integrator]),
 )

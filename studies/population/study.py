@@ -100,5 +100,4 @@ STUDY = Study(
     verdict=words.sentences,
     opening=opening,
     full=lambda: grid(full=True),
-    uses=lambda case: case.settings.get("integrators", [case.integrator]),
 )

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from symtop.core.jit import compile_kernel, register_jitable
-from symtop.methods.framework.angles import reduced
+from symtop.methods.framework.angles import on_angles
 from symtop.methods.lagrangian import discrete_lagrangian
 from symtop.methods.lagrangian.quadrature import Quadrature
 from symtop.model import top as model
@@ -62,7 +62,7 @@ class SolverError(NamedTuple):
 
 def textbook_midpoint(scene: Scene, h: float, steps: int, tolerance: float, iterations: int = 50) -> float:
     """Largest |E - E0| of the midpoint rule if Newton stops after a correction of at most `tolerance` rad."""
-    par, state = reduced(scene.top, scene.start)
+    par, state = on_angles(scene.top, scene.start)
     marks = np.unique(np.linspace(0, steps, SAMPLES).astype(np.int64))
     samples = np.full((marks.size, 2), math.nan)
     _march(par, state[0], state[1], h, tolerance, iterations, marks, samples)
@@ -71,7 +71,7 @@ def textbook_midpoint(scene: Scene, h: float, steps: int, tolerance: float, iter
 
 def solver_sweep(rule: Quadrature, scene: Scene, h: float, steps: int, tolerance: float) -> SolverError:
     """A discrete Lagrangian of this package, its iteration stopped at `tolerance` of the increment (inf: after one)."""
-    par, state = reduced(scene.top, scene.start)
+    par, state = on_angles(scene.top, scene.start)
     marks = np.unique(np.linspace(0, steps, SAMPLES).astype(np.int64))
     done = discrete_lagrangian.march(par, rule._replace(tolerance=tolerance), state, h, marks)
     momenta = scene.top.momenta(scene.start)

@@ -78,5 +78,4 @@ STUDY = Study(
     follow_up=follow_up,
     charts=charts,
     opening=opening,
-    uses=lambda case: case.settings.get("integrators", [case.integrator]),
 )

@@ -69,9 +69,9 @@ def run(
         error = errors_against(chosen, data, truth)
         verdict = judgement(chosen, data, error["axis"].values)
         if figure is not None:
-            from symtop.report import single
+            from symtop.report.plot import draw_run
 
-            single.draw(chosen, data, truth, error, figure)
+            draw_run(chosen, data, truth, error, figure)
     series = {name: error[name].dropna("time").values for name in QUANTITIES if name in error}
     largest = {
         name: {"largest": float(values.max()), "last": float(values[-1])}
@@ -213,9 +213,9 @@ def ensemble(
     outcomes, steps = Counter(data["outcome"].values.tolist()), int(data["steps"].sum())
     with ticking("comparing with the exact motion"):
         if figure is not None:
-            from symtop.report import ensemble as picture
+            from symtop.report.plot import draw_ensemble
 
-            picture.draw(few, shown, figure)
+            draw_ensemble(few, shown, figure)
         worst = {name: spread(largest(member_errors(few, shown, name))[:, None])[:, 0].tolist() for name in compared}
     data.close()
     if as_json:

@@ -5,13 +5,22 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from symtop.core.files import is_terminal
 
-BEAT = 1.0  # seconds from one look of the clock to the next
-CLOCK = Path(__file__).with_name("clock.py")  # run as a script
+BEAT = 1.0  # seconds from one drawing to the next
+CLOCK = """\
+import signal, sys, threading, time
+signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
+began, ended = time.monotonic(), threading.Event()
+threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
+while not ended.is_set():
+    minutes, seconds = divmod(int(time.monotonic() - began), 60)
+    print(f"\\r{sys.argv[1]}: {minutes:02d}:{seconds:02d}", end="", file=sys.stderr, flush=True)
+    ended.wait(float(sys.argv[2]))
+print("\\r\\x1b[K", end="", file=sys.stderr, flush=True)
+"""
 
 
 @contextlib.contextmanager
@@ -40,15 +49,16 @@ def ticking(words: str) -> Iterator[None]:
     """Some words and the time since, on the standard error if that is a terminal, drawn each second until the end.
 
     A process of its own draws them: a compiler that holds Python's lock, as heyoka's does for seconds, stops threads.
+    It ends when its standard input does, as at the end of this process.
     """
     if not is_terminal(sys.stderr):
         yield
         return
-    command = [sys.executable, "-I", "-S", str(CLOCK), words, str(BEAT)]
+    command = [sys.executable, "-I", "-S", "-c", CLOCK, words, str(BEAT)]
     with subprocess.Popen(command, stdin=subprocess.PIPE) as clock:  # noqa: S603  (our own words)
         try:
             yield
         finally:
             assert clock.stdin is not None  # noqa: S101
-            clock.stdin.close()  # which ends it, as the end of this process would
+            clock.stdin.close()
             clock.wait()

@@ -1,8 +1,12 @@
-"""The explorer's answers: one run beside the exact motion, the same run as a dataset, and as a script.
+"""The explorer's answers: one run beside the exact motion, as a dataset, and as a script; a map of many runs.
 
 The page sends a flat mapping of numbers and names, which `setup` reads; ``scene`` names the run in its sentences. The
 run is made by the public functions (`Scene`, `simulate`, the closed form), so that the script gives the same numbers to
 the last bit.
+
+The map is one method on one top over a grid of steps and spins, as one ensemble. A cell is the run from the page's
+start with its own psi_dot (row) and step size (column). Its value is the largest angle in radians between its axis and
+the exact one over nine samples; a run that ended early has none.
 """
 
 import base64
@@ -20,8 +24,10 @@ from symtop.core.errors import SymtopError, finite, positive
 from symtop.measure.conservation import CONSTANTS, residuals
 from symtop.methods.framework.registry import Integrator, integrator, integrators
 from symtop.model import charts
+from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.scenes import Scene, closed_form, horizon_of, scenes
 from symtop.model.top import Angles, SymmetricTop
+from symtop.run.ensemble.ensemble import ensemble
 from symtop.run.simulation import simulate
 
 TOP = ("I1", "I3", "mgl")
@@ -34,6 +40,9 @@ FIRST_TRIAL = 16.0
 SAMPLES_A_NUTATION = 60
 FEWEST_SAMPLES, MOST_SAMPLES = 601, 4001  # of one run, whatever its nutations
 PORTRAIT = 361  # points of the exact phase curve, over one nutation
+COLUMNS, ROWS = 48, 32  # steps, spins
+MAP_SAMPLES = 9
+MOST_MAP_STEPS = 20_000_000  # of all cells: seconds of an implicit method
 
 
 @dataclass(frozen=True)
@@ -159,7 +168,7 @@ def answer(chosen: Setup) -> dict[str, Any]:
             "axis_error": charts.axis_distance(run["axis"].values, charts.axis_from_quaternion(truth)),
             "attitude_error": charts.attitude_distance(attitude, truth),
         }
-        single = {name: np.ascontiguousarray(values, dtype="<f4") for name, values in arrays.items()}
+        coded = {name: _float32(values) for name, values in arrays.items()}
     return {
         "outcome": run.attrs["outcome"],
         "message": run.attrs["outcome_message"],
@@ -170,13 +179,67 @@ def answer(chosen: Setup) -> dict[str, Any]:
         "run_ms": 1e3 * (ran - began),
         "all_ms": 1e3 * (time.perf_counter() - began),
         "largest": {name: _largest(arrays[name]) for name in (*CONSTANTS, "axis_error")},
-        "arrays": {name: base64.b64encode(values.tobytes()).decode() for name, values in single.items()},
+        "arrays": coded,
     }
+
+
+def _float32(values: Any) -> str:
+    """Base64 of the values as float32, little-endian."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode()
 
 
 def _largest(values: Any) -> float | None:
     good = np.abs(values[np.isfinite(values)])
     return float(good.max()) if good.size else None
+
+
+def grid(fields: Mapping[str, Any]) -> tuple[Setup, np.ndarray, np.ndarray]:
+    """The run, the steps and the spins of a map: `step_least`, `step_most` (s), `spin_least`, `spin_most` (rad/s).
+
+    Raises SymtopError for a method without a step, a range that is empty, and a map of too many steps.
+    """
+    chosen = setup(fields)
+    if chosen.method.control != "step_size":
+        raise SymtopError(f"integrator must be one with a step for a map, not {chosen.method.name!r}")
+    least, most = (positive(name, fields.get(name)) for name in ("step_least", "step_most"))
+    low, high = (finite(name, fields.get(name)) for name in ("spin_least", "spin_most"))
+    if not (least < most and low < high):
+        raise SymtopError(f"the ranges of a map must not be empty, not {least!r} to {most!r} s, {low!r} to {high!r}")
+    steps, spins = np.geomspace(least, most, COLUMNS), np.linspace(low, high, ROWS)
+    if (total := ROWS * float(np.sum(chosen.scene.horizon / steps))) > MOST_MAP_STEPS:
+        raise SymtopError(f"a map must have at most {MOST_MAP_STEPS} steps, not {total:.3g}: take a shorter time")
+    return chosen, steps, spins
+
+
+def outcome_map(chosen: Setup, steps: np.ndarray, spins: np.ndarray) -> dict[str, Any]:
+    """The map: ``error_rad`` as base64 of float32, row by row from the least spin; NaN where a run ended early."""
+    began = time.perf_counter()
+    scene = chosen.scene
+    step, spin = (each.ravel() for each in np.meshgrid(steps, spins))
+    start = {name: getattr(scene.start, name) for name in START}
+    numbers = {name: getattr(scene.top, name) for name in TOP} | start | {"psi_dot": spin}
+    members = xr.Dataset({name: ("member", np.broadcast_to(number, step.size)) for name, number in numbers.items()})
+    runs = ensemble(
+        members, chosen.method, step_size=step, horizon=scene.horizon, samples=MAP_SAMPLES, variables=["axis"],
+        observe="attitude", quiet=True,
+    )  # fmt: skip
+    times = np.broadcast_to(runs["time"].values, (step.size, MAP_SAMPLES)).reshape(ROWS, -1)
+    axes = runs["axis"].values.reshape(ROWS, -1, 3)
+    error = np.full(times.shape, np.nan)
+    for row, rate in enumerate(spins):
+        known = np.isfinite(times[row]) & np.isfinite(axes[row]).all(axis=-1)
+        truth = ClosedForm(scene.top, Angles(**start | {"psi_dot": float(rate)})).axis(times[row, known])
+        error[row, known] = charts.axis_distance(axes[row, known], truth)
+    worst = np.fmax.reduce(error.reshape(step.size, MAP_SAMPLES), axis=1)
+    worst[runs["outcome"].values != "ok"] = np.nan
+    seconds = time.perf_counter() - began
+    return {
+        "columns": COLUMNS,
+        "rows": ROWS,
+        "error_rad": _float32(worst),
+        "failed": int(np.isnan(worst).sum()),
+        "cells_a_second": step.size / seconds,
+    }
 
 
 def script(chosen: Setup) -> str:

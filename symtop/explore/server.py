@@ -23,7 +23,7 @@ from typing import Any
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, whole, words_of
 from symtop.core.parallel import cores
-from symtop.explore import answers, maps
+from symtop.explore import answers
 
 STATIC = Path(__file__).parent / "static"
 PAGES = {
@@ -50,7 +50,7 @@ ACTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], bytes], str]] = {
     "/run": (answers.setup, lambda chosen: json.dumps(answers.answer(chosen)).encode(), "application/json"),
     "/netcdf": (answers.setup, _netcdf, "application/x-netcdf"),
     "/script": (answers.setup, lambda chosen: answers.script(chosen).encode(), "text/x-python; charset=utf-8"),
-    "/map": (maps.grid, lambda asked: json.dumps(maps.answer(asked)).encode(), "application/json"),
+    "/map": (answers.grid, lambda grid: json.dumps(answers.outcome_map(*grid)).encode(), "application/json"),
 }
 
 

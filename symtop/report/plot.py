@@ -1,22 +1,47 @@
-"""plot(): a run, its errors, a sweep or an ensemble on an Axes of the caller's, or on a new one."""
+"""Runs as pictures: on an Axes of the caller's (`plot`), or as a file of one run or of an ensemble.
 
+a run        its motion beside the true one, its errors, and the residuals of constants of the motion
+a sweep      the largest error against what was varied
+an ensemble  how the errors of its members spread as time goes on
+"""
+
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 
-from symtop.core.errors import SymtopError, one_of
+from symtop.core.errors import SymtopError, at_home, one_of
 from symtop.measure import spread
+from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES, errors
-from symtop.report.ensemble import bands
-from symtop.report.style import look
+from symtop.model.scenes import Scene
+from symtop.report.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    LEAST_TEXT,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    headline,
+    legend_below,
+    look,
+    panels,
+    save,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LEAST = 1e-17  # what is smaller is drawn here
 LINES = ("-", "--", "-.", ":")  # of a sweep's scenes
+COLORS = {"axis": BLACK, "attitude": GREY, "theta": SKY, "energy": VERMILLION, "p_phi": GREEN, "p_psi": PURPLE}
+BANDS = ((0, 4, 0.18), (1, 3, 0.38))  # of `spread.LEVELS`, 1 to 99 % and 10 to 90 %, and how opaque
+MOST = {"axis": np.pi, "energy": 1e3}  # what is larger, and members that failed, are drawn here
 
 
 def plot(
@@ -120,5 +145,93 @@ def _can_be_x(values: xr.DataArray) -> bool:
 def _ensemble(ax: "Axes", data: xr.Dataset, quantity: str, members: Any) -> None:
     if not isinstance(members, xr.Dataset):
         raise SymtopError("plot needs members, the tops of the ensemble, to compare it with the exact motion")
-    bands(ax, members, data, one_of("quantity", quantity, spread.QUANTITIES))
+    _bands(ax, members, data, one_of("quantity", quantity, spread.QUANTITIES))
     ax.set_title(f"{data.attrs['integrator']} on {data.sizes['member']} tops")
+
+
+def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Dataset, path: str | Path) -> None:
+    """Three panels in a file: theta and the truth's, errors in angles, residuals of energy and momenta."""
+    figure, axes = panels(3, 1, height=1.7, sharex=True)
+    times = run["time"].values
+    motion, angles, constants = axes[:, 0]
+    motion.plot(times, np.degrees(truth["theta"].values), color=ORANGE, lw=2.4, alpha=0.6, label="true theta")
+    motion.plot(times, np.degrees(run["theta"].values), color=BLUE, lw=1.0, label=f"theta of {run.attrs['integrator']}")
+    motion.set_ylabel("theta (degrees)")
+    headline(figure, f"{run.attrs['title']}: {run.attrs['outcome_message']}")
+    for name in ("axis", "attitude", "theta"):
+        if name in errors:
+            _line(angles, times, errors[name].values, COLORS[name], QUANTITIES[name])
+    for name, values in residuals(scene, run).items():
+        _line(constants, times, np.abs(values), COLORS[name], f"residual of {name}, relative")
+    angles.set(yscale="log", ylabel="error (rad)")
+    constants.set(yscale="log", ylabel="|change| since the start", xlabel="time")
+    if run.attrs["outcome"] != "ok":
+        for axis in axes[:, 0]:
+            axis.axvline(run.attrs["reached_time"], color=VERMILLION, ls="--", label="stopped here")
+    legend_below(figure, axes)
+    save(figure, at_home(path))
+
+
+def _line(axis: Any, times: Any, values: Any, color: str, label: str) -> None:
+    axis.plot(times[1:], np.maximum(values[1:], LEAST), color=color, lw=1.0, label=label)
+
+
+def draw_ensemble(members: xr.Dataset, data: xr.Dataset, path: str | Path) -> None:
+    """Two panels in a file: quantiles over members of the axis error and of the energy error against time."""
+    shown = [name for name in spread.QUANTITIES if name in data]
+    figure, axes = panels(len(shown), 1, height=2.1, sharex=True)
+    for axis, name in zip(axes[:, 0], shown, strict=True):
+        _bands(axis, members, data, name)
+        axis.label_outer()
+    ended = (data["outcome"] == "ok").mean().item()
+    sentence = (
+        f"{data.attrs['integrator']} on {data.sizes['member']} tops: errors against the closed form; "
+        f"{100.0 * ended:.4g} % of the runs ended ok"
+    )
+    if ended < 1.0:
+        sentence += ", and those that failed count as infinitely wrong, at the upper edge"
+    headline(figure, sentence)
+    save(figure, at_home(path))
+
+
+def _bands(axis: Any, members: xr.Dataset, data: xr.Dataset, quantity: str) -> None:
+    """Quantiles over members of an error against time, on one Axes, at places of `symtop.measure.spread.at_places`.
+
+    Errors beyond `MOST` are drawn there: angles do not exceed pi, and a quantile of runs that failed is named so. Where
+    all members have as many steps a nutation, a sample at a whole nutation is one for all of them, and energy errors
+    that return there, as those of a symplectic method do, dip: that is no error of the samples, which are dithered.
+    """
+    horizons = data["horizon"].values
+    shared = (horizons == horizons[0]).all()
+    places, errors = spread.at_places(data, spread.member_errors(members, data, quantity))
+    quantiles = spread.spread(errors)
+    known = np.isfinite(places) & ~np.isnan(quantiles).any(axis=0) & (places > 0.0)
+    if not known.any():
+        raise SymtopError("there is nothing to draw: the closed form of no member is known")
+    times, quantiles = (places * (horizons[0] if shared else 1.0))[known], quantiles[:, known]
+    _draw_quantiles(axis, times, quantiles, MOST[quantity], look(data.attrs["integrator"]).color)
+    label = "time" if shared else "time, as a fraction of each member's horizon"
+    axis.set(yscale="log", ylabel=spread.QUANTITIES[quantity], xlabel=label)
+
+
+def _draw_quantiles(axis: Any, times: Any, errors: Any, most: float, color: str) -> None:
+    """The median as a line and two bands about it, labelled at their right ends."""
+    quantiles = np.clip(errors, LEAST, most)
+    for low, high, opaque in BANDS:
+        axis.fill_between(times, quantiles[low], quantiles[high], color=color, alpha=opaque, lw=0.0)
+    marker = "o" if times.size == 1 else None  # a line has two points at least
+    axis.plot(times, quantiles[spread.LEVELS.index(0.5)], color=color, lw=1.8, marker=marker)
+    names = [
+        (f"{100.0 * level:g} %" if level != 0.5 else "median") + (": failed" if np.isinf(end) else "")
+        for level, end in zip(spread.LEVELS, errors[:, -1], strict=True)
+    ]
+    if np.isinf(errors).any():
+        axis.plot(times[[0, -1]], [most, most], color="0.4", lw=0.8, ls=":")
+    ends, place = np.log10(quantiles[:, -1]), -np.inf
+    least = 0.045 * max(np.ptp(np.log10(quantiles)), 1.0)  # labels do not overlap
+    for end, name in zip(ends, names, strict=True):
+        place = max(end, place + least)
+        axis.annotate(
+            name, (times[-1], 10.0**place), xytext=(5, 0), textcoords="offset points", fontsize=LEAST_TEXT, va="center"
+        )
+    axis.set_xlim(0.0, times[-1] * 1.07)

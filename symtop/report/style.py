@@ -15,7 +15,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from symtop.core import netcdf
-from symtop.report import embedded
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -68,7 +67,7 @@ RAISED, FIRM = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"), "
 UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
 _MARKERS = "osv^<>DPXph8dH"
 
-# The looks of the integrators that ship with symtop. A new one gets a line here; the others keep theirs.
+# Looks set by hand; `look` finds one for every other integrator.
 _LOOKS = {
     "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "simpson-linear": Look(PURPLE, "v"),
     "midpoint-unreduced": Look(BLUE, "^"), "trapezoidal-unreduced": Look(BLUES[1], "<"),
@@ -121,8 +120,8 @@ FILLS = {"angles": "none", "axis": "full", "attitude": "left"}  # of a marker, b
 def look(name: str) -> Look:
     """Colour and marker of an integrator or a variant: the marker of ``rk4[angles]`` is open, of ``rk4[axis]`` full.
 
-    Those that ship with symtop have a fixed look. An added one gets a shade of its family and a marker that no shipped
-    one of these shades has; which of them depends on its name alone, not on what else is registered.
+    One that `_LOOKS` does not name gets a shade of its family and a marker that none of these has; which of them
+    depends on its name alone, not on what else is registered.
     """
     from symtop.methods.framework.registry import integrators, split_name
 
@@ -259,8 +258,7 @@ def _written(figure: Any, path: Path, dpi: float) -> None:
         return
     figure.set_dpi(dpi)
     if path.suffix == ".pdf":
-        with embedded.letters_alone():
-            FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
+        FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
     elif dpi == DPI:
         canvas = FigureCanvasAgg(figure)
         canvas.draw()

@@ -2,7 +2,6 @@
 
 import importlib
 import json
-import math
 import re
 import sys
 from pathlib import Path
@@ -58,14 +57,6 @@ def test_an_engine_that_raises_is_a_row_with_its_reason():
     assert not measure.agrees(made)
     found = study.findings([made], ["Other is not installed here and was skipped: reason."], "today")
     assert found["failures"] == [*found["missing"], "Engine (bad): RuntimeError: no such body"]
-
-
-def test_the_verdict_names_what_is_not_the_map():
-    rows = [measure.row(engine("bullet", "bullet")), measure.row(engine("bullet", "ode", "other"))]
-    said = study.verdict(rows)
-    assert said[0].startswith("1 of 2 settings in double precision")
-    assert said[1] == "Not the map: Engine (other, free)."
-    assert all(math.isfinite(float(cell)) for cell in study.cells(rows[0])[5:10])
 
 
 def test_an_engine_that_is_absent_is_skipped_with_the_reason(monkeypatch):

@@ -64,22 +64,6 @@ def test_both_ratios_against_scipy_stand_side_by_side_for_each_chart_and_languag
     assert ratios["scipy[angles], Python"] == ["angles", "Python", "12 to 12", "500 to 500"]
 
 
-def test_the_verdict_names_winners_losers_and_ties_of_each_call():
-    data = (
-        _stored({
-            "symtop": (1e-3, 1e-4), "rebound": (2e-4, 3e-4), "diffrax": (1.05e-3, 1.05e-4), "drake": (np.nan, np.nan),
-            "mujoco": (1e-2, 1e-2), "arkode": (2e-3, 5e-5),
-        })
-    )  # fmt: skip
-    said = summary.verdict(data)
-    public, inner = (next(line for line in said if line.startswith(word)) for word in ("Public call", "Inner loop"))
-    assert "faster in 2 of 6 comparisons, level or within the noise in 2, slower in 2: rebound in 2 of 2 (" in public
-    assert "faster in 2 of 6 comparisons, level or within the noise in 2, slower in 2: arkode in 2 of 2 (" in inner
-    ratios = {row[0]: row[3:] for row in summary.tables(data)[0].rows}
-    assert ratios["rebound"] == ["0.2 to 0.2", "3 to 3"]
-    assert ratios["drake"] == ["not reached", "not reached"]
-
-
 def test_noise_is_not_called_a_win():
     data = _stored({"symtop": (1e-4, 1e-4), "rebound": (1.4e-4, 1.4e-4)})
     assert "faster in 2 of 2 comparisons, level or within the noise in 0" in summary.verdict(data)[0]
@@ -87,19 +71,6 @@ def test_noise_is_not_called_a_win():
     assert all(
         "faster in 0 of 2 comparisons, level or within the noise in 2" in said for said in summary.verdict(data)[1:]
     )
-
-
-def test_the_price_of_a_callback_through_python_is_told():
-    said = summary.verdict(_stored({"symtop": (1e-3, 1e-4), "cvode": (4e-4, 2e-4), "scikit-sundae": (3e-3, 2.4e-3)}))
-    assert "CVODE takes 12 to 12 times as long where each call of its right-hand side goes through Python" in said[-1]
-
-
-def test_every_row_names_its_chart_its_language_and_what_its_call_shows():
-    given = summary.tables(_stored({"symtop": (1e-3, 1e-4), "scipy[angles] Python": (1e-2, 1e-2)}))[-1]
-    columns = {name: [row[i] for row in given.rows] for i, name in enumerate(given.header)}
-    assert columns["chart"] == ["axis", "angles"]
-    assert columns["right-hand side"] == ["numba, called from C", "Python"]
-    assert all(cell for row in given.rows for cell in row)
 
 
 # ---- the report ------------------------------------------------------------------------------------------------------
@@ -184,37 +155,7 @@ def test_the_stored_measurement_is_whole_and_its_inner_loops_did_the_work():
                     assert summary.best_of(data, call, scene, summary.groups(data)[name], target) is not None
 
 
-def test_the_title_of_the_figure_is_about_every_row_of_solve_ivp_and_its_numbers_stand_beside_them():
-    data = _stored({
-        "symtop": (1e-3, 2e-5), "rebound": (2e-3, 1e-4), "scipy[axis] C": (6e-3, 4e-3),
-        "scipy[angles] Python": (1.2e-2, 1e-2),
-    })  # fmt: skip
-    (drawn,) = study.pictures(data)
-    assert " ".join(drawn.figure.get_suptitle().split("\n")) == (
-        "SciPy's solve_ivp takes 6 to 12 times as long as symtop's own methods in a public call, 200 to 500 times as "
-        "long in an inner loop"
-    )
-    for axis, first, last in zip(drawn.figure.axes, ("6", "200"), ("12", "500"), strict=True):
-        beside = {text.get_text() for text in axis.texts}
-        assert {f"{first} to {first}", f"{last} to {last}"} <= beside
-
-
 # ---- many tops at once -----------------------------------------------------------------------------------------------
-
-
-def test_many_tops_at_once_are_told_by_their_cheapest_lanes_and_with_every_error():
-    rows = [
-        together.Row("heyoka, batch mode", 1000, 1e-6, 9e-7, 120.0, 6e-6),
-        together.Row("srkn-14-6[axis], lanes", 1000, 1e-6, 6e-7, 45.0, 2e-6),
-        together.Row("rk4[axis], lanes", 1000, 1e-6, 8e-7, 1400.0, 7e-6),
-        together.Row("diffrax Tsit5, vmap", 1000, 1e-6, 3e-5, 200.0, 60e-6),
-    ]
-    (said,) = together.verdict(rows)
-    assert "srkn-14-6[axis], lanes, takes 2.0 us a top and 44.4 ns a step to an error of 6e-07" in said
-    assert "Of 2 others heyoka, batch mode takes 3 times as long (error 9e-07)" in said
-    assert "diffrax Tsit5, vmap takes 30 times as long (error 3e-05)" in said
-    assert together.table(rows).rows[3] == ["1,000", "1e-06", "diffrax Tsit5, vmap", "3.0e-05", "200", "60.00", "300.0"]
-    assert together.verdict([]) == together.verdict(rows[:1]) == []
 
 
 def test_all_ways_of_running_many_tops_end_at_the_same_axes():

@@ -1,7 +1,8 @@
-"""Bad input through the API and the command line: always one sentence of SymtopError, never a traceback, never a wait.
+"""Bad input through the API: always one sentence of SymtopError, never a traceback, never a wait.
 
 A table says for every argument what is surely bad; hypothesis draws an entry, a value, and what the sentence is about.
-A second test draws anything at all: then a result is allowed, and any error but SymtopError is not.
+A second test draws anything at all: then a result is allowed, and any error but SymtopError is not. The command line is
+tried in `tests.hostile.test_command_lines`, and here in a process of its own.
 """
 
 import contextlib
@@ -14,12 +15,9 @@ from pathlib import Path
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, given, settings
 
 import symtop
-from symtop.cli.main import main
-from symtop.runner import run as runner
 
 CALM = settings(
     max_examples=200, deadline=None, derandomize=True, database=None, suppress_health_check=[HealthCheck.too_slow]
@@ -153,6 +151,12 @@ CALLS = {
 PLACES = [(call, argument) for call, (_, _, bad) in CALLS.items() for argument in bad]
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _warm():
+    """Importing and compiling are not waiting for an answer."""
+    test_the_same_calls_with_good_input_are_fine()
+
+
 @CALM
 @given(place=st.sampled_from(PLACES), data=st.data())
 def test_the_api_refuses_bad_input_in_one_sentence(place, data):
@@ -189,83 +193,6 @@ def test_anything_at_all_is_used_or_refused(place, value):
         function(**{**good, argument: value})
 
 
-# ---- the command line ------------------------------------------------------------------------------------------------
-
-BAD_NUMBER = st.one_of(
-    st.sampled_from(["nan", "inf", "-inf", "0", "-1", "x", "", "1e-400", "1,5", "0x10", "1e999", "٣x", "--"]),
-    st.floats(max_value=0.0).map(repr),
-)
-BAD_NAME = st.one_of(
-    st.text(st.characters(exclude_characters="\0"), max_size=12),
-    st.sampled_from(["spheroyd", "midpont", "", "é", "../x", "a" * 3000]),
-)
-PLUGINS = ["no-such.py", "", ".", "/", "/dev/null/x.py", "/etc/hostname", "é.py", "x" * 5000]
-RUN = ["run", "spheroid", "midpoint", "--step-size", "0.002", "--horizon", "0.5", "--samples", "5"]
-
-
-def known() -> set[str]:
-    return set(symtop.scenes()) | set(symtop.integrators()) | set(runner.names())
-
-
-@st.composite
-def commands(draw):
-    """A command line with something bad in it."""
-    number, name = draw(BAD_NUMBER), draw(BAD_NAME)
-    assume(name not in known() and not name.startswith("-"))
-    plugin = draw(st.sampled_from(PLUGINS))
-    return draw(
-        st.sampled_from([
-            ["run", name, "midpoint", "--step-size", "0.1"],
-            ["run", "spheroid", name, "--step-size", "0.1"],
-            ["run", "spheroid", "midpoint", f"--step-size={number}"],
-            ["run", "spheroid", "rk45", f"--tolerance={number}"],
-            [*RUN, f"--horizon={number}"],
-            [*RUN, f"--samples={number}"],
-            [*RUN, f"--tolerance={number}"],
-            [*RUN, f"--observe={name}"],
-            [*RUN, f"--output={draw(st.sampled_from(['/', '.', '/proc/x/y.nc', '/dev/null/x.nc']))}"],
-            [*RUN, f"--plugin={plugin}"],
-            [*RUN, "more"],
-            [*RUN, f"--{name or 'x'}"],
-            ["study", name],
-            ["study", "convergence", name, "--quick"],
-            ["study", "--quick"],
-            ["study", "convergence", f"--jobs={number}"],
-            ["study", "convergence", "--quick", f"--limit={number}", "--results", "/tmp/none-such"],
-            ["study", "convergence", "--quick", "--results", draw(st.sampled_from(["/dev/null", "/proc/x"]))],
-            ["study", "convergence", "--status", f"--plugin={plugin}"],
-            ["study", f"/no/such/{draw(st.sampled_from(['x', 'é', 'probe']))}.py"],
-            ["report", "--results", draw(st.sampled_from(["/no-such", "/dev/null", "/proc"]))],
-            ["scenes", f"--plugin={plugin}"],
-            ["integrators", f"--plugin={plugin}"],
-            ["scenes", name],
-            ["integrators", name],
-            ["doctor", f"--{name or 'x'}"],
-            [name or "x"],
-        ])
-    )  # fmt: skip
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _warm():
-    """Importing and compiling are not waiting for an answer."""
-    test_the_same_calls_with_good_input_are_fine()
-    CliRunner().invoke(main, ["study", "convergence", "--quick", "--status"])
-    CliRunner().invoke(main, RUN)
-
-
-@CALM
-@given(words=commands())
-def test_the_command_line_refuses_bad_input_in_one_sentence(words):
-    with at_once():
-        done = CliRunner().invoke(main, words)
-    assert done.exit_code == 2, (words, done.output, done.exception)
-    assert isinstance(done.exception, SystemExit)
-    assert "Traceback" not in done.output
-    said = [line for line in done.stderr.splitlines() if line.startswith(("symtop: ", "Error: "))]
-    assert len(said) == 1, done.stderr
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
@@ -277,7 +204,7 @@ def test_the_command_line_refuses_bad_input_in_one_sentence(words):
         ["integrators", "--plugin", "/etc/hostname"],
     ],
 )
-def test_the_same_in_a_process_of_its_own(words, tmp_path):
+def test_the_command_line_refuses_in_a_process_of_its_own(words, tmp_path):
     start = time.monotonic()
     done = subprocess.run(
         [sys.executable, "-m", "symtop.cli", *words], capture_output=True, text=True, cwd=tmp_path, check=False

@@ -10,7 +10,6 @@ from click.testing import CliRunner
 from terminal import recorded
 
 import symtop
-from symtop.cli.common import completing
 from symtop.cli.main import main
 from symtop.measure.verdicts import ACCURATE
 from symtop.run.guard.guard import EXPECTED
@@ -119,32 +118,6 @@ def test_advice_says_that_a_method_in_plain_python_was_not_tried(axis_only):
     assert "Not tried, as only compiled methods are timed: on-the-axis." in done.output
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (["run", "spheroid", "midpoint"], "needs --step-size, for example 0.007"),
-        (["run", "spheroid", "gauss-8"], "needs --step-size, for example 0.1"),
-        (["run", "spheroid", "rk45"], "needs a tolerance, for example 1e-6"),
-        (["run", "spheroid", "midpoint", "--step-size", "1e-12"], "(see --budget)"),
-        (["run", "spheroid", "midpoint", "--tolerance", "1e-3"], "give --step-size, not --tolerance = 0.001"),
-        (["run", "spheroid", "rk45", "--step-size", "1"], "give --tolerance, not --step-size = 1.0"),
-        (["run", "spheroid", "taylor", "--horizon", "-3"], "symtop: --horizon must be above zero"),
-        (["ensemble", "strang", "--horizon", "1"], "needs --step-size or --per-nutation"),
-        (["run", "spherod", "midpoint", "--step-size", "1"], "did you mean spheroid? (symtop scenes lists all)"),
-        (["run", "spheroid", "midpint", "--step-size", "1"], "(symtop integrators lists all)"),
-        (["run", "spheroid", "taylor", "--figure", "no-such/x.png"], "--figure must be a file in a folder"),
-        (["run", "spheroid", "taylor", "--figure", "x.jpg"], "that ends in .png or .svg or .pdf"),
-        (["run", "spheroid", "taylor", "--output", "no-such/x.nc"], "--output must be a file in a folder"),
-    ],
-)  # fmt: skip
-def test_errors_name_the_options_and_propose(words, says, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    done = call(*words)
-    assert done.exit_code == 2
-    assert says in done.stderr
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_proposed_step_is_of_use():
     """The error that it leads to is between a tenth and ten times the 1e-3 rad that it is proposed for."""
     for name in ("midpoint", "strang", "rk4", "gauss-4"):
@@ -161,17 +134,6 @@ def test_figures_come_in_three_kinds_and_are_the_same_again(ending, head, tmp_pa
         assert call("run", "spheroid", "strang", "--step-size", "0.005", "--figure", file).exit_code == 0
     assert files[0].read_bytes().startswith(head)
     assert files[0].read_bytes() == files[1].read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("kind", "prefix", "some"),
-    [("scenes", "sph", "spheroid"), ("integrators", "mid", "midpoint"), ("integrators", "rk4[", "rk4[axis]"),
-     ("studies", "conv", "convergence")],
-)  # fmt: skip
-def test_completion_lists_names_that_begin_as_what_is_typed(kind, prefix, some):
-    names = completing(kind)(None, None, prefix)
-    assert some in names
-    assert all(name.startswith(prefix) for name in names)
 
 
 def test_a_cold_kernel_is_announced_once(monkeypatch):

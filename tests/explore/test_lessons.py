@@ -15,7 +15,7 @@ import pytest
 
 import symtop
 from symtop.core.errors import SymtopError
-from symtop.explore import answers, maps
+from symtop.explore import answers
 from symtop.explore.server import STATIC, address, serve
 from tests.browser import FAINT, Browser
 from tests.explore.test_explore import fields
@@ -34,18 +34,18 @@ def server():
 
 
 def test_a_cell_of_the_map_is_the_run_that_a_click_asks_for():
-    asked = maps.grid(fields(**RANGE))
-    _, steps, spins = asked
-    found = np.frombuffer(base64.b64decode(maps.answer(asked)["error_rad"]), "<f4").reshape(maps.ROWS, maps.COLUMNS)
+    chosen, steps, spins = answers.grid(fields(**RANGE))
+    coded = answers.outcome_map(chosen, steps, spins)["error_rad"]
+    errors = np.frombuffer(base64.b64decode(coded), "<f4").reshape(answers.ROWS, answers.COLUMNS)
     early = 0
     for row, column in ((0, 0), (8, 10), (20, 20), (31, 47), (16, 47)):
         alone = answers.answer(answers.setup(fields(step_size=steps[column], psi_dot=spins[row])))
         early += alone["outcome"] != "ok"
-        assert np.isnan(found[row, column]) == (alone["outcome"] != "ok")
+        assert np.isnan(errors[row, column]) == (alone["outcome"] != "ok")
         if alone["outcome"] == "ok":  # nine samples of the many of a run
-            assert 0.2 * alone["largest"]["axis_error"] < found[row, column] < 1.001 * alone["largest"]["axis_error"]
+            assert 0.2 * alone["largest"]["axis_error"] < errors[row, column] < 1.001 * alone["largest"]["axis_error"]
     assert 0 < early < 5
-    assert found[8, 10] != pytest.approx(found[20, 20], rel=0.01)
+    assert errors[8, 10] != pytest.approx(errors[20, 20], rel=0.01)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_a_cell_of_the_map_is_the_run_that_a_click_asks_for():
 )  # fmt: skip
 def test_a_map_that_cannot_be_is_refused_in_a_sentence(changes, word):
     with pytest.raises(SymtopError, match=word):
-        maps.grid(fields(**RANGE | changes))
+        answers.grid(fields(**RANGE | changes))
 
 
 def answered(browser, selector, value):

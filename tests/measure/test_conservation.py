@@ -56,19 +56,19 @@ def test_the_energy_of_rk45_falls_linearly_and_its_momenta_drift():
 
 def test_momenta_are_recomputed_and_not_copied():
     """A kernel that moves phi by the wrong amount shows it in p_phi."""
-    from symtop.methods.framework.angles import reduced
-    from symtop.methods.framework.loop import driver
+    from symtop.methods.framework.angles import on_angles
+    from symtop.methods.framework.loop import kernel_loop
     from symtop.methods.lagrangian import discrete_lagrangian as family
 
     where = symtop.scene("spheroid")
-    par, state = reduced(where.top, where.start)
+    par, state = on_angles(where.top, where.start)
     right = family.increment
 
     def wrong(par, rule, state, carry, h):
         step, carry, effort, outcome = right(par, rule, state, carry, h)
         return (step[0], step[1], step[2] * (1.0 + 1e-6), step[3]), carry, effort, outcome
 
-    loop = driver(family.begin, wrong, family.observe)
+    loop = kernel_loop(family.begin, wrong, family.observe)
     done = loop(par, family.Quadrature((0.5,), (1.0,)), state, 0.01, np.array([0, 100]))
     momenta = where.top.momenta(where.start)
     assert abs(done.momenta[-1, 0] / momenta.p_phi - 1.0) > 1e-8

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from symtop_studies.drift.long_runs import elapsed_steps, members
 from symtop_studies.drift.phase_loss import phase_loss
+from symtop_studies.drift.runs import elapsed_steps, members
 
 import symtop
 from symtop.measure.conservation import history

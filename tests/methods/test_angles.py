@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.methods.framework.angles import chart_outcome, reduced
+from symtop.methods.framework.angles import chart_outcome, on_angles
 from symtop.methods.framework.fixed_step import inside
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK
 from symtop.methods.lagrangian import discrete_lagrangian, galerkin
@@ -42,7 +42,7 @@ def test_an_iteration_that_wanders_off_ends_as_with_the_sines_of_the_library(fam
     loop, rule = family.march, inside(symtop.integrator(name).solvers["angles"]).rule
     ends = []
     for top, at, h in violent(400, seed=3):
-        par, state = reduced(top, at)
+        par, state = on_angles(top, at)
         interpreted = family.increment(par, rule, state, family.begin(par, rule, state, h), h)[3]
         ends.append((interpreted, loop(par, rule, state, h, np.array([1])).outcome))
     assert {OK, LEFT_CHART} < {outcome for outcome, _ in ends}  # and not converged

@@ -7,7 +7,7 @@ from scipy.optimize import root
 import symtop
 from symtop.measure.conservation import trend
 from symtop.measure.step_map import StepMap, angles_at, one_step, return_miss, symplectic_defect
-from symtop.methods.framework.angles import reduced
+from symtop.methods.framework.angles import on_angles
 from symtop.methods.lagrangian import galerkin as kernel
 from symtop.model.top import effective_force, effective_stiffness
 from tests.conftest import random_scenes
@@ -122,7 +122,7 @@ def test_a_step_without_its_last_force_is_neither_symplectic_nor_symmetric():
 @pytest.mark.parametrize("where", random_scenes(4, seed=24), ids=lambda s: s.name)
 def test_slopes_at_a_node_are_those_of_the_effective_potential(where):
     """V' and V'' as the model has them, and the derivatives by the momenta by differences (V' is quadratic in them)."""
-    par, (theta, *_) = reduced(where.top, where.start)
+    par, (theta, *_) = on_angles(where.top, where.start)
     south, north, e = par.south, par.north, 0.5
 
     def V(south, north):
@@ -138,7 +138,7 @@ def test_slopes_at_a_node_are_those_of_the_effective_potential(where):
 @pytest.mark.parametrize("where", random_scenes(4, seed=25), ids=lambda s: s.name)
 def test_every_derivative_of_a_trial_is_right(where):
     """The analytic Jacobian against central differences; one that is off by a thousandth is seen."""
-    par, (theta, *_) = reduced(where.top, where.start)
+    par, (theta, *_) = on_angles(where.top, where.start)
     start, m, d, e = kernel._node(par, theta), 0.03, 0.07, 1e-5
 
     def trial(shift_m, shift_1):
@@ -172,7 +172,7 @@ def test_recomputed_momenta_stay_for_a_million_steps(scene_name):
 def test_the_recomputed_momenta_see_a_wrong_increment():
     """The negative control of the last test: a phi that moved 1e-10 too far shows in p_phi."""
     where = symtop.scene("spheroid")
-    par, state = reduced(where.top, where.start)
+    par, state = on_angles(where.top, where.start)
     carry = kernel.begin(par, kernel.Iteration(), state, 0.01)
     step, *_ = kernel.increment(par, kernel.Iteration(), state, carry, 0.01)
     right = kernel.observe(par, kernel.Iteration(), state, step, 0.01)

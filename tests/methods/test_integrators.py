@@ -9,9 +9,9 @@ import symtop
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import order
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
-from symtop.methods.framework.angles import reduced
+from symtop.methods.framework.angles import on_angles
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian.discrete_lagrangian import forces, march, node_sums, opening
 from symtop.methods.lagrangian.quadrature import Quadrature
@@ -49,7 +49,7 @@ def test_starting_from_q0_plus_h_v0_costs_an_order():
     """The negative control of every order test: the start that a public package uses."""
 
     def begun_wrongly(top, start):
-        par, state = reduced(top, start)
+        par, state = on_angles(top, start)
         rule = Quadrature((0.5,), (1.0,))
         h = begun_wrongly.h
         # p1 = D2 Ld(q0, q0 + h v0) moved back by a step is the momentum that this start amounts to
@@ -89,7 +89,7 @@ def test_the_step_map_is_symplectic(name, where):
 
 def explicit_euler(top, start, plan):
     """Order 1, not symplectic, not symmetric: what the structure tests must catch."""
-    par, (theta, p, phi, psi) = reduced(top, start)
+    par, (theta, p, phi, psi) = on_angles(top, start)
     from symtop.methods.framework.plan import Run
     from symtop.model.top import effective_force
 
@@ -208,7 +208,7 @@ def test_compensated_sums_keep_a_million_small_increments():
     def observe(par, rule, before, dstate, h):
         return 0.0, 0.0
 
-    run = driver(begin, increment, observe)
+    run = kernel_loop(begin, increment, observe)
     done = run((1.0,), (1.0,), (0.0,), 0.1, np.array([0, 10, 1_000_000]))
     assert done.states[-1, 0] == 0.1 * 1_000_000
     naive = 0.0
@@ -221,7 +221,7 @@ def test_compensated_sums_keep_a_million_small_increments():
 def test_one_newton_iteration_is_not_enough_and_round_off_is_reached_with_more():
     """A loose stop rule shows as an error of the implicit equation; the default leaves rounding only."""
     where = symtop.scene("spheroid")
-    par, state = reduced(where.top, where.start)
+    par, state = on_angles(where.top, where.start)
     h, marks = 0.02, np.arange(0, 40)
 
     def residual(tolerance):

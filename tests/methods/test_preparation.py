@@ -11,7 +11,7 @@ import pytest
 import symtop
 from symtop.core.jit import compile_kernel
 from symtop.methods.framework import fixed_step, loop as loops
-from symtop.methods.framework.angles import reduced, require_chart, with_rates
+from symtop.methods.framework.angles import on_angles, require_chart, with_rates
 from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.many import refused
 from symtop.methods.framework.plan import Plan
@@ -24,7 +24,7 @@ from symtop.methods.splitting.composition import composition
 from symtop.methods.splitting.loop import exact_sum
 from symtop.model.top import Angles, SymmetricTop, flat
 
-PREPARATIONS = [reduced, with_rates, with_momenta, on_axis, on_attitude, on_frame]
+PREPARATIONS = [on_angles, with_rates, with_momenta, on_axis, on_attitude, on_frame]
 
 
 def tops(count, seed=3):
@@ -139,7 +139,7 @@ def test_long_runs_return_to_python(monkeypatch):
 
 def test_a_start_on_a_pole_is_refused_as_before():
     top = SymmetricTop(1.0, 1.0, 1.0)
-    for prepare in (reduced, with_rates, with_momenta):
+    for prepare in (on_angles, with_rates, with_momenta):
         with pytest.raises(symtop.SymtopError, match="inside"):
             prepare(top, Angles(0.0))
     with pytest.raises(symtop.SymtopError, match="inside"):
@@ -190,7 +190,7 @@ def test_a_rule_may_be_whatever_a_kernel_takes(rule):
     def observe(par, rule, before, dstate, h):
         return 0.0, 0.0
 
-    solver = FixedStep(loops.driver(begin, increment, observe), rule, reduced, 1, implicit=False)
+    solver = FixedStep(loops.kernel_loop(begin, increment, observe), rule, on_angles, 1, implicit=False)
     run = solver(SymmetricTop(1.0, 1.0, 1.0), Angles(1.0, theta_dot=0.5), Plan.steps(0.25, [0, 1, 4]))
     assert run.states[:, 0].tolist() == [1.0, 1.125, 1.5]
     assert (solver._whole is not None) == isinstance(rule, tuple)

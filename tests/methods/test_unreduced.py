@@ -7,7 +7,7 @@ from symtop_studies.reduction.tables import Column, unreduced_cost, unreduced_fo
 import symtop
 from symtop.measure.conservation import trend
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.lagrangian import unreduced as kernel
 from symtop.methods.lagrangian.quadrature import RULES, Quadrature
 from symtop.methods.lagrangian.unreduced import march, unreduced, with_momenta
@@ -124,7 +124,7 @@ def one_iteration(par, rule, state, carry, h):
 @pytest.mark.parametrize("scene_name", SCENES)
 def test_one_iteration_a_step_lets_the_momenta_go(scene_name):
     """The negative control: equations that are not solved show in p_phi, which no parameter holds."""
-    largest, _ = momentum_walk(scene_name, driver(kernel.begin, one_iteration, kernel.observe), steps=50_000)
+    largest, _ = momentum_walk(scene_name, kernel_loop(kernel.begin, one_iteration, kernel.observe), steps=50_000)
     assert not largest < 1e-11
 
 

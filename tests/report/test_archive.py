@@ -79,7 +79,7 @@ def test_every_file_has_its_sum(bundled):
 def test_the_readme_names_every_file_and_describes_every_variable(bundled):
     readme = bundled["README.md"].decode()
     assert all(f"| {name} |" in readme for name in bundled.keys() - {"README.md", "SHA256SUMS"})
-    assert "| x | scene (1) x integrator (1) x step_size (2) | rad | a number |" in readme
+    assert "| x | scene (1) x variant (1) x step_size (2) | rad | a number |" in readme
     states = readme.partition("### scenes/states.nc")[2]
     assert re.findall(r"\| theta_lo \| scene \(\d+\) x sample \(10\) \| rad \| \S", states)
     assert netcdf.provenance()["symtop_revision"] in readme

@@ -1,13 +1,11 @@
-"""How a figure is written: drawn once for each file, as savefig draws it, and with the letters of its fonts alone."""
+"""How a figure is written: drawn once for each file, as savefig draws it."""
 
 import numpy as np
 import pytest
-from fontTools import subset
 from matplotlib.figure import Figure
-from matplotlib.font_manager import FontProperties, findfont
 from PIL import Image
 
-from symtop.report import embedded, style
+from symtop.report import style
 
 
 def drawn() -> Figure:
@@ -47,20 +45,3 @@ def test_a_figure_is_drawn_once_a_file(tmp_path, monkeypatch, write, files):
     monkeypatch.setattr(Figure, "draw", lambda *args: (times.append(1), draw(*args))[1])
     write(figure, tmp_path / "a.png")
     assert len(times) == files == len(list(tmp_path.iterdir()))
-
-
-def tables() -> set[str]:
-    with subset.load_font(findfont(FontProperties(family="DejaVu Sans")), subset.Options()) as font:
-        return set(font.keys())
-
-
-def test_fonts_of_a_vector_figure_have_no_layout_tables(tmp_path, monkeypatch):
-    whole = tables()
-    assert {"GSUB", "GPOS"} < whole
-    with embedded.letters_alone():
-        assert tables() == whole - set(embedded.LAYOUT)
-    assert tables() == whole
-    loaded, load = [], subset.load_font
-    monkeypatch.setattr(subset, "load_font", lambda *args, **options: (loaded.append(1), load(*args, **options))[1])
-    style.publish(drawn(), tmp_path / "a.png")
-    assert loaded  # matplotlib asks here for its fonts: if it did not, they would be whole

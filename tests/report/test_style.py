@@ -56,10 +56,6 @@ def test_an_added_integrator_has_a_look_of_its_own_whatever_else_was_added(clean
     assert style.look("heun-3") == alone
 
 
-def test_every_shipped_integrator_has_a_line_in_the_table():
-    assert {name for name in symtop.integrators() if registry.is_built_in(name)} == set(style._LOOKS)
-
-
 @pytest.mark.parametrize(("count", "columns"), [(1, 1), (5, 3), (6, 3), (2, 4)])
 def test_a_grid_labels_its_left_and_its_lowest_panels(count, columns):
     figure, axes = style.grid(count, columns, ("step", "error"), sharex=True, sharey=True)

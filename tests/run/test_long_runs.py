@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numba import njit
-from symtop_studies.drift.long_runs import members, rounding
+from symtop_studies.drift.runs import members, rounding
 
 import symtop
 from symtop.cli.main import main

@@ -6,11 +6,8 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
-from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
-from symtop_studies.stability import atlas, atlas_figures, atlas_words, figures, messages, outcome_maps, words
+from symtop_studies.stability import atlas, atlas_figures, atlas_words, figures, outcome_maps
 from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, row_plan, spin_unit, with_spin
 from symtop_studies.stability.tables import Column, family_limits, map_table, sampling_table
 
@@ -21,7 +18,6 @@ from symtop.measure.verdicts import JUDGED, VERDICTS, verdict
 from symtop.methods.framework.registry import integrator, methods
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
-from symtop.report import style
 from symtop.report.style import OUTCOME_COLORS
 from symtop.run.reference.truth import reference
 from symtop.runner import run as runner, store
@@ -212,60 +208,6 @@ def test_gauss_methods_go_on_beyond_the_limit_of_their_sweeps(name):
         assert {VERDICTS[k] for k in np.unique(runs.verdict)} <= set(JUDGED)
 
 
-def mechanism(limit, third):
-    """A dataset of `steady-fast` with one method of these limits."""
-    names = {Column.LIMIT_PHASE: limit, Column.THIRD_TURN_PHASE: third, Column.SOUGHT_PHASE: 10.0}
-    return store.combine([(Case("steady-fast", "midpoint"), xr.Dataset(names))])
-
-
-def test_a_method_without_a_linear_limit_is_said_to_have_none():
-    free = mechanism(math.nan, 3.4641)
-    said = words.limits(free.sel(scene="steady-fast"))
-    assert "first grow, or it is lost, at none of 300 steps up to h omega = 10 with midpoint." in said
-    assert words.tables(free)[-1].rows[0][1] == "none of 300 steps up to 10"
-    bound = mechanism(1.9999, 1.7321)
-    assert "none of" not in words.limits(bound.sel(scene="steady-fast"))
-    assert words.tables(bound)[-1].rows[0][1] == "1.9999"
-    narrow = free.assign({Column.WINDOW_START: free[Column.LIMIT_PHASE].fillna(6.28),
-                          Column.WINDOW_END: free[Column.LIMIT_PHASE].fillna(6.287)})  # fmt: skip
-    said = words.limits(narrow.sel(scene="steady-fast"))
-    assert "only between steps tried, in windows up to 0.007 wide from 6.28 on, with midpoint" in said
-    assert "none of" not in said
-    assert words.tables(narrow)[-1].rows[0][1:3] == ["none of 300 steps up to 10", "6.280"]
-    both = narrow.assign({Column.LIMIT_PHASE: narrow[Column.WINDOW_START] + 2.0})  # strang is of this kind
-    assert "first grow, or it is lost, at h omega at 6.28 (midpoint)" in words.limits(both.sel(scene="steady-fast"))
-    assert words.tables(both)[-1].rows[0][1:3] == ["8.2800", "6.280"]
-    unknown = mechanism(math.nan, math.nan)  # not symmetric: nothing is claimed
-    assert words.limits(unknown.sel(scene="steady-fast")) == ""
-
-
-def test_a_resonance_is_said_to_lose_some_displacement_and_not_every_larger_one():
-    """What is measured is the displacement up to which all stay: the next one may be 5 % larger."""
-    for at, said in ((0.006, True), (0.0195, False)):
-        data = mechanism(math.nan, 3.4641)
-        for name, value in ((Column.SURVIVING_AT_THIRD_TURN, at), (Column.SURVIVING_PAST_THIRD_TURN, 0.2)):
-            data[name] = data[Column.THIRD_TURN_PHASE] * 0.0 + value
-        part = data.sel(scene="steady-fast")
-        assert (
-            "with 1 of 1 variant a top is lost at some displacement of at most 0.02 rad" in words.resonances(part)
-        ) is (said)
-        assert ("lose a top at some displacement of at most 0.02 rad" in messages.of_mechanism("resonances", part)) is (
-            said
-        )
-
-
-def test_the_caption_of_a_page_names_the_methods_without_a_limit():
-    for limit, said in ((math.nan, True), (0.3, False)):
-        data = hand_made([[A, B, B]] * 4)
-        for variable, value in ((Column.LINEAR_LIMIT, limit), (Column.THIRD_TURN, 0.55)):
-            data[variable] = (("scene", "variant", "curve"), [[[value, value]]])
-        caption = atlas_words.caption(data, "cusp", ["midpoint"])
-        text = "With midpoint small nutations grow at no spin at any of 48 steps tried up to 1 nutation periods"
-        assert (text in caption) is said
-        (table,) = atlas_words.atlas_tables(data, "cusp")
-        assert table.rows[0][-1] == ("none" if said else "0.3")
-
-
 def hand_made(
     words, control=(0.01, 0.1, 1.0), parameter=(0.3, 0.6, 5.0, 10.0), knob_name="step_size", scene_name="cusp"
 ):
@@ -349,46 +291,6 @@ def test_the_two_charts_of_a_method_are_compared_and_one_alone_is_not():
     assert "The chart alone" not in " ".join(atlas_words.summary(store.combine(cells[:1]), "cusp"))
 
 
-def test_rows_that_reach_less_than_the_smallest_step_are_the_least_and_are_counted():
-    """On slow tops (the first two variants of a map) one of two methods is inaccurate at the smallest step already."""
-    cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", variant="midpoint", drop=True))
-             for name, rows in (("rk4[axis]", [[B, B, B]] * 2 + [[A, A, B]] * 2), ("strang[axis]", [[A, A, B]] * 4),
-                                ("gauss-2[axis]", [[A, B, B]] * 4))]  # fmt: skip
-    said = atlas_words.summary(store.combine(cells), "cusp")[0]
-    assert "from 0.01 (gauss-2[axis]) to 0.1 (rk4[axis]) on fast tops" in said
-    assert "from below 0.01 (rk4[axis]) to 0.1 (strang[axis]) on slow tops" in said
-    never = store.combine([(Case("cusp", "rk4[axis]"), cells[0][1].isel(parameter=[0, 0, 1, 1]))])
-    assert "is from below 0.01 (rk4[axis]) on slow tops" in atlas_words.summary(never, "cusp")[0]
-    without = store.combine([*cells, (Case("cusp", "rk45[axis]"), hand_made([[A, B, B]] * 4, knob_name="tolerance").sel(
-        scene="cusp", variant="midpoint", drop=True))])  # fmt: skip
-    assert said.endswith("in nutation periods.")
-    assert atlas_words.summary(without, "cusp")[0].endswith("Not counted: 1 variant without a fixed step.")
-
-
-def test_a_row_without_an_inaccurate_run_has_no_share_of_them():
-    cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", variant="midpoint", drop=True))
-             for name, rows in (("rk4[axis]", [[A, B, L]] * 4), ("strang[axis]", [[A, A, A]] * 4))]  # fmt: skip
-    assert math.isnan(atlas.maps(store.combine(cells), "cusp")["strang[axis]"].silent)
-    assert "With the median variant 50% of inaccurate runs end" in atlas_words.summary(store.combine(cells), "cusp")[-1]
-    (table,) = atlas_words.atlas_tables(store.combine(cells), "cusp")
-    assert [row[5] for row in table.rows] == ["50%", ""]
-    right = atlas_words.summary(store.combine(cells[1:]), "cusp")[-1]
-    assert right.startswith("1 of 1 variant never end a run early")
-
-
-def test_a_pole_that_spoils_is_named():
-    gaps = (1e-6, 1e-5, 1e-2, 0.2)
-    near = hand_made([[L, L, L], [L, L, L], [A, L, L], [A, A, L]], parameter=gaps, scene_name="grazing")
-    both = xr.concat([hand_made([[A, A, A]] * 4), near], "scene")
-    assert (
-        "needs steps less than half as long within 0.01 rad of a pole (right next to it, smaller than any on the map)"
-        in atlas_words.advice(both, "cusp")["midpoint"].fails
-    )
-    unspoiled = hand_made([[A, A, L]] * 4, parameter=gaps, scene_name="grazing")
-    both = xr.concat([hand_made([[A, A, A]] * 4), unspoiled], "scene")
-    assert "pole" not in atlas_words.advice(both, "cusp")["midpoint"].fails
-
-
 def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
     small = map_table("grazing", integrator("strang"), {"parameters": [1e-3, 0.1], "ladder": [0.01, 0.05],
                                                         "periods": 1.0, "shown": 0.01})  # fmt: skip
@@ -420,117 +322,6 @@ def test_maps_can_be_read_without_colours(size):
     assert {"left_chart", "wrong_regime", "not_converged", "drifting"} <= set(VERDICTS) - set(plain)
 
 
-def two_maps():
-    """A dataset of a method with steps and one with tolerances, the first accurate more often."""
-    step, tolerance = hand_made([[A, A, B]] * 4), hand_made([[A, L, L]] * 4, knob_name="tolerance")
-    cells = [(Case("cusp", name), one.sel(scene="cusp", variant="midpoint", drop=True))
-             for name, one in (("rk4[axis]", step), ("strang[axis]", hand_made([[A, B, B]] * 4)),
-                               ("rk45[axis]", tolerance))]  # fmt: skip
-    return store.combine(cells)
-
-
-def test_a_page_of_small_maps_shows_every_row_once_in_the_order_of_its_accurate_share():
-    drawn = {picture.name: picture for picture in figures.pictures(two_maps())}
-    assert list(drawn) == ["atlas-cusp-enlarged", "atlas-cusp-steps", "atlas-cusp-tolerances"]
-    titles = [axis.get_title() for axis in drawn["atlas-cusp-steps"].figure.axes if axis.get_visible()]
-    assert titles == ["rk4\n[axis] 67%", "strang\n[axis] 33%"]
-    assert "2 variants" in drawn["atlas-cusp-steps"].caption
-    (title,) = (axis.get_title() for axis in drawn["atlas-cusp-tolerances"].figure.axes if axis.get_visible())
-    assert title == "rk45\n[axis] 33%"
-    assert "to the right the tolerance" in drawn["atlas-cusp-tolerances"].caption
-
-
-def test_the_enlarged_map_is_that_of_a_familiar_row_and_names_its_regions():
-    data = two_maps()
-    figure = next(figures.pictures(data)).figure
-    assert figure.get_suptitle() == "rk4[axis] is accurate in 67% of the map of cusp"
-    assert {text.get_text() for text in figure.axes[0].texts} == {"accurate", "bounded but wrong"}
-    renamed = data.assign_coords(variant=["rk4[axis]", figures.FAMILIAR, "rk45[axis]"])
-    assert next(figures.pictures(renamed)).figure.get_suptitle().startswith(figures.FAMILIAR)
-
-
-def test_the_message_of_a_mechanism_follows_from_its_numbers():
-    def said(once, every):
-        columns = {Column.ENERGY_ONCE: ("variant", once), Column.ENERGY_EVERY: ("variant", every)}
-        return messages.of_mechanism("sampling", xr.Dataset(columns, coords={"variant": ["rk4[axis]", "strang[axis]"]}))
-
-    assert "up to 1000 times too small (rk4[axis])" in said([1e-7, 1e-6], [1e-4, 1e-6])
-    assert "not seen" not in said([1e-7, 1e-6], [1e-4, 1e-6])
-    assert "that of 1 method is not seen at all" in said([1e-7, 1e-16], [1e-4, 1e-6])
-
-
-def test_the_message_of_the_sleeping_top_says_where_the_threshold_goes_not_how_far():
-    columns = {Column.SLEEPING_THRESHOLD: (("variant", "rung"), [[2.0, 1.92], [2.01, 2.24], [2.0, 2.0]])}
-    names = ["strang[axis]", "cayley[axis]", "midpoint[angles]"]
-    said = messages.of_mechanism("sleeping", xr.Dataset(columns, coords={"variant": names}))
-    assert "from 2 to 2.24 with cayley[axis], 1.92 with strang[axis]; 1 methods keep it" in said
-
-
-def test_the_message_of_the_pole_is_that_of_the_step_drawn():
-    gaps, broken = [1e-6, 1e-5, 0.2], [math.nan, math.nan, 1e-3]
-    columns = {
-        Column.PARAMETER: (("variant", "parameter"), [gaps, gaps]),
-        Column.GRAZING_ERROR: (("variant", "parameter"), [broken, [2e-4, 2e-4, 1e-4]]),
-    }
-    part = xr.Dataset(columns, coords={"variant": ["stormer-verlet[angles]", "strang[axis]"]})
-    said = messages.of_mechanism("pole", part)
-    assert said.startswith("At one step 1 of 1 fixed-step methods in angles end early within 0.0001 rad of a pole")
-    assert said.endswith("the 1 in other charts have errors that differ at most 2 times between all gaps")
-    part[Column.GRAZING_ERROR][1, 2] = 4e-5  # the base is the smallest error at any gap
-    assert "differ at most 5 times" in messages.of_mechanism("pole", part)
-
-
-def test_the_runs_that_outlast_the_law_of_the_separatrix_are_named_and_not_counted():
-    columns = {
-        Column.EARLY_ERROR: (("variant", "setting"), [[1e-6, 1e-8], [1e-6, 1e-8]]),
-        Column.PREDICTED_HORIZON: (("variant", "setting"), [[29.0, 38.2], [29.0, 38.2]]),
-        Column.HORIZON: (("variant", "setting"), [[29.5, 38.4], [72.0, 71.0]]),
-    }
-    part = xr.Dataset(columns, coords={"variant": ["rk4[axis]", "gauss-4[axis]"]})
-    assert words.outlasting(part) == ["gauss-4[axis]"]
-    assert words.misses(part) == pytest.approx([0.5, 0.2])
-    assert messages.of_mechanism("separatrix", part).endswith("to 0.35/λ in the median; 1 method lasts longer")
-    assert words.horizons(part).endswith("gauss-4[axis] lasts more than 10/λ longer.")
-    assert "more run" not in words.horizons(part)
-    part[Column.HORIZON][0, 1] = math.nan  # it never reaches the error of which the law speaks
-    assert "1 more run (rk4[axis]) never did." in words.horizons(part)
-    part[Column.BROKEN] = ("variant", "setting"), [[0.0, 1.0], [0.0, 0.0]]
-    assert "predicts when 1 runs reach" in words.horizons(part)
-    assert "1 more run (rk4[axis]) ended before." in words.horizons(part)
-    assert "; 1 method lasts longer, 1 run never got there" in messages.of_mechanism("separatrix", part)
-
-
-def slope(pixels):
-    """Do the dark lines of a picture rise to the right (+1), fall (-1), or neither (0)?"""
-    dark = np.mean(pixels[..., :3], axis=-1)
-    dark = dark < 0.5 * (dark.min() + dark.max())
-    rising, falling = (np.mean(dark[3:-3, 3:-3] & np.roll(dark, (-3 * k, 3), (0, 1))[3:-3, 3:-3]) for k in (1, -1))
-    return int(np.sign(rising - falling)) if abs(rising - falling) > 0.2 * max(rising, falling) else 0
-
-
-@pytest.mark.parametrize("word", ["left_chart", "wrong_regime", "not_converged"])
-def test_the_hatch_of_a_map_has_the_slope_of_its_swatch_in_the_legend(word):
-    style.use()
-    index = np.full((40, 60), VERDICTS.index(word), dtype=np.uint8)
-    slopes = []
-    for draw in ("map", "swatch"):
-        figure = Figure(figsize=(2.0, 1.6), dpi=200, layout="none")
-        axis = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        if draw == "map":
-            axes = np.geomspace(0.1, 30.0, 40), np.geomspace(0.01, 1.0, 60)
-            one = atlas.OutcomeMap(index, *axes, "step_size", np.full(index.shape, True))
-            atlas_figures.draw_map(axis, one, "small")
-        else:
-            swatch = atlas_figures._handle(word)
-            axis.add_patch(Rectangle((0, 0), 1, 1, fc=swatch.get_facecolor(), hatch=swatch.get_hatch(), ec="black"))
-        axis.set_axis_off()
-        canvas = FigureCanvasAgg(figure)
-        canvas.draw()
-        slopes.append(slope(np.asarray(canvas.buffer_rgba())[20:-20, 20:-20] / 255.0))
-    assert slopes[0] == slopes[1]
-    assert slopes[0] == {"left_chart": 1, "wrong_regime": -1, "not_converged": 0}[word]
-
-
 def tolerances(*ladders):
     """Maps of methods over tolerances: accurate up to 1e-4."""
     names = ["rk45[axis]", "radau[axis]", "dop853[axis]", "lsoda[axis]"]
@@ -539,75 +330,6 @@ def tolerances(*ladders):
         cell = hand_made([[A if value < 2e-4 else B for value in ladder]] * 4, ladder, knob_name="tolerance")
         cells.append((Case("cusp", name), cell.sel(scene="cusp", variant="midpoint", drop=True)))
     return store.combine(cells)
-
-
-def test_shares_of_a_page_are_of_what_all_its_maps_have_and_panels_share_their_axes():
-    data = tolerances([1e-10, 1e-8, 1e-6, 1e-4, 1e-2], [1e-6, 1e-4, 1e-2])
-    shares = {name: one.shares[0] for name, one in atlas.common(atlas.maps(data, "cusp")).items()}
-    assert shares == pytest.approx({"rk45[axis]": 2 / 3, "radau[axis]": 2 / 3})
-    drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-tolerances"]
-    seen = [axis for axis in drawn.figure.axes if axis.get_visible()]
-    assert seen[0].get_xlim() == pytest.approx(seen[1].get_xlim())
-    assert "Maps and shares are of what was tried with all: 1e-06 to 0.01." in drawn.caption
-    for axis in seen:  # the share that is printed is the share that is seen
-        low, high = axis.get_xlim()
-        assert (10.0**low, 10.0**high) == pytest.approx((1e-6, 1e-2))
-        painted = np.isclose(axis.images[0].get_array(), to_rgb(OUTCOME_COLORS["accurate"])).all(axis=-1)
-        assert painted.mean() == pytest.approx(2 / 3, abs=0.02)
-        assert axis.get_title().endswith("67%")
-    key = {text.get_text() for text in drawn.figure.legends[0].get_texts()}
-    assert key == {"accurate", "bounded but wrong"}
-
-
-def test_the_share_of_a_coarse_map_is_seen_beside_that_of_a_fine_one():
-    data = tolerances([1e-6, 1e-5, 1e-4, 1e-3, 1e-2], [1e-6, 1e-4, 1e-2])
-    shares = [one.shares[0] for one in atlas.common(atlas.maps(data, "cusp")).values()]
-    drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-tolerances"]
-    for axis in (axis for axis in drawn.figure.axes if axis.get_visible()):
-        printed = float(axis.get_title().split()[-1].rstrip("%")) / 100.0
-        assert any(printed == pytest.approx(share, abs=0.005) for share in shares)
-        left, right, low, high = axis.images[0].get_extent()  # all of it is inside the panel
-        assert (left, right, low, high) == pytest.approx((*axis.get_xlim(), *axis.get_ylim()))
-        painted = np.isclose(axis.images[0].get_array(), to_rgb(OUTCOME_COLORS["accurate"])).all(axis=-1)
-        assert painted.mean() == pytest.approx(printed, abs=0.02)
-
-
-def test_rows_that_are_accurate_everywhere_share_a_panel():
-    right = hand_made([[A, A, A]] * 4).sel(scene="cusp", variant="midpoint", drop=True)
-    wrong = hand_made([[A, B, B]] * 4).sel(scene="cusp", variant="midpoint", drop=True)
-    names = ["yoshida-4[axis]", "suzuki-4[axis]", "strang[axis]", "rk4[axis]"]
-    data = store.combine([(Case("cusp", name), wrong if name == "rk4[axis]" else right) for name in names])
-    drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-steps"]
-    titles = [axis.get_title() for axis in drawn.figure.axes if axis.get_visible()]
-    assert titles == ["3 methods\n(named below) 100%", "rk4\n[axis] 33%"]
-    assert "everywhere, all [axis]: yoshida-4, suzuki-4, strang." in drawn.figure.legends[0].get_title().get_text()
-
-
-def test_the_page_of_the_pole_tells_charts_apart_and_names_an_exception():
-    rows = {"rk4[axis]": [0, 0, 0], "strang[axis]": [0, 0, 1], "rk4[angles]": [0, 1, 1],
-            "stormer-verlet-reversible[angles]": [0, 0, 1]}  # fmt: skip
-    axes = np.array([1e-6, 0.3]), np.array([0.001, 0.01, 0.1]), "step_size"
-    shown = {name: atlas.OutcomeMap(np.array([row] * 2), *axes, np.full((2, 3), True)) for name, row in rows.items()}
-    data = xr.Dataset(coords={"variant": list(rows)})
-    assert atlas_words.page_message(data, "grazing", shown) == (
-        "Past a pole methods on the axis are accurate in 67% to 100% of their maps, methods in angles in 33%, but for "
-        "stormer-verlet-reversible (67%)"
-    )
-
-
-def test_a_tie_has_no_single_winner():
-    ladder = [1e-6, 1e-4, 1e-2]
-    data = tolerances(ladder, ladder, ladder)
-    best, worst = atlas_words.ends(atlas.maps(data, "cusp"))
-    assert best == worst == "3 methods (67%)"
-
-
-def test_words_of_mechanisms_come_only_from_what_is_there():
-    data = hand_made([[A, B, L]] * 4)
-    assert words.mechanism_sentences(data) == []
-    assert [table.title for table in words.tables(data)] == [
-        "The atlas in words: cusp with its spin changed, 10 nutations"
-    ]
 
 
 def test_the_full_grid_is_as_large_as_promised():

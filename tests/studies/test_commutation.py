@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.optimize import root
-from symtop_studies.reduction import commutation, figures, words
+from symtop_studies.reduction import commutation, words
 from symtop_studies.reduction.commutation import gap, kernel_path, path, reduced_first
-from symtop_studies.reduction.tables import Column, Ratio, commutation_table, unreduced_forms
+from symtop_studies.reduction.tables import Column, commutation_table, unreduced_forms
 
 import symtop
 from symtop.measure.order import power_law
 from symtop.methods.framework import registry
 from symtop.methods.lagrangian.discrete_lagrangian import rule_of
 from symtop.methods.lagrangian.quadrature import Quadrature
-from symtop.report.style import number
 from tests.conftest import random_scenes
 
 SCENES = ("spheroid", "goldstein")
@@ -125,66 +124,9 @@ def test_an_unreduced_form_steps_the_same_rule_whatever_it_is_called(monkeypatch
     assert unreduced_forms() == {"midpoint": "whole", "trapezoidal": "trapezoidal-unreduced"}
 
 
-@pytest.mark.parametrize(("gap", "judged"), [(2e-13, "nothing but rounding"), (3e-4, "more than rounding")])
-def test_the_title_of_the_twins_says_which_order_and_whether_the_difference_is_rounding(gap, judged):
-    gaps = {name: (("scene", "variant", "sample"), [[[0.0, value]]]) for name, value in
-            ((Column.THETA_GAP, 1e-15), (Column.PHI_GAP, gap), (Column.PSI_GAP, 1e-14))}  # fmt: skip
-    data = xr.Dataset(gaps, coords={"scene": ["spheroid"], "variant": ["midpoint"]})
-    said = words.unreduced_message(data, ["midpoint"])
-    assert f"after discretising changes {judged}: midpoint with and without it" in said
-    assert said.endswith(f"{number(gap)} rad")
-
-
 def test_a_method_that_has_no_reduced_twin_is_refused_in_one_sentence():
     with pytest.raises(symtop.SymtopError, match="must be a reduced discrete Lagrangian, not 'rk45'"):
         commutation_table(symtop.scene("spheroid"), symtop.integrator("rk45"), 1.0, (10,))
-
-
-def test_what_a_larger_chart_costs_is_said_by_its_ends_and_listed_by_family(monkeypatch):
-    times = {"strang": 1.1, "yoshida-4": 0.9, "rk4": 2.4}
-    ratios = [("spheroid", name, Ratio("attitude", "axis", time, 1.0)) for name, time in times.items()]
-    monkeypatch.setattr(words, "ratios", lambda _: ratios)
-    assert [(one.family, one.time, one.methods) for one in words.larger_charts(None)] == [
-        ("splitting", 1.0, ["strang", "yoshida-4"]), ("runge-kutta", 2.4, ["rk4"]),
-    ]  # fmt: skip
-    said = words.larger_sentence(None)
-    assert "1 times as long (attitude over axis, splitting) to 2.4 times as long (attitude over axis, runge" in said
-    monkeypatch.setattr(words, "ratios", lambda _: [])
-    assert words.larger_sentence(None) == ""
-
-
-def timed_pair(time, iterations):
-    """One rule on one scene at two steps: nanoseconds and iterations a step, reduced and unreduced."""
-    dims = ("scene", "variant", "kernel", "twin_step")
-    return xr.Dataset(
-        {Column.SECONDS_A_STEP: (dims, [[np.array(time) * 1e-9]]), Column.ITERATIONS_A_STEP: (dims, [[iterations]]),
-         Column.COMPARED_STEP: (("scene", "variant", "twin_step"), [[[0.1, 0.01]]])},
-        coords={"scene": ["spheroid"], "variant": ["midpoint"], "kernel": ["reduced", "unreduced"]},
-    )  # fmt: skip
-
-
-def test_what_a_reduced_kernel_saves_is_told_by_iterations_and_by_the_time_of_one():
-    """Twice the time for twice the iterations, or for as many that take twice as long each: two other sentences."""
-    more = words.cheaper(timed_pair([[100.0, 100.0], [200.0, 300.0]], [[2.0, 1.5], [4.0, 4.5]]))
-    assert "midpoint takes 2.0 to 3.0 times as long as a reduced one." in more
-    assert "It has 2.0 to 3.0 times as many Newton iterations (4.0 to 4.5, not 1.5 to 2.0)" in more
-    assert "each takes 1.00 to 1.00 times as long" in more
-    assert "what eliminating phi and psi alone saves was not measured" in more
-    dearer = words.cheaper(timed_pair([[100.0, 100.0], [200.0, 300.0]], [[2.0, 1.5], [2.0, 1.5]]))
-    assert "It has 1.0 to 1.0 times as many" in dearer
-    assert "each takes 2.00 to 3.00 times as long" in dearer
-    (pair, _) = words.savings(timed_pair([[100.0, 100.0], [200.0, 300.0]], [[2.0, 1.5], [3.0, 4.5]]))
-    assert (pair.time, pair.more, pair.each) == pytest.approx((2.0, 1.5, 4.0 / 3.0))
-    assert words.cheaper(xr.Dataset(coords={"scene": ["spheroid"], "variant": ["midpoint"]})) == ""
-
-
-def test_the_title_of_the_charts_counts_comparisons_and_not_methods():
-    said = figures.charts_message([1.0, 1.05, 2.0], 2, "the chart axis")
-    assert said == (
-        "In 2 of 3 comparisons, of 2 methods, another chart takes at most 10% more time than the chart axis, in the "
-        "others up to 2 times as long, at the same step or tolerance"
-    )
-    assert "others" not in figures.charts_message([1.0, 1.05], 1, "the chart axis")
 
 
 @pytest.mark.parametrize(("gap", "judged"), [(2e-13, "within"), (3e-4, "more than")])

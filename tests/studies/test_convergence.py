@@ -1,19 +1,17 @@
 """The convergence study: variants, adaptive methods beside them, and one rule for verdicts."""
 
 import math
-import re
 
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.convergence import figures, study, tables, words
+from symtop_studies.convergence import study, tables, words
 
 import symtop
 from symtop.judging.battery import CLAIMS
 from symtop.judging.claims.order import measured_order
 from symtop.measure.order import BESIDE, order_verdict
 from symtop.methods.framework.registry import integrator, methods, split_name, variants
-from symtop.report import style
 from symtop.runner import store
 from symtop.runner.study import Case
 
@@ -69,52 +67,6 @@ def test_rows_with_the_same_errors_are_drawn_as_one(data):
     assert "strang[attitude]" not in labels
     assert labels["rk4[angles]"] == "rk4[angles]"  # another chart, other errors
     assert labels["rk4[axis]"] == "rk4[axis]"
-
-
-def test_adaptive_methods_are_drawn_against_their_tolerance(data):
-    fitted = tables.tolerance_fits(data)
-    assert {name for _, name in fitted} == {name for name in ROWS if integrator(name).adaptive}
-    assert fitted["goldstein", "rk45[angles]"].slope == pytest.approx(1.0, abs=0.15)
-    (sentence,) = words.tolerance_sentence(data)
-    assert "fall as tolerance^" in sentence
-    slopes = words.by_tolerance(data)["rk45[angles]"].slopes
-    assert slopes == [fitted["goldstein", "rk45[angles]"].slope]
-    assert words.tolerance_sentence(tables.stepping(data)) == []
-
-
-def test_the_first_figure_shows_the_five_named_methods_by_step_tolerance_and_work(data):
-    drawn = figures.pictures(data)
-    assert [picture.name for picture in drawn] == ["named-methods", "constants", "tolerance"]
-    steps, tolerances, work, energy = (
-        {split_name(label)[0] for label in axis.get_legend_handles_labels()[1] if "[" in label}
-        for axis in drawn[0].figure.axes
-    )
-    assert work == steps | tolerances == set(figures.NAMED)
-    assert steps == {"midpoint", "trapezoidal", "stormer-verlet"}
-    assert energy == set()  # these cases have no history: they are not of the scene that has one
-    assert not drawn[0].figure.axes[3].get_visible()
-
-
-def test_the_titles_have_numbers_that_their_figures_show(data):
-    _, constants, tolerance = figures.pictures(data)
-    for picture in (constants, tolerance):
-        title = " ".join(picture.figure.get_suptitle().split("\n"))
-        said = [text.get_text() for axis in picture.figure.axes for text in axis.texts]
-        assert said
-        assert any(text in title for text in said)
-    heads = [text for axis in constants.figure.axes for text in axis.get_yticklabels() if text.get_weight() == "bold"]
-    assert {text.get_text() for text in heads} == {"order 2", "order 4"}
-    (axis,) = tolerance.figure.axes
-    numbers = re.findall(r"[\d.]+ times", " ".join(tolerance.figure.get_suptitle().split("\n")))
-    assert numbers == [text.get_text() for text in sorted(axis.texts, key=lambda text: text.xy[0])]
-    ratios = np.concatenate([line.get_xdata() for line in axis.get_lines() if line.get_markersize() == 2.5])
-    fitted = tables.tolerance_fits(data)
-    assert ratios.size == sum(
-        int(fit.used.sum()) for fit in fitted.values()
-    )  # every run that counts is drawn, no other
-    assert numbers == [f"{style.number(value)} times" for value in (np.median(ratios), ratios.max())]
-    (equal,) = [line for line in axis.get_lines() if line.get_label() == "error = tolerance"]
-    assert set(equal.get_xdata()) == {1.0}
 
 
 def test_the_energy_over_time_is_that_of_the_run_that_it_names():

@@ -21,7 +21,6 @@ from symtop_studies.factors.cells import (
     cells,
     taylor_in_angles,
 )  # fmt: skip
-from symtop_studies.factors.figures import BESIDE, pictures
 from symtop_studies.factors.tables import (
     FACTORS,
     LEAST,
@@ -166,15 +165,6 @@ def test_every_time_is_the_least_of_samples_that_were_taken(measured, rows):
     assert set(counts[counts > 0]) <= {2, 4, 22}  # rounds; as many again if noisy, ten times as many if short
 
 
-def test_loud_times_are_said_to_be_loud(measured):
-    quiet, loud = measured.copy(), measured.copy()
-    known = np.isfinite(measured[Column.SECONDS])
-    quiet[Column.SPREAD] = measured[Column.SPREAD].where(~known, 0.01)
-    loud[Column.SPREAD] = measured[Column.SPREAD].where(~known, 0.9)
-    assert "quiet machine" in words.noise_sentence(loud)
-    assert "quiet machine" not in words.noise_sentence(quiet)
-
-
 # ---- one factor at a time --------------------------------------------------------------------------------------------
 
 
@@ -248,35 +238,3 @@ def test_a_tie_goes_to_the_smaller_chart_and_a_lead_does_not(attitude, chart):
         for where, seconds in (("axis", 1.0), ("attitude", attitude))
     ]
     assert fastest(pair).chart == chart
-
-
-@pytest.mark.parametrize(("ratio", "said"), [(1.94, "more"), (1.09, "the same"), (0.97, "the same"), (0.87, "less")])
-def test_a_title_calls_level_what_a_tie_is(ratio, said):
-    assert words.more(ratio) == said
-
-
-def test_figures_tables_and_sentences_come_from_the_dataset(measured):
-    drawn = pictures(measured)
-    assert [picture.name for picture in drawn] == ["waterfall", "charts"]
-    assert "10 nutations, axis error 1e-06" in drawn[0].caption
-    said = drawn[0].figure.get_suptitle().replace("\n", " ")
-    for order in (False, True):  # both orders that are drawn, not the one that suits
-        _, _, _, bars = words.waterfalls(measured, call_first=order)[0]
-        factor = said.removeprefix("The ").partition(" makes the largest part")[0]
-        largest = max(bar.ratio for bar in bars[1:] if bar.factor == factor)
-        assert f"{words.times_faster(largest)} times {'with the solver alone' if order else 'through simulate'}" in said
-    dots = [value for axis in drawn[1].figure.axes for line in axis.get_lines() if line.get_marker() == "o"
-            for value in line.get_xdata()]  # fmt: skip
-    assert sorted(dots) == sorted(one for family in FAMILIES for chart in BESIDE
-                                  for one in words.family_ratios(measured, family, chart))  # fmt: skip
-    text = " ".join(words.verdict(measured))
-    for phrase in ("rk45[angles] called through solve_ivp", "in the inner loop", "(Dormand-Prince) times as long"):
-        assert phrase in text
-    scipy, families, falls, effects, charts, everything = words.tables(measured)
-    taken = times(next(goals_of(measured))[3])
-    assert len(falls.rows) == len(waterfall(taken)) + len(waterfall(taken, call_first=True))
-    assert {row[0] for row in effects.rows} == {"chart", "language", "call", "method"}
-    assert len(charts.rows) == 2
-    assert len(everything.rows) == measured.sizes["variant"]
-    for table in (scipy, families, falls, effects, charts, everything):
-        assert all(len(row) == len(table.header) for row in table.rows)

@@ -16,7 +16,7 @@ from symtop_studies.stability.failures import (
     surviving_displacements,
 )
 from symtop_studies.stability.solver_tolerance import solver_sweep, textbook_midpoint
-from symtop_studies.stability.windows import narrow_window
+from symtop_studies.stability.tables import narrow_window
 
 import symtop
 from symtop.methods.framework.calling import solve

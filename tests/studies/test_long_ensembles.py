@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from symtop_studies.drift import study
-from symtop_studies.drift.long_runs import gauges_of, members, side_by_side
+from symtop_studies.drift.runs import gauges_of, members, side_by_side
 from symtop_studies.drift.tables import ROUNDINGS
 
 from symtop.methods.framework.many import LEAST

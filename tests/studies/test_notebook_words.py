@@ -7,30 +7,8 @@ import pytest
 import xarray as xr
 from symtop_studies.notebook import words as notebook_words
 from symtop_studies.notebook.long_energy import better_from
-from symtop_studies.notebook.long_words import long_table
 from symtop_studies.notebook.tables import SOLVER, Column
-
-
-def test_the_notebook_study_names_discrete_methods_that_lose_their_momenta():
-    sizes = np.array([[1e-15, 1e-15, 1e-6]])
-    coords = {"scene": ["spheroid"], "variant": ["midpoint[angles]", "strang[axis]", SOLVER]}
-    data = xr.Dataset(dict.fromkeys(notebook_words.MOMENTA, (("scene", "variant"), sizes)), coords=coords)
-    assert "With all 2 discrete Lagrangians and splittings" in notebook_words.momenta(data)
-    lost = data.assign({"p_phi_largest": (("scene", "variant"), [[1e-15, 1e-9, 1e-6]])})
-    assert "With 1 of 2 discrete Lagrangians and splittings" in notebook_words.momenta(lost)
-    assert "not with strang[axis]" in notebook_words.momenta(lost)
-
-
-def test_the_notebook_study_says_how_many_discrete_methods_have_a_smaller_error_than_the_solver():
-    coords = {"scene": ["spheroid"], "variant": ["midpoint[angles]", "stormer-verlet[angles]", SOLVER]}
-    data = xr.Dataset(coords=coords).assign({
-        "energy_largest": (("scene", "variant"), [[3e-5, 1e-9, 1e-6]]),
-        Column.ENERGY_CHANGE: ("shadow_setting", [4e-4]),
-        Column.MODIFIED_CHANGE: ("shadow_setting", [1e-5]),
-    })  # fmt: skip
-    sentence = notebook_words.energy(data)
-    assert "1 of 2 have a smaller one than the solver (1e-06)" in sentence
-    assert "40-fold" in sentence
+from symtop_studies.notebook.words import long_table
 
 
 def long_runs(level, slope):
@@ -58,23 +36,6 @@ def test_the_notebooks_question_is_answered_and_the_time_from_which_its_hope_is_
     assert "has not changed; midpoint[angles] is never better." in notebook_words.hopes(never)[0]
     assert better_from(always, "spheroid", "midpoint[angles]") == 0.0
     assert "worse than midpoint[angles]" in notebook_words.hopes(always)[0]
-
-
-def test_the_titles_of_the_notebook_say_where_the_discrete_method_is_the_worse_one():
-    first, second = long_runs(3e-5, 1e-7), long_runs(1e-7, 1e-7).assign_coords(scene=["goldstein"])
-    data = xr.concat([first, second], "scene")
-    assert notebook_words.hope_message(data) == (
-        "lsoda keeps the energy better than 1 of 1 methods of order two to the notebook's end on spheroid, 0 of 1 on "
-        "goldstein; by 1000 s it is worse than each of them"
-    )
-    never = xr.concat([long_runs(3e-5, 1e-9), second], "scene")
-    assert notebook_words.hope_message(never).endswith("by 1000 s it is not worse than all of them")
-    momenta = xr.DataArray([[1e-15, 2e-6]] * 2, dims=("scene", "variant"))
-    said = notebook_words.residuals_message(data.assign(p_phi_largest=momenta, p_psi_largest=momenta))
-    assert said == (
-        "Discrete methods keep both momenta to 10⁻¹⁵, lsoda to 2 × 10⁻⁶; the energy is worse than lsoda's with 1 of 1 "
-        "on spheroid and 0 of 1 on goldstein"
-    ).replace(" × ", "\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}")
 
 
 def test_the_notebooks_path_is_turned_by_a_quarter_about_the_vertical():

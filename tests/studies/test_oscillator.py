@@ -6,8 +6,6 @@ import math
 import mpmath
 import numpy as np
 import pytest
-import xarray as xr
-from symtop_studies.oscillators import words
 from symtop_studies.oscillators.damped_top import Friction, damped_run, damped_truth
 from symtop_studies.oscillators.oscillator import (
     ONE_SIDED,
@@ -17,14 +15,7 @@ from symtop_studies.oscillators.oscillator import (
     notebook_positions,
     rule_sums,
 )
-from symtop_studies.oscillators.tables import (
-    AGAINST_RK45,
-    Column,
-    convergence,
-    damped_top_table,
-    decay,
-    notebook_history,
-)
+from symtop_studies.oscillators.tables import Column, convergence, damped_top_table, decay, notebook_history
 
 import symtop
 from symtop.measure.order import power_law
@@ -133,18 +124,6 @@ def test_the_midpoint_rule_conserves_the_undamped_energy_the_trapezoidal_bounds_
     assert loss[-1] > 5.0 * loss[loss.size // 10]  # a drift
 
 
-def test_the_message_of_the_decay_tells_of_every_damping_that_is_drawn():
-    """Without friction the midpoint rule is best, with it rk45: a title must not tell of one panel alone."""
-    errors = {"undamped": (1e-13, 1e-3, 1e-4), "damping-0.1": (2e-2, 4e-3, 1e-3)}
-    names = dict(zip(AGAINST_RK45, errors.values(), strict=True))
-    coords = {"scene": list(names), "variant": ["midpoint", "trapezoidal", "rk45"]}
-    values = np.array(list(names.values()))[..., None]
-    said = words.decay_message(xr.Dataset({Column.ENERGY_ERROR: (("scene", "variant", "sample"), values)}, coords))
-    assert "by midpoint with b = 0, undamped" in said
-    assert "by rk45 with b = 0.1" in said
-    assert "midpoint 0.02" in said
-
-
 # the damped top
 
 FRICTION = Friction(0.05, 0.1)
@@ -199,21 +178,4 @@ def test_the_power_of_the_friction_is_what_the_energy_loses():
     spent = np.sum(0.5 * (power[1:] + power[:-1])) * times[1]
     assert np.subtract(*(scene.top.energy(symtop.Angles(*truth[:, k])) for k in (0, -1))) == pytest.approx(
         spent, rel=1e-4
-    )
-
-
-def test_the_title_of_the_orders_tells_the_slopes_at_critical_damping():
-    steps = np.geomspace(1e-4, 1e-1, 13)
-    powers = {"midpoint": 2.0, "trapezoidal": 1.0, ONE_SIDED: 0.5}
-    errors = np.array([[steps**power for power in powers.values()]])
-    data = xr.Dataset(
-        {
-            Column.STEP: (("scene", "variant", "setting"), np.broadcast_to(steps, errors.shape)),
-            Column.EXPONENT_ERROR: (("scene", "variant", "setting"), errors),
-        },
-        coords={"scene": ["damping-2"], "variant": list(powers)},
-    )
-    assert words.orders_message(data) == (
-        "At critical damping the rate of decay has order 1.0 only with trapezoidal and 0.5 with the force at one end; "
-        "midpoint keeps 2.0"
     )

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.phase_diagram import checks, figures, laws, runs, study, tables, words
-from symtop_studies.phase_diagram.tables import TARGETS, diagram
+from symtop_studies.phase_diagram import checks, laws, runs, tables, words
+from symtop_studies.phase_diagram.tables import diagram
 
 import symtop
 from symtop.measure.phase import split
@@ -125,22 +125,6 @@ def test_step_times_number_is_exact():
     np.testing.assert_allclose(h * 17.48, tops.period, rtol=1e-7)
 
 
-def test_the_diagram_says_which_rows_take_part():
-    names = ["series[axis]", "midpoint[angles]", "gauss-8[axis]"]
-    ladders = xr.Dataset({"conserves_energy": (("scene", "variant"), [[0.0, 0.0, 1.0]])},
-                         coords={"scene": ["spheroid"], "variant": names})  # fmt: skip
-    tree = xr.DataTree.from_dict({tables.LADDERS: ladders})
-    said = words.part_sentence(tree)
-    assert said.startswith("3 variants take part.")
-    assert "as taylor-longdouble and taylor-quad" in said
-    assert words.parts_table(tree).rows == [
-        [names[0], *["yes"] * 3],
-        [names[1], *["yes"] * 3],
-        [names[2], "yes", "no", "no"],
-    ]
-    assert not any(name.startswith(("taylor-longdouble", "taylor-quad")) for name in study.CANDIDATES)
-
-
 def test_costs_rise_with_the_horizon_and_with_the_accuracy(data):
     for name in tables.tops_run(data):
         for quantity in runs.QUANTITIES:
@@ -215,12 +199,6 @@ def test_every_setting_has_its_own_price(data):
     assert np.ptp(ratio) > 1.0
 
 
-def test_a_cost_by_evaluations_is_not_called_measured(data):
-    assert "No run was timed" in words.spot_sentence(data)
-    assert not any("measured" in name for name in words.SPOTS)
-    assert len(words.spot_sentence(data)) <= 400
-
-
 def test_a_check_that_misses_counts_as_wrong():
     missed = words.Spot("axis", 1e-3, 1e6, ["a", "b"], 100.0, [np.inf, 130.0])
     right = words.Spot("axis", 1e-3, 1e6, ["a", "b"], 100.0, [110.0, 130.0])
@@ -228,32 +206,3 @@ def test_a_check_that_misses_counts_as_wrong():
     assert not missed.close
     assert right.winner
     assert right.close
-
-
-@pytest.mark.parametrize("place", [0, 1])
-def test_every_target_has_a_row_of_the_picture(data, place):
-    name = tables.tops_run(data)[place]
-    picture = figures.draw(data, name)
-    axes = picture.figure.axes
-    assert len(axes) == len(runs.QUANTITIES)
-    assert axes[0].images[0].get_array().shape[:2] == (len(TARGETS), runs.horizons()[::2].size)
-    said = " ".join(picture.figure.get_suptitle().split("\n"))
-    assert " is the cheapest method in " in said
-    for axis, (row, share) in zip(
-        axes, words.leaders(data, name).values(), strict=True
-    ):  # what the title says is painted
-        image, unreached = axis.images[0].get_array(), figures.to_rgb(figures.UNREACHED)
-        color = figures.look(row).color
-        mine = np.isclose(image, figures.to_rgb(color)).all(axis=-1).sum()
-        assert mine / (~np.isclose(image, unreached).all(axis=-1)).sum() == pytest.approx(share)
-        assert f"{share:.0%}" in said
-        assert f"in {share:.0%}" in axis.get_title()
-    for axis, quantity in zip(axes, runs.QUANTITIES, strict=True):  # a dot a cell that is level
-        panel = tables.diagram(data, name, quantity)
-        level = ((panel.winner >= 0) & (panel.ratio < tables.TIE)).sum()
-        assert sum(line.get_xdata().size for line in axis.lines if line.get_marker() == "o") == level
-    (key,) = picture.figure.legends
-    said = [text.get_text() for text in key.get_texts() if not text.get_text().startswith("dot")]
-    swatches = dict(zip(said, key.get_patches(), strict=True))
-    hatched = {patch.get_hatch() for axis in axes for patch in axis.patches if patch.get_hatch()}
-    assert hatched <= {swatches["hatched: predicted, not run"].get_hatch()}

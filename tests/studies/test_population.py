@@ -2,25 +2,13 @@
 
 import dataclasses
 import math
-import re
 import time
 
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.population import (
-    costs,
-    figures,
-    ladder,
-    messages,
-    prices as pricing,
-    study,
-    tops as tops_module,
-    verdicts,
-    words,
-)
+from symtop_studies.population import costs, ladder, messages, prices as pricing, study, tops as tops_module, verdicts
 from symtop_studies.population.costs import Share, cost_to_reach, detection, quantiles, run_lengths, slowdowns, winner
-from symtop_studies.population.opening import unmet_sentence
 from symtop_studies.population.prices import prices
 from symtop_studies.population.tops import ASKED, FIRST, MOMENTA, Tops, numbers_of, strata_of
 from symtop_studies.population.verdicts import Cell
@@ -35,8 +23,6 @@ from symtop.measure.work import TARGETS, nutation_width
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
-from symtop.report import style
-from symtop.report.style import look
 from symtop.run.guard.guard import EXPECTED
 from symtop.runner.check import differences
 
@@ -437,24 +423,6 @@ def test_the_stored_tolerance_meets_the_target(tops, strang):
     assert not strang["met_at"].values.any()
 
 
-def test_the_opening_says_which_row_meets_the_error_on_more_tops():
-    held = {name: ("scene", [value]) for name, value in (("nutations", 10.0), ("budget", 1e3))}
-    wider = {"a": [1.0] * 6 + [INF] * 4, "b": [3.0] * 10}
-    many = {name: values * 3 for name, values in wider.items()}  # tops of a kind, enough to tell
-    for given, kind in ((wider, False), (many, True)):
-        data = tree(given)
-        data["short"] = data["short"].to_dataset().assign(held)
-        assert ("on 100.0% of slow tops, and a on 60.0%" in unmet_sentence(data)) == kind
-    for given, row in ((wider, "b"), (wider | {"b": [3.0] * 6 + [INF] * 4}, "")):
-        data = tree(given)
-        data["short"] = data["short"].to_dataset().assign(held)
-        said = unmet_sentence(data)
-        assert ("b meets 1e-03 rad over 10 nutations on 100.0% of all tops, and a on 60.0%" in said) == bool(row)
-        taken = verdicts.costs(data, Cell("short", "axis", 1e-3), "alone")
-        assert verdicts.widest(verdicts.standings(taken)).name == (row or "a")
-        assert "of the tops that a variant solves" in words.quantity_sentence(data, "axis")
-
-
 def test_standings_of_known_costs():
     data = tree({"a": [1.0, 1.0, 1.0, INF], "b": [2.0, 1.05, 0.5, INF], "c": [INF, NAN, 3.0, INF]})
     first, second, third = verdicts.standings(verdicts.costs(data, Cell("short", "axis", 1e-3), "alone"))
@@ -473,21 +441,6 @@ def test_a_method_made_worse_loses():
     _, won = verdicts.best(tree({"a": 2.0 * same["a"], "b": same["b"]}), Cell("short", "axis", 1e-3), "alone")
     assert won.sure
     assert (won.row, won.share, won.next_share) == (1, Share(500, 500), Share(0, 500))
-
-
-def test_slowdowns_show_only_who_is_the_cheapest_somewhere_and_say_which_tops_are_asked():
-    data = tree({"a": [1.0, 1.0, 1.0, NAN], "b": [2.0, 1.05, 0.5, NAN], "c": [1.01, 3.0, 3.0, NAN]})
-    held = {name: ("scene", [value]) for name, value in (("nutations", 10.0), ("budget", 1e3))}
-    data["short"] = data["short"].to_dataset().assign(held)
-    drawn = figures.draw_slowdowns(data, "short")
-    axis = drawn.figure.axes[0]
-    rows = [text.get_text() for text in axis.get_yticklabels()]
-    assert rows == ["b", "nobody"]  # a is level with another on two tops and slower on the third
-    shares = {text.xy[1]: text.get_text() for text in axis.texts if text.xy[0] == 1.3 and text.xy[1] >= 0}
-    assert shares == {0: "33%", 1: "67%"}
-    note = drawn.figure.legends[0].get_title().get_text().replace("\n", " ")
-    assert "of 4 tops, to 0.001 rad the 3 whose nutation is wider than the error" in note
-    assert "the 1 of 3 methods that are the cheapest on at least one top" in note
 
 
 def test_what_is_not_zero_is_not_printed_as_zero_and_what_is_not_all_not_as_all():
@@ -553,75 +506,6 @@ def test_quick_results_hold_every_verdict(quick_results):
     hits, alarms = verdicts.caught(data)
     assert hits.value > 0.9
     assert alarms.value < 0.2
-
-
-def test_a_row_looks_as_in_every_other_figure(quick_results):
-    drawn = figures.draw_run_lengths(netcdf.read_any(quick_results / "population.nc"), "evaluations").figure
-    lines = [line for axis in drawn.axes for line in axis.get_lines() if line.get_label().endswith("]")]
-    assert {line.get_label() for line in lines} > {"strang[axis]", "midpoint[angles]"}
-    for line in lines:
-        mark = look(line.get_label())
-        assert (line.get_color(), line.get_marker(), line.get_fillstyle()) == (mark.color, mark.marker, mark.fill)
-
-
-def test_the_titles_say_what_their_figures_show(quick_results):
-    data = netcdf.read_any(quick_results / "population.nc")
-    titles = {one.name: " ".join(one.figure.get_suptitle().split("\n")) for one in figures.pictures(data)}
-    assert "wins" not in titles["run-lengths-alone"]  # it shows who has solved how many tops
-    drawn = figures.draw_run_lengths(data, "alone").figure
-    said = {text.get_text().strip() for axis in drawn.axes for text in axis.texts}
-    assert "µs of force evaluations" in titles["run-lengths-alone"].replace(style.FIRM, " ")  # no run was timed
-    assert {axis.get_xlabel() for axis in drawn.axes} - {""} == {"force evaluations × measured price of one (µs)"}
-    named = re.findall(r" for (\S+)", titles["run-lengths-alone"].replace(style.FIRM, "_").replace(",", ""))
-    assert named
-    assert all(number.replace("_", " ") in said for number in named)
-    for horizon, length in (("short", "10"), ("long", "100")):
-        title = titles[f"slowdowns-{horizon}"]
-        assert title.endswith(f", over {length} nutations")
-        drawn = figures.draw_slowdowns(data, horizon).figure
-        ends = messages.first_and_last(data, horizon)
-        assert len(ends) == 2
-        for (name, share), axis in zip(ends, (drawn.axes[0], drawn.axes[3]), strict=True):  # beside its name
-            place = [text.get_text() for text in drawn.axes[0].get_yticklabels()].index(name)
-            (beside,) = [text.get_text() for text in axis.texts if text.xy == (1.3, place)]
-            assert beside in share
-            assert beside in title
-    shares = re.findall(r"\d+%", titles["silent"])
-    drawn = figures.draw_silent(data).figure
-    (axis,) = drawn.axes
-    assert shares == [text.get_text() for text in axis.texts if "%" in text.get_text()][:2]
-    for bar, text in zip(axis.patches, shares, strict=False):
-        assert f"{bar.get_width():.0%}" == text
-
-
-def test_the_silent_runs_at_small_steps_are_told_by_kind_of_top(quick_results):
-    data = netcdf.read_any(quick_results / "population.nc")
-    share, group = words.hidden(data), data["short"].to_dataset().isel(scene=0)
-    counts = dict.fromkeys(verdicts.strata(data), 0.0)
-    for name in verdicts.judged_variants(data):
-        one = group.sel(variant=name)
-        if str(one["control"].values) == "step_size":
-            fine = one["silent"].isel(level=np.flatnonzero(one["setting"].values >= words.FINE))
-            for kind, count in zip(counts, fine.sum("level").values, strict=True):
-                counts[kind] += count
-    assert share.kind == max(counts, key=counts.get)
-    assert share.of_kind <= counts[share.kind]  # settings at which some tops were not judged are left out
-    assert share.of_kind <= share.silent_fine <= sum(counts.values())
-    assert share.silent_fine == pytest.approx(share.fine * share.wrong_fine)
-    said = words.silent_sentence(data)
-    assert f"{share.of_kind:,.0f} of them on {share.kind} tops" in said
-    assert "within 10 nutations" in said
-    assert len(said) <= 400
-
-
-def test_the_wrong_runs_by_steps_are_those_of_the_rows_with_a_fixed_step(quick_results):
-    data = netcdf.read_any(quick_results / "population.nc")
-    each, share = words.hidden_by_steps(data), words.hidden(data)
-    assert [step for step, _, _ in each] == sorted(step for step, _, _ in each)
-    fine = [(wrong, silent) for step, wrong, silent in each if step >= words.FINE]
-    assert sum(wrong for wrong, _ in fine) == share.wrong_fine
-    assert sum(silent for _, silent in fine) == pytest.approx(share.fine * share.wrong_fine)
-    assert sum(wrong for _, wrong, _ in each) < share.wrong  # adaptive variants have no steps a nutation
 
 
 @pytest.mark.parametrize("quantity", ["axis", "attitude", "energy"])

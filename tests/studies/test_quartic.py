@@ -173,9 +173,3 @@ def test_a_point_with_one_value_outside_the_picture_is_counted_as_outside(orbits
     monkeypatch.setattr(quartic_figures, "MAPS", tuple(orbits["variant"].values))
     cell = orbits.sel(scene="planar").isel(quartic_shown=-1)
     assert quartic_figures._outside(cell, -0.25, 1.25) == "mcmillan:\nall of 2\noutside"
-
-
-def test_the_title_names_the_least_and_the_largest_of_the_largest_distances():
-    said = quartic_figures.orbits_message(dict(zip(MAPS, (1e-6, 0.065, 0.076, 0.023), strict=True)))
-    assert said.startswith("At steps of T/4.37 only exact-discrete stays on the curve of the motion")
-    assert "is 0.023 to 0.076 on planar-softening" in said

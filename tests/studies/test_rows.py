@@ -4,32 +4,18 @@ A comparison of ``rk4`` with ``strang`` changes two factors at once, method and 
 and a number without its step or tolerance cannot be compared with another.
 """
 
-import json
-import re
-
 import numpy as np
 import pytest
 import xarray as xr
 
 from symtop.core import netcdf
 from symtop.methods.framework.registry import integrators, methods, split_name
-from symtop.model.scenes import scenes
 from symtop.runner.grid import grid_variants
 
 STUDIES = (
     "population", "truth", "convergence", "work_precision", "factors", "drift", "stability", "reduction", "claims",
     "notebook", "oscillators", "engines", "phase_diagram",
 )  # fmt: skip
-MUST_SAY = {
-    "a step or a tolerance": r"\bsteps?\b|\btolerances?\b",
-    "a scene": rf"\b(scenes?|oscillator|{'|'.join(map(re.escape, scenes()))})\b",
-    "a chart": r"\bcharts?\b|\bangles\b|\[(angles|axis|attitude)\]",
-}  # "no chart" and "no step" say why there is none
-
-
-def lacking(caption: str) -> list[str]:
-    """What a caption does not name."""
-    return [what for what, pattern in MUST_SAY.items() if not re.search(pattern, caption)]
 
 
 def without_a_chart(data: xr.Dataset) -> list[str]:
@@ -47,30 +33,6 @@ def test_every_stored_dataset_says_in_which_chart_a_method_ran(study, quick_resu
     ]
     assert groups
     assert [name for group in groups for name in without_a_chart(group)] == []
-
-
-@pytest.mark.parametrize("study", STUDIES)
-def test_every_caption_names_step_scene_and_chart(study, quick_results):
-    findings = json.loads((quick_results / f"{study}.json").read_text(encoding="utf-8"))
-    assert findings["pictures"]
-    assert {picture["file"]: lacking(picture["caption"]) for picture in findings["pictures"]} == {
-        picture["file"]: [] for picture in findings["pictures"]
-    }
-
-
-@pytest.mark.parametrize(
-    ("caption", "lacks"),
-    [
-        ("Energy error of rk4 over time: it drifts.", ["a step or a tolerance", "a scene", "a chart"]),
-        ("Energy error over time on spheroid, 118 steps a nutation.", ["a chart"]),
-        ("Energy error over time of rk4[axis], 118 steps a nutation.", ["a scene"]),
-        ("Energy error over time of rk4[axis] on spheroid.", ["a step or a tolerance"]),
-        ("Energy error over time of rk4[axis] on spheroid, 118 steps a nutation.", []),
-        ("The cubic of goldstein, in closed form, which has no step and no chart.", []),
-    ],
-)
-def test_a_caption_that_leaves_something_out_is_found(caption, lacks):
-    assert lacking(caption) == lacks
 
 
 @pytest.mark.parametrize(

@@ -3,22 +3,13 @@
 import dataclasses
 import math
 import pickle
-import re
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.work_precision import (
-    energy,
-    figures as work_figures,
-    fronts,
-    opening,
-    rankings,
-    timing_rounds as rounds_module,
-    trust,
-)
+from symtop_studies.work_precision import energy, timing_rounds as rounds_module, trust
 from symtop_studies.work_precision.timing_rounds import (
     PATIENCE,
     Effort,
@@ -29,11 +20,9 @@ from symtop_studies.work_precision.timing_rounds import (
 )  # fmt: skip
 
 import symtop
-from symtop.core import netcdf
 from symtop.measure import ranking
 from symtop.measure.timing import Timing
 from symtop.measure.work import TARGETS, least_work, work_table
-from symtop.report.figures import BELOW
 from symtop.runner import depends, run as runner, store
 from symtop.runner.study import Case, Study
 
@@ -123,22 +112,6 @@ def test_the_cheapest_runs_of_each_method_have_a_time_and_no_other_run(timed_stu
     assert trust.measured(modelled) == 0.0
 
 
-def test_a_chart_shows_timed_runs_against_seconds_and_every_run_against_work(timed_study):
-    seconds, work = (
-        [[point for series in panel for point in series.points] for panel in chart.panels.values()]
-        for chart in opening.charts(timed_study)
-    )
-    ran = (timed_study["outcome"] == "ok").sum(["variant", "setting"]).values.ravel()
-    assert (
-        list(map(len, seconds)) == timed_study["seconds"].notnull().sum(["variant", "setting"]).values.ravel().tolist()
-    )
-    assert list(map(len, work)) == ran.tolist()
-    assert all(any(f" {unit}," in words for unit in ("us", "ms")) for panel in seconds for *_, words in panel)
-    assert sum("us," in words or "ms," in words for *_, words in work[0]) == len(
-        seconds[0]
-    )  # a time where there is one
-
-
 def test_a_crossing_of_two_power_laws_is_found_where_it_is():
     x = np.geomspace(1.0, 1e4, 9)
     table = np.array([1e-3 / x, 1e-1 / x**2])  # equal at 100
@@ -210,13 +183,6 @@ def test_energies_are_compared_within_a_chart():
     error, work = energy.at_steps(data.isel(scene=0, horizon=0).sel(variant="rk4[axis]"), 118.0)
     assert (error, work) == (pytest.approx(0.1 * 118.0**-4), pytest.approx(4.0))
     assert "with strang[axis] (1)" in energy.at_equal_steps(data, ["rk4[axis]", "strang[axis]"], "x")
-
-
-@pytest.mark.parametrize(
-    ("share", "said"), [(0.0, "0%"), (1 / 163, "0.6%"), (0.47, "47%"), (0.998, "99.8%"), (1.0, "100%")]
-)
-def test_a_share_that_is_neither_none_nor_all_does_not_read_as_such(share, said):
-    assert energy.percent(share) == said
 
 
 def test_times_that_no_other_predicts_are_told_apart(timed_study):
@@ -310,54 +276,9 @@ def test_a_study_may_have_a_second_round_made_from_the_first(tmp_path, monkeypat
     assert depends.digest(study, alone) == depends.digest(study, dataclasses.replace(alone))
 
 
-def test_a_front_shows_the_runs_that_its_title_counts(quick_results):
-    data = netcdf.read(quick_results / "work_precision.nc")
-    for picture in work_figures.pictures(data)[:3]:
-        title = " ".join(picture.figure.get_suptitle().split("\n"))
-        owners = title.partition(" make")[0].split(" and ")
-        count, whole = map(int, re.search(r"(\d+) of the (\d+) runs", title).groups())
-        drawn = {name: sum(len(line.get_xdata()) for axis in picture.figure.axes for line in axis.get_lines()
-                           if line.get_label() == name) for name in (*owners, fronts.REST)}  # fmt: skip
-        assert all(drawn[name] > 0 for name in owners)
-        assert sum(drawn[name] for name in owners) == count
-        assert sum(drawn.values()) == whole
-        named = {text.get_text() for text in picture.figure.legends[0].get_texts()}
-        assert {*owners, fronts.REST, fronts.OFF, BELOW} <= named
-        beside = [
-            re.search(r"(\d+) of (\d+) runs", axis.get_title()) for axis in picture.figure.axes if axis.get_title()
-        ]
-        assert [sum(int(one[k]) for one in beside) for k in (1, 2)] == [count, whole]
-
-
-def test_the_title_of_slowdowns_names_the_fastest_before_the_one_that_fails_least():
-    table = xr.DataArray([[1.0, 1.0, np.nan], [50.0, 60.0, 70.0]], dims=("variant", "problem"),
-                         coords={"variant": ["quick", "sure"]})  # fmt: skip
-    assert rankings.slowdown_message(table) == (
-        "quick is the fastest in the median and meets 2 of 3 targets; sure meets 3, in 60 times the least time"
-    )
-    assert rankings.slowdown_message(table.sel(variant=["sure"])) == (
-        "sure takes 60 times the least time in the median and meets 3 of 3 targets"
-    )
-    assert rankings.middles(table) == (3, [("quick", 2, 1.0), ("sure", 3, 60.0)])
-
-
-def test_the_open_circles_of_a_front_are_named():
-    owners = {"a": 9, "b": 1, "c": 3, "d": 1, "e": 1, "f": 1, "g": 1}
-    assert fronts.others(owners, ["a"]) == "Open circles: c (3), b (1), d (1), e (1), f (1); 1 other (1)."
-    assert fronts.others({"a": 9}, ["a"]) == ""
-    assert fronts.power(1e-12) == "10⁻¹²"
-
-
 def test_the_parts_are_compared_at_equal_settings_and_above_rounding():
     settings = [[0.1, 0.05, 0.01], [0.05, 0.1, np.nan]]
     runs = xr.Dataset({"setting_value": (("horizon", "setting"), settings),
                        "shape": (("horizon", "setting"), [[1e-3, 1e-4, 1e-14], [2e-4, 3e-3, np.nan]])})  # fmt: skip
     assert energy.ratios_at_equal_settings(runs, "shape") == pytest.approx([3.0, 2.0])
     assert energy.growth_at_equal_settings(runs, "shape") == pytest.approx(2.5)
-
-
-def test_the_title_of_the_parts_tells_what_stays_from_what_grows():
-    said = work_figures.growth_message(("10", "1000"), [1.0, 1.02, 99.0], [100.0, 101.0, 9e3])
-    assert "stays the same with 2 of the 3 methods" in said
-    assert "grows 101 times" in said
-    assert "factor of 1" not in said

@@ -18,7 +18,7 @@ import numpy as np
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March, Marks
 from symtop.judging.adapters.python_step import FunctionStep
-from symtop.methods.framework.angles import chart_outcome, reduced
+from symtop.methods.framework.angles import chart_outcome, on_angles
 from symtop.methods.framework.equations import Formulation
 from symtop.methods.framework.plan import Array
 from symtop.model.top import Angles, SymmetricTop, effective_force
@@ -30,7 +30,7 @@ def _no_field(*_: Any) -> Any:
 
 def _begin(top: SymmetricTop, at: Angles) -> tuple[Any, tuple[float, ...]]:
     """The top with its momenta, and (theta, p_theta) of a start."""
-    par, state = reduced(top, at)
+    par, state = on_angles(top, at)
     return par, state[:2]
 
 

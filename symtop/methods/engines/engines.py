@@ -71,7 +71,7 @@ def _both(
 
 
 def built_in() -> list[Integrator]:
-    """Seventeen maps, five of them in single precision too."""
+    """The maps in double, and those of engines in single precision in that, too."""
     return [
         *_both("no-gyro", kicks.no_gyro, None, "Havok, PhysX and Jolt by default: no gyroscopic term",
                "havok physx jolt", "p_psi", energy_error="bounded"),

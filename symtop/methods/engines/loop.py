@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.loop import Loop, driver
+from symtop.methods.framework.loop import Loop, kernel_loop
 from symtop.methods.framework.preparation import Body, Preparation
 from symtop.methods.framework.space import (
     axis_parts,
@@ -273,7 +273,7 @@ def axis_loop(step: Callable[..., Any], carried: Carried, reused: Callable[..., 
         total = dstate[0] + dstate[1] + dstate[2] + dstate[3] + dstate[4] + dstate[5]
         return dstate, carry, 1, finite_outcome(total)
 
-    return driver(begin, increment, carried.observe["axis"], _enter, carried.present["axis"])
+    return kernel_loop(begin, increment, carried.observe["axis"], _enter, carried.present["axis"])
 
 
 def attitude_loop(
@@ -299,7 +299,7 @@ def attitude_loop(
         total = dstate[0] + dstate[1] + dstate[2] + dstate[3] + dstate[4] + dstate[5] + dstate[6]
         return dstate, carry, 1, finite_outcome(total)
 
-    return driver(begin, increment, carried.observe["attitude"], _enter, carried.present["attitude"])
+    return kernel_loop(begin, increment, carried.observe["attitude"], _enter, carried.present["attitude"])
 
 
 class Substeps(NamedTuple):

@@ -54,7 +54,7 @@ from symtop.methods.engines.loop import (
     turned,
     velocity,
 )
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.space import finite_outcome, observe_attitude
 from symtop.methods.vectors import cross, dot, plus, product, scaled
 
@@ -338,4 +338,4 @@ def increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) -
     return dstate, carry, 1, finite_outcome(total)
 
 
-march_no_squish = driver(begin_no_squish, increment_no_squish, observe_attitude)
+march_no_squish = kernel_loop(begin_no_squish, increment_no_squish, observe_attitude)

@@ -65,14 +65,14 @@ def _outside(at: Any) -> str:
 require_chart = Requirement(_in_chart, _outside)
 
 
-def _reduced(top: Any, at: Any) -> Any:
+def _on_angles(top: Any, at: Any) -> Any:
     """Kernel parameters and state of a start; p_theta0 = dL/dtheta' is the discrete Legendre transform's start."""
     momenta = conserved(top, at)
     par = ReducedTop(top.I1, top.I3, top.mgl, momenta.p_psi, momenta.north, momenta.south)
     return par, (at.theta, top.I1 * at.theta_dot, at.phi, at.psi)
 
 
-reduced = Preparation(_reduced, 4, require_chart)
+on_angles = Preparation(_on_angles, 4, require_chart)
 
 
 LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, where SciPy draws the line

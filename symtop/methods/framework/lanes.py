@@ -19,9 +19,9 @@ then those of the rule that the family's `lay` writes.
 A lane is given up when its step does what lanes cannot: an outcome that is not OK, or a branch that only the kernel for
 one has. It is then run alone from its start, by the compiled run that `simulate` uses; its neighbours do not notice.
 
-How a family joins: it hands a `Lanes` to `loop.driver`. Its `step` makes one step of all lanes, as one loop or several
-over ``range(W)``; in each, `column` makes the tuple that a kernel takes and `put` writes what it returns. LLVM turns
-such a loop into vectors only if
+How a family joins: it hands a `Lanes` to `loop.kernel_loop`. Its `step` makes one step of all lanes, as one loop or
+several over ``range(W)``; in each, `column` makes the tuple that a kernel takes and `put` writes what it returns. LLVM
+turns such a loop into vectors only if
     all that a loop writes lies in `block`, at ``(constant) W + j``, and it reads `table` at ``(same for all j) W + j``;
     nothing in it branches (two values of which one is chosen are no branch) or calls the C library;
     no loop of a length unknown when it is compiled stands inside it: stages go outside, lanes inside;
@@ -271,7 +271,7 @@ def one_loop(
 ) -> Lanes:  # fmt: skip
     """``advance(par, rule, state, carry)`` is the increment, the next carry and an outcome; `rule` its NamedTuple.
 
-    `add` is how increments are summed, as in `loop.driver`.
+    `add` is how increments are summed, as in `loop.kernel_loop`.
     """
     tops, fields = len(top._fields), len(rule._fields)
     zeros, given = (0.0,) * dimension, (0.0,) * fields

@@ -126,7 +126,7 @@ class Loop:
         return March(states, momenta.T, k, work, outcome), Position(state, low, carry, k)
 
 
-def driver(  # noqa: C901  (one loop, read in one piece)
+def kernel_loop(  # noqa: C901  (one loop, read in one piece)
     begin: Callable[..., Any], increment: Callable[..., Any], observe: Callable[..., Any],
     enter: Callable[..., Any] = _as_given, present: Callable[..., Any] = _as_stepped,
     add: Callable[..., Any] = accumulate, lanes: Callable[[Any], Lanes | None] = _no_lanes,
@@ -202,7 +202,7 @@ def driver(  # noqa: C901  (one loop, read in one piece)
 
     @functools.cache
     def plain() -> Loop:
-        return driver(begin, increment, observe, enter, present, accumulate_plainly)
+        return kernel_loop(begin, increment, observe, enter, present, accumulate_plainly)
 
     alone = compile_kernel(prepare), compile_kernel(marching(as_it_steps))
     return Loop(begin, *alone, whole, lanes, blocks, plain)

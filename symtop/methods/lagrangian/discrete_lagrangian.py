@@ -34,10 +34,10 @@ import numpy as np
 
 from symtop.core.jit import fused, register_jitable
 from symtop.core.sines import sincos
-from symtop.methods.framework.angles import ReducedTop, chart_outcome, reduced
+from symtop.methods.framework.angles import ReducedTop, chart_outcome, on_angles
 from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
 from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.registry import Array, Integrator
@@ -301,7 +301,7 @@ def _in_lanes(rule: Quadrature) -> Lanes:
     )  # fmt: skip
 
 
-march = driver(begin, increment, observe, lanes=_in_lanes)
+march = kernel_loop(begin, increment, observe, lanes=_in_lanes)
 
 
 def rule_of(method: Integrator) -> Quadrature | None:
@@ -343,7 +343,7 @@ def discrete_lagrangian(
         name=name,
         family="discrete-lagrangian",
         summary=summary or f"discrete Lagrangian with nodes {rule.nodes} and weights {rule.weights}",
-        solvers={"angles": FixedStep(march, rule, reduced, fresh, implicit=True, each_step=at_start)},
+        solvers={"angles": FixedStep(march, rule, on_angles, fresh, implicit=True, each_step=at_start)},
         order=order, explicit=False, symplectic=True, symmetric=symmetric, conserves=frozenset({"p_phi", "p_psi"}),
         reference=reference, needs="lagrangian", general=True,
     )  # fmt: skip

@@ -67,7 +67,7 @@ from symtop.core.jit import fused, register_jitable, set_item
 from symtop.core.jit_functions import two_product
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, one_loop
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import finite_outcome
@@ -284,8 +284,8 @@ def _in_lanes(rule: Map) -> Lanes:
     return _lanes
 
 
-march_axis = driver(begin, increment, observe, enter, present_axis, accumulate_plainly, lanes=_in_lanes)
-march_attitude = driver(begin, increment, observe, enter, present_attitude, accumulate_plainly, lanes=_in_lanes)
+march_axis = kernel_loop(begin, increment, observe, enter, present_axis, accumulate_plainly, lanes=_in_lanes)
+march_attitude = kernel_loop(begin, increment, observe, enter, present_attitude, accumulate_plainly, lanes=_in_lanes)
 
 
 def built_in() -> list[Integrator]:

@@ -35,10 +35,10 @@ from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
-from symtop.methods.framework.angles import ReducedTop, chart_outcome, reduced
+from symtop.methods.framework.angles import ReducedTop, chart_outcome, on_angles
 from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
 from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.registry import Integrator
@@ -293,7 +293,7 @@ def _in_lanes(rule: Iteration) -> Lanes:
     )  # fmt: skip
 
 
-march = driver(begin, increment, observe, lanes=_in_lanes)
+march = kernel_loop(begin, increment, observe, lanes=_in_lanes)
 
 
 def built_in() -> list[Integrator]:
@@ -303,7 +303,7 @@ def built_in() -> list[Integrator]:
             name="galerkin-simpson",
             family="discrete-lagrangian",
             summary="Galerkin discrete Lagrangian, parabola in time and Simpson's rule",
-            solvers={"angles": FixedStep(march, Iteration(), reduced, 2, implicit=True, each_step=1)},
+            solvers={"angles": FixedStep(march, Iteration(), on_angles, 2, implicit=True, each_step=1)},
             order=4, explicit=False,
             symplectic=True, symmetric=True,
             conserves=frozenset({"p_phi", "p_psi"}),

@@ -28,7 +28,7 @@ from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.angles import BareTop, chart_outcome, require_chart
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.newton import Correction, newton
 from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.preparation import Preparation, Shown, conserved
@@ -204,7 +204,7 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     return before[4] + dstate[4], before[5] + dstate[5]
 
 
-march = driver(begin, increment, observe)
+march = kernel_loop(begin, increment, observe)
 
 
 def _with_momenta(top: Any, at: Any) -> Any:

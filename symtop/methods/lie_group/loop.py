@@ -30,7 +30,7 @@ from symtop.core.jit import register_jitable
 from symtop.core.simd import wide_vectors
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
-from symtop.methods.framework.loop import Loop, driver
+from symtop.methods.framework.loop import Loop, kernel_loop
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.preparation import Body, Preparation, Shown, as_it_steps
 from symtop.methods.framework.space import (
@@ -154,7 +154,7 @@ def lie_loop(
             outcome = ended(step)
         return step, carry, effort, outcome
 
-    return driver(begin, increment, observe_attitude, lanes=lanes)
+    return kernel_loop(begin, increment, observe_attitude, lanes=lanes)
 
 
 def shown_in(carried: Carried) -> Callable[..., None]:

@@ -33,7 +33,7 @@ from symtop.methods.framework.angles import BareTop
 from symtop.methods.framework.equations import FORMULATIONS, Formulation
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, W, column, put
-from symtop.methods.framework.loop import Loop, driver
+from symtop.methods.framework.loop import Loop, kernel_loop
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop
@@ -225,7 +225,7 @@ def _loop(form: Formulation, top: Any, dimension: int) -> Loop:
         return step, carry, len(rule.b), ended(state, step)
 
     lanes = explicit_in_lanes(field, add, ended, top=top, dimension=dimension)
-    return driver(begin, increment, form.observe, lanes=lanes)
+    return kernel_loop(begin, increment, form.observe, lanes=lanes)
 
 
 _STEPPED = {"angles": (BareTop, 6), "axis": (SpaceTop, 6), "attitude": (SpaceTop, 7)}

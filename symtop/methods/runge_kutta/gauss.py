@@ -51,13 +51,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.borrowed import borrowed
 from symtop.core.jit import register_jitable, set_item
 from symtop.core.multiprecision import context
 from symtop.core.simd import wide_vectors
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
-from symtop.methods.framework.loop import Loop, driver
+from symtop.methods.framework.loop import Loop, kernel_loop
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Later
 from symtop.methods.framework.registry import Array, Integrator
@@ -373,8 +372,8 @@ class GaussRule(NamedTuple):
 
 @register_jitable
 def _opened(rows: Any) -> GaussRule:
-    table, s = borrowed(rows), rows.shape[1]
-    return GaussRule(table[:s], table[s], table[s + 1 :])
+    s = rows.shape[1]
+    return GaussRule(rows[:s], rows[s], rows[s + 1 :])
 
 
 def packed(rule: GaussRule) -> tuple[Callable[[Any], GaussRule], Array]:
@@ -558,7 +557,7 @@ def _loop(field: Any, dimension: int) -> Loop:
             return None
         return of_rows(*(tuple(map(tuple, rows.tolist())) for rows in (rule.mu, rule.predict)))
 
-    return driver(begin, increment, observe_axis, lanes=in_lanes)
+    return kernel_loop(begin, increment, observe_axis, lanes=in_lanes)
 
 
 march_axis, march_frame = _loop(field_axis, 6), _loop(field_frame, 9)

@@ -25,7 +25,7 @@ import numpy as np
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.plan import OUTCOMES, Run
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
@@ -94,7 +94,10 @@ def _attitude_shown(par: Any, t: float, y: Any) -> Any:
     return frame_sample(par, t, (*e, y[3], y[4], y[5], *a))
 
 
-march_axis, march_frame = driver(begin, increment_axis, observe_axis), driver(begin, increment_frame, observe_frame)
+march_axis, march_frame = (
+    kernel_loop(begin, increment_axis, observe_axis),
+    kernel_loop(begin, increment_frame, observe_frame),
+)
 
 
 class Onward(FixedStep):

@@ -19,7 +19,7 @@ from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome
 from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.registry import Array
 from symtop.methods.splitting.loop import Composition, compose, composed, stages
 from symtop.model.charts import View
@@ -108,7 +108,7 @@ def _in_lanes(rule: Composition) -> Lanes:
     return _LANES
 
 
-march = driver(begin, increment, observe, lanes=_in_lanes)
+march = kernel_loop(begin, increment, observe, lanes=_in_lanes)
 
 
 def verlet_energy(seen: View, momenta: Momenta, h: float) -> Array:

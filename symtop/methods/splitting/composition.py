@@ -16,7 +16,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from symtop.core.errors import SymtopError, finite, one_of, row
-from symtop.methods.framework.angles import reduced
+from symtop.methods.framework.angles import on_angles
 from symtop.methods.framework.fixed_step import FixedStep, Prepare
 from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.preparation import Scaled
@@ -28,7 +28,7 @@ from symtop.methods.splitting.loop import Composition, closed, packed
 from symtop.methods.splitting.rotor import ROTATIONS, TUNED
 
 _KERNELS: dict[str, dict[str, tuple[Loop, Prepare]]] = {
-    "angles": {"angles": (angles.march, reduced)},
+    "angles": {"angles": (angles.march, on_angles)},
     "space": {"axis": (space.march_axis, on_axis), "attitude": (space.march_attitude, on_attitude)},
 }
 # the modified energy and the sleeping threshold of kick-drift-kick, by chart and rotation

@@ -26,7 +26,7 @@ import numpy as np
 
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.sines import sincos
-from symtop.methods.framework.angles import chart_outcome, reduced
+from symtop.methods.framework.angles import chart_outcome, on_angles
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, OUT_OF_BUDGET, OUTCOMES, Array, Plan, Run
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.splitting.angles import drift_angles, force_angles, kick_angles, observe
@@ -78,7 +78,7 @@ def march(par, k, eps, turn, times, budget, seen, place, states, momenta):  # ty
 
 def _run(top: SymmetricTop, start: Angles, k: float, parts: Sequence[tuple[float, Array]], asked: int) -> Run:
     """The samples of the last part, each part with an eps and times of its own."""
-    par, state = reduced(top, start)
+    par, state = on_angles(top, start)
     place: Any = (state, NONE, NONE[:3], NONE[:1], NONE[:1], 1.0 / math.sin(start.theta) ** k)
     done, outcome, before, turn, most = 0, OK, 0.0, BEGIN, max(min(BLOCK + SHARE * asked, STEPS), 8 * asked)
     for eps, times in parts:

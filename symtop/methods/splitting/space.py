@@ -45,7 +45,7 @@ from symtop.core.jit import register_jitable
 from symtop.core.jit_functions import shared
 from symtop.core.numbers import sign_changes
 from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.registry import Array
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, observe_attitude, observe_axis, with_spin
 from symtop.methods.splitting.loop import Composition, compose, composed, stages
@@ -253,11 +253,11 @@ def _in_lanes(force: Any, turned: Any, ended: Any, dimension: int) -> Callable[[
     return lambda rule: exact if rule.turn == EXACT else cayley
 
 
-march_axis = driver(
+march_axis = kernel_loop(
     begin_axis, increment_axis, observe_axis, enter_axis, present_axis,
     lanes=_in_lanes(force_axis, turn_axis, ended_axis, 6),
 )  # fmt: skip
-march_attitude = driver(
+march_attitude = kernel_loop(
     begin_attitude, increment_attitude, observe_attitude, enter_attitude, present_attitude,
     lanes=_in_lanes(force_attitude, turn_attitude, ended_attitude, 7),
 )  # fmt: skip

@@ -65,7 +65,7 @@ from symtop.core.simd import Components, Vectors
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, one_loop
-from symtop.methods.framework.loop import Loop, driver
+from symtop.methods.framework.loop import Loop, kernel_loop
 from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import Body, Scaled, Start
 from symtop.methods.framework.registry import Integrator
@@ -202,7 +202,7 @@ def march_axis(order: int) -> Loop:
         x, y, u, wx, wy, _, _ = series(state, rule.turn, rule.pull)
         return (x, y, u, wx, wy, 0.0), carry, 1, finite_outcome(x + y + u + wx + wy)
 
-    return driver(begin, increment, observe_axis, lanes=functools.partial(_axis_lanes, order))
+    return kernel_loop(begin, increment, observe_axis, lanes=functools.partial(_axis_lanes, order))
 
 
 @functools.cache
@@ -302,7 +302,9 @@ def march_attitude(order: int) -> Loop:
         w, x, y, z, wx, wy, _, _ = series(state, rule.turn, rule.pull)
         return (w, x, y, z, wx, wy, 0.0), carry, 1, finite_outcome(w + x + y + z + wx + wy)
 
-    return driver(begin, increment, observe_attitude, present=present, lanes=functools.partial(_attitude_lanes, order))
+    return kernel_loop(
+        begin, increment, observe_attitude, present=present, lanes=functools.partial(_attitude_lanes, order)
+    )
 
 
 @functools.cache

@@ -4,7 +4,7 @@ import dataclasses
 
 import symtop
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.space import observe_axis, on_axis
 from symtop.methods.splitting import space as family
 from symtop.methods.splitting.coefficients import STRANG
@@ -17,7 +17,7 @@ def increment(par, rule, state, carry, h):
     return (step[0], step[1], step[2], step[3], step[4], step[5] + 1e-10), axis, forces, outcome
 
 
-march = driver(family.begin_axis, increment, observe_axis, family.enter_axis, family.present_axis)
+march = kernel_loop(family.begin_axis, increment, observe_axis, family.enter_axis, family.present_axis)
 
 
 def solve(top, start, plan):

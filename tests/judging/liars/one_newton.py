@@ -6,9 +6,9 @@ import numpy as np
 
 import symtop
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.angles import chart_outcome, reduced
+from symtop.methods.framework.angles import chart_outcome, on_angles
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.lagrangian import discrete_lagrangian as family
 from symtop.methods.lagrangian.discrete_lagrangian import forces, node_sums, opening
 
@@ -31,8 +31,8 @@ def forces_at(par, rule, theta, d):
     return forces(par, node_sums(rule, theta, d, opening(None, rule, theta)))
 
 
-march = driver(family.begin, increment, family.observe)
-solver = FixedStep(march, family.Quadrature((0.5,), (1.0,)), reduced, 1, implicit=True)
+march = kernel_loop(family.begin, increment, family.observe)
+solver = FixedStep(march, family.Quadrature((0.5,), (1.0,)), on_angles, 1, implicit=True)
 symtop.register(
     dataclasses.replace(
         symtop.integrator("midpoint"), name="one-newton", solvers={"angles": solver}, energy_error="bounded"

@@ -1,9 +1,9 @@
 """Velocity Verlet with h and h^2/2 swapped in the position, as a public library once shipped it."""
 
 import symtop
-from symtop.methods.framework.angles import chart_outcome, reduced
+from symtop.methods.framework.angles import chart_outcome, on_angles
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import driver
+from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.splitting import angles
 
 
@@ -33,7 +33,7 @@ def observe(par, rule, before, dstate, h):
     return 0.5 * (par.north + par.south), par.p_psi
 
 
-solver = FixedStep(driver(begin, increment, observe), (0.0,), reduced, 1, implicit=False)
+solver = FixedStep(kernel_loop(begin, increment, observe), (0.0,), on_angles, 1, implicit=False)
 symtop.register(
     symtop.Integrator(
         name="verlet-swapped", family="other", summary="velocity Verlet, mistyped", solvers={"angles": solver}, order=2,

@@ -1,4 +1,4 @@
-"""Long runs of the four methods whose modified energy is known: windows of one, and rounding in an ensemble of them.
+"""Long runs: histories of every method, and windows and ensembles of the four whose modified energy is known.
 
 `rounding` shows how the modified energy of an ensemble wanders off by rounding, and what plain sums would do. Each
 member starts a hundredth of a radian from the one before; its step is the same fraction of its own nutation. Drift is
@@ -10,6 +10,7 @@ between its means over (0, c] and over (a, b], a >= c, such a walk has the varia
 Reference: Hairer, McLachlan, Razakarivony, BIT 48 (2008) 231.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -19,6 +20,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.core.errors import whole
+from symtop.measure.conservation import history
 from symtop.measure.growth import ensemble_growth
 from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.registry import Integrator
@@ -121,3 +123,22 @@ def rounding(scene: Scene, method: Integrator, steps: int, per_nutation: float, 
         walks = columns[f"{prefix}drift"][1][:PLAIN_MEMBERS, late]
         columns[f"{prefix}late"] = float(np.sqrt(np.mean(walks**2)))
     return xr.Dataset({**columns, "gain": columns["plain_late"] / columns["late"]})
+
+
+def run_history(
+    scene: Scene, method: Integrator, *, horizon: float, samples: int, step_size: float | None = None,
+    tolerance: float | None = None,
+) -> xr.Dataset:  # fmt: skip
+    """What `history` returns, and ``nutations``, ``steps_a_nutation`` or ``tolerance`` of the run.
+
+    NaN stands for what a method does not have; ``own_tolerance`` is true for a method that ran at its own default.
+    """
+    given: dict[str, Any] = {"step_size": step_size, "tolerance": tolerance}
+    data = history(scene, method, horizon=horizon, samples=samples, **{k: v for k, v in given.items() if v is not None})
+    used = method.check_tolerance(tolerance) if method.adaptive else math.nan
+    return data.assign(
+        nutations=horizon / scene.nutation_period,
+        steps_a_nutation=scene.nutation_period / step_size if step_size else math.nan,
+        tolerance=used,
+        own_tolerance=float(method.adaptive and tolerance is None),
+    )
