@@ -9,7 +9,6 @@ from symtop.measure.order_conditions import conditions
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.registry import integrator
 from symtop.methods.runge_kutta import pairs
-from symtop.methods.runge_kutta.dormand_prince import solver
 from symtop.methods.runge_kutta.pair_tables import DOP853, TSIT5, VERN9
 from symtop.run.simulation import make_plan
 from tests.slopes import assert_order
@@ -90,7 +89,7 @@ def test_a_wrong_estimate_takes_other_steps():
     scene, pair = symtop.scene("spheroid"), PAIRS["dop853-compiled"]
     plan, _ = make_plan(scene, integrator("dop853-compiled"), None, 1e-6, horizon=8.0, samples=2)
     wrong = pair._replace(table=DOP853._replace(third=DOP853.error))
-    right, other = (solver("axis", chosen)(scene.top, scene.start, plan) for chosen in (pair, wrong))
+    right, other = (pairs.solver("axis", chosen)(scene.top, scene.start, plan) for chosen in (pair, wrong))
     assert right.steps != other.steps
 
 

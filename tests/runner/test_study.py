@@ -122,6 +122,7 @@ def of_everyone():
 
 GAUSS = {f"gauss-{order}" for order in (2, 4, 6, 8, 10, 12)}
 COLLECTIVE = {f"collective-gauss-{order}" for order in (2, 4, 6)}
+PAIRS = {"rk45-compiled"} | {f"{pair}{end}" for pair in ("tsit5", "dop853-compiled", "vern9") for end in ("", "-fixed")}
 SCIPY = {"rk45", "dop853", "lsoda", "radau"}
 SPLITTING = {name for name, method in symtop.integrators().items() if method.family == "splitting"}
 STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "trapezoidal-unreduced"}
@@ -136,10 +137,10 @@ STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "
         ("methods/lagrangian/discrete_lagrangian.py", STRAIGHT),
         ("methods/framework/newton.py", STRAIGHT | {"galerkin-simpson"}),
         ("methods/library/scipy_ivp.py", SCIPY),
-        ("methods/runge_kutta/dormand_prince.py", {"rk45-compiled"}),
-        ("methods/runge_kutta/explicit.py", {"rk4", "rk45-compiled"}),
-        ("methods/framework/equations.py", {"rk4", "rk45-compiled"} | SCIPY),
-        ("methods/framework/angles.py", {"rk4", "rk45-compiled"} | SCIPY),
+        ("methods/runge_kutta/pairs.py", PAIRS),
+        ("methods/runge_kutta/explicit.py", {"rk4"} | PAIRS),
+        ("methods/framework/equations.py", {"rk4"} | PAIRS | SCIPY),
+        ("methods/framework/angles.py", {"rk4"} | PAIRS | SCIPY),
         ("methods/library/exact.py", {"exact"}),
         ("methods/splitting/loop.py", SPLITTING),
         ("methods/taylor/heyoka.py", {"taylor", "taylor-longdouble", "taylor-quad"}),

@@ -1,6 +1,6 @@
 """The coefficients of embedded explicit pairs of order 5, 8 and 9, as published; `tests` has their order conditions.
 
-tsit5     Tsitouras, Comput. Math. Appl. 62 (2011) 770: 5(4), the last stage of a step is the first of the next
+tsit5     Tsitouras, Comput. Math. Appl. 62 (2011) 770: 5(4)
 dop853    Hairer, Norsett, Wanner, Solving ODEs I, section II.5 and II.6: 8(5,3), samples of order 7
 vern9     Verner, Numer. Algorithms 53 (2010) 383: 9(8), the "most efficient" one
 """
@@ -18,10 +18,30 @@ class Table(NamedTuple):
     error: Row
     third: Row = ()  # a second estimate, of order 3
     extra: tuple[Row, ...] = ()  # stages that only samples need
-    dense: tuple[Row, ...] = ()
+    dense: tuple[Row, ...] = ()  # of samples: polynomials in x = (t - t_old)/h, one a stage, or rows of sums
 
 
 # fmt: off
+DORMAND_PRINCE = Table(
+    a=(
+        (1 / 5,),
+        (3 / 40, 9 / 40),
+        (44 / 45, -56 / 15, 32 / 9),
+        (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729),
+        (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
+    ),
+    b=(35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+    error=(-71 / 57600, 0.0, 71 / 16695, -71 / 1920, 17253 / 339200, -22 / 525, 1 / 40),
+    dense=(
+        (1.0, -8048581381 / 2820520608, 8663915743 / 2820520608, -12715105075 / 11282082432),
+        (0.0, 0.0, 0.0, 0.0),
+        (0.0, 131558114200 / 32700410799, -68118460800 / 10900136933, 87487479700 / 32700410799),
+        (0.0, -1754552775 / 470086768, 14199869525 / 1410260304, -10690763975 / 1880347072),
+        (0.0, 127303824393 / 49829197408, -318862633887 / 49829197408, 701980252875 / 199316789632),
+        (0.0, -282668133 / 205662961, 2019193451 / 616988883, -1453857185 / 822651844),
+        (0.0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423),
+    ),
+)
 TSIT5 = Table(
     a=(
         (0.161,),

@@ -1,18 +1,23 @@
-"""Explicit pairs of order 5 to 9 with a tolerance, and the same tables with fixed steps, their stages written out.
+"""Explicit pairs of order 5 to 9 with SciPy's control of the step, compiled, and the same tables with fixed steps.
 
-    k_i = f(y + h sum_{j<i} a_ij k_j),  y+ = y + h sum_i b_i k_i    each sum without the terms whose coefficient is zero
-
-The steps are chosen as SciPy chooses them (`dormand_prince`), |err| by the order of the estimate:
+    k_1 = f(y),  k_i = f(y + h sum_{j<i} a_ij k_j),  y+ = y + h sum_i b_i k_i,  f(y+) is the k_1 of the next step
+    |err| as below, of parts err_m / (atol + rtol max(|y_m|, |y+_m|)), must be below 1;  q: the order of the estimate
+    h <- h min(10, .9 |err|^(-1/(q+1))) after a step (min(1, ..) after a rejection),  h max(.2, ..) when rejected
 
     name              order   f a step   |err|, e_p = rms(err of order p)   samples between steps
+    rk45-compiled     5       6          e_4                                order 4, no further f
     tsit5             5       6          e_4                                order 4, no further f
     dop853-compiled   8       12         e_5^2 / sqrt(e_5^2 + e_3^2/100)    order 7, three f for all of a step
     vern9             9       16         e_8                                by a shorter step, 15 f each
 
-`dop853-compiled` accepts and rejects the steps of SciPy's `dop853` and takes as many f. Stages that are written out
-keep their slopes in registers: on the axis a step of order 8 takes a quarter of the time of a loop over the table.
-Explicit, neither symplectic nor symmetric; nothing is conserved but what is linear in the state (`equations`).
-Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, sections II.5 and II.6; `pair_tables`.
+`rk45-compiled` and `dop853-compiled` are SciPy's `rk45` and `dop853` on the same equations (see `equations`): they
+accept and reject the same steps and take as many f, so that their times differ only by what Python costs and their
+errors not at all: they keep the language out of a comparison of methods.
+
+The stages of a step are written out, without the terms whose coefficient is zero, and keep their slopes in registers:
+on the axis a step of order 8 takes a quarter of the time of a loop over the table. Nothing is symplectic, symmetric or
+conserved but what is linear in the state. Sources: those of `pair_tables`; the initial step: Hairer, Norsett, Wanner,
+Solving Ordinary Differential Equations I, section II.4.
 """
 
 import functools
@@ -22,15 +27,165 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.jit import combined, register_jitable, set_item
+from symtop.core.jit import combined, compile_kernel, register_jitable, set_item
+from symtop.methods.framework.adaptive import Adaptive, Loop as AdaptiveLoop
 from symtop.methods.framework.angles import LEAST_TOLERANCE
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import Loop, driver
+from symtop.methods.framework.loop import Loop, kernel_loop
+from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
+from symtop.methods.framework.preparation import Body, Start, as_it_steps
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.runge_kutta.dormand_prince import Method, interpolate, nothing_more, rms, solver
 from symtop.methods.runge_kutta.explicit import Tableau, add, plus, row_of, store, weighted
-from symtop.methods.runge_kutta.pair_tables import DOP853, TSIT5, VERN9, Row, Table
+from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5, VERN9, Row, Table
+
+BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
+EVALUATIONS = 1_000_000_000  # a run's limit: about half a minute
+
+SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
+
+
+class Method(NamedTuple):
+    """A pair in one chart, in functions that compile; `slopes` (rows, size) begins with f(y) and ends with f(y+)."""
+
+    attempt: Callable[..., Any]  # (par, state, slopes, h, tolerance) -> new state and |err|; fills `slopes`
+    refine: Callable[..., int]  # (par, state, slopes, h) -> evaluations: what samples of a step need beyond that
+    sample: Callable[..., Any]  # (par, state, new, slopes, h, x) -> the state at a fraction x of the step
+    rows: int
+    evaluations: int  # of an attempt
+    power: float  # of |err| in the step control: -1/(order of the estimate + 1)
+
+
+@register_jitable
+def rms(vector: Any, state: Any, other: Any, tolerance: float) -> float:
+    """Root mean square of a vector in units of what is allowed, tolerance (1 + |y|)."""
+    total = 0.0
+    for m in range(len(vector)):
+        part = vector[m] / (tolerance + max(abs(state[m]), abs(other[m])) * tolerance)
+        total += part * part
+    return math.sqrt(total / len(vector))
+
+
+@register_jitable
+def interpolate(dense: Any, state: Any, slopes: Any, h: float, x: float) -> Any:
+    """The state at a fraction x of the step."""
+    weights = dense[0] + dense[1][:3]  # a tuple of seven
+    for i in range(len(dense)):
+        row = dense[i]
+        weights = set_item(weights, i, x * (row[0] + x * (row[1] + x * (row[2] + x * row[3]))))
+    return plus(state, weighted(weights, state, slopes, h))
+
+
+@register_jitable
+def nothing_more(par: Any, state: Any, slopes: Any, h: float) -> int:
+    """Samples need no further evaluations."""
+    return 0
+
+
+@register_jitable
+def _try_steps(
+    attempt: Any, cost: int, power: float, par: Any, state: Any, slopes: Any, tolerance: float, t: float, step: float,
+    end: float,
+) -> Any:  # fmt: skip
+    """Shrink the step until its error passes: new state, new time, next step, evaluations, outcome."""
+    least = 10.0 * (np.nextafter(t, np.inf) - t)
+    step = max(step, least)
+    grow = GROW
+    evaluations = 0
+    while step >= least:
+        after = min(t + step, end)
+        h = after - t
+        new, error = attempt(par, state, slopes, h, tolerance)
+        evaluations += cost
+        change = GROW if error == 0.0 else SAFETY * error**power
+        if error < 1.0:
+            return new, after, h * min(grow, change), evaluations, OK
+        step = h * (change if change > SHRINK else SHRINK)  # noqa: FURB136  (max would pass NaN on)
+        grow = 1.0
+    return state, t, step, evaluations, STEP_TOO_SMALL
+
+
+@register_jitable
+def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, tolerance: float, power: float) -> float:
+    """SciPy's initial step: 1 % of |y|/|f|, then from the size of the second derivative, by one evaluation of f."""
+    d0, d1 = rms(state, state, state, tolerance), rms(slope, state, state, tolerance)
+    trial = min(1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1, end)
+    bent = field(par, add(state, slope, trial))
+    for m in range(len(state)):
+        bent = set_item(bent, m, bent[m] - slope[m])
+    d2 = rms(bent, state, state, tolerance) / trial
+    guess = max(1e-6, 1e-3 * trial) if max(d1, d2) <= 1e-15 else (0.01 / max(d1, d2)) ** -power
+    return min(100.0 * trial, guess, end)
+
+
+@functools.cache
+def loop(chart: str, pair: "Pair") -> AdaptiveLoop:  # noqa: C901
+    """The loop in one chart as `adaptive` takes it, compiled when it is first used; it counts force evaluations.
+
+    The place is (state, its slope, time, step).
+    """
+    form: Any = FORMULATIONS[chart]  # whose parts compile
+    field, ended, observe, prepare, size = form.field, form.ended, form.observe, form.prepare.numbers, form.prepare.size
+    sample = as_it_steps if form.present is None else form.present.sample
+    register_jitable(observe)
+    method: Method = pair.method(field)
+    attempt, refine, between, stages, cost, power = method
+    clock, last = 2 * size, method.evaluations
+
+    def march(  # type: ignore[no-untyped-def]  # noqa: C901
+        numbers, tolerance, times, budget, seen, place, states, momenta
+    ):
+        par, state = prepare(Body(*numbers[:3]), Start(*numbers[3:]))
+        slopes, nothing, end = np.empty((stages, size)), state, times[-1]
+        for m in range(size):
+            nothing = set_item(nothing, m, 0.0)
+        steps = effort = outcome = 0
+        if seen < 0:
+            slope = field(par, state)
+            store(slopes, 0, slope)
+            seen, t, step, effort = 0, 0.0, first_step(field, par, state, slope, end, tolerance, power), 2
+        else:
+            t, step = place[clock], place[clock + 1]
+            for m in range(size):
+                state, slopes[0, m] = set_item(state, m, place[m]), place[size + m]
+        while t < end and effort < budget:
+            before, start = state, t
+            state, t, step, work, outcome = _try_steps(
+                attempt, cost, power, par, before, slopes, tolerance, start, step, end
+            )
+            effort += work
+            if outcome != OK:
+                break
+            steps += 1
+            h = t - start
+            if seen < len(times) and times[seen] <= t:
+                effort += refine(par, before, slopes, h)
+            while seen < len(times) and times[seen] <= t:
+                place_then = between(par, before, state, slopes, h, (times[seen] - start) / h)
+                store(states, seen, sample(par, times[seen], place_then))
+                momenta[seen, 0], momenta[seen, 1] = observe(par, 0.0, place_then, nothing, 0.0)
+                seen += 1
+            outcome = ended(state)
+            for m in range(size):
+                slopes[0, m] = slopes[last, m]
+            if outcome != OK:
+                break
+        for m in range(size):
+            place[m], place[size + m] = state[m], slopes[0, m]
+        place[clock], place[clock + 1] = t, step
+        return seen, steps, effort, outcome
+
+    compiled: AdaptiveLoop = compile_kernel(march)
+    return compiled
+
+
+def solver(chart: str, pair: "Pair") -> Adaptive:
+    """A solver of the registry in one chart."""
+    form: Any = FORMULATIONS[chart]
+    size, shown = form.prepare.size, form.prepare.size if form.present is None else form.present.size
+    return Adaptive(
+        lambda _: loop(chart, pair), shown, 2 * size + 2, 2 * size, EVALUATIONS, BLOCK, check=form.prepare.check
+    )
 
 
 @register_jitable
@@ -86,7 +241,7 @@ class Pair(NamedTuple):
     reference: str
 
     def method(self, field: Callable[..., Any]) -> Method:
-        """What `dormand_prince.loop` steps by: attempts, their error, and samples."""
+        """What `loop` steps by: attempts, their error, and samples."""
         table, dense = self.table, self.table.dense
         keep = store if dense else _forget
         stages, total = _stages(field, table.a, keep), _sum(table.b)
@@ -192,9 +347,10 @@ def fixed_loop(chart: str, pair: Pair) -> Loop:
         step = total(zero(state), stages(par, state, field(par, state), rule.b, h), h)
         return step, carry, cost, ended_at(plus(state, step))
 
-    return driver(begin, increment, form.observe)
+    return kernel_loop(begin, increment, form.observe)
 
 
+RK45 = Pair("rk45-compiled", DORMAND_PRINCE, 5, 4, "Dormand-Prince", "dormand-prince-1980")
 PAIRS = (
     Pair("tsit5", TSIT5, 5, 4, "Tsitouras's pair 5(4)", "tsitouras-2011"),
     Pair("dop853-compiled", DOP853, 8, 7, "Dormand-Prince 8(5,3)", "prince-dormand-1981 hairer-norsett-wanner-1993"),
@@ -203,5 +359,5 @@ PAIRS = (
 
 
 def built_in() -> list[Integrator]:
-    """Each pair with a tolerance and with a step."""
-    return [make() for pair in PAIRS for make in (pair.adaptive, pair.fixed)]
+    """Each pair with a tolerance and, but for SciPy's RK45, with a step."""
+    return [RK45.adaptive()] + [make() for pair in PAIRS for make in (pair.adaptive, pair.fixed)]
