@@ -278,12 +278,12 @@ def _walk(scene, tolerance, horizon, pair=pairs.RK45, **limits):
 
 def _step_ends(scene, tolerance, horizon, pair):
     """The ends of the accepted steps: with a budget of one evaluation the loop returns after each."""
-    loop, place, seen, ends = pairs.loop("angles", pair), np.empty(14), -1, []
+    loop, place, seen, ends = pairs.loop("angles", pair), np.empty(6 + 7 * 6 + 2), -1, []
     samples = np.array([horizon]), np.empty((1, 4)), np.empty((1, 2))
     while seen < 1:
         budget = 3 if seen < 0 else 1  # two evaluations choose the first step
         seen, *_ = loop(flat(scene.top, scene.start), tolerance, samples[0], budget, seen, place, *samples[1:])
-        ends.append(place[12])
+        ends.append(place[-2])
     return np.array(ends)
 
 

@@ -8,7 +8,7 @@
     rk45-compiled     5       6          e_4                                order 4, no further f
     tsit5             5       6          e_4                                order 4, no further f
     dop853-compiled   8       12         e_5^2 / sqrt(e_5^2 + e_3^2/100)    order 7, three f for all of a step
-    vern9             9       16         e_8                                by a shorter step, 15 f each
+    vern9             9       16         e_8                                a shorter step, not counted
 
 `rk45-compiled` and `dop853-compiled` are SciPy's `rk45` and `dop853` on the same equations (see `equations`): they
 accept and reject the same steps and take as many f, so that their times differ only by what Python costs and their
@@ -46,14 +46,14 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 
 
 class Method(NamedTuple):
-    """A pair in one chart, in functions that compile; `slopes` (rows, size) begins with f(y) and ends with f(y+)."""
+    """A method in one chart, in functions that compile; `memory` (rows, size) begins with f(y), the rest is its own."""
 
-    attempt: Callable[..., Any]  # (par, state, slopes, h, tolerance) -> new state and |err|; fills `slopes`
-    refine: Callable[..., int]  # (par, state, slopes, h) -> evaluations: what samples of a step need beyond that
-    sample: Callable[..., Any]  # (par, state, new, slopes, h, x) -> the state at a fraction x of the step
+    advance: Callable[..., Any]  # (par, state, memory, tolerance, t, step, end) -> state, t, step, evaluations, outcome
+    refine: Callable[..., int]  # (par, state, memory, h) -> evaluations: what samples of a step need beyond that
+    sample: Callable[..., Any]  # (par, state, new, memory, h, x) -> the state at a fraction x of the step
     rows: int
-    evaluations: int  # of an attempt
-    power: float  # of |err| in the step control: -1/(order of the estimate + 1)
+    last: int  # the row of f(y+) after a step
+    power: float  # of the error in the choice of the first step
 
 
 @register_jitable
@@ -82,27 +82,28 @@ def nothing_more(par: Any, state: Any, slopes: Any, h: float) -> int:
     return 0
 
 
-@register_jitable
-def _try_steps(
-    attempt: Any, cost: int, power: float, par: Any, state: Any, slopes: Any, tolerance: float, t: float, step: float,
-    end: float,
-) -> Any:  # fmt: skip
-    """Shrink the step until its error passes: new state, new time, next step, evaluations, outcome."""
-    least = 10.0 * (np.nextafter(t, np.inf) - t)
-    step = max(step, least)
-    grow = GROW
-    evaluations = 0
-    while step >= least:
-        after = min(t + step, end)
-        h = after - t
-        new, error = attempt(par, state, slopes, h, tolerance)
-        evaluations += cost
-        change = GROW if error == 0.0 else SAFETY * error**power
-        if error < 1.0:
-            return new, after, h * min(grow, change), evaluations, OK
-        step = h * (change if change > SHRINK else SHRINK)  # noqa: FURB136  (max would pass NaN on)
-        grow = 1.0
-    return state, t, step, evaluations, STEP_TOO_SMALL
+def trying(attempt: Callable[..., Any], cost: int, power: float) -> Callable[..., Any]:
+    """`Method.advance`: shrink the step until the error of ``attempt(par, state, slopes, h, tolerance)`` passes."""
+
+    @register_jitable
+    def advance(par, state, slopes, tolerance, t, step, end):  # type: ignore[no-untyped-def]
+        least = 10.0 * (np.nextafter(t, np.inf) - t)
+        step = max(step, least)
+        grow = GROW
+        evaluations = 0
+        while step >= least:
+            after = min(t + step, end)
+            h = after - t
+            new, error = attempt(par, state, slopes, h, tolerance)
+            evaluations += cost
+            change = GROW if error == 0.0 else SAFETY * error**power
+            if error < 1.0:
+                return new, after, h * min(grow, change), evaluations, OK
+            step = h * (change if change > SHRINK else SHRINK)  # noqa: FURB136  (max would pass NaN on)
+            grow = 1.0
+        return state, t, step, evaluations, STEP_TOO_SMALL
+
+    return advance
 
 
 @register_jitable
@@ -119,59 +120,58 @@ def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, toleran
 
 
 @functools.cache
-def loop(chart: str, pair: "Pair") -> AdaptiveLoop:  # noqa: C901
+def loop(chart: str, pair: Any) -> AdaptiveLoop:  # noqa: C901
     """The loop in one chart as `adaptive` takes it, compiled when it is first used; it counts force evaluations.
 
-    The place is (state, its slope, time, step).
+    The place is (state, memory, time, step).
     """
     form: Any = FORMULATIONS[chart]  # whose parts compile
     field, ended, observe, prepare, size = form.field, form.ended, form.observe, form.prepare.numbers, form.prepare.size
     sample = as_it_steps if form.present is None else form.present.sample
     register_jitable(observe)
     method: Method = pair.method(field)
-    attempt, refine, between, stages, cost, power = method
-    clock, last = 2 * size, method.evaluations
+    advance, refine, between, rows, last, power = method
+    clock = size + rows * size
 
-    def march(  # type: ignore[no-untyped-def]  # noqa: C901
+    def march(  # type: ignore[no-untyped-def]
         numbers, tolerance, times, budget, seen, place, states, momenta
     ):
         par, state = prepare(Body(*numbers[:3]), Start(*numbers[3:]))
-        slopes, nothing, end = np.empty((stages, size)), state, times[-1]
+        memory, nothing, end = np.zeros((rows, size)), state, times[-1]
         for m in range(size):
             nothing = set_item(nothing, m, 0.0)
         steps = effort = outcome = 0
         if seen < 0:
             slope = field(par, state)
-            store(slopes, 0, slope)
+            store(memory, 0, slope)
             seen, t, step, effort = 0, 0.0, first_step(field, par, state, slope, end, tolerance, power), 2
         else:
             t, step = place[clock], place[clock + 1]
-            for m in range(size):
-                state, slopes[0, m] = set_item(state, m, place[m]), place[size + m]
+            state = row_of(place[:size].reshape(1, size), 0, state)
+            memory[:] = place[size:clock].reshape(rows, size)
         while t < end and effort < budget:
             before, start = state, t
-            state, t, step, work, outcome = _try_steps(
-                attempt, cost, power, par, before, slopes, tolerance, start, step, end
-            )
+            state, t, step, work, outcome = advance(par, before, memory, tolerance, start, step, end)
             effort += work
             if outcome != OK:
                 break
             steps += 1
             h = t - start
             if seen < len(times) and times[seen] <= t:
-                effort += refine(par, before, slopes, h)
+                effort += refine(par, before, memory, h)
             while seen < len(times) and times[seen] <= t:
-                place_then = between(par, before, state, slopes, h, (times[seen] - start) / h)
+                place_then = between(par, before, state, memory, h, (times[seen] - start) / h)
                 store(states, seen, sample(par, times[seen], place_then))
                 momenta[seen, 0], momenta[seen, 1] = observe(par, 0.0, place_then, nothing, 0.0)
                 seen += 1
             outcome = ended(state)
             for m in range(size):
-                slopes[0, m] = slopes[last, m]
+                memory[0, m] = memory[last, m]
             if outcome != OK:
                 break
         for m in range(size):
-            place[m], place[size + m] = state[m], slopes[0, m]
+            place[m] = state[m]
+        place[size:clock] = memory.ravel()
         place[clock], place[clock + 1] = t, step
         return seen, steps, effort, outcome
 
@@ -179,13 +179,12 @@ def loop(chart: str, pair: "Pair") -> AdaptiveLoop:  # noqa: C901
     return compiled
 
 
-def solver(chart: str, pair: "Pair") -> Adaptive:
+def solver(chart: str, pair: Any) -> Adaptive:
     """A solver of the registry in one chart."""
     form: Any = FORMULATIONS[chart]
     size, shown = form.prepare.size, form.prepare.size if form.present is None else form.present.size
-    return Adaptive(
-        lambda _: loop(chart, pair), shown, 2 * size + 2, 2 * size, EVALUATIONS, BLOCK, check=form.prepare.check
-    )
+    clock = size * (1 + pair.method(form.field).rows)
+    return Adaptive(lambda _: loop(chart, pair), shown, clock + 2, clock, EVALUATIONS, BLOCK, check=form.prepare.check)
 
 
 @register_jitable
@@ -270,9 +269,8 @@ class Pair(NamedTuple):
             part = x * h
             return plus(state, total(zero(state), stages(par, state, row_of(slopes, 0, state), slopes, part), part))
 
-        parts = Method(
-            attempt, nothing_more, polynomial if dense else shorter, cost + 1, cost, -1 / (self.estimate + 1)
-        )
+        sample, power = polynomial if dense else shorter, -1.0 / (self.estimate + 1)
+        parts = Method(trying(attempt, cost, power), nothing_more, sample, cost + 1, cost, power)
         return parts if not two else parts._replace(**_order_seven(table, field, cost))
 
     def adaptive(self) -> Integrator:
