@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.ticker import NullLocator
 
 from symtop.judging.battery import CLAIMS, SCENE
-from symtop.judging.findings import Finding, spoken
+from symtop.judging.findings import Finding, claim_name
 from symtop.methods.framework.registry import FAMILIES, integrators
 from symtop.report import style
 from symtop.report.figures import name_ends
@@ -65,7 +65,7 @@ def _matrix(judged: dict[str, list[Finding]]) -> Picture:
                 fontsize=style.LEAST_TEXT, fontweight="bold" if count["refuted"] else "normal",
             )  # fmt: skip
     axis.set(xlim=(-0.5, len(names) - 0.5), ylim=(len(CLAIMS) - 0.5, -0.5))
-    axis.set_yticks(range(len(CLAIMS)), [ROWS.get(claim, spoken(claim)) for claim in CLAIMS])
+    axis.set_yticks(range(len(CLAIMS)), [ROWS.get(claim, claim_name(claim)) for claim in CLAIMS])
     heads = [TITLES.get(name, name).replace("-", "\n") for name in names]
     counts = [methods(len(families[name])) for name in names]
     axis.set_xticks(range(len(names)), [f"{head}\n{count}" for head, count in zip(heads, counts, strict=True)])

@@ -5,7 +5,7 @@ from collections import Counter
 import xarray as xr
 
 from symtop.judging.battery import CLAIMS, SCENE
-from symtop.judging.findings import VERDICTS, Finding, spoken
+from symtop.judging.findings import VERDICTS, Finding, claim_name
 from symtop.report.sentences import FEW, joined
 from symtop.runner.study import Table
 
@@ -32,9 +32,9 @@ def tables(data: xr.Dataset) -> list[Table]:
     """Declared, measured and verdict of every cell; what was refuted or left open, in words; the long runs."""
     judged = findings(data)
     rows = [[name, *map(_cell, row)] for name, row in judged.items()]
-    table = Table(f"Declared | measured, and the verdict: {LEGEND}", ["variant", *map(spoken, CLAIMS)], rows)
+    table = Table(f"Declared | measured, and the verdict: {LEGEND}", ["variant", *map(claim_name, CLAIMS)], rows)
     reasons = [
-        [name, spoken(finding.claim), finding.declared, finding.verdict, finding.why]
+        [name, claim_name(finding.claim), finding.declared, finding.verdict, finding.why]
         for name, finding in with_verdict(judged, "refuted", "undecided")
     ]
     title = f"What was refuted or left open, on {SCENE} where no other scene is named, and why"
@@ -65,7 +65,7 @@ def verdict(data: xr.Dataset) -> list[str]:
     if len(refuted) > FEW:
         sentences.append(f"{len(refuted) - FEW} more claims are refuted; the table of what was refuted has them.")
     if undecided:
-        by_claim = Counter(spoken(finding.claim) for _, finding in undecided)
+        by_claim = Counter(claim_name(finding.claim) for _, finding in undecided)
         listed = joined([f"{claim} with {count}" for claim, count in by_claim.most_common()])
         sentences.append(f"{len(undecided)} claims are undecided: {listed} integrators. A table says why.")
     return [*sentences, *long_runs(data)]

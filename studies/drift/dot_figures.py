@@ -7,7 +7,7 @@ import xarray as xr
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from symtop.measure.conservation import CONSTANTS
-from symtop.measure.growth import ROUNDED
+from symtop.measure.growth import RUN_ROUNDING
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.report import style
 from symtop.runner.study import Picture
@@ -59,8 +59,8 @@ def sizes(histories: xr.Dataset) -> Picture:
         "Largest relative change of every constant over the run and all scenes, energies relative to E0 - min V. "
         "A dot is a variant, method[chart]: those that hold all constants on a line for each family, the "
         f"others on their own. {variants.setting(data)} A million steps of rounding explain changes up to "
-        f"{ROUNDED:.0e} of a momentum or of |E|: what a method conserves lies below. A larger change is the truncation "
-        "error of a step or, farthest right, a drift."
+        f"{RUN_ROUNDING:.0e} of a momentum or of |E|: what a method conserves lies below. A larger change is the "
+        "truncation error of a step or, farthest right, a drift."
     )
     alt = "Dot plot of the largest changes of energy and momenta; methods that lose one are named."
     return Picture("sizes", figure, caption, alt)

@@ -12,7 +12,7 @@ import math
 
 import xarray as xr
 
-from symtop.measure.growth import ROUNDED, behaviour
+from symtop.measure.growth import RUN_ROUNDING, behaviour
 from symtop.model.scenes import scenes
 
 HISTORIES, WINDOWS, ROUNDINGS, HORIZONS = "histories", "windows", "rounding", "horizons"  # groups
@@ -49,4 +49,4 @@ def grain(scene_name: str, name: str) -> float:
 def rounding(cell: xr.Dataset, name: str) -> float:
     """The largest relative change of a constant that a million steps of rounding explain, in a cell of one scene."""
     constant = "energy" if name == "phase" else name
-    return ROUNDED * grain(str(cell["scene"].item()) if "scene" in cell.coords else "", constant)
+    return RUN_ROUNDING * grain(str(cell["scene"].item()) if "scene" in cell.coords else "", constant)

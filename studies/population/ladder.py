@@ -6,7 +6,7 @@ Steps are halved from setting to setting, tolerances divided by ten. A member le
     before a run that is foreseen to take more force evaluations than the budget,
     when no target that is left can be reached within the budget: the error falls with the declared order or, if that is
     more, as from the last setting to this, and a tenth of the target's distance is forgiven,
-    when two settings below `ROUNDED` have the same error: rounding.
+    when two settings below `NEAR_ROUNDING` have the same error: rounding.
 
 The energy is asked from `LEAST_STEPS` a nutation on, because longer steps may keep it and miss the motion. A run is
 *wrong* if its axis is off by more than `WRONG`; it is a *silent failure* if nothing warns of it: it ended `ok` and kept
@@ -32,8 +32,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.measure.settings import FLAT, LEAST_STEPS, ROUNDED
-from symtop.measure.work import TARGETS
+from symtop.measure.settings import FLAT, LEAST_STEPS, NEAR_ROUNDING, TARGETS
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.fixed_step import inside
@@ -186,7 +185,7 @@ def _stay(
             gain = np.clip(before / error, falls, 1e4)
             gain = np.where(np.isfinite(before), gain, 1e4)
             foreseen = error * gain**-left / FORGIVEN
-        stuck = (error < ROUNDED) & (error > before / FLAT)
+        stuck = (error < NEAR_ROUNDING) & (error > before / FLAT)
         worth |= (following > 0.0) & ~stuck & ((foreseen <= following) | (error > ASYMPTOTIC))
     return worth & (left >= 1.0), settled
 

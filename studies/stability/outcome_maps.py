@@ -10,7 +10,7 @@ of 1.1 delta. `verdicts.judge` compares every run with the closed form.
 
 Compiled methods run whole columns of a map in one call, in lanes where the method has them: the runs of a column have
 equally many steps, so that no lane waits for another. Other methods run one after another. The constants of a row's
-closed form are computed once, and all runs are judged in compiled passes (`symtop.measure.many_verdicts`). Samples are
+closed form are computed once, and all runs are judged in compiled passes (`symtop.measure.verdicts`). Samples are
 taken at the same fractions of a nutation for every spin, and these are not commensurate with the nutation.
 
 Half of the steps of a map stand in its shortest octave, where most methods have long been accurate. So a map is run
@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.measure.many_verdicts import Judged, judge_runs, truths
+from symtop.measure.verdicts import Judged, judge_runs, truths
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.plan import OUTCOMES, Plan

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure import ranking
-from symtop.measure.work import TARGETS
+from symtop.measure.settings import TARGETS
 from symtop.report.sentences import joined
 from symtop.runner.study import Table
 

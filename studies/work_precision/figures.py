@@ -13,7 +13,7 @@ from matplotlib.ticker import PercentFormatter
 
 from symtop.measure import ranking
 from symtop.measure.phase import PARTS
-from symtop.measure.work import TARGETS
+from symtop.measure.settings import TARGETS
 from symtop.methods.framework.registry import split_name
 from symtop.report import style
 from symtop.report.figures import BELOW, error_band, name_ends

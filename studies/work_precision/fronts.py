@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure import ranking
-from symtop.measure.work import TARGETS
+from symtop.measure.settings import TARGETS
 from symtop.report.figures import bound_of, error_band, pareto
 from symtop.report.sentences import joined
 from symtop.report.style import GREY, RAISED, few_ticks, grid, headline, legend_below, line, look

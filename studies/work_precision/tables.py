@@ -22,7 +22,7 @@ its own), target (rad), batch.
 
 import xarray as xr
 
-from symtop.measure.work import spans, work_table
+from symtop.measure.settings import spans, work_table
 from symtop.methods.framework.registry import integrator
 from symtop.model import scenes
 from symtop.runner.study import Case

@@ -22,8 +22,8 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
+from symtop.measure.settings import TARGETS, least_work
 from symtop.measure.timing import MISSED, Timing, bare_run, first_call, forecasts, met_again, timings
-from symtop.measure.work import TARGETS, least_work
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.scenes import Scene
 

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure import ranking
-from symtop.measure.work import CAPPED, TARGETS, TOO_WIDE
+from symtop.measure.settings import CAPPED, TARGETS, TOO_WIDE
 from symtop.methods.framework.registry import split_name
 from symtop.report.sentences import abridged, joined
 from symtop.runner.study import Table

@@ -16,7 +16,7 @@ from typing import Any, TextIO
 import click
 
 from symtop.core import files
-from symtop.core.errors import SymtopError, SymtopWarning, UnknownNameError, at_home, place, spare
+from symtop.core.errors import SymtopError, SymtopWarning, UnknownNameError, at_home, check_replaceable, file_path
 from symtop.core.signals import INTERRUPTED, told_apart
 
 LONGEST_NAME = 80  # characters of a file that are told
@@ -186,11 +186,11 @@ def check_outputs(**files: str | None) -> None:
             raise SymtopError(f"{option} must be a file that ends in {' or '.join(endings)}, not {file!r}")
         if not (file and Path(file).absolute().parent.is_dir()):
             raise SymtopError(f"{option} must be a file in a folder that is there, not {file!r}")
-        path = place(option, file).absolute()
+        path = file_path(option, file).absolute()
         if path.is_dir():
             raise SymtopError(f"{option} must be a file, not the folder {file!r}")
         if name == "output":
-            spare(path)
+            check_replaceable(path)
         try:
             with tempfile.TemporaryFile(dir=path.parent):
                 pass

@@ -74,7 +74,7 @@ def judge(
     if as_json:
         click.echo(as_text([finding.plain() for finding in ledger.findings]))
     else:
-        click.echo(text_report.ending(ledger.findings, ledger.implied))
+        click.echo(text_report.summary(ledger.findings, ledger.implied))
     if output is not None:
         from symtop.core import netcdf
 

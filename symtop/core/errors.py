@@ -1,22 +1,22 @@
 """Errors of the user and errors of other people's code, each as one sentence.
 
 The checks of arguments (`positive`, `whole`, `one_of`, ...) raise a `SymtopError` that names the argument, its value
-and what is allowed. `door` is for calls of foreign code, a plug-in's solver or a user's study: whatever it raises,
-errors beside `Exception` included, becomes a SymtopError; Ctrl-C and SIGTERM pass.
+and what is allowed. Within `foreign_code`, around a call of a plug-in's solver or a user's study, whatever is raised
+becomes a SymtopError, errors beside `Exception` included; Ctrl-C and SIGTERM pass.
 """
 
+import contextlib
 import difflib
 import math
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from types import TracebackType
 
 from symtop.core.signals import is_of_user
 
 LONGEST_PART = 255  # bytes of a name in a folder
-SHOWN = 80  # characters of a name that is told
+SHOWN = 80  # characters of a name that are shown
 MAGIC = (b"\x89HDF", b"CDF")  # the first bytes of netCDF files
 
 
@@ -100,14 +100,14 @@ def whole(name: str, value: object, least: int, most: float = math.inf) -> int:
     return int(number)
 
 
-def truth(name: str, value: object) -> bool:
+def boolean(name: str, value: object) -> bool:
     """Return `value` if it is True or False, also NumPy's."""
     if type(value).__name__ in ("bool", "bool_"):
         return bool(value)
     raise SymtopError(f"{name} must be True or False, not {shown(value)}", name)
 
 
-def place(name: str, value: object) -> Path:
+def file_path(name: str, value: object) -> Path:
     """Return a file's name as a path, ``~`` the user's folder; refuse what can name none. No disk is looked at."""
     if isinstance(value, (str, os.PathLike)):
         path = at_home(value)
@@ -120,18 +120,18 @@ def place(name: str, value: object) -> Path:
     raise SymtopError(f"{name} must be the name of a file, not {shown(value)[:SHOWN]}", name)
 
 
-def spare(path: Path) -> None:
+def check_replaceable(path: Path) -> None:
     """Refuse to replace what is there and is no netCDF file: a script, a device, a folder; SymtopError."""
     if path.is_dir():
         raise SymtopError(f"cannot write {path}: it is a folder")
-    begun = b""
+    head = b""
     if path.is_file():
         try:
             with path.open("rb") as file:
-                begun = file.read(4)
+                head = file.read(4)
         except OSError as error:
             raise SymtopError(f"cannot write {path}: {error.strerror or error}") from error
-    if path.exists() and not begun.startswith(MAGIC):
+    if path.exists() and not head.startswith(MAGIC):
         raise SymtopError(f"cannot write {path}: it is there, and no netCDF file; remove it or name another path")
 
 
@@ -175,32 +175,25 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     raise UnknownNameError(f"{name} {shown(value)} is unknown; {hint}", name, value=value)
 
 
-LONGEST = 300  # characters of a stranger's words
+LONGEST = 300  # characters of an error's message that are shown
 
 
 def words_of(error: BaseException) -> str:
     """The type of an error and what it says, in one line, if it can be said."""
     try:
-        said = " ".join(str(error).split())
+        message = " ".join(str(error).split())
     except Exception:  # noqa: BLE001  (its own __str__ may raise anything)
         return f"{type(error).__name__}, which cannot be printed"
-    cut = said if len(said) <= LONGEST else f"{said[:LONGEST]} ..."
+    cut = message if len(message) <= LONGEST else f"{message[:LONGEST]} ..."
     return f"{type(error).__name__}: {cut}" if cut else type(error).__name__
 
 
-class door:
+@contextlib.contextmanager
+def foreign_code(what: str) -> Iterator[None]:
     """Within it, whatever is raised becomes a SymtopError: `what` failed, and how. A SymtopError passes as it is."""
-
-    __slots__ = ("what",)
-
-    def __init__(self, what: str) -> None:
-        self.what = what
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if error is not None and not isinstance(error, SymtopError) and not is_of_user(error):
-            raise SymtopError(f"{self.what} failed: {words_of(error)}") from error
+    try:
+        yield
+    except BaseException as error:
+        if isinstance(error, SymtopError) or is_of_user(error):
+            raise
+        raise SymtopError(f"{what} failed: {words_of(error)}") from error

@@ -18,7 +18,7 @@ VERDICTS = ("confirmed", "refuted", "measured", "undecided", "inapplicable")
 LONGEST = 240  # characters of somebody else's error message
 
 
-def spoken(claim: str) -> str:
+def claim_name(claim: str) -> str:
     """The name of a claim in a sentence or a heading."""
     return claim if claim.startswith("p_") else claim.replace("_", " ")
 
@@ -59,7 +59,7 @@ class Finding(NamedTuple):
     def sentence(self, name: str) -> str:
         """The verdict in words."""
         claimed = f"claims {self.declared}" if self.declared else "claims nothing"
-        return f"{name}, {spoken(self.claim)}: {claimed}; {self.verdict}: {self.why}."
+        return f"{name}, {claim_name(self.claim)}: {claimed}; {self.verdict}: {self.why}."
 
     def plain(self) -> dict[str, str | float | None]:
         """The finding as JSON can hold it: no number is null."""

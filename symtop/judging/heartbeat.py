@@ -35,7 +35,6 @@ class Heartbeat:
     def reset(self, *, quick: bool) -> None:
         """Something else is judged from now on."""
         self.forward_only, self.patience = False, QUICK_PATIENCE if quick else PATIENCE
-        self._numbers[INSIDE] = 0.0
 
     def call(self, h: float, seconds: float = 0.0) -> "Heartbeat":
         """The context of a call that steps by h, which may take so many seconds beyond the usual."""
@@ -49,10 +48,14 @@ class Heartbeat:
         self._numbers[INSIDE] = 1.0
         self._numbers[CALLS] += 1.0
 
+    def end(self) -> None:
+        """No call is under way."""
+        self._numbers[INSIDE] = 0.0
+
     def __exit__(
         self, _kind: type[BaseException] | None, error: BaseException | None, _trace: TracebackType | None
     ) -> None:
-        self._numbers[INSIDE] = 0.0
+        self.end()
         if isinstance(error, Exception) and not isinstance(error, SymtopError):
             raise SymtopError(f"a step of h = {self._numbers[STEP]:.3g} raises {words_of(error)}") from error
 

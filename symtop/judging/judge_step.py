@@ -27,7 +27,9 @@ class StepLedger(Ledger):
     implied: frozenset[str] = frozenset()  # claims that follow from those that were made
 
     def __str__(self) -> str:
-        return text_report.screen(self.about._asdict(), self.scene, self.findings, implied=self.implied)
+        lines = [text for one in self.findings if (text := text_report.line(one))]
+        head = text_report.heading(self.about._asdict(), self.scene)
+        return "\n".join([head, *lines, text_report.summary(self.findings, self.implied)])
 
     def dataset(self) -> xr.Dataset:
         """As of any ledger, with attributes that say what was judged."""
@@ -76,38 +78,28 @@ def judge(
         claims | {"conserves": conserves, "energy_error": energy},
     )  # fmt: skip
     made = request.claimed()  # claims that make no sense are refused before anything is loaded
+    listen = tell or (lambda _: None)
     if form is None and trajectory.is_trajectory(target):
-        others = {order, symplectic, symmetric, explicit}
-        return _states(target, request.scene, made.conserves or frozenset(), energy, tell, others)
+        if {order, symplectic, symmetric, explicit} != {None}:
+            raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
+        about = About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory", "", "", 0.0)
+        shown = trajectory.findings(target, request.scene, made.conserves or frozenset(), energy)
+        listen(about)
+        for one in shown:
+            listen(one)
+        return StepLedger(about.name, request.scene.name, tuple(shown), {}, about)
     findings: list[Finding] = []
     traces: dict[str, Any] = {}
-    about = None
     for event in sandbox.run(request):
         if isinstance(event, About):
             about = event
-        else:
-            findings += event.findings
-            traces |= event.traces
-        for one in [event] if isinstance(event, About) else event.findings:
-            if tell is not None:
-                tell(one)
-    if about is None:
+            listen(about)
+            continue
+        for one in event.findings:
+            listen(one)
+        findings += event.findings
+        traces |= event.traces
+    if not findings:
         raise SymtopError("it cannot be judged: its process ended before it was open")
     implied = {"time"} | ({"energy"} if energy is None and "energy" not in (conserves or ()) else set())
     return StepLedger(about.name, request.scene.name, tuple(findings), traces, about, frozenset(implied))
-
-
-def _states(
-    target: Any, scene: Scene, conserves: Collection[str], energy: str | None, tell: Listener | None, others: set[Any]
-) -> StepLedger:
-    """The findings on a trajectory."""
-    if others != {None}:
-        raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
-    name = Path(target).stem if isinstance(target, (str, Path)) else "trajectory"
-    about = About(name, "", "", 0.0)
-    shown = trajectory.findings(target, scene, conserves, energy)
-    if tell is not None:
-        tell(about)
-        for one in shown:
-            tell(one)
-    return StepLedger(name, scene.name, tuple(shown), {}, about)

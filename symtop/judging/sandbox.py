@@ -28,7 +28,8 @@ from symtop.judging.heartbeat import heartbeat
 THREADED = "jax"  # hangs in a process that was forked after its import
 LOOK = 0.05  # seconds between two looks
 OPENING = 60.0  # seconds for loading a file and its imports
-VERDICT, QUICK_VERDICT = (45.0, 120.0, 15.0), (12.0, 40.0, 6.0)  # seconds for the claims of one stage, see `_limit`
+# seconds for the claims of one stage: at most, for all stages together, and at least however many were spent
+VERDICT, QUICK_VERDICT = (45.0, 120.0, 15.0), (12.0, 40.0, 6.0)
 WORDS = 160  # characters of what a process says before it ends
 
 
@@ -65,16 +66,15 @@ def run(request: Request) -> Iterator[About | Results]:
     opened, began = False, time.monotonic()
     while todo:
         failure = None
-        with _Process(request, todo, began) as process:
-            for event in process.events():
-                if isinstance(event, _Failure):
-                    failure = event
-                elif isinstance(event, Results):
-                    todo.pop(0)
-                    yield event
-                elif not opened:
-                    opened = True
-                    yield event
+        for event in _isolated(request, todo, began):
+            if isinstance(event, _Failure):
+                failure = event
+            elif isinstance(event, Results):
+                todo.pop(0)
+                yield event
+            elif not opened:
+                opened = True
+                yield event
         if failure is None:
             return
         if not opened:
@@ -101,89 +101,81 @@ def _work(request: Request, todo: list[Stage]) -> Iterator[About | Results]:
         yield Results(measure(stage, subject), subject.traces)
 
 
-def _limit(spent: float, *, quick: bool) -> float:
-    """Seconds for the next stage: as many as one may take, fewer as all of them come near their sum, never too few."""
-    most, together, least = QUICK_VERDICT if quick else VERDICT
-    return max(least, min(most, together - spent))
-
-
-class _Process(contextlib.AbstractContextManager["_Process"]):
-    """A forked process that works through stages, and its end of the pipe."""
-
-    def __init__(self, request: Request, todo: list[Stage], first: float) -> None:
-        self.request, self.todo, self.first = request, todo, first  # first: when the judging began
-        self.output = tempfile.TemporaryFile()  # noqa: SIM115  (closed in __exit__)
-        context: Any = multiprocessing.get_context("fork")
-        self.ours, theirs = context.Pipe()
-        self.process = context.Process(target=self._child, args=(theirs,), daemon=True)
+def _isolated(request: Request, todo: list[Stage], first: float) -> Iterator[About | Results | _Failure]:
+    """The stages in a forked process, and at last why it ended if not well; `first` is when the judging began."""
+    context: Any = multiprocessing.get_context("fork")
+    ours, theirs = context.Pipe()
+    with tempfile.TemporaryFile() as output, ours:
+        process = context.Process(target=_child, args=(request, list(todo), theirs, output), daemon=True)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # newer versions of Python warn of threads; the child uses none of theirs
-            self.process.start()
+            heartbeat.end()
+            process.start()
         theirs.close()
-
-    def _child(self, pipe: Any) -> None:
-        os.setsid()  # what it starts is ended with it
-        for stream in (1, 2):
-            os.dup2(self.output.fileno(), stream)
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        faulthandler.disable()  # a crash is told by us
         try:
-            for event in _work(self.request, list(self.todo)):
-                pipe.send(event)
-        except SymtopError as error:
-            pipe.send(error)
-        except BaseException as error:  # noqa: BLE001  (somebody else's code: what it raised is told)
-            pipe.send(_Failure(words_of(error)))
-        pipe.send(None)
+            yield from _events(process, ours, output, first, quick=request.quick)
+        finally:
+            if process.is_alive():
+                with contextlib.suppress(OSError):
+                    os.killpg(process.pid, signal.SIGKILL)
+                process.kill()
+            process.join()
 
-    def events(self) -> Iterator[About | Results | _Failure]:
-        """What the process tells, and at last why it ended if it did not end well."""
-        limit, began = OPENING, time.monotonic()
-        calls, since = heartbeat.look().calls, began
-        while True:
-            if self.ours.poll(LOOK):
-                try:
-                    event = self.ours.recv()
-                except EOFError:
-                    yield _Failure(self._death())
-                    return
-                if event is None:
-                    return
-                if isinstance(event, SymtopError):
-                    raise event
+
+def _child(request: Request, todo: list[Stage], pipe: Any, output: Any) -> None:
+    os.setsid()  # what it starts is ended with it
+    for stream in (1, 2):
+        os.dup2(output.fileno(), stream)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    faulthandler.disable()  # a crash is reported by the one that waits
+    try:
+        for event in _work(request, todo):
+            pipe.send(event)
+    except SymtopError as error:
+        pipe.send(error)
+    except BaseException as error:  # noqa: BLE001  (somebody else's code)
+        pipe.send(_Failure(words_of(error)))
+    pipe.send(None)
+
+
+def _events(process: Any, pipe: Any, output: Any, first: float, *, quick: bool) -> Iterator[About | Results | _Failure]:
+    """What the process sends, until it ends, hangs in a call or takes too long for a stage."""
+    limit, began = OPENING, time.monotonic()
+    calls, since = heartbeat.look().calls, began
+    while True:
+        if pipe.poll(LOOK):
+            try:
+                event = pipe.recv()
+            except EOFError:
+                event = _Failure(_death(process, output))
+            if isinstance(event, SymtopError):
+                raise event
+            if event is not None:
                 yield event
-                if isinstance(event, _Failure):
-                    return
-                began = time.monotonic()
-                limit = _limit(began - self.first, quick=self.request.quick)
-                continue
-            beat, now = heartbeat.look(), time.monotonic()
-            if beat.calls != calls or not beat.inside:
-                calls, since = beat.calls, now
-            if now - since > beat.allowed:
-                yield _Failure(
-                    f"a step of h = {beat.step:.3g} had not returned after {now - since:.0f} s", beat.step < 0
-                )
+            if event is None or isinstance(event, _Failure):
                 return
-            if now - began > limit:
-                yield _Failure(f"it was not judged within {limit:.0f} s")
-                return
+            began = time.monotonic()
+            most, together, least = QUICK_VERDICT if quick else VERDICT
+            limit = max(least, min(most, together - (began - first)))
+            continue
+        beat, now = heartbeat.look(), time.monotonic()
+        if beat.calls != calls or not beat.inside:
+            calls, since = beat.calls, now
+        if now - since > beat.allowed:
+            why = f"a step of h = {beat.step:.3g} had not returned after {now - since:.0f} s"
+            yield _Failure(why, beat.step < 0)
+            return
+        if now - began > limit:
+            yield _Failure(f"it was not judged within {limit:.0f} s")
+            return
 
-    def _death(self) -> str:
-        self.process.join(2.0)
-        code, beat = self.process.exitcode, heartbeat.look()
-        if code is not None and code < 0:
-            during = f" in a step of h = {beat.step:.3g}" if beat.inside else ""
-            return f"its process was ended by {signal.Signals(-code).name}{during}"
-        self.output.seek(0)
-        words = " ".join(self.output.read()[-4 * WORDS :].decode(errors="replace").split())[-WORDS:]
-        return f"its process ended with code {code}{': ' if words else ''}{words}"
 
-    def __exit__(self, *_: object) -> None:
-        if self.process.is_alive():
-            with contextlib.suppress(OSError):
-                os.killpg(self.process.pid, signal.SIGKILL)
-            self.process.kill()
-        self.process.join()
-        self.ours.close()
-        self.output.close()
+def _death(process: Any, output: Any) -> str:
+    process.join(2.0)
+    code, beat = process.exitcode, heartbeat.look()
+    if code is not None and code < 0:
+        during = f" in a step of h = {beat.step:.3g}" if beat.inside else ""
+        return f"its process was ended by {signal.Signals(-code).name}{during}"
+    output.seek(0)
+    words = " ".join(output.read()[-4 * WORDS :].decode(errors="replace").split())[-WORDS:]
+    return f"its process ended with code {code}{': ' if words else ''}{words}"

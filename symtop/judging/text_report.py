@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from symtop.judging.findings import Finding, spoken
+from symtop.judging.findings import NOTHING, Finding, Measured, claim_name
 
 COLUMNS = {"claim": 13, "claimed": 12, "measured": 24, "verdict": 12}
 WIDTH = 100
@@ -28,80 +28,60 @@ def line(finding: Finding, width: int = WIDTH) -> str:
     """A finding in one line, and its reason below where it is no plain number; empty if nobody asked what cannot be."""
     if finding.verdict == "inapplicable" and not finding.declared:
         return ""
-    cells = (spoken(finding.claim), finding.declared or "-", str(finding.measured) or "-", finding.verdict)
-    columns = "".join(_cut(cell, size) for cell, size in zip(cells, COLUMNS.values(), strict=True))
-    shown = columns + _number(finding)
-    if finding.verdict in ("confirmed", "measured") and ";" not in (finding.why if finding.claim == "calls" else ""):
-        return shown.rstrip()
-    return (
-        shown.rstrip() + "\n" + textwrap.fill(f"{finding.why}.", width, initial_indent="    ", subsequent_indent="    ")
+    cells = (claim_name(finding.claim), finding.declared or "-", str(finding.measured) or "-", finding.verdict)
+    shown = "".join(
+        f"{cell if len(cell) < size else cell[: size - 2] + '~'}".ljust(size)
+        for cell, size in zip(cells, COLUMNS.values(), strict=True)
     )
+    if math.isfinite(finding.value):
+        shown += f"{finding.value:.3g}"
+        shown += f" (resolved: {finding.resolution:.1g})" if math.isfinite(finding.resolution) else ""
+    if finding.verdict in ("confirmed", "measured") and not (finding.claim == "calls" and ";" in finding.why):
+        return shown.rstrip()
+    return shown.rstrip() + "\n" + textwrap.indent(textwrap.fill(f"{finding.why}.", width - 4), "    ")
 
 
-def _cut(text: str, size: int) -> str:
-    return f"{text if len(text) < size else text[: size - 2] + '~'}".ljust(size)
-
-
-def _number(finding: Finding) -> str:
-    if not math.isfinite(finding.value):
-        return ""
-    number = f"{finding.value:.3g}"
-    return f"{number} (resolved: {finding.resolution:.1g})" if math.isfinite(finding.resolution) else number
-
-
-def described(findings: Sequence[Finding]) -> str:
+def description(findings: Sequence[Finding]) -> str:
     """What the method is, whatever is claimed of it: "order 2, symplectic, reversible, keeps p_phi; not p_psi"."""
-    by_claim = {one.claim: one for one in findings}
-    words = [_order(by_claim)]
+    measured = {one.claim: one.measured for one in findings}
+    errors = {one.claim.removesuffix("_error"): one.value for one in findings if one.claim.endswith("_error")}
+    words = [f"{name} within {value:.1e} rad of the truth" for name, value in errors.items()]  # of a trajectory
+    words += [_order(measured["order"])] if measured.get("order") else []
     for claim, yes in (("symplectic", "symplectic"), ("symmetric", "reversible")):
-        answer = by_claim[claim].measured.kind if claim in by_claim else ""
+        answer = measured.get(claim, NOTHING).kind
         words += [yes] if answer == "yes" else [f"not {yes}"] if answer == "no" else []
-    kinds = {name: by_claim[name].measured.kind for name in KEPT if name in by_claim}
-    kept = [KEPT[name] for name, kind in kinds.items() if kind == "kept"]
-    lost = [KEPT[name] for name, kind in kinds.items() if kind in ("drift", "growing", "random walk")]
-    bounded = [KEPT[name] for name, kind in kinds.items() if kind == "bounded"]
-    words += [f"keeps {_listed(kept)}"] if kept else []
-    words += [f"{_listed(bounded)} bounded"] if bounded else []
-    wrong = {name.removesuffix("_error"): one for name, one in by_claim.items() if name.endswith("_error")}
-    if wrong:  # a trajectory
-        words = [f"{name} within {one.value:.1e} rad of the truth" for name, one in wrong.items()] + words
-    sentence = ", ".join(word for word in words if word)
-    return (sentence or "nothing could be measured") + (f"; not {_listed(lost)}" if lost else "")
+
+    def of_kind(*kinds: str) -> str:
+        return _listed([name for claim, name in KEPT.items() if measured.get(claim, NOTHING).kind in kinds])
+
+    kept, bounded, lost = of_kind("kept"), of_kind("bounded"), of_kind("drift", "growing", "random walk")
+    words += [f"keeps {kept}"] if kept else []
+    words += [f"{bounded} bounded"] if bounded else []
+    return (", ".join(words) or "nothing could be measured") + (f"; not {lost}" if lost else "")
 
 
-def _order(by_claim: Mapping[str, Finding]) -> str:
-    one = by_claim.get("order")
-    if one is None or not one.measured:
-        return ""
-    if one.measured.kind == "wrong limit":
+def _order(measured: Measured) -> str:
+    if measured.kind == "wrong limit":
         return "converges to another motion"
-    number = one.measured.number
+    number = measured.number
     return f"order {round(number)}" if abs(number - round(number)) < 0.3 else f"order {number:.1f}"
 
 
 def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    return " and ".join([", ".join(names[:-1]), *names[-1:]] if len(names) > 1 else names)
 
 
-def ending(findings: Sequence[Finding], implied: Collection[str] = ()) -> str:
+def summary(findings: Sequence[Finding], implied: Collection[str] = ()) -> str:
     """What the method is, and how many claims hold: those that were made, and those that follow from them."""
     own = _counted([one for one in findings if one.declared and one.claim not in implied])
     theirs = _counted([one for one in findings if one.declared and one.claim in implied])
     claims = f"Claims: {own}" if own else "No claims were made"
-    follow = f". Implied by them ({_listed([spoken(name) for name in sorted(implied)])}): {theirs}" if theirs else ""
-    return f"\nIt is: {described(findings)}.\n{claims}{follow}."
+    follow = (
+        f". Implied by them ({_listed([claim_name(name) for name in sorted(implied)])}): {theirs}" if theirs else ""
+    )
+    return f"\nIt is: {description(findings)}.\n{claims}{follow}."
 
 
 def _counted(findings: Sequence[Finding]) -> str:
     counts = Counter(one.verdict for one in findings)
-    return ", ".join(
-        f"{counts[verdict]} {verdict}" for verdict in ("confirmed", "refuted", "undecided") if counts[verdict]
-    )
-
-
-def screen(
-    about: Mapping[str, Any], scene: str, findings: Sequence[Finding], width: int = WIDTH, implied: Collection[str] = ()
-) -> str:
-    """All of it."""
-    lines = [text for one in findings if (text := line(one, width))]
-    return "\n".join([heading(about, scene), *lines, ending(findings, implied)])
+    return ", ".join(f"{counts[word]} {word}" for word in ("confirmed", "refuted", "undecided") if counts[word])

@@ -28,8 +28,7 @@ from symtop.core.errors import SymtopError, at_home
 from symtop.judging.claims.long_run import KEPT, Constant
 from symtop.judging.findings import NOTHING, Finding, Measured, undecided
 from symtop.measure.conservation import CONSTANTS, constant_of
-from symtop.measure.errors import errors
-from symtop.measure.trajectory import completed, refuse_other_scene, sampled
+from symtop.measure.errors import completed, errors, refuse_other_scene, sampled
 from symtop.model.charts import space_energy
 from symtop.model.scenes import Scene
 
@@ -50,15 +49,8 @@ def is_trajectory(target: Any) -> bool:
 def read(target: Any) -> dict[str, Any]:
     """Columns by name, of a text file, a Dataset or a mapping; SymtopError for anything else."""
     if not isinstance(target, (str, Path)):
-        columns = {str(name): np.asarray(target[name]) for name in target if str(name) in (*VECTORS, *SCALARS)}
-        return columns | {"time": np.asarray(target["time"])} if "time" in target else columns
-    if str(target).lower().endswith(".nc"):
-        return read(netcdf.read(at_home(target)))
-    return _text(at_home(target))
-
-
-def _text(path: Path) -> dict[str, Any]:
-    """The columns of a text file."""
+        return {name: np.asarray(target[name]) for name in (*VECTORS, *SCALARS) if name in target}
+    path = at_home(target)
     try:
         head, *lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError, ValueError) as error:
@@ -109,22 +101,18 @@ def findings(target: Any, scene: Scene, conserves: Collection[str] = (), energy:
         if values is not None:
             shown.append(_constant(name, declared, time, np.asarray(values, float), scene))
         elif declared:
-            shown.append(undecided(name, declared, f"the trajectory shows no {name}{_remedy(name)}"))
+            remedy = f"; it would with {name}, or with the angular momentum beside the axis"
+            remedy = remedy if name in CONSTANTS else ", as its axes are scaled to length one"
+            shown.append(undecided(name, declared, f"the trajectory shows no {name}{remedy}"))
     return shown
-
-
-def _remedy(name: str) -> str:
-    """What would show a constant, or why nothing can."""
-    if name in CONSTANTS:
-        return f"; it would with {name}, or with the angular momentum beside the axis"
-    return ", as its axes are scaled to length one" if name == "axis_length" else ""
 
 
 def _from_states(scene: Scene, given: Mapping[str, Any], momentum: Any) -> dict[str, np.ndarray]:
     """Energy and momenta by the angular momentum and the axis; nothing where one of them is not there."""
     if momentum is None:
         return {}
-    whole = completed(xr.Dataset({name: (_dimensions(name), given[name]) for name in given if name != "time"}))
+    dims = {"axis": ("time", "component"), "quaternion": ("time", "part")}
+    whole = completed(xr.Dataset({name: (dims.get(name, "time"), given[name]) for name in given if name != "time"}))
     if "axis" not in whole:
         return {}
     axis = whole["axis"].values
@@ -135,20 +123,16 @@ def _from_states(scene: Scene, given: Mapping[str, Any], momentum: Any) -> dict[
     return {"energy": space_energy(scene.top, axis, L, p_psi), "p_phi": L[:, 2], "p_psi": p_psi}
 
 
-def _dimensions(name: str) -> tuple[str, ...]:
-    return {"axis": ("time", "component"), "quaternion": ("time", "part")}.get(name, ("time",))
-
-
 def _error(name: str, time: np.ndarray, apart: xr.Dataset) -> Finding:
     """The largest error of a quantity and its law of growth."""
     values = apart[name].values
-    seen = constant_of(time, values) if time.size >= FEWEST else None
+    growth = constant_of(time, values) if time.size >= FEWEST else None
     largest = float(np.nanmax(values)) if np.isfinite(values).any() else math.nan
     bound = float(np.nanmax(apart[f"{name}_bound"].values))
     why = f"largest error {largest:.1e} rad in {time.size} samples up to t = {time[-1]:.4g}"
-    if seen is not None and math.isfinite(seen.exponent):
-        why += f", growing as t^{seen.exponent:.2f} +- {seen.exponent_interval:.2f} ({seen.law})"
-    law = seen.law if seen is not None and seen.law not in ("undecided", "not judged") else ""
+    if growth is not None and math.isfinite(growth.exponent):
+        why += f", growing as t^{growth.exponent:.2f} +- {growth.exponent_interval:.2f} ({growth.law})"
+    law = growth.law if growth is not None and growth.law not in ("undecided", "not judged") else ""
     measured = Measured(law, largest, unit="rad", text=f"{largest:.0e} rad{law and ', '}{law}")
     return Finding(f"{name}_error", "", measured, "measured", why, largest, bound)
 
@@ -158,19 +142,19 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     scale, grain = (scene.energy_scale, scene.energy_grain) if name == "energy" else (scene.momentum_scale, 1.0)
     true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)
     change = (values - values[0]) / scale
-    seen = Constant(constant_of(time, change), math.nan, KEPT * grain, grain)
-    largest, off = seen.changed.largest, abs(values[0] - true) / scale
+    constant = Constant(constant_of(time, change), math.nan, KEPT * grain, grain)
+    largest, off = constant.changed.largest, abs(values[0] - true) / scale
     why = f"largest relative change {largest:.1e} in {time.size} samples; it begins {off:.1e} from the scene's"
-    kind = seen.kind if time.size >= FEWEST else "kept" if largest <= seen.floor else "unknown"
+    kind = constant.kind if time.size >= FEWEST else "kept" if largest <= constant.floor else "unknown"
     measured, verdict = Measured(kind, largest), "undecided"
     if kind == "unknown":
         measured, why = NOTHING, f"{why}; no law of growth to judge it by"
     else:
         if kind != "kept":
-            why += f", growth exponent {seen.changed.exponent:.2f} +- {seen.changed.exponent_interval:.2f}"
-        holds = {"kept": kind == "kept" or largest <= seen.floor, "bounded": not seen.grows}.get(declared)
-        if declared == "bounded" and seen.grows is None:
+            why += f", growth exponent {constant.changed.exponent:.2f} +- {constant.changed.exponent_interval:.2f}"
+        holds = {"kept": kind == "kept" or largest <= constant.floor, "bounded": not constant.grows}.get(declared)
+        if declared == "bounded" and constant.grows is None:
             measured, why = NOTHING, f"{why}, which leaves open whether it grows"
         else:
             verdict = "measured" if holds is None else "confirmed" if holds else "refuted"
-    return Finding(name, declared, measured, verdict, why, largest, seen.floor)
+    return Finding(name, declared, measured, verdict, why, largest, constant.floor)

@@ -27,7 +27,7 @@ from symtop.measure.statistics import columns_fitted
 LAWS = {0.0: "bounded", 0.5: "random walk", 1.0: "linear", 1.5: "t^3/2", 2.0: "quadratic"}
 DRAWS, SEED = 2000, 1937  # of the bootstrap
 BLOCKS = 50
-ROUNDED = 3e-13  # relative: the largest change that a million steps of rounding explain where sums are compensated
+RUN_ROUNDING = 3e-13  # relative: the largest change that a million steps of rounding explain where sums are compensated
 WALK = 100.0  # times what rounding explains: a larger growth as t^1/2 is no walk of rounding
 
 
@@ -72,21 +72,21 @@ def behaviour(size: float, slope: float, interval: float, grain: float = 1.0, ro
     """What became of a constant whose largest change is `size` and grows as t^slope (95 %: +- interval).
 
     The one rule of every study. `grain` is the rounding of the constant in units of the machine's, 1 or more (see
-    `Scene.energy_grain`); `rounding` is what rounding explains beyond ``ROUNDED * grain``, where sums may be plain.
+    `Scene.energy_grain`); `rounding` is what rounding explains beyond ``RUN_ROUNDING * grain``, where sums are plain.
 
-        kept          size <= ROUNDED grain, whatever the exponent; or size <= rounding, and not bounded
+        kept          size <= RUN_ROUNDING grain, whatever the exponent; or size <= rounding, and not bounded
         bounded       the exponent is nearest to 0, and its interval excludes 1/2: an error of the step, however small
         random walk   nearest to 1/2, the interval excludes 0 and 1, and size <= `WALK` times rounding
         drift         nearest to 1 or larger, and the interval excludes 1/2
         growing       anything else: the interval does not tell two laws apart, a growth as t^1/2 that is too large for
                       rounding, or no exponent (NaN)
     """
-    if size <= ROUNDED * grain:
+    if size <= RUN_ROUNDING * grain:
         return "kept"
     low, high = slope - interval, slope + interval
     if slope < 0.25 and high < 0.5:
         return "bounded"
-    rounding = max(rounding, ROUNDED * grain)
+    rounding = max(rounding, RUN_ROUNDING * grain)
     if size <= rounding:
         return "kept"
     if slope >= 0.75 and low > 0.5:

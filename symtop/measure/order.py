@@ -165,7 +165,7 @@ def _series(h: Array, e: Array, b: Array, power: int) -> _Series | None:
     return _widest(h.tobytes(), e.tobytes(), b.tobytes(), power)
 
 
-@functools.lru_cache(maxsize=4096)  # 4 ms each; the words, tables and figures of a study ask for the same 1,600
+@functools.lru_cache(maxsize=4096)  # the words, tables and figures of a study ask for the same 1,600
 def _widest(steps: bytes, errors: bytes, bounds: bytes, power: int) -> _Series | None:
     """`_series` of the bytes of the points."""
     h, e, b = (np.frombuffer(values) for values in (steps, errors, bounds))

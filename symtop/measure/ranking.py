@@ -17,8 +17,8 @@ import numpy as np
 import xarray as xr
 
 from symtop.core.memoize import of_one_dataset
+from symtop.measure.settings import TARGETS
 from symtop.measure.timing import MISSED, met_again
-from symtop.measure.work import TARGETS
 
 MARGIN = 1.1  # the least: the same code in another process, elsewhere in memory, differs by some per cent
 NEEDS = ("control", "nutation_width", "outcome", "implementation", "seconds", "seconds_samples", "seconds_forecast")

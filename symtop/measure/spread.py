@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 QUANTITIES = {"axis": "angle between axes (rad)", "energy": "energy error / (E0 - min V)"}
 LEVELS = (0.01, 0.1, 0.5, 0.9, 0.99)
-ROUNDED = 1e-9  # of a horizon: a sample that is later than a place by less than this is there
+SAME_SHARE = 1e-9  # of a horizon: a sample that is later than a place by less than this is there
 BLOCK = 1 << 20  # samples that are compared at a time
 
 
@@ -73,11 +73,11 @@ def at_places(data: xr.Dataset, errors: Array) -> tuple[Array, Array]:
     if (counts == errors.shape[1]).all():
         return shares.mean(axis=0), errors
     places = np.linspace(0.0, 1.0, int(counts.max()))
-    places = places[places + ROUNDED >= shares[:, 1].max()] + ROUNDED  # at a start no method is wrong
+    places = places[places + SAME_SHARE >= shares[:, 1].max()] + SAME_SHARE  # at a start no method is wrong
     latest = np.empty((len(errors), places.size))
     for i, count in enumerate(counts):
         latest[i] = errors[i, np.searchsorted(shares[i, :count], places, side="right") - 1]
-    return places - ROUNDED, latest
+    return places - SAME_SHARE, latest
 
 
 def spread(errors: Array, levels: tuple[float, ...] = LEVELS) -> Array:

@@ -247,12 +247,13 @@ def _differences(step: StepMap, z: Array, middle: Array, width: float) -> Array:
             columns.append(np.zeros_like(middle))
             continue
         aside = width * np.eye(z.size)[k]
-        ahead, behind = (_aligned(step.chart, step.image(z + sign * aside), middle) for sign in (1.0, -1.0))
+        ahead, behind = (aligned(step.chart, step.image(z + sign * aside), middle) for sign in (1.0, -1.0))
         columns.append((ahead - behind) / (2.0 * width))
     return np.stack(columns, axis=1)
 
 
-def _aligned(chart: str, y: Array, middle: Array) -> Array:
+def aligned(chart: str, y: Array, middle: Array) -> Array:
+    """Y with the sign of q that is nearer to that of `middle`: q and -q are one attitude."""
     if chart == "attitude" and float(y[:4] @ middle[:4]) < 0.0:
         return np.concatenate([-y[:4], y[4:]])
     return y

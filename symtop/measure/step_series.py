@@ -22,7 +22,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from symtop.core.errors import SymtopError
-from symtop.measure.step_map import StepMap
+from symtop.measure.step_map import StepMap, aligned
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles
@@ -35,7 +35,7 @@ LEAST_POWER = 6  # of the powers of h that are shown
 FURTHER = 2  # degrees more: by what they change a term is in doubt, as by the scatter
 NOISE = 1.25  # times the least: the polynomial of least degree whose residual is as small as this is taken
 CLEAN = 3e-14  # of a residual: nothing is gained with a smaller H
-ROUNDING = 2e-16  # of a sample
+SAMPLE_ROUNDING = 2e-16  # of a sample
 SURE = 10.0  # times its noise: a term is there
 AGREES = 1e-10  # a smaller defect is none: difference quotients in a step leave 1e-11, coefficients 1e-12
 SHARP = 1e-3  # of a term of the motion: a noise beyond it says nothing about the term
@@ -77,32 +77,16 @@ def step_series(step: StepMap, start: Angles, period: float) -> Series:
 
     Raises SymtopError if no step succeeds.
     """
-    motion = _motion(step, start)
-    image = _images(step, start)
-    return compared(image, motion, period)
-
-
-def _images(step: StepMap, start: Angles) -> Callable[[float], Array]:
-    z, before = step.point(start), step.at(start)
-    return lambda h: _near(step, step.image(z, h), before)
-
-
-def _motion(step: StepMap, start: Angles) -> Callable[[float], Array]:
-    exact, before = motion_from(step, start), step.at(start)
-    return lambda h: _near(step, exact(h), before)
+    exact, z, before = motion_from(step, start), step.point(start), step.at(start)
+    return compared(
+        lambda h: aligned(step.chart, step.image(z, h), before), lambda h: aligned(step.chart, exact(h), before), period
+    )
 
 
 def motion_from(step: StepMap, start: Angles) -> Callable[[float], Array]:
     """Y of the true motion from a start, as a function of time."""
     exact = closed_form(Scene("start", step.top, start, 1.0))
     return lambda h: step.at(Angles(*(float(value[0]) for value in exact(np.array([h])))))
-
-
-def _near(step: StepMap, y: Array, guide: Array) -> Array:
-    """q and -q are one attitude."""
-    if step.chart == "attitude" and float(y[:4] @ guide[:4]) < 0.0:
-        return np.concatenate([-y[:4], y[4:]])
-    return y
 
 
 def compared(image: Callable[[float], Array], motion: Callable[[float], Array], period: float) -> Series:
@@ -171,9 +155,9 @@ def _degree(nodes: Array, values: Array) -> tuple[float, int]:
     for degree in DEGREES:
         rest = values - chebyshev.chebval(nodes, chebyshev.chebfit(nodes, values, degree)).T
         rows.append(float(np.max(np.sqrt(np.sum(rest * rest, axis=0) / (nodes.size - degree - 1)))))
-    least = max(min(rows), ROUNDING)
+    least = max(min(rows), SAMPLE_ROUNDING)
     place = next(k for k, row in enumerate(rows) if row <= NOISE * least)
-    return max(rows[place], ROUNDING), DEGREES[place]
+    return max(rows[place], SAMPLE_ROUNDING), DEGREES[place]
 
 
 def _monomials(coefficients: Any, *, backward: bool) -> Array:
@@ -182,7 +166,7 @@ def _monomials(coefficients: Any, *, backward: bool) -> Array:
     return powers
 
 
-@functools.cache  # 9 ms, of a few degrees; a claim needs six of them
+@functools.cache
 def _to_powers(degree: int, *, backward: bool) -> Array:
     """The matrix from Chebyshev coefficients to powers of h/H."""
     columns = []

@@ -125,7 +125,7 @@ class Scene:
         }
 
 
-_nutation_period = functools.lru_cache(maxsize=256)(SymmetricTop.nutation_period)  # 20 us: two bisections
+_nutation_period = functools.lru_cache(maxsize=256)(SymmetricTop.nutation_period)
 
 
 @functools.lru_cache(maxsize=256)

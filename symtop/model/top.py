@@ -42,7 +42,6 @@ from symtop.core.errors import SymtopError, finite, not_negative, positive, row
 from symtop.core.jit_functions import inlined, shared
 from symtop.core.numbers import newton_between
 
-Rates = tuple[float, float, float, float, float, float]  # theta, phi, psi and their rates
 UNIT = 1e-6  # a quaternion or an axis may differ from unit length by this
 
 
@@ -72,29 +71,7 @@ def body_frame(quaternion: Sequence[float], space: Sequence[float]) -> list[floa
     return [a + 2.0 * (y * s - z * q), b + 2.0 * (z * p - x * s), c + 2.0 * (x * q - y * p)]
 
 
-def from_body_rates(quaternion: Sequence[float], rates: Sequence[float]) -> Rates:
-    """Euler angles and their rates of a unit quaternion (w, x, y, z) and an angular velocity in the body frame."""
-    w, x, y, z = quaternion
-    theta = 2.0 * math.atan2(math.hypot(x, y), math.hypot(w, z))
-    total, difference = 2.0 * math.atan2(z, w), 2.0 * math.atan2(y, x)  # phi + psi and phi - psi
-    return _euler_angles(min(theta, math.pi), total, difference, rates)
-
-
-def from_axis_and_momentum(axis: Sequence[float], momentum: Sequence[float], I1: float, I3: float) -> Rates:
-    """Euler angles and their rates of a unit axis and an angular momentum in the space frame, with psi = 0.
-
-    Two axes of the body are e1 = (cos phi, sin phi, 0) and e2 = e x e1 where psi = 0.
-    """
-    ex, ey, ez = axis
-    theta, phi = math.atan2(math.hypot(ex, ey), ez), math.atan2(ex, -ey) if ex or ey else 0.0
-    c, s = math.cos(phi), math.sin(phi)
-    across = momentum[0] * c + momentum[1] * s
-    up = (ex * s - ey * c) * momentum[2] - ez * (momentum[0] * s - momentum[1] * c)  # L . (e x e1)
-    along = math.fsum(e * part for e, part in zip(axis, momentum, strict=True))
-    return _euler_angles(theta, phi, phi, (across / I1, up / I1, along / I3))
-
-
-def _euler_angles(theta: float, total: float, difference: float, rates: Sequence[float]) -> Rates:
+def _euler_angles(theta: float, total: float, difference: float, rates: Sequence[float]) -> tuple[float, ...]:
     """Angles and rates from theta, phi + psi, phi - psi and the body's angular velocity."""
     w1, w2, w3 = rates
     sine = math.sin(theta)
@@ -202,7 +179,10 @@ class Angles:
         q, name = unit("quaternion", quaternion, 4), "omega_body" if omega_space is None else "omega_space"
         given = omega_body if omega_space is None else omega_space
         omega = vector(name, (0.0, 0.0, 0.0) if given is None else given, 3)
-        return cls(*from_body_rates(q, omega if omega_space is None else body_frame(q, omega)))
+        w, x, y, z = q
+        theta = min(2.0 * math.atan2(math.hypot(x, y), math.hypot(w, z)), math.pi)
+        total, difference = 2.0 * math.atan2(z, w), 2.0 * math.atan2(y, x)  # phi + psi and phi - psi
+        return cls(*_euler_angles(theta, total, difference, omega if omega_space is None else body_frame(q, omega)))
 
     @classmethod
     def from_axis(cls, top: "SymmetricTop", axis: Sequence[float], angular_momentum: Sequence[float]) -> "Angles":
@@ -211,7 +191,13 @@ class Angles:
         They leave the turn about the axis open: psi is zero, except at a pole.
         """
         e, L = unit("axis", axis, 3), vector("angular_momentum", angular_momentum, 3)
-        return cls(*from_axis_and_momentum(e, L, top.I1, top.I3))
+        ex, ey, ez = e
+        theta, phi = math.atan2(math.hypot(ex, ey), ez), math.atan2(ex, -ey) if ex or ey else 0.0
+        c, s = math.cos(phi), math.sin(phi)  # two axes of the body are e1 = (c, s, 0) and e x e1, where psi = 0
+        across = L[0] * c + L[1] * s
+        up = (ex * s - ey * c) * L[2] - ez * (L[0] * s - L[1] * c)  # L . (e x e1)
+        along = math.fsum(axis * momentum for axis, momentum in zip(e, L, strict=True))
+        return cls(*_euler_angles(theta, phi, phi, (across / top.I1, up / top.I1, along / top.I3)))
 
     @property
     def spin(self) -> float:

@@ -17,9 +17,9 @@ import numpy as np
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home
-from symtop.judging.findings import Finding, spoken
+from symtop.judging.findings import Finding, claim_name
 from symtop.judging.judge_step import StepLedger
-from symtop.judging.text_report import described
+from symtop.judging.text_report import description
 from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels
 
 LEAST = 1e-17  # what is smaller is drawn here
@@ -109,7 +109,7 @@ def card(ledger: StepLedger, path: str | Path) -> Path:
         css=(folder / "style.css").read_text(encoding="utf-8"),
         about=ledger.about,
         scene=ledger.scene,
-        described=described(ledger.findings),
+        described=description(ledger.findings),
         badge=badge(ledger),
         drawings=[_drawn(figure) for figure in figures(ledger)],
         rows=[_row(one) for one in ledger.findings if one.declared or one.verdict != "inapplicable"],
@@ -119,14 +119,14 @@ def card(ledger: StepLedger, path: str | Path) -> Path:
 
 def _row(finding: Finding) -> dict[str, str]:
     verdict = f"{SIGNS[finding.verdict]} {finding.verdict}"
-    cells = finding.plain() | {"verdict": verdict, "claim": spoken(finding.claim)}
+    cells = finding.plain() | {"verdict": verdict, "claim": claim_name(finding.claim)}
     return {name: str(value) for name, value in cells.items()}
 
 
 def badge(ledger: StepLedger) -> str:
     """The badge: what the method is, in green without a claim that is refuted, in vermillion with one."""
-    refuted = [spoken(one.claim) for one in ledger.findings if one.verdict == "refuted"]
-    words = f"refuted: {', '.join(refuted)}" if refuted else described(ledger.findings).partition(";")[0]
+    refuted = [claim_name(one.claim) for one in ledger.findings if one.verdict == "refuted"]
+    words = f"refuted: {', '.join(refuted)}" if refuted else description(ledger.findings).partition(";")[0]
     if len(words) > LONGEST:
         words = words[:LONGEST].rsplit(",", 1)[0]
     left, right = (round(len(text) * LETTER + 12) for text in ("symtop", words))

@@ -54,7 +54,7 @@ def spoken(study: Mapping[str, Any]) -> str:
 
 
 def measured(parts: Sequence[Part]) -> str:
-    """How it was measured: the same words as on the page, formulas in plain text."""
+    """How it was measured: the same words as on the page, formulas in LaTeX."""
     said = [f"### {part.title}\n\n" + "\n\n".join(map(_block, part.blocks)) for part in parts]
     return "\n\n".join(["## How it was measured", *said])
 
@@ -62,7 +62,7 @@ def measured(parts: Sequence[Part]) -> str:
 def _block(block: Block) -> str:
     if block.rows:
         return table(block.header, block.rows)
-    return block.words or f"    {block.formula}"
+    return block.words or "\n\n".join(f"$${formula}$$" for formula in block.formulas)
 
 
 def explanations(study: Mapping[str, Any], titles: Mapping[str, str]) -> list[tuple[str, str]]:

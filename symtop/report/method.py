@@ -1,6 +1,6 @@
 """How it was measured, as the report says it: the top, its equations, the scenes, the errors, and the truth.
 
-Formulas are in the plain notation of `symtop.report.mathml`: the page shows them as MathML, the Markdown as they stand.
+Formulas are LaTeX: the page shows them as MathML, the Markdown between dollar signs.
 The scenes and the bounds of the truth on them are read from the package when the report is written.
 """
 
@@ -28,10 +28,10 @@ TERMS = {  # of the answers, with what they mean
 
 
 class Block(NamedTuple):
-    """A paragraph, a formula, or a table with its title: the others are empty."""
+    """A paragraph, formulas, or a table with its title: the others are empty."""
 
     words: str = ""
-    formula: str = ""
+    formulas: Sequence[str] = ()
     title: str = ""
     header: Sequence[str] = ()
     rows: Sequence[Sequence[str]] = ()
@@ -45,6 +45,11 @@ class Part(NamedTuple):
     blocks: Sequence[Block]
 
 
+LAGRANGIAN = (
+    r"T - U = \frac{I_1}{2} (\dot\theta^2 + \dot\varphi^2 \,\sin^2\theta)"
+    r" + \frac{I_3}{2} (\dot\psi + \dot\varphi\,\cos\theta)^2 - mgl\,\cos\theta"
+)
+POTENTIAL = r"\frac{(p_\varphi - p_\psi\,\cos\theta)^2}{2 I_1 \sin^2\theta} + \frac{p_\psi^2}{2 I_3} + mgl\,\cos\theta"
 TOP = (
     Block(
         "A rigid body turns about a fixed point on its axis of symmetry. I1 and I3 are its moments of inertia about "
@@ -52,21 +57,28 @@ TOP = (
         "angles, z-x-z, are phi (precession), theta (the inclination of the axis from the upward vertical) and psi "
         "(spin). The Lagrangian, kinetic less potential energy, is"
     ),
-    Block(formula="T - U = I1/2 (theta'^2 + phi'^2 sin^2 theta) + I3/2 (psi' + phi' cos theta)^2 - mgl cos theta"),
+    Block(formulas=[LAGRANGIAN]),
     Block("It does not depend on phi and psi. Their momenta are therefore conserved:"),
-    Block(formula="p_psi = I3 (psi' + phi' cos theta),   p_phi = I1 phi' sin^2 theta + p_psi cos theta"),
-    Block("The inclination moves like a particle in an effective potential, and its oscillation is the nutation:"),
     Block(
-        formula="I1 theta'' = -dV/dtheta,   "
-        "V = (p_phi - p_psi cos theta)^2/(2 I1 sin^2 theta) + p_psi^2/(2 I3) + mgl cos theta"
+        formulas=[
+            r"p_\psi = I_3 (\dot\psi + \dot\varphi\,\cos\theta)",
+            r"p_\varphi = I_1 \dot\varphi\,\sin^2\theta + p_\psi\,\cos\theta",
+        ]
     ),
+    Block("The inclination moves like a particle in an effective potential, and its oscillation is the nutation:"),
+    Block(formulas=[r"I_1 \ddot\theta = -\frac{dV}{d\theta}", f"V = {POTENTIAL}"]),
     Block(
         "Methods [angles] integrate these angles. Methods [axis] integrate the direction e of the axis and the angular "
         "momentum L in space, with k the upward vertical:"
     ),
-    Block(formula="e' = (L x e)/I1,   L' = mgl k x e"),
+    Block(formulas=[r"\dot e = \frac{L \times e}{I_1}", r"\dot L = mgl\,k \times e"]),
     Block("Methods [attitude] integrate L and the quaternion q that turns the body into space:"),
-    Block(formula="q' = 1/2 omega q,   omega = L/I1 + (1/I3 - 1/I1) p_psi e"),
+    Block(
+        formulas=[
+            r"\dot q = \frac{1}{2} \omega q",
+            r"\omega = \frac{L}{I_1} + \left(\frac{1}{I_3} - \frac{1}{I_1}\right) p_\psi\,e",
+        ]
+    ),
 )
 ENERGY = (
     "difference of the energies over E0 - min V, the energy of the nutation: the height of the start above the steady "
@@ -147,8 +159,12 @@ def _truth(largest: float) -> list[Block]:
         f"{largest:.1e} rad, {largest / EPSILON:.0f} units of rounding. `symtop.reference` gives values and bounds at "
         "any time."
     )
-    formula = "u = u1 + (u2 - u1) sn^2(tau),   tau = tau_0 + Omega t,   Omega^2 = mgl (u3 - u1)/(2 I1)"
-    return [Block(EXACT), Block(formula=formula), Block(words)]
+    formulas = [
+        r"u = u_1 + (u_2 - u_1) \operatorname{sn}^2 \tau",
+        r"\tau = \tau_0 + \Omega t",
+        r"\Omega^2 = \frac{mgl\,(u_3 - u_1)}{2 I_1}",
+    ]
+    return [Block(EXACT), Block(formulas=formulas), Block(words)]
 
 
 def _bound(scene: Scene) -> float:

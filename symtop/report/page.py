@@ -19,7 +19,6 @@ from typing import Any
 from symtop.core.errors import SymtopError
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.report import markdown, method, tables
-from symtop.report.mathml import mathml
 from symtop.report.style import look
 from symtop.report.unchanged import PAGE, WORDS, made_of
 from symtop.runner import plugins, run as runner, store
@@ -136,6 +135,7 @@ def _named(studies: Sequence[dict[str, Any]]) -> None:
 def write(results: Path, *, embed: bool = False) -> Path:
     """Write ``report.html``, and ``report.md`` with the same words, into the results folder; returns the page."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
+    from latex2mathml.converter import convert
 
     environment = Environment(
         loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined,
@@ -162,7 +162,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
         glossary=method.glossary(markdown.spoken(first)) if first else [],
         leads=[(study, picture) for study in studies for picture in study["pictures"] if picture["lead"]],
         measured=measured,
-        mathml=mathml,
+        mathml=lambda formula: convert(formula, display="block"),
         explanations=lambda study: markdown.explanations(study, titles),
         integrators=tables.columns([method.record() for method in integrators().values()]),
         provenance=facts,

@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from symtop.core import netcdf
 from symtop.core.code_hash import digest, file_reasons, hashed
-from symtop.core.errors import SymtopError, SymtopWarning, place, positive, spare, whole
+from symtop.core.errors import SymtopError, SymtopWarning, check_replaceable, file_path, positive, whole
 from symtop.core.files import cache_root
 from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
@@ -147,7 +147,7 @@ def long_run(
     loop = solver.loop if compensated else solver.loop.plain()
     par, rule, state = solver.setup(chosen.top, chosen.start, h)
     book = _Book(checkpoint, _identity(chosen, method, h, count, compensated))
-    result = None if output is None else book.apart(place("output", output))
+    result = None if output is None else book.apart(file_path("output", output))
     at, rows = book.resumed(loop.begun(par, rule, state, h))
     ends, outcome, reached = windows(count), OK, at.k
     gauge = watch(chosen, method, h) if len(rows) < len(ends) else None
@@ -230,9 +230,9 @@ class _Book:
     def __init__(self, file: "str | Path | bool", identity: str) -> None:
         own = cache_root() / "runs" / f"{identity}.nc"
         self.own = file is True
-        if not isinstance(file, bool) and place("checkpoint", file).is_dir():
+        if not isinstance(file, bool) and file_path("checkpoint", file).is_dir():
             raise SymtopError(f"checkpoint must be a file, not the folder {str(file)!r}", "checkpoint")
-        self.file = own if file is True else None if file is False else place("checkpoint", file)
+        self.file = own if file is True else None if file is False else file_path("checkpoint", file)
         self.identity = identity
         self.saved = time.monotonic()
         self.latest: tuple[Position, list[list[float]]] | None = None
@@ -305,7 +305,7 @@ class _Book:
             raise SymtopError(
                 f"output and checkpoint must be two files, not both {str(output)!r}", "output", "checkpoint"
             )
-        spare(output)
+        check_replaceable(output)
         return output
 
     def write(self, data: xr.Dataset, output: Path) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.core import netcdf
-from symtop.core.errors import SymtopError, SymtopWarning, one_of, positive, shown, truth, whole
+from symtop.core.errors import SymtopError, SymtopWarning, boolean, one_of, positive, shown, whole
 from symtop.core.numbers import GOLDEN
 from symtop.core.over_time import over_time
 from symtop.methods.framework.calling import solve
@@ -171,7 +171,7 @@ def simulate(
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
     chosen, method = _scene(scene), _integrator(integrator)
-    guard = guard if callable(guard) else truth("guard", guard)
+    guard = guard if callable(guard) else boolean("guard", guard)
     end = chosen.horizon if horizon is None else horizon_of(horizon)
     count = whole("samples", samples, 2, MOST_SAMPLES)
     chart = chart_of(method, chosen.observes, observe)

@@ -7,7 +7,8 @@ whose question it suits. What a study leaves out, it names with the reason.
 from collections.abc import Callable, Iterable
 
 from symtop.core.errors import one_of
-from symtop.methods.framework.registry import Integrator, integrator, variants
+from symtop.measure.settings import smallest_charts
+from symtop.methods.framework.registry import Integrator, variants
 from symtop.model.scenes import TAGS, Scene, scenes
 
 
@@ -27,7 +28,4 @@ def grid_variants(observe: str, *, attitude: bool = False) -> list[Integrator]:
     Where a method has the axis chart, its attitude chart is left out unless `attitude` is true: it steps the same axis
     and angular momentum, and the rotation about the axis besides, which neither quantity depends on.
     """
-    return [
-        row for row in variants(observe)
-        if attitude or row.charts() != ("attitude",) or "axis" not in integrator(row.method).charts()
-    ]  # fmt: skip
+    return variants(observe) if attitude else smallest_charts(observe)

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from symtop.core import code_hash
-from symtop.core.errors import SymtopError, door
+from symtop.core.errors import SymtopError, foreign_code
 from symtop.core.python_files import execute, python_file
 from symtop.methods.framework.registry import integrators, is_built_in, split_name
 from symtop.model.scenes import added_scenes, scenes
@@ -26,7 +26,7 @@ def load(path: str | Path) -> list[str]:
         return _registered_by(file)
     before = [*integrators().values(), *scenes().values()]
     modules = set(sys.modules)
-    with door(f"plugin {file.name}"):
+    with foreign_code(f"plugin {file.name}"):
         try:
             execute(f"symtop_plugin_{file.stem}", file)
         except SymtopError as error:  # the names in it are the file's, and no options of a command

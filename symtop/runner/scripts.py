@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 
 from symtop.core import code_hash
-from symtop.core.errors import SymtopError, door, one_of
+from symtop.core.errors import SymtopError, foreign_code, one_of
 from symtop.core.python_files import execute, python_file
 from symtop.runner.study import Study
 
@@ -74,7 +74,7 @@ def _module(file: Path) -> ModuleType:
 def load(name: str) -> Study:
     """The study of that name or in that file."""
     file = file_of(name)
-    with door(f"study {file.name}"):
+    with foreign_code(f"study {file.name}"):
         study = getattr(_module(file), "STUDY", None)
     if not isinstance(study, Study):
         raise SymtopError(f"study {file.name} must define STUDY, a Study, not {study!r}")

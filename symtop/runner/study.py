@@ -192,8 +192,8 @@ class Study:
     how_to_read: str
     cases: Callable[[bool], list[Case]]  # quick -> grid
     measure: Callable[[Case], xr.Dataset]
-    pictures: Callable[[Any], Iterable[Picture]]
-    verdict: Callable[[Any], list[str]]
+    pictures: Callable[[Any], Iterable[Picture]] = lambda _: []
+    verdict: Callable[[Any], list[str]] = lambda _: []
     tables: Callable[[Any], list[Table]] = lambda _: []
     charts: Callable[[Any], list[Chart]] = lambda _: []
     opening: Callable[[Any], Opening] | None = None  # for the first screen of the page

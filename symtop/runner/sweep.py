@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from symtop.core import code_hash, netcdf
 from symtop.core.code_hash import Walk
-from symtop.core.errors import SymtopError, place, positive, row, truth, whole
+from symtop.core.errors import SymtopError, boolean, file_path, positive, row, whole
 from symtop.core.parallel import MOST_THREADS, cores, in_threads
 from symtop.core.progress import beating
 from symtop.measure.accuracy import as_table, enough_samples, error_row
@@ -83,7 +83,7 @@ def sweep(
     """
     chosen = [find_scene(one) for one in _listed(scenes)]
     methods = [find_integrator(one) for one in _listed(integrators)]
-    silent = truth("quiet", quiet)
+    silent = boolean("quiet", quiet)
     workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
     for words, names in (("scenes", [one.name for one in chosen]), ("integrators", [one.name for one in methods])):
         if not names or len(set(names)) < len(names):
@@ -94,7 +94,7 @@ def sweep(
         if values is not None
     }
     asked = [_cell(one, method, given, horizon, observe) for one in chosen for method in methods]
-    file = None if path is None else place("path", path)
+    file = None if path is None else file_path("path", path)
     stored = {} if file is None else _stored(file)
     pairs = [(cell.scene.name, cell.method.name) for cell in asked]
     if others := [f"{name} on {of}" for of, name in stored if (of, name) not in pairs]:

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import symtop
-from symtop.judging.text_report import described
+from symtop.judging.text_report import description
 
 BLIND = Path(__file__).parent / "blind"
 
@@ -178,9 +178,4 @@ def test_without_a_claim_it_says_the_order_that_a_step_has_and_not_the_slope():
     ledger = symtop.judge(WRONG.rounded_triple, quick=True)
     assert ledger.refuted == []
     assert str(ledger["order"].measured) == "2 by its h^3 term"
-    assert described(ledger.findings).startswith("order 2, not symplectic, reversible, keeps ")
-
-
-def test_the_set_is_as_large_as_it_is_said_to_be():
-    assert len(CORRECT.CLAIMS) + len(RIGHT.CLAIMS) + 4 + 3 + 1 + 1 + 2 >= 48
-    assert len(WRONG.CLAIMS) + len(TRICKS.CLAIMS) + 4 + 1 + 3 + 1 >= 55
+    assert description(ledger.findings).startswith("order 2, not symplectic, reversible, keeps ")

@@ -118,7 +118,7 @@ WAVE = 1e-5 * np.sin(37.1 * TIME)  # not commensurate with the samples
     ],
 )
 def test_residuals_are_classified_by_how_they_grow(residual, kind):
-    assert long.judged(TIME, residual, residual[:100], 1_000_000).kind == kind
+    assert long.change_of(TIME, residual, residual[:100], 1_000_000).kind == kind
 
 
 @pytest.mark.parametrize(
@@ -143,14 +143,14 @@ def test_a_law_is_named_only_if_the_interval_excludes_its_neighbours(size, slope
 
 def test_a_run_too_short_for_an_exponent_is_not_called_bounded():
     short = np.where(TIME < 4.0, WAVE + 1e-6, np.nan)  # ends before the last two decades begin
-    found = long.judged(TIME, short, short[:2], 2000)
+    found = long.change_of(TIME, short, short[:2], 2000)
     assert math.isnan(found.changed.exponent)
     assert (found.kind, found.grows) == ("unknown", None)
 
 
 def test_an_oscillation_with_noise_is_never_called_a_drift():
     draw = np.random.default_rng(5)
-    kinds = [long.judged(TIME, WAVE + 1e-6 * draw.standard_normal(TIME.size), WAVE, 1).kind for _ in range(200)]
+    kinds = [long.change_of(TIME, WAVE + 1e-6 * draw.standard_normal(TIME.size), WAVE, 1).kind for _ in range(200)]
     assert set(kinds) == {"bounded"}
 
 

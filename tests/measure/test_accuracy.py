@@ -5,12 +5,11 @@ import pytest
 
 import symtop
 from symtop.core.numbers import EPSILON
-from symtop.measure import extended
+from symtop.measure import order_table
 from symtop.measure.accuracy import SAMPLES, enough_samples, error_table
 from symtop.measure.errors import attitude_error, error_bound, errors_against
-from symtop.measure.extended import extended_errors, extended_order_data
 from symtop.measure.order import LARGEST_ERROR, order
-from symtop.measure.order_table import asymptotic_steps
+from symtop.measure.order_table import asymptotic_steps, extended_errors, extended_order_data
 from symtop.methods.framework.registry import integrator
 from symtop.model.charts import axis_from_angles, momentum_parts
 from symtop.model.scenes import scene
@@ -129,10 +128,10 @@ def alone(where, stages, horizon, count):
 def test_runs_side_by_side_in_long_double_are_those_alone(name):
     where = scene("spheroid")
     horizon, counts = 1.37 * where.nutation_period, np.array([7, 8, 40])
-    stages = extended._composition(where, integrator(name))
-    together = extended._ends(where, stages, horizon, counts)
+    stages = order_table._composition(where, integrator(name))
+    together = order_table._ends(where, stages, horizon, counts)
     for count, end in zip(counts, together, strict=True):
-        assert np.array_equal(end, extended._ends(where, stages, horizon, np.array([count]))[0])
+        assert np.array_equal(end, order_table._ends(where, stages, horizon, np.array([count]))[0])
         expected = alone(where, stages, horizon, count)
         assert np.abs(end - expected).max() < 1e-15
         assert np.abs(end - alone(where, stages, horizon, count + 1)).max() > 1e-12  # the control
@@ -143,7 +142,7 @@ def test_runs_side_by_side_in_long_double_are_those_alone(name):
 def test_a_free_top_is_run_in_long_double_without_a_warning(psi_dot):
     """Its kicks are zero, and so is its momentum if it rests."""
     free = symtop.Scene("free", symtop.SymmetricTop(1.0, 0.5, 0.0), symtop.Angles(1.0, phi_dot=psi_dot / 3.0), 5.0)
-    ends = extended._ends(free, extended._composition(free, integrator("strang")), 2.0, np.array([7, 8]))
+    ends = order_table._ends(free, order_table._composition(free, integrator("strang")), 2.0, np.array([7, 8]))
     true = symtop.ClosedForm(free.top, free.start).axis([2.0])[0]
     assert np.abs(ends.astype(float) - true).max() < 1e-14
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.measure.increments import from_increments, momenta_of
+from symtop.measure.conservation import from_increments, momenta_of
 from symtop.methods.framework.plan import Plan
 from symtop.model.scenes import closed_form
 from tests.conftest import random_scenes

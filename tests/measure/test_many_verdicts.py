@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from symtop.measure.many_verdicts import judge_runs, truths
-from symtop.measure.verdicts import VERDICTS, verdict
+from symtop.measure.verdicts import VERDICTS, judge_runs, truths, verdict
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator

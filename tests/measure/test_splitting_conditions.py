@@ -3,15 +3,7 @@
 import numpy as np
 import pytest
 
-from symtop.measure.splitting_conditions import (
-    commutator,
-    conditions,
-    element,
-    exponential,
-    logarithm,
-    product,
-    vanishing,
-)
+from symtop.measure.order_conditions import commutator, conditions, element, exponential, logarithm, product, vanishing
 
 FREE = [2, 1, 2, 3, 6, 9, 18, 30, 56, 99]  # dimensions of the free Lie algebra of two letters: Witt's formula
 ROOT = 19**0.5

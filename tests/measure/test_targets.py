@@ -7,8 +7,7 @@ import pytest
 
 import symtop
 from symtop.measure.accuracy import error_row
-from symtop.measure.settings import compared, limits
-from symtop.measure.work import CAPPED, TARGETS, TOO_WIDE, Walk, nutation_width, spans, work_table
+from symtop.measure.settings import CAPPED, TARGETS, TOO_WIDE, Walk, compared, limits, nutation_width, spans, work_table
 from symtop.methods.framework.registry import methods
 from symtop.model import charts
 from symtop.run.reference.truth import reference

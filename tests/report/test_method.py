@@ -1,9 +1,11 @@
 """The section on how it was measured says what the package does: scenes, bounds, equations, glosses."""
 
 import math
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from latex2mathml.converter import convert
 
 import symtop
 from symtop.model.charts import space_state
@@ -79,6 +81,17 @@ def test_the_equations_in_space_hold_along_the_true_motion(moving):
     w, v = quaternions[1][0], quaternions[1][1:]
     turned = 0.5 * np.array([-omega @ v, *(w * omega + np.cross(omega, v))])
     assert slope(quaternions) == pytest.approx(turned, abs=1e-5)
+
+
+def test_every_formula_is_shown_in_full():
+    formulas = [one for part in method.parts() for block in part.blocks for one in block.formulas]
+    assert len(formulas) == 12
+    for formula in formulas:
+        tree = ET.fromstring(convert(formula))
+        letters = "".join(tree.itertext())
+        assert "=" in letters
+        assert "\\" not in letters  # of a command that is not known
+        assert len(tree.findall(".//{*}mfrac")) == formula.count("\\frac")
 
 
 def test_a_gloss_is_given_to_every_name_in_a_text_and_to_no_part_of_one():

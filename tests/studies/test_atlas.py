@@ -6,8 +6,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.colors import to_rgb
-from symtop_studies.stability import atlas, atlas_figures, atlas_words, figures, outcome_maps
+from symtop_studies.stability import atlas, atlas_words, outcome_maps
 from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, row_plan, spin_unit, with_spin
 from symtop_studies.stability.tables import Column, family_limits, map_table, sampling_table
 
@@ -18,7 +17,6 @@ from symtop.measure.verdicts import JUDGED, VERDICTS, verdict
 from symtop.methods.framework.registry import integrator, methods
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
-from symtop.report.style import OUTCOME_COLORS
 from symtop.run.reference.truth import reference
 from symtop.runner import run as runner, store
 from symtop.runner.study import Case
@@ -134,27 +132,6 @@ def test_a_top_that_had_settled_and_is_not_accurate_is_run_at_every_setting(monk
     assert after.made[1].all()
     np.testing.assert_array_equal(after.made[[0, 2]], before.made[[0, 2]])
     assert (after.verdict[1] == VERDICTS.index("drifting")).sum() == 2
-
-
-def test_cells_that_were_not_run_are_pale_and_counted():
-    spins, steps = [0.3, 3.0, 8.0, 20.0], np.geomspace(0.01, 0.5, 30).tolist()
-    settings = {"parameters": spins, "ladder": steps, "periods": 10.0}
-    data = store.combine([(Case("cusp", name), map_table("cusp", integrator(name), settings))
-                          for name in ("gauss-4[axis]", "strang[axis]")])  # fmt: skip
-    one = atlas.maps(data, "cusp")["gauss-4[axis]"]
-    assert set(np.unique(data[Column.OUTCOME].values)) > {0, outcome_maps.SETTLED}
-    assert one.made.mean() < 0.8
-    assert (one.outcome[~one.made] == 0).all()
-    pale = np.isclose(atlas_figures.painted(one.outcome, one.made), to_rgb(atlas_figures.PALE_GREEN)).all(axis=-1)
-    assert pale.mean() == pytest.approx(1.0 - one.made.mean(), abs=0.02)
-    said = atlas_words.summary(data, "cusp")[-1]
-    left = sum((~each.made).sum() for each in atlas.maps(data, "cusp").values())
-    assert said.startswith(f"Of the 240 cells of these maps {left / 240:.0%} were not run")
-    assert said.endswith(f"{int(data[Column.CHECKS].sum())} runs of such tops check this, and none is inaccurate.")
-    data[Column.REFUTED] += 1.0  # of each of the two variants
-    assert atlas_words.summary(data, "cusp")[-1].endswith("check this; 2 tops failed and ran at every setting.")
-    drawn = {picture.name: picture for picture in figures.pictures(data)}["atlas-cusp-steps"]
-    assert atlas_figures.SETTLED["step_size"] in {text.get_text() for text in drawn.figure.legends[0].get_texts()}
 
 
 def test_adaptive_methods_are_mapped_over_their_tolerance():
@@ -278,19 +255,6 @@ def test_a_threshold_holds_at_every_larger_step_and_says_in_how_many_starts():
     assert failing(0.0, 0.0, 0.0) == "it fails nowhere on the map"
 
 
-def test_the_two_charts_of_a_method_are_compared_and_one_alone_is_not():
-    cells = [(Case("cusp", name), hand_made(rows).sel(scene="cusp", variant="midpoint", drop=True))
-             for name, rows in (("rk4[angles]", [[A, L, L]] * 4), ("rk4[axis]", [[A, A, L]] * 4))]  # fmt: skip
-    said = " ".join(atlas_words.summary(store.combine(cells), "cusp"))
-    assert "matters most for rk4: accurate in 33% with rk4[angles] and 67% with rk4[axis] of the map of cusp" in said
-    assert "0 of 2 variants never end a run early" in said
-    every, charts = atlas_words.atlas_tables(store.combine(cells), "cusp")
-    assert list(charts.rows) == [["rk4", "33%", "67%"]]
-    assert [row[3:6] for row in every.rows] == [["33%", "67%", "0%"], ["67%", "33%", "0%"]]
-    assert {len(row) for row in every.rows} == {len(every.header)}
-    assert "The chart alone" not in " ".join(atlas_words.summary(store.combine(cells[:1]), "cusp"))
-
-
 def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
     small = map_table("grazing", integrator("strang"), {"parameters": [1e-3, 0.1], "ladder": [0.01, 0.05],
                                                         "periods": 1.0, "shown": 0.01})  # fmt: skip
@@ -304,22 +268,6 @@ def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
     assert (again["outcome"].sel(variant="strang").values[0, 2] == NOT_RUN).all()
     shapes = {name: one.outcome.shape for name, one in atlas.maps(again, "grazing").items()}
     assert shapes == {"strang": (2, 2), "midpoint": (3, 3)}
-
-
-@pytest.mark.parametrize("size", ["small", "enlarged"])
-def test_maps_can_be_read_without_colours(size):
-    """Every outcome that is not plain has a hatch of its own, and any two colours differ in lightness or have one."""
-    hatched = {}
-    for index, word in enumerate(VERDICTS):
-        image = atlas_figures.painted(np.full((4, 6), index, dtype=np.uint8), np.full((4, 6), True), size)
-        hatched[word] = tuple(np.unique(image.reshape(-1, 3), axis=0).shape)
-    plain = [word for word, shape in hatched.items() if shape[0] == 1]
-    lightness = {word: 0.2126 * r + 0.7152 * g + 0.0722 * b for word in plain
-                 for r, g, b in [tuple(int(OUTCOME_COLORS[word][k : k + 2], 16) / 255 for k in (1, 3, 5))]}  # fmt: skip
-    for first in plain:
-        for second in plain:
-            assert first == second or abs(lightness[first] - lightness[second]) > 0.1, (first, second)
-    assert {"left_chart", "wrong_regime", "not_converged", "drifting"} <= set(VERDICTS) - set(plain)
 
 
 def tolerances(*ladders):

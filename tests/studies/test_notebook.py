@@ -1,9 +1,7 @@
 """The notebook that the project began with: its algebra checked symbolically, its numbers, its inconsistencies."""
 
 import itertools
-import json
 import math
-import shutil
 
 import numpy as np
 import pytest
@@ -232,15 +230,3 @@ def test_the_films_body_axes_are_those_of_the_charts(tmp_path):
         assert film.n_frames == 5
         colors = {color for _, color in film.convert("RGB").getcolors(1 << 20)}
     assert {(0xD5, 0x5E, 0x00), (0x00, 0x9E, 0x73), (0x00, 0x72, 0xB2)} <= colors  # the triad's own
-
-
-def test_the_film_fits_a_page_and_is_embedded_as_what_it_is(tmp_path, quick_results):
-    from symtop.report import page
-
-    film = quick_results / "figures" / "notebook-triad.gif"
-    assert film.stat().st_size < 500_000
-    (tmp_path / "figures").mkdir()
-    shutil.copy(film, tmp_path / "figures")
-    (tmp_path / "notebook.json").write_text(json.dumps({"pictures": [{"file": film.name}], "charts": []}))
-    (findings,) = page.gather(tmp_path, embed=True)
-    assert findings["pictures"][0]["source"].startswith("data:image/gif;base64,")

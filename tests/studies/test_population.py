@@ -18,8 +18,8 @@ from symtop import advise
 from symtop.core import netcdf
 from symtop.measure.accuracy import error_row
 from symtop.measure.nearest import nearest
+from symtop.measure.settings import TARGETS, nutation_width
 from symtop.measure.timing import Timing
-from symtop.measure.work import TARGETS, nutation_width
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat

@@ -1,6 +1,5 @@
 """Work and precision: timing rounds, energies within a chart, charts, and the second round of cases."""
 
-import dataclasses
 import math
 import pickle
 import subprocess
@@ -21,10 +20,10 @@ from symtop_studies.work_precision.timing_rounds import (
 
 import symtop
 from symtop.measure import ranking
+from symtop.measure.settings import TARGETS, least_work, work_table
 from symtop.measure.timing import Timing
-from symtop.measure.work import TARGETS, least_work, work_table
-from symtop.runner import depends, run as runner, store
-from symtop.runner.study import Case, Study
+from symtop.runner import store
+from symtop.runner.study import Case
 
 
 def timed(name, far=0, place=0, targets=()):
@@ -235,45 +234,6 @@ def test_a_winner_that_is_called_beyond_the_noise_wins_in_another_process_too(tm
         outcomes.append(called(xr.load_dataset(answer), table))
     for (sure, _), (_, wins) in (outcomes, outcomes[::-1]):
         assert {key: wins[key] for key in sure} == sure
-
-
-def _first(case):
-    return xr.Dataset({"found": ("setting", [float(len(case.integrator)), 1.0])})
-
-
-def _both(case):
-    if not case.timed:
-        return _first(case)
-    names = case.settings["integrators"]
-    return xr.Dataset({"later": ("variant", [float(k) for k in range(len(names))])}, coords={"variant": names})
-
-
-def test_a_study_may_have_a_second_round_made_from_the_first(tmp_path, monkeypatch):
-    sizes = []
-
-    def again(data):
-        sizes.append(dict(data.sizes))
-        names = [str(name) for name in data["variant"].values]
-        return [Case("spheroid", "together", {"integrators": names}, timed=True)]
-
-    study = Study(
-        name="stability", title="", question="", how_to_read="", measure=_both, pictures=lambda _: [],
-        cases=lambda _: [Case("spheroid", name) for name in ("midpoint", "strang")], verdict=lambda _: ["done"],
-        follow_up=again,
-    )  # fmt: skip
-    monkeypatch.setattr(runner, "load", lambda _: study)
-    first = runner.run(study, tmp_path, quiet=True)
-    assert first["computed"] == 3
-    assert sizes == [{"scene": 1, "variant": 2, "setting": 2}]
-    data = xr.open_dataset(tmp_path / "stability.nc").load()
-    assert data["later"].values.tolist() == [[0.0, 1.0]]
-    assert data["found"].sel(variant="strang").values.tolist() == [[6.0, 1.0]]
-    next((tmp_path / "cases" / "stability").glob("*together*")).unlink()
-    (tmp_path / "stability.nc").unlink()
-    assert runner.run(study, tmp_path, quiet=True)["computed"] == 1
-    assert runner.run(study, tmp_path, quiet=True)["computed"] == 0
-    alone = Case("spheroid", "midpoint", timed=True)
-    assert depends.digest(study, alone) == depends.digest(study, dataclasses.replace(alone))
 
 
 def test_the_parts_are_compared_at_equal_settings_and_above_rounding():

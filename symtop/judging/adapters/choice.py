@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from symtop.core.errors import SymtopError, door, one_of
+from symtop.core.errors import SymtopError, foreign_code, one_of
 from symtop.core.python_files import execute, python_file
 from symtop.judging.adapters.adapter import Stepper
 from symtop.judging.adapters.batch_step import BatchStep
@@ -84,7 +84,7 @@ def _from_file(target: str | Path) -> tuple[Any, str]:
     """What FILE.py:NAME names, and its name; without a name the function ``step``."""
     path, _, name = str(target).partition(":")
     file = python_file(path, "a step", "FILE.py:NAME with a file that is there")
-    with door(f"the file {file.name}"):
+    with foreign_code(f"the file {file.name}"):
         sys.path.insert(0, str(file.parent))  # what stands beside it, as Python has it for a script
         module = execute(f"symtop_judged_{Path(file).stem}", file)
     thing = getattr(module, name or "step", None)

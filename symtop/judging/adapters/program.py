@@ -27,6 +27,7 @@ from symtop.methods.framework.plan import Array
 from symtop.model.top import SymmetricTop
 
 WORDS = 100  # characters of what a program says when it fails
+TEXT = b"0123456789+-.eEinfaINFA, \t\r\n"  # the letters of numbers
 SHORT = 1e-3  # relative: digits that a program may leave out
 SLACK = 5.0  # times the seconds that earlier runs make one expect
 
@@ -87,10 +88,8 @@ class Program(Stepper):
 
 def _states(answer: bytes, rows: int, size: int, name: str) -> Array:
     """The states that a program wrote, shape (rows, size)."""
-    if len(answer) == 8 * rows * size:
-        raw = np.frombuffer(answer)
-        if not _is_text(answer):
-            return raw.reshape(rows, size).copy()
+    if len(answer) == 8 * rows * size and answer.translate(None, TEXT):
+        return np.frombuffer(answer).reshape(rows, size).copy()
     try:
         values = np.array(answer.decode("ascii").replace(",", " ").split(), dtype=float)
     except ValueError:
@@ -108,7 +107,3 @@ def _begins(state: Array, start: Array) -> bool:
     """Is a state the start, but for rounding, the sign of a quaternion and whole turns?"""
     turns = np.stack([state - start, state + start, np.sin(0.5 * (state - start))])  # any of them shows that it is
     return bool((np.abs(turns).min(axis=0) <= SHORT * np.abs(start).max()).all()) or not np.isfinite(state).all()
-
-
-def _is_text(answer: bytes) -> bool:
-    return all(byte in b"0123456789+-.eEinfaINFA, \t\r\n" for byte in answer)

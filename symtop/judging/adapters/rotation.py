@@ -15,9 +15,9 @@ import numpy as np
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March, Marks
 from symtop.judging.adapters.python_step import FunctionStep, state_like
-from symtop.methods.framework.equations import FORMULATIONS, Formulation
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
-from symtop.methods.framework.space import ended_space, on_attitude
+from symtop.methods.framework.space import on_attitude
 from symtop.model.charts import space_momenta
 from symtop.model.top import Angles, SymmetricTop
 
@@ -59,9 +59,7 @@ def _momenta(body: Body, states: Array) -> tuple[Array, Array]:
     return p_phi, p_psi
 
 
-ROTATION = Formulation(
-    FORMULATIONS["attitude"].field, ended_space, FORMULATIONS["attitude"].observe, _begin, _show, _momenta
-)
+ROTATION = FORMULATIONS["attitude"]._replace(prepare=_begin, present=_show, momenta=_momenta)
 
 
 class RotationStep(FunctionStep):

@@ -84,7 +84,10 @@ def _calls(stepper: Stepper, scene: Scene) -> Finding:
         if missed > MISSED:
             return _refuted("miscounts steps", why, missed, MISSED)
         traits |= {"remembers": why} if missed > REMEMBERED else {}
-    traits |= _backwards(lambda step: once(start, step), h)
+    try:
+        once(start, -h)
+    except SymtopError as error:
+        traits["forward only"] = str(error)
     why = "; ".join(["a call gives the same numbers again, and after a step elsewhere", *traits.values()])
     return Finding("calls", "", Measured(", ".join(traits) or "a function"), "measured", why, later, SAME)
 
@@ -108,13 +111,9 @@ def _steps_missed(stepper: Stepper, scene: Scene, h: float) -> tuple[float, str]
     a_step = float(np.max(np.abs(run(start, 1) - start)))
     if a_step == 0.0:  # it stands still, which is not to count wrongly
         return 0.0, ""
-    worst, why = 0.0, ""
-    for first, second in PARTS:
-        gap = float(np.max(np.abs(run(start, first + second) - run(run(start, first), second)))) / a_step
-        if gap > worst:
-            worst = gap
-            why = f"a run of {first + second} steps is {gap:.2g} steps from one of {first} and one of {second}"
-    return worst, why
+    gaps = {(n, m): float(np.max(np.abs(run(start, n + m) - run(run(start, n), m)))) / a_step for n, m in PARTS}
+    n, m = max(PARTS, key=lambda parts: gaps[parts])
+    return gaps[n, m], f"a run of {n + m} steps is {gaps[n, m]:.2g} steps from one of {n} and one of {m}"
 
 
 def _alike(chart: str, guide: Any, state: Any) -> Any:
@@ -131,17 +130,6 @@ def _apart(first: Any, second: Any) -> float:
     size = float(np.max(np.abs(first)))
     apart = float(np.max(np.abs(first - second))) / max(size, 1e-300)
     return apart if np.isfinite(apart) else math.inf
-
-
-def _backwards(once: Callable[[float], Any], h: float) -> dict[str, str]:
-    """What becomes of a step of -h, where it makes none."""
-    try:
-        once(-h)
-    except SymtopError as error:
-        return {"forward only": str(error)}
-    except Exception as error:  # noqa: BLE001  (somebody else's code)
-        return {"forward only": f"a step of -h raises {type(error).__name__}: {error}"}
-    return {}
 
 
 def _traits(stepper: Stepper, state: Any) -> dict[str, str]:

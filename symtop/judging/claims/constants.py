@@ -39,7 +39,7 @@ def measure(subject: Subject) -> list[Finding]:
 def of_run(method: Integrator, run: LongRun) -> list[Finding]:
     """What one long run shows of each claim of `OF_A_RUN`."""
     rest = [_reported(run), _invariant(method, run), _explicit(method, run), _work(method, run)]
-    return [*(_kept(method, run, claim) for claim in CONSTANTS), *rest]
+    return [*(_constant(one, declared(method, one), run, run.constants.get(one)) for one in CONSTANTS), *rest]
 
 
 def traces_of(run: LongRun) -> dict[str, np.ndarray]:
@@ -60,22 +60,12 @@ def _badness(one: Finding) -> tuple[int, int, float]:
     return BADNESS.index(one.verdict), growth, one.value if math.isfinite(one.value) else -1.0
 
 
-def _span(run: LongRun) -> str:
-    steps = f"{run.steps} steps" if run.steps else "a formula"
-    return f"{steps} over {run.nutations:.3g} nutations"
-
-
-def _kept(method: Integrator, run: LongRun, claim: str) -> Finding:
-    claimed = declared(method, claim)
-    if claim not in run.constants:
+def _constant(claim: str, claimed: str, run: LongRun, constant: Constant | None) -> Finding:
+    if constant is None:
         return inapplicable(claim, f"the {run.chart} chart has no such constant", claimed)
-    return _constant(claim, claimed, run, run.constants[claim])
-
-
-def _constant(claim: str, claimed: str, run: LongRun, constant: Constant) -> Finding:
     kind, changed, verdict = constant.kind, constant.changed, "undecided"
     measured = Measured(kind, changed.largest) if kind != "unknown" and run.steps else NOTHING
-    why = f"largest relative change {changed.largest:.1e} in {_span(run)}, {constant.a_step:.0e} in one step at most"
+    why = f"largest relative change {changed.largest:.1e} in {run.span}, {constant.a_step:.0e} in one step at most"
     if kind not in ("kept", "unknown"):
         why += f", growth exponent {changed.exponent:.2f} +- {changed.exponent_interval:.2f}"
         if kind == "drift":
@@ -84,7 +74,7 @@ def _constant(claim: str, claimed: str, run: LongRun, constant: Constant) -> Fin
         why += f"; but the run {run.message}"
     elif kind == "unknown":
         why = f"the run {run.message}" if run.outcome != "ok" else f"{why}: no exponent to judge it by"
-    elif claimed == "bounded" and constant.grows is None and changed.largest > _of_a_nutation(run, constant):
+    elif claimed == "bounded" and constant.grows is None and changed.largest > run.most_in_a_nutation(constant):
         verdict, why = "refuted", f"{why}, more than the steps of a nutation can add up to: it does not come back"
     elif claimed == "bounded" and constant.grows is None:
         why += ", which leaves open whether it grows"
@@ -93,11 +83,6 @@ def _constant(claim: str, claimed: str, run: LongRun, constant: Constant) -> Fin
         true = {"kept": within, "bounded": not constant.grows}.get(claimed)
         verdict = "measured" if true is None else "confirmed" if true else "refuted"
     return Finding(claim, claimed, measured, verdict, why, changed.largest, constant.floor)
-
-
-def _of_a_nutation(run: LongRun, constant: Constant) -> float:
-    """What an error that returns with the nutation cannot exceed: the largest change of a step, all one way."""
-    return constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
 
 
 def _reported(run: LongRun) -> Finding:
@@ -152,7 +137,7 @@ def _work(method: Integrator, run: LongRun) -> Finding:
     if without := _no_cost(method, run):
         return inapplicable("work", without)
     solves = f" and {run.iterations:.2f} iterations" if run.iterations else ""
-    why = f"{run.evaluations:.2f} force evaluations{solves} a step, in {_span(run)}"
+    why = f"{run.evaluations:.2f} force evaluations{solves} a step, in {run.span}"
     text = f"{run.evaluations:.1f}" + (f" ({run.iterations:.1f} it.)" if run.iterations else "")
     measured = Measured("work", run.evaluations, unit="forces a step", text=text)
     return Finding("work", "", measured, "measured", why, run.evaluations, 0.0)

@@ -4,16 +4,16 @@ A constant is kept, bounded, a random walk, a drift or just growing by the rule 
 `symtop.measure.growth.behaviour`: by its size, and by the exponent of its growth (0, 1/2, 1) if the 95 % interval
 excludes the others. Somebody else's sums may be plain. So a change that grows is rounding, too, while it is no more
 than `KEPT`, relative, or than the random walk that the rounding seen in one step makes, n^1/2 times as much: a bias
-beyond a thousandth of that rounding is seen in a million steps. A drift that hides below a
-bounded oscillation shows in the means of 24 equal stretches, and counts if the line through them exceeds `SURE` of its
-own intervals. Random walks pass a plain test of the slope in one case in three; this one they do not pass, and at the
-size of rounding nothing but the size is judged. Every chart of a method makes its own run.
+beyond a thousandth of that rounding is visible in a million steps. A drift that hides below a bounded oscillation shows
+in the means of 24 equal stretches, and counts if the line through them exceeds `SURE` of its own intervals. A random
+walk passes a plain test of the slope in one case in three, and not this one; at the size of rounding only the size is
+judged. Every chart of a method makes its own run.
 
 A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 tau, whatever its tau: c is fitted, and it
 is the rest of the fit that must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
 
 In the space frame p_phi = L_z and p_psi = L.e are those of the states, whatever the run reports; in angles, where they
-are parameters of a state, those of the increments are set beside the reported ones (`symtop.measure.increments`).
+are parameters of a state, those of the increments are set beside the reported ones (`symtop.measure.conservation`).
 
 Python solvers are too slow for a million steps: they run for as many as `EVALUATIONS` allow, and the ledger says so.
 """
@@ -23,20 +23,16 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from symtop.measure.conservation import Changed, constant_of, residuals
+from symtop.measure.conservation import Changed, Difference, constant_of, from_increments, residuals
 from symtop.measure.growth import behaviour, tops
-from symtop.measure.increments import Difference, from_increments
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan, Run, sentence
+from symtop.methods.framework.plan import Array, Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import space_momenta
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop
 from symtop.run.simulation import as_dataset, make_plan
-
-Array = NDArray[np.float64]
 
 STEPS, QUICK_STEPS = 1_000_000, 50_000
 STEPS_A_NUTATION = 118.02
@@ -66,15 +62,14 @@ class Constant(NamedTuple):
     @property
     def kind(self) -> str:
         """kept, bounded, random walk, drift, or just growing; unknown without a size or an exponent to judge it by."""
-        seen = self.changed
-        word = behaviour(seen.largest, seen.exponent, seen.exponent_interval, self.grain, self.floor)
+        change = self.changed
+        word = behaviour(change.largest, change.exponent, change.exponent_interval, self.grain, self.floor)
         if word == "kept":
             return word
-        if not (math.isfinite(seen.largest) and math.isfinite(seen.exponent)):
+        if not (math.isfinite(change.largest) and math.isfinite(change.exponent)):
             return "unknown"
-        sure = 0.0 < SURE * seen.interval < abs(seen.slope)
-        drifts = sure and abs(seen.rise) > VISIBLE * seen.largest
-        return "drift" if drifts else word
+        sure = 0.0 < SURE * change.interval < abs(change.slope)
+        return "drift" if sure and abs(change.rise) > VISIBLE * change.largest else word
 
     @property
     def grows(self) -> bool | None:
@@ -100,17 +95,20 @@ class LongRun(NamedTuple):
     reported: Difference | None  # of the momenta from those of the states; None where the states show none
     energy: tuple[Array, Array]  # times, in nutations, and the largest relative change around each, shape (WINDOWS,)
 
+    @property
+    def span(self) -> str:
+        """Its length in words."""
+        return f"{f'{self.steps} steps' if self.steps else 'a formula'} over {self.nutations:.3g} nutations"
 
-class _Done(NamedTuple):
-    """One run: its dataset, with the momenta of its states, and the run as the solver returned it."""
-
-    data: xr.Dataset
-    run: Run
-    plan: Plan
+    def most_in_a_nutation(self, constant: Constant) -> float:
+        """What an error that returns with the nutation cannot exceed: the largest change of a step, all one way."""
+        return constant.a_step * self.steps / self.nutations if self.nutations > 1.0 else math.inf
 
 
-def _run(method: Integrator, scene: Scene, chart: str, steps: float, step: float, samples: int) -> _Done:
-    """A run for `steps` times `step`: of that many steps, or for that time at the tolerance."""
+def _run(
+    method: Integrator, scene: Scene, chart: str, steps: float, step: float, samples: int
+) -> tuple[xr.Dataset, Run, Plan]:
+    """A run for `steps` times `step`: with the momenta of its states, as the solver returned it, and its plan."""
     horizon = (round(steps) if method.fixed_step else steps) * step
     control = {"step_size": step} if method.fixed_step else {}
     if method.adaptive and method.default_tolerance is None:
@@ -123,7 +121,7 @@ def _run(method: Integrator, scene: Scene, chart: str, steps: float, step: float
             p_phi, p_psi = space_momenta(chart, run.states)
         own = run._replace(p_phi=p_phi, p_psi=p_psi)
     data = as_dataset(scene, chart, plan, own)
-    return _Done(data.assign_attrs(chart=chart, step_size=plan.step_size), run, plan)
+    return data.assign_attrs(chart=chart, step_size=plan.step_size), run, plan
 
 
 def long_run(
@@ -132,32 +130,35 @@ def long_run(
     """A million steps of a compiled method in one of its charts, or `most`; fewer where that would take minutes."""
     for finer in FINER:  # a motion that passes close to a pole needs shorter steps
         step = scene.time_scale() / (STEPS_A_NUTATION * finer)
-        pilot = _run(method, scene, chart, PILOT, step, PILOT + 1)
+        pilot, first, _ = _run(method, scene, chart, PILOT, step, PILOT + 1)
         steps = float(PILOT)  # of a formula, which has no steps: nothing adds up
         if method.control is not None:
-            cost = max(pilot.run.force_evaluations / PILOT, 1.0)
+            cost = max(first.force_evaluations / PILOT, 1.0)
             share = QUICK_SHARE if quick else 1.0
             limit = share * EVALUATIONS[method.implementation] / cost if most is None else most
             steps = max(min(QUICK_STEPS if quick else STEPS, limit) * method.speed, PILOT)
-        done = _run(method, scene, chart, steps, step, SAMPLES)
-        if done.run.outcome == "ok" or not method.fixed_step:
+        data, run, plan = _run(method, scene, chart, steps, step, SAMPLES)
+        if run.outcome == "ok" or not method.fixed_step:
             break
-    other = _run(method, scene, chart, PILOT, 0.21 * step, PILOT + 1)
-    run, made, time = done.run, max(done.run.steps, 1), done.plan.times
-    changes, small = constants(scene, done.data), constants(scene, pilot.data)
+    _, other, _ = _run(method, scene, chart, PILOT, 0.21 * step, PILOT + 1)
+    made, changes, small = max(run.steps, 1), constants(scene, data), constants(scene, pilot)
     grains = {name: scene.energy_grain if name == "energy" else 1.0 for name in changes}
+    if chart == "angles":
+        reported = from_increments(method, scene, plan) if method.fixed_step else None
+    else:
+        reported = _reported(scene, data, run)
     return LongRun(
-        {name: judged(time, values, small[name], made, grains[name]) for name, values in changes.items()},
-        run.outcome,
-        sentence(run.outcome, run.reached, done.plan.horizon),
-        chart,
-        run.steps,
-        run.reached / scene.time_scale(),
-        run.force_evaluations / made,
-        run.newton_iterations / made,
-        len({one.run.force_evaluations / max(one.run.steps, 1) for one in (pilot, other)}) == 1,
-        _reported(method, scene, chart, done),
-        windows(time / scene.time_scale(), changes["energy"]),
+        constants={name: change_of(plan.times, changes[name], small[name], made, grains[name]) for name in changes},
+        outcome=run.outcome,
+        message=sentence(run.outcome, run.reached, plan.horizon),
+        chart=chart,
+        steps=run.steps,
+        nutations=run.reached / scene.time_scale(),
+        evaluations=run.force_evaluations / made,
+        iterations=run.newton_iterations / made,
+        steady_cost=len({one.force_evaluations / max(one.steps, 1) for one in (first, other)}) == 1,
+        reported=reported,
+        energy=windows(plan.times / scene.time_scale(), changes["energy"]),
     )
 
 
@@ -169,16 +170,14 @@ def windows(nutations: Array, change: Array) -> tuple[Array, Array]:
     return middles, largest
 
 
-def _reported(method: Integrator, scene: Scene, chart: str, done: _Done) -> Difference | None:
+def _reported(scene: Scene, data: xr.Dataset, run: Run) -> Difference:
     """How far the reported momenta are from those of the states, over the long run."""
-    if chart == "angles":
-        return from_increments(method, scene, done.plan) if method.fixed_step else None
     apart = {}
     for name in ("p_phi", "p_psi"):
-        gap = np.abs(getattr(done.run, name) - done.data[name].values) / scene.momentum_scale
+        gap = np.abs(getattr(run, name) - data[name].values) / scene.momentum_scale
         apart[name] = float(np.max(gap[np.isfinite(gap)], initial=0.0))
     name = max(apart, key=lambda one: apart[one])
-    return Difference(name, apart[name], REPORTED, f"of the larger momentum in {done.run.steps} steps")
+    return Difference(name, apart[name], REPORTED, f"of the larger momentum in {run.steps} steps")
 
 
 def constants(scene: Scene, run: xr.Dataset) -> dict[str, Array]:
@@ -208,11 +207,10 @@ def _cayley_residual(top: SymmetricTop, run: xr.Dataset) -> Array:
     return relative
 
 
-def judged(time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0) -> Constant:
+def change_of(time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0) -> Constant:
     """Size, growth and trend of a residual over so many steps; `every_step` holds it at consecutive ones."""
     jumps = np.abs(np.diff(every_step))
-    jumps = jumps[np.isfinite(jumps)]
-    a_step = float(jumps.max()) if jumps.size else math.nan
+    a_step = float(np.max(jumps[np.isfinite(jumps)])) if np.isfinite(jumps).any() else math.nan
     floor = KEPT * grain
     if a_step <= ROUNDING_OF_A_STEP * grain:
         floor = max(floor, a_step * math.sqrt(steps))

@@ -29,13 +29,11 @@ from symtop.core.errors import SymtopError
 from symtop.judging.claims.series import ChartSeries, series_of
 from symtop.judging.claims.subject import FINEST, Subject
 from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, yes_no
-from symtop.measure import splitting_conditions as splitting
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order_verdict
-from symtop.measure.order_conditions import Conditions, conditions, triangle
+from symtop.measure.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
-from symtop.measure.step_series import AGREES, SURE
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.preparation import Scaled
@@ -55,7 +53,6 @@ SHARE = 0.37  # of a nutation: length of the runs that are extrapolated to h = 0
 STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the coarsest of them; 200 beyond order 6
 TRUE_LIMIT = 1e-11  # a limit as close as this is the true motion
 SHOWN = 24  # settings of the order that are kept
-CLEAR = 1e-9  # noise of the h^1 term: a step that is rounded to single precision leaves 1e-8
 ABOVE, FINEST_RUNS, SPREAD = 10.0, 5, 10.0  # errors beyond so many bounds, of so many runs, fall as h^p to this factor
 
 
@@ -134,15 +131,20 @@ def _by_steps(subject: Subject) -> Finding:
     method, scene, quick, finest = subject.method, subject.scene, subject.quick, subject.finest
     series = series_of(method, scene, quick=quick) if method.fixed_step else None
     fitted, claim = measured_order(method, scene, quick=quick, finest=finest), method.order
-    if series is not None and _steps_are_those_of_another_order(fitted, series, method):
+    if series and not fitted.measured and series.series.seen and series.order < (claim or 0):
+        # a method of high order is tried at long steps, whose errors fall as no power where the order is low, and the
+        # limit of its runs is extrapolated by a power that they do not have: it looks wrong
         method = replace(method, order=max(series.order, 1))
         fitted = measured_order(method, scene, quick=quick, finest=finest)
     subject.traces.update(settings_shown(fitted))
     main = fitted.main
     slopes = ", ".join(f"{name} {fit}" for name, fit in fitted.fits.items() if math.isfinite(fit.slope))
     slopes = f"slopes {slopes} on {fitted.scene}" if slopes else "no slope"
-    if method.fixed_step and not (math.isfinite(main.slope) and _follows(series, method)):
-        wrong = _wrong_limit(method, scene, main, finest)
+    if method.fixed_step and not (fitted.measured and series and series.follows(max(method.order or 1, 1))):
+        power = method.order or 1
+        if fitted.measured:
+            power = max(1, min(power if method.order else 99, round(main.slope)))
+        wrong = limit(method, scene, power, finest).wrong
         if wrong:
             why = f"as its step goes to zero it goes to a motion that is wrong by {wrong:.1e} ({slopes})"
             verdict = "measured" if claim is None else "refuted"
@@ -150,38 +152,19 @@ def _by_steps(subject: Subject) -> Finding:
     return weighed(claim, fitted, series, slopes)
 
 
-def _steps_are_those_of_another_order(fitted: Order, series: ChartSeries, method: Integrator) -> bool:
-    """Was no slope found with the steps of a declared order, beyond the one that a term of a step shows?
-
-    A method of high order is tried at long steps, whose errors fall as no power where the order is low, and the limit
-    of its runs is extrapolated by a power that they do not have: it looks wrong.
-    """
-    judged = math.isfinite(fitted.main.slope)
-    return not judged and series.series.seen and series.order < (method.order or 0)
-
-
 def weighed(claim: int | None, fitted: Order, series: ChartSeries | None, slopes: str) -> Finding:
     """The finding of slopes and series together; `slopes` says what the slopes are."""
     if claim is not None:
         return _claimed(claim, fitted, series, slopes)
-    main, measured = fitted.main, fitted.measured
-    power = round(main.slope) if measured else None
-    if series is None:
-        words, value = slopes, main.slope
-    else:
-        words, value = f"{slopes}; {series.words(series.order if power is None else power)}", main.slope
-        if power is None or series.order < power:  # the slope, unless the series of a step has a lower order
-            value = float(series.order)
-            measured = (
-                _by_term(series) if series.series.seen else Measured("or more", value, text=f"{series.order} or more")
-            )
+    main, measured, value, why = fitted.main, fitted.measured, fitted.main.slope, slopes
+    if series is not None:
+        power = round(main.slope) if measured else series.order
+        why = f"{slopes}; {series.words(power)}"
+        if not measured or series.order < power:  # the slope, unless the series of a step has a lower order
+            measured, value = series.measured, float(series.order)
     if not measured:
         return Finding("order", "", NOTHING, "undecided", main.reason)
-    return Finding("order", "", measured, "measured", words, value, main.interval)
-
-
-def _by_term(series: ChartSeries) -> Measured:
-    return Measured("by a term", series.order, text=f"{series.order} by its h^{series.order + 1} term")
+    return Finding("order", "", measured, "measured", why, value, main.interval)
 
 
 def _claimed(power: int, fitted: Order, series: ChartSeries | None, slopes: str) -> Finding:
@@ -200,21 +183,16 @@ def _claimed(power: int, fitted: Order, series: ChartSeries | None, slopes: str)
         if early or (not measured and _agree(fitted, power)):
             why = f"{why} ({main.reason or 'at steps too long for a slope'})"
             measured = Measured("order", power, text=str(power))
-            return Finding("order", str(power), measured, "confirmed", why, *_term(series, power))
+            return Finding("order", str(power), measured, "confirmed", why, *series.term(power))
     if verdict == "refuted":
         why = f"the error falls with another power of the step: {why}"
     elif series is not None and series.order < min(power, series.series.resolved):
         verdict, why = "refuted", f"{series.words(power)}; {slopes}"
-        measured = _by_term(series)
-        value, resolution = _term(series, series.order + 1)
+        measured = series.measured
+        value, resolution = series.term(series.order + 1)
     elif verdict == "undecided":
         why = f"the slope is neither {power} nor clearly another order: {why}" if measured else f"{main.reason} ({why})"
     return Finding("order", str(power), measured, verdict, why, value, resolution)
-
-
-def _term(series: ChartSeries, power: int) -> tuple[float, float]:
-    """The largest defect up to h^power, and the least that is told from none."""
-    return series.series.worst(power), max(AGREES, SURE * float(series.series.noise[power]))
 
 
 def _agree(fitted: Order, power: int) -> bool:
@@ -226,27 +204,16 @@ def _agree(fitted: Order, power: int) -> bool:
     return scaled.size < 2 or float(np.max(scaled)) < SPREAD * float(np.min(scaled))
 
 
-def _follows(series: ChartSeries | None, method: Integrator) -> bool:
-    """Does a step that is one map have the motion's first terms, beyond doubt? Then its runs go to the motion."""
-    if series is None or series.order < max(method.order or 1, 1):
-        return False
-    return float(series.series.noise[1]) < CLEAR
-
-
-def _wrong_limit(method: Integrator, scene: Scene, main: Fit, finest: float | None) -> float:
-    """How wrong the motion is that the run goes to as its step goes to zero; 0 if it is the true one."""
-    power = method.order or 1
-    if math.isfinite(main.slope):
-        power = max(1, min(power if method.order else 99, round(main.slope)))
-    end = limit(method, scene, power, finest)
-    return end.miss if end.miss > TRUE_LIMIT and end.miss > 10.0 * end.doubt else 0.0
-
-
 class Limit(NamedTuple):
     """Where the end of a run goes as h -> 0."""
 
     miss: float  # distance from the true motion, the larger of angle and momentum over the larger one
     doubt: float  # of the extrapolation
+
+    @property
+    def wrong(self) -> float:
+        """How wrong the motion is, beyond doubt; 0 if it is the true one."""
+        return self.miss if self.miss > TRUE_LIMIT and self.miss > 10.0 * self.doubt else 0.0
 
 
 def limit(method: Integrator, scene: Scene, power: int, finest: float | None = None) -> Limit:
@@ -258,14 +225,14 @@ def limit(method: Integrator, scene: Scene, power: int, finest: float | None = N
     if finest is not None:
         fewest = min(fewest, int(finest) // 4)
     ends = [_signed_error(method, scene, SHARE * scene.time_scale(), fewest * 2**k) for k in range(3)]
-    once = [_without(power, ends[k], ends[k + 1]) for k in range(2)]
-    size = [float(np.max(np.abs(value))) for value in (ends[2], once[1], _without(power + 1, once[0], once[1]))]
+
+    def without(power: int, coarse: Array, fine: Array) -> Array:
+        """The combination of the errors at h and h/2 that has no term in h^power."""
+        return fine + (fine - coarse) / (2.0**power - 1.0)
+
+    once = [without(power, ends[k], ends[k + 1]) for k in range(2)]
+    size = [float(np.max(np.abs(value))) for value in (ends[2], once[1], without(power + 1, once[0], once[1]))]
     return Limit(min(size[0], size[2]), abs(size[2] - size[1]))
-
-
-def _without(power: int, coarse: Array, fine: Array) -> Array:
-    """The combination of the errors at h and h/2 that has no term in h^power."""
-    return fine + (fine - coarse) / (2.0**power - 1.0)
 
 
 def _signed_error(method: Integrator, scene: Scene, horizon: float, steps: int) -> Array:
@@ -315,7 +282,7 @@ def table_of(method: Integrator) -> Conditions | None:
         if isinstance(rule, Tableau):
             return conditions(triangle(rule.a, len(rule.b)), rule.b)
         if isinstance(rule, Composition) and rule.turn == EXACT:
-            return splitting.conditions(rule.drift, rule.kick, rule.gradient, rule.processor)
+            return splitting_conditions(rule.drift, rule.kick, rule.gradient, rule.processor)
     return None
 
 

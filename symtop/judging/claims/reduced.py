@@ -1,4 +1,4 @@
-"""The battery of a map of (theta, p_theta): the claims of `claims`, asked of the nutation alone.
+"""The claims of a map of (theta, p_theta): order, structure and energy of the nutation alone.
 
 Such a map is judged in the plane. Its order is that of the distance from the true (theta, p_theta), p_theta in units of
 the larger momentum; it is symplectic if it keeps the area, {theta, p_theta} = 1; and the one constant of its motion is
@@ -144,30 +144,28 @@ def long_run(stepper: SeparableStep, scene: Scene, steps: int) -> long.LongRun:
 
     def change(marks: Array, h: float) -> tuple[Array, int]:
         """The change of the energy since the start, as a share of the nutation's, and the forces."""
-        states, asked = stepper.march(scene.top, par, np.array(state), h, marks.astype(np.int64))
+        states, forces = stepper.march(scene.top, par, np.array(state), h, marks.astype(np.int64))
         with np.errstate(all="ignore"):
             energy = scene.top.reduced_energy(states[:, 0], states[:, 1], p_phi, p_psi)
-        return (energy - energy[0]) / scene.energy_scale, asked
+        return (energy - energy[0]) / scene.energy_scale, forces
 
     marks = np.unique(np.rint(np.linspace(0, most, long.SAMPLES)))
-    values, asked = change(marks, h)
+    values, forces = change(marks, h)
     every, few = change(np.arange(long.PILOT + 1.0), h)
     _, other = change(np.arange(long.PILOT + 1.0), 0.21 * h)
-    good = np.isfinite(values)
+    good, times = np.isfinite(values), marks * h
     made = int(marks[good][-1])
     outcome = OUTCOMES[OK if good.all() else NOT_FINITE]
-    times = marks * h
-    energy = long.judged(times, values, every, max(made, 1), scene.energy_grain)
     return long.LongRun(
-        {"energy": energy},
-        outcome,
-        sentence(outcome, made * h, most * h),
-        CHART,
-        made,
-        made * h / scene.time_scale(),
-        asked / max(made, 1),
-        0.0,
-        few == other,
-        None,
-        long.windows(times / scene.time_scale(), values),
+        constants={"energy": long.change_of(times, values, every, max(made, 1), scene.energy_grain)},
+        outcome=outcome,
+        message=sentence(outcome, made * h, most * h),
+        chart=CHART,
+        steps=made,
+        nutations=made * h / scene.time_scale(),
+        evaluations=forces / max(made, 1),
+        iterations=0.0,
+        steady_cost=few == other,
+        reported=None,
+        energy=long.windows(times / scene.time_scale(), values),
     )

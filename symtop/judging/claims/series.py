@@ -32,6 +32,7 @@ from symtop.model.top import Angles
 
 TURNS = 0.7  # of the frame in a nutation
 BEGIN = 0.23  # of a nutation: t0
+CLEAR = 1e-9  # noise of the h^1 term: a step that is rounded to single precision leaves 1e-8
 
 
 class ChartSeries(NamedTuple):
@@ -59,6 +60,21 @@ class ChartSeries(NamedTuple):
         defect, noise = self.series.defect[term], self.series.noise[term]
         return f"the h^{term} term of a step is off by {defect:.1e} of itself (noise {noise:.0e})"
 
+    def follows(self, power: int) -> bool:
+        """Has the step the motion's terms up to h^power, beyond doubt? Then its runs go to the motion."""
+        return self.order >= power and float(self.series.noise[1]) < CLEAR
+
+    def term(self, power: int) -> tuple[float, float]:
+        """The largest defect up to h^power, and the least that is told from none."""
+        noise = self.series.noise[min(power, self.series.noise.size - 1)]
+        return self.series.worst(power), max(AGREES, SURE * float(noise))
+
+    @property
+    def measured(self) -> Measured:
+        """The order that is seen, or the least that it can be."""
+        text = f"{self.order} by its h^{self.order + 1} term" if self.series.seen else f"{self.order} or more"
+        return Measured("by a term", self.order, text=text)
+
 
 def series_of(method: Integrator, scene: Scene, *, quick: bool = False) -> ChartSeries | None:
     """The series of the chart with the lowest order; None where no step is one map of the state."""
@@ -84,7 +100,6 @@ def time_order(subject: Subject) -> list[Finding]:
     if turning.order < 0:
         return [inapplicable("time", "a step of no length moves a state that is not of its chart")]
     series, power = turning.series, turning.order if order is None else order
-    resolution = max(AGREES, SURE * float(series.noise[min(power, series.noise.size - 1)]))
     shown = min(turning.order, power)
     declared, measured, verdict = yes_no(order), Measured("order", shown, text=str(shown)), "measured"
     if turning.order >= min(power, series.resolved):
@@ -98,7 +113,7 @@ def time_order(subject: Subject) -> list[Finding]:
         declared, why = "", f"{turning.wrong_term()}, as for f(y)"
     else:
         verdict, why = "refuted", f"where f depends on t, {turning.wrong_term()}: f is asked at wrong times"
-    return [Finding("time", declared, measured, verdict, why, series.worst(power), resolution)]
+    return [Finding("time", declared, measured, verdict, why, *turning.term(power))]
 
 
 def series_in_frame(subject: Subject, rate: float) -> tuple[ChartSeries, set[float]]:

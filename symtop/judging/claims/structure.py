@@ -43,31 +43,24 @@ def measure(subject: Subject) -> list[Finding]:
 
 def structure_of(steps: Mapping[str, Callable[[], tuple[maps.StepMap, Angles]]], subject: Subject) -> list[Finding]:
     """The findings from the map of a step in each chart, with the point to judge it at; a map may refuse to be made."""
-    brackets, returns = [], []
+    brackets: dict[str, _Chart] = {}
+    returns: dict[str, _Chart] = {}
     for chart, made in steps.items():
         try:
             step, start = made()
             defect = maps.symplectic_defect(step, start)
             gap = maps.restart_gap(step, start)
-            brackets.append(_bracket(chart, defect, gap))
+            brackets[chart] = _bracket(chart, defect, gap)
             subject.traces.update(defect_width=defect.widths, bracket_defect=defect.raw)
+            returns[chart] = _returned(chart, maps.return_miss(step, start), gap)
         except SymtopError as error:
-            brackets.append(_unknown(chart, error))
-            returns.append(_unknown(chart, error))
-            continue
-        try:
-            returns.append(_returned(chart, maps.return_miss(step, start), gap))
-        except SymtopError as error:
-            returns.append(_unknown(chart, error))
-    method = subject.method
+            unknown = _Chart(chart, None, math.nan, math.nan, undecided("", "", str(error)).why)
+            brackets.setdefault(chart, unknown)
+            returns.setdefault(chart, unknown)
     return [
-        _over_charts("symplectic", method.symplectic, brackets),
-        _over_charts("symmetric", method.symmetric, returns),
+        _over_charts("symplectic", subject.method.symplectic, list(brackets.values())),
+        _over_charts("symmetric", subject.method.symmetric, list(returns.values())),
     ]
-
-
-def _unknown(chart: str, error: SymtopError) -> _Chart:
-    return _Chart(chart, None, math.nan, math.nan, undecided("", "", str(error)).why)
 
 
 def _bracket(chart: str, defect: maps.Defect, gap: float) -> _Chart:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from symtop.core.errors import SymtopError, door
+from symtop.core.errors import SymtopError, foreign_code
 from symtop.core.signals import at_most
 from symtop.methods.framework.plan import OUTCOMES, Array, Plan, Run
 from symtop.methods.framework.registry import Integrator
@@ -30,7 +30,7 @@ def solve(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan
     the top or the start, or returns anything but a Run that fits.
     """
     solver, before = method.solvers[chart], flat(top, start)
-    with door(f"integrator {method.name}{context}"):
+    with foreign_code(f"integrator {method.name}{context}"):
         own = getattr(solver, "__module__", "").startswith(OWN)
         given = plan if own else plan._replace(times=plan.times.copy(), marks=plan.marks.copy())
         backwards = (

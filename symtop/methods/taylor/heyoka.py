@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.multiprecision import context
+from symtop.core.numbers import EPSILON
 from symtop.methods.framework.plan import Plan, Run
 from symtop.methods.framework.registry import Array, Integrator, Solver
 from symtop.model import charts
@@ -32,7 +33,6 @@ from symtop.model.charts import space_momenta
 from symtop.model.top import Angles, SymmetricTop
 
 START_DIGITS = 60  # of the multiprecision that a start is converted in
-EPSILON = float(np.finfo(np.float64).eps)
 MOST_STEPS = {"double": 30_000_000, "longdouble": 5_000_000, "quad": 100_000}  # of one run: 10 to 25 s
 
 

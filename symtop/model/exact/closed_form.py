@@ -29,7 +29,7 @@ form. The functions release the interpreter's lock and write to arrays of their 
 """
 
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -87,16 +87,82 @@ class Provenance(NamedTuple):
     reason: str  # why 40 digits were needed, or empty
 
 
-class ClosedForm:
+Number = TypeVar("Number", float, Array)  # of one top, and (n,) of many
+
+
+class _Form(Generic[Number]):
+    """What one closed form and many have in common: constants, and views of the motion at given times.
+
+    Shapes are those of a `ClosedForm`; those of many `ClosedForms` begin with the member.
+    """
+
+    def _constant(self, place: int) -> Number:
+        raise NotImplementedError
+
+    def _view(self, times: ArrayLike, view: int) -> Array:
+        raise NotImplementedError
+
+    @property
+    def energy(self) -> Number:
+        """Total energy, p_psi^2/2 I3 included."""
+        return self._constant(at.ENERGY)
+
+    @property
+    def p_phi(self) -> Number:
+        """Momentum conjugate to phi."""
+        return self._constant(at.P_PHI)
+
+    @property
+    def p_psi(self) -> Number:
+        """Momentum conjugate to psi."""
+        return self._constant(at.P_PSI)
+
+    @property
+    def nutation_period(self) -> Number:
+        """Time from one turning point of a kind to the next; infinite where there is no next."""
+        return self._constant(at.PERIOD)
+
+    @property
+    def phi_per_period(self) -> Number:
+        """Mean precession in a nutation period, radians."""
+        return self._constant(at.PHI_PER_PERIOD)
+
+    @property
+    def psi_per_period(self) -> Number:
+        """Mean growth of psi in a nutation period, radians."""
+        return self._constant(at.PSI_PER_PERIOD)
+
+    @property
+    def precession_rate(self) -> Number:
+        """Mean of phi' over a nutation, radians per unit time."""
+        return self._constant(at.PHI_LINE)
+
+    def quaternion(self, times: ArrayLike) -> Array:
+        """Attitude (w, x, y, z), body to space, shape (..., 4); continuous in time, through poles as well."""
+        return self._view(times, QUATERNION)
+
+    def axis(self, times: ArrayLike) -> Array:
+        """Unit vector along the top's axis, shape (..., 3)."""
+        return self._view(times, AXIS)
+
+    def momentum(self, times: ArrayLike) -> Array:
+        """Angular momentum L in the space frame, shape (..., 3), in units of I1 times a rate."""
+        return self._view(times, MOMENTUM)
+
+    def state(self, times: ArrayLike) -> Array:
+        """Quaternion and angular momentum, shape (..., 7): a state of the attitude chart."""
+        return self._view(times, STATE)
+
+
+class ClosedForm(_Form[float]):
     """Closed-form motion of `top` from `start` at time 0, all numbers read as exact doubles.
 
-    Construction takes 3 to 6 microseconds compiled (0.5 ms while nothing is compiled, to the same bits), evaluation 0.1
-    microseconds a time. Errors, measured against 50 digits for times up to 1e6: theta 1e-15; phi and psi one unit in
-    the last place plus 1e-15; axis and quaternion 1e-15. Methods take times of any shape and raise `SymtopError` for
-    any that is not finite; so does construction if the axis comes within 1e-145 of a pole that it does not meet.
+    Errors, measured against 50 digits for times up to 1e6: theta 1e-15; phi and psi one unit in the last place plus
+    1e-15; axis and quaternion 1e-15. Methods take times of any shape and raise `SymtopError` for any that is not
+    finite; so does construction if the axis comes within 1e-145 of a pole that it does not meet.
 
-    The constants are double-double numbers. Where a bound says that this is too little they come from quad-double sums
-    (5 microseconds), and where that is too little, too, from 40 digits (15 ms): `provenance` says which it was.
+    The constants are double-double numbers. Where a bound says that this is too little they come from quad-double sums,
+    and where that is too little, too, from 40 digits, which takes a thousand times as long: see `provenance`.
 
     `nutation_period` is that of small nutations for a steady precession, and infinite where the axis stands on an
     unstable pole or climbs to it for ever; `phi_per_period`, `psi_per_period` are the mean growth over it (0 if the
@@ -124,41 +190,6 @@ class ClosedForm:
         return Provenance(ARITHMETIC[kind], error, REASONS[int(self._constants[at.STATUS])])
 
     @property
-    def energy(self) -> float:
-        """Total energy, p_psi^2/2 I3 included."""
-        return float(self._constants[at.ENERGY])
-
-    @property
-    def p_phi(self) -> float:
-        """Momentum conjugate to phi."""
-        return float(self._constants[at.P_PHI])
-
-    @property
-    def p_psi(self) -> float:
-        """Momentum conjugate to psi."""
-        return float(self._constants[at.P_PSI])
-
-    @property
-    def nutation_period(self) -> float:
-        """Time from one turning point of a kind to the next."""
-        return float(self._constants[at.PERIOD])
-
-    @property
-    def phi_per_period(self) -> float:
-        """Mean precession in a nutation period, radians."""
-        return float(self._constants[at.PHI_PER_PERIOD])
-
-    @property
-    def psi_per_period(self) -> float:
-        """Mean growth of psi in a nutation period, radians."""
-        return float(self._constants[at.PSI_PER_PERIOD])
-
-    @property
-    def precession_rate(self) -> float:
-        """Mean of phi' over a nutation, radians per unit time."""
-        return float(self._constants[at.PHI_LINE])
-
-    @property
     def theta_range(self) -> tuple[float, float]:
         """The turning points, radians."""
         return float(self._constants[at.THETA_LOW]), float(self._constants[at.THETA_HIGH])
@@ -174,31 +205,18 @@ class ClosedForm:
         rows: Array = fill(self._all, _in_a_row(times)[0], TURNS)[0]
         return rows
 
-    def quaternion(self, times: ArrayLike) -> Array:
-        """Attitude (w, x, y, z), body to space, shape (..., 4); continuous in time, through poles as well."""
-        return self._view(times, QUATERNION)
-
-    def axis(self, times: ArrayLike) -> Array:
-        """Unit vector along the top's axis, shape (..., 3)."""
-        return self._view(times, AXIS)
-
     def axis_distance(self, times: Array, axes: Array) -> Array:
         """Angles between axes (n, 3) and the top's at times (n,), rad, shape (n,)."""
         apart: Array = distances(self._all, _in_a_row(times)[0], axes[None])[0]
         return apart
 
-    def momentum(self, times: ArrayLike) -> Array:
-        """Angular momentum L in the space frame, shape (..., 3), in units of I1 times a rate."""
-        return self._view(times, MOMENTUM)
-
-    def state(self, times: ArrayLike) -> Array:
-        """Quaternion and angular momentum, shape (..., 7): a state of the attitude chart."""
-        return self._view(times, STATE)
-
     def run(self, times: Array) -> tuple[Array, Array, Array]:
         """States (n, 7) at a row of times, with p_phi = L_z and p_psi = L.e read off them."""
         seen = fill(self._all, _in_a_row(times)[0], RUN)[0]
         return seen[:, :7], seen[:, 7], seen[:, 8]
+
+    def _constant(self, place: int) -> float:
+        return float(self._constants[place])
 
     def _view(self, times: ArrayLike, view: int) -> Array:
         flat_times, shape = _in_a_row(times)
@@ -270,7 +288,7 @@ def _in_a_row(times: ArrayLike) -> tuple[Array, tuple[int, ...]]:
     return (row if row.flags.writeable else row.copy()), array.shape
 
 
-class ClosedForms:
+class ClosedForms(_Form[Array]):
     """Closed-form motions of n tops from rows (n, 9) of `NUMBERS`, as `symtop.model.top.flat` puts them together.
 
     What `ClosedForm` says of a top is an array here, the first dimension the member. Times are a row for all members or
@@ -301,41 +319,6 @@ class ClosedForms:
         return [ARITHMETIC.get(kind, "") for kind in self.constants[:, at.ARITHMETIC].tolist()]
 
     @property
-    def energy(self) -> Array:
-        """Total energies, shape (n,)."""
-        return self.constants[:, at.ENERGY]
-
-    @property
-    def p_phi(self) -> Array:
-        """Momenta conjugate to phi, shape (n,)."""
-        return self.constants[:, at.P_PHI]
-
-    @property
-    def p_psi(self) -> Array:
-        """Momenta conjugate to psi, shape (n,)."""
-        return self.constants[:, at.P_PSI]
-
-    @property
-    def nutation_period(self) -> Array:
-        """Time from one turning point of a kind to the next, shape (n,); infinite where there is no next."""
-        return self.constants[:, at.PERIOD]
-
-    @property
-    def precession_rate(self) -> Array:
-        """Mean of phi' over a nutation, radians per unit time, shape (n,)."""
-        return self.constants[:, at.PHI_LINE]
-
-    @property
-    def phi_per_period(self) -> Array:
-        """Mean precession in a nutation period, radians, shape (n,)."""
-        return self.constants[:, at.PHI_PER_PERIOD]
-
-    @property
-    def psi_per_period(self) -> Array:
-        """Mean growth of psi in a nutation period, radians, shape (n,)."""
-        return self.constants[:, at.PSI_PER_PERIOD]
-
-    @property
     def theta_range(self) -> Array:
         """The turning points, radians, shape (n, 2)."""
         return self.constants[:, [at.THETA_LOW, at.THETA_HIGH]]
@@ -344,31 +327,18 @@ class ClosedForms:
         """Angles and rates at `times`, each (n, samples)."""
         return Motion(*self._view(times, MOTION).swapaxes(0, 1))
 
-    def quaternion(self, times: ArrayLike) -> Array:
-        """Attitudes (w, x, y, z), body to space, shape (n, samples, 4); continuous in time, through poles as well."""
-        return self._view(times, QUATERNION)
-
-    def axis(self, times: ArrayLike) -> Array:
-        """Unit vectors along the axes, shape (n, samples, 3)."""
-        return self._view(times, AXIS)
-
     def turns(self, times: ArrayLike) -> tuple[Array, Array]:
         """phi and psi alone, each (n, samples), with the bits of a call."""
         phi, psi = self._view(times, TURNS).swapaxes(0, 1)
         return phi, psi
 
-    def momentum(self, times: ArrayLike) -> Array:
-        """Angular momenta in the space frame, shape (n, samples, 3)."""
-        return self._view(times, MOMENTUM)
-
-    def state(self, times: ArrayLike) -> Array:
-        """Quaternions and angular momenta, shape (n, samples, 7): states of the attitude chart."""
-        return self._view(times, STATE)
-
     def run(self, times: ArrayLike) -> tuple[Array, Array]:
         """States (n, samples, 7), and p_phi = L_z and p_psi = L.e read off them, (n, samples, 2)."""
         seen = self._view(times, RUN)
         return seen[..., :7], seen[..., 7:]
+
+    def _constant(self, place: int) -> Array:
+        return self.constants[:, place]
 
     def _view(self, times: ArrayLike, view: int) -> Array:
         given = real_numbers("times", times)

@@ -19,7 +19,7 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.core.code_hash import Walk, digest, file_reasons, hashed, packages
-from symtop.core.errors import SymtopError, spare
+from symtop.core.errors import SymtopError, check_replaceable
 from symtop.core.files import locked
 from symtop.core.signals import ending_on_sigterm
 from symtop.run.ensemble.chunks import PIECE, PIECE_STEPS, Job
@@ -31,7 +31,7 @@ IDENTITY = "identity"  # the file that says which ensemble a folder belongs to
 @contextlib.contextmanager
 def streaming(path: Path, job: Job, labels: dict[str, Any], words: dict[str, Any]) -> Iterator["Stream"]:
     """The stream to a file, while nobody else has one; SymtopError if another process does."""
-    spare(path)
+    check_replaceable(path)
     with locked(_folder(path), wait=False) as ours:
         if not ours:
             raise SymtopError(f"another process is writing {path}: wait until it has ended, or name another path")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from symtop.core import cluster, netcdf
-from symtop.core.errors import SymtopError, SymtopWarning, place, positive, shown, truth, whole
+from symtop.core.errors import SymtopError, SymtopWarning, boolean, file_path, positive, shown, whole
 from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
 from symtop.core.progress import beating
 from symtop.methods.framework.plan import OUTCOMES
@@ -79,7 +79,7 @@ def ensemble(
     path to which another process is writing.
     """
     read, method = read_members(members), find_integrator(integrator)
-    count, silent = whole("samples", samples, 2, MOST_SAMPLES), truth("quiet", quiet)
+    count, silent = whole("samples", samples, 2, MOST_SAMPLES), boolean("quiet", quiet)
     workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
     chart = chart_of(method, read.observes, observe)
     names = _shown(variables, chart)
@@ -117,7 +117,7 @@ def ensemble(
         said = {RAISED: raised.first} if raised.members else {}
         data = netcdf.describe(as_dataset(columns, read.labels), **words, **said)
     else:
-        with streaming(place("path", path), job, read.labels, words) as stream:
+        with streaming(file_path("path", path), job, read.labels, words) as stream:
             raised = compute(stream.missing(pieces), stream.keep)
             if raised.members == n:
                 stream.forget(pieces)  # there is nothing to resume

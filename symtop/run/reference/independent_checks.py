@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.errors import SymtopError, door
+from symtop.core.errors import SymtopError, foreign_code
 from symtop.core.multiprecision import context
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
@@ -49,7 +49,7 @@ def integrate(scene: Scene, times: charts.Array, precision: str, chart: str = "a
     Raises SymtopError if it does not reach the last time, as where mgl/I1 is 1e60.
     """
     tolerance = heyoka.arithmetic(precision).epsilon / 100.0
-    with door(f"heyoka's integration of {scene.name} in {precision}"):
+    with foreign_code(f"heyoka's integration of {scene.name} in {precision}"):
         flight = heyoka.propagate(chart, precision, tolerance, scene.top, scene.start, times)
     if len(flight.states) < times.size:
         reached = float(times[len(flight.states) - 1]) if len(flight.states) else 0.0

@@ -1,4 +1,4 @@
-"""Sockets: what fits is judged; what hangs, crashes, raises or keeps something is told so and takes nobody along."""
+"""Adapters: what fits is judged; what hangs, crashes, raises or keeps something is reported and stops nothing else."""
 
 import os
 import shutil
@@ -10,10 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from scipy.integrate import RK23
 
 import symtop
 from symtop.cli.judge import FORMS as OFFERED
+from symtop.cli.main import main
 from symtop.judging.adapters.adapter import integrator, label_of
 from symtop.judging.adapters.choice import FORMS, open_target
 from symtop.judging.adapters.python_step import PythonStep
@@ -22,7 +24,7 @@ from symtop.judging.adapters.separable import SeparableStep
 from symtop.judging.battery import CLAIMS, TABLE
 from symtop.judging.findings import VERDICTS, read
 from symtop.judging.heartbeat import heartbeat
-from symtop.judging.text_report import described
+from symtop.judging.text_report import description
 
 SPHEROID = symtop.scene("spheroid")
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no C compiler")
@@ -340,7 +342,9 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset():
     screen = str(ledger).splitlines()
     assert screen[0].startswith("changes_its_input in the axis chart on spheroid, ")
     assert screen[-1] == "No claims were made."
-    assert described(ledger.findings).startswith("order 1, not symplectic, not reversible, keeps p_phi; not the energy")
+    assert description(ledger.findings).startswith(
+        "order 1, not symplectic, not reversible, keeps p_phi; not the energy"
+    )
     assert all(len(line) <= 100 for line in screen)
 
 
@@ -356,3 +360,46 @@ def test_a_library_in_a_folder_of_its_own(tmp_path):
 
 def test_the_command_knows_every_form():
     assert OFFERED == FORMS
+
+
+# ---- the examples ----------------------------------------------------------------------------------------------------
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "studies" / "examples"
+STEPS = EXAMPLES / "judged_steps.py"
+
+
+def run_judge(*arguments):
+    done = CliRunner().invoke(main, ["judge", *arguments, "--quick"])
+    return done.exit_code, done.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((f"{STEPS}:heun", "--order", "2"), "It is: order 2, not symplectic"),
+        ((f"{STEPS}:Ralston", "--order", "3"), "It is: order 3, not symplectic"),
+        (
+            (f"{STEPS}:leapfrog", "--form", "separable", "--order", "2", "--symplectic", "--symmetric"),
+            "It is: order 2, symplectic, reversible, the energy bounded",
+        ),
+        ((f"{STEPS}:engine", "--form", "rotation", "--order", "1"), "It is: order 1, not symplectic"),
+        pytest.param(
+            (f"{sys.executable} {EXAMPLES / 'judged_program.py'}", "--form", "program", "--order", "2"),
+            "It is: order 2, not symplectic",
+            marks=pytest.mark.slow,
+        ),
+    ],
+)
+def test_the_example_of_a_form_is_what_it_says(arguments, words):
+    code, output = run_judge(*arguments)
+    assert code == 0, output
+    assert words in output
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
+def test_the_example_in_c_is_what_it_says(tmp_path):
+    library = tmp_path / "judged.so"
+    subprocess.run(["cc", "-O2", "-shared", "-fPIC", str(EXAMPLES / "judged.c"), "-o", str(library), "-lm"], check=True)
+    code, output = run_judge(str(library), "--order", "1", "--symplectic", "--conserves", "p_phi,p_psi")
+    assert code == 0, output
+    assert "It is: order 1, symplectic, not reversible" in output

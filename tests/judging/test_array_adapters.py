@@ -1,4 +1,4 @@
-"""Sockets of diffrax, torch and JAX: what fits is judged where they are installed; what does not is refused.
+"""Adapters of diffrax, torch and JAX: what fits is judged where they are installed; what does not is refused.
 
 None of the three is imported in this process: JAX has threads, which a fork would lose, and judging forks.
 """
