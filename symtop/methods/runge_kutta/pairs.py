@@ -82,7 +82,7 @@ def nothing_more(par: Any, state: Any, slopes: Any, h: float) -> int:
     return 0
 
 
-def trying(attempt: Callable[..., Any], cost: int, power: float) -> Callable[..., Any]:
+def trying(attempt: Callable[..., Any], cost: int, power: float) -> Any:
     """`Method.advance`: shrink the step until the error of ``attempt(par, state, slopes, h, tolerance)`` passes."""
 
     @register_jitable
@@ -200,7 +200,7 @@ def _forget(slopes: Any, i: int, slope: Any) -> None:
     """Slopes that nobody reads again."""
 
 
-def _sum(weights: Sequence[float]) -> Callable[..., Any]:
+def _sum(weights: Sequence[float]) -> Any:
     """``(place, made, h)`` to place + h sum_j w_j k_j, term by term, of a tuple of slopes."""
     used = tuple(float(weight) if weight else None for weight in weights)
 
@@ -210,7 +210,7 @@ def _sum(weights: Sequence[float]) -> Callable[..., Any]:
     return register_jitable(added)
 
 
-def _stages(field: Callable[..., Any], rows: Sequence[Row], keep: Callable[..., Any]) -> Callable[..., Any]:
+def _stages(field: Callable[..., Any], rows: Sequence[Row], keep: Callable[..., Any]) -> Any:
     """``(par, state, first, slopes, h)`` to the slopes of a step, a tuple of tuples; `keep` writes each down."""
     if not rows:
 
@@ -281,7 +281,8 @@ class Pair(NamedTuple):
         """The table of the higher order with a step."""
         a, b = self.table.a[: len(self.table.b) - 1], self.table.b
         triangle = [value for i, row in enumerate(a) for value in (*row, *(0.0,) * (i + 1 - len(row)))]
-        rule = Tableau(np.array(triangle), np.array(b))  # type: ignore[arg-type]  (in arrays they travel faster)
+        arrays: Any = np.array(triangle), np.array(b)  # they travel faster than tuples
+        rule = Tableau(*arrays)
         solvers = {
             chart: FixedStep(fixed_loop(chart, self), rule, form.prepare, 1, implicit=False, present=form.present)
             for chart, form in FORMULATIONS.items()
