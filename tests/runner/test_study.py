@@ -122,7 +122,9 @@ def of_everyone():
 
 GAUSS = {f"gauss-{order}" for order in (2, 4, 6, 8, 10, 12)}
 COLLECTIVE = {f"collective-gauss-{order}" for order in (2, 4, 6)}
-PAIRS = {"rk45-compiled"} | {f"{pair}{end}" for pair in ("tsit5", "dop853-compiled", "vern9") for end in ("", "-fixed")}
+PAIRS = {"rk45-compiled", "extrapolation"} | {
+    f"{pair}{end}" for pair in ("tsit5", "dop853-compiled", "vern9") for end in ("", "-fixed")
+}
 SCIPY = {"rk45", "dop853", "lsoda", "radau"}
 SPLITTING = {name for name, method in symtop.integrators().items() if method.family == "splitting"}
 STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear", "midpoint-unreduced", "trapezoidal-unreduced"}
