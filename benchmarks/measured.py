@@ -15,7 +15,7 @@ def circumstances() -> dict[str, Any]:
         "measured": datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
         "cores": os.cpu_count() or 0,
         "load_before": os.getloadavg()[0],
-        **netcdf.provenance(),
+        **netcdf.provenance(changes=True),
     }
 
 

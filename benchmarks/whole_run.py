@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 import symtop
 from symtop.core import netcdf
 from symtop.core.lazy_kernel import LAZY
-from symtop.core.over_time import over_time
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.fixed_step import inside
 from symtop.methods.framework.registry import methods
 from symtop.model.scenes import closed_form
 from symtop.run.guard.guard import warning
-from symtop.run.simulation import as_dataset, make_plan
+from symtop.run.simulation import make_plan
+from symtop.run.trajectory import Trajectory, dataset
 
 SCENE, METHOD, CHART, STEPS = "spheroid", "strang", "axis", 400
 BATCHES, BATCH = 40, 2e-3
@@ -41,9 +41,8 @@ def measure() -> list[Item]:
     h = scene.horizon / STEPS
     plan, _ = make_plan(scene, method, h, None, horizon=scene.horizon, samples=501)
     run = solve(method, CHART, scene.top, scene.start, plan)
-    data, form = as_dataset(scene, CHART, plan, run), closed_form(scene)
-    axes = data["axis"].to_numpy()[:300]
-    columns = {str(name): values.to_numpy() for name, values in data.data_vars.items()}
+    shown, form = Trajectory.of_run(scene, CHART, plan, run), closed_form(scene)
+    axes, columns = shown.axis[:300], shown.columns
     attributes: dict[str, Any] = dict(symtop.simulate(scene, method, step_size=h).attrs)
     del attributes["title"]
     calls: dict[str, Callable[[], object]] = {
@@ -52,10 +51,10 @@ def measure() -> list[Item]:
         "guard": lambda: warning(scene, method, CHART, plan),
         "closed form at the guard's points": lambda: form.axis_distance(plan.times[:300], axes),
         "solver, every step shown": lambda: solve(method, CHART, scene.top, scene.start, plan),
-        "columns and dataset": lambda: as_dataset(scene, CHART, plan, run),
+        "columns": lambda: Trajectory.of_run(scene, CHART, plan, run),
         "closed form at the samples": lambda: form.turns(plan.times),
-        "dataset of columns": lambda: over_time(plan.times, columns),
-        "attributes": lambda: netcdf.describe(data, "bench", **attributes),
+        "dataset of columns": lambda: dataset(plan.times, columns),
+        "attributes": lambda: netcdf.attributes_of("bench", **attributes),
         "simulate without the guard": lambda: symtop.simulate(scene, method, step_size=h, guard=False),
         "simulate": lambda: symtop.simulate(scene, method, step_size=h),
     }

@@ -1,5 +1,5 @@
 """``python -m symtop`` is ``symtop``."""
 
-from symtop.cli.__main__ import run
+from symtop.cli.main import main
 
-run()
+main(prog_name="symtop")

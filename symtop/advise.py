@@ -189,9 +189,9 @@ def _usable(quantity: str) -> list[str]:
     A method is named with its chart, ``rk4[axis]``, if it has several.
     """
     return [
-        row.name if len(integrator(row.method).charts()) > 1 else row.method
-        for row in settings.compared(settings.observed(quantity))
-        if row.control is not None and row.implementation == "compiled"
+        variant.name if len(integrator(variant.method).charts()) > 1 else variant.method
+        for variant in settings.compared(settings.observed(quantity))
+        if variant.control is not None and variant.implementation == "compiled"
     ]
 
 
@@ -201,10 +201,10 @@ def _not_tried() -> tuple[str, ...]:
     return (f"Not tried, as only compiled methods are timed: {', '.join(names)}.",) if names else ()
 
 
-def _same(row: str, usable: Sequence[str]) -> str | None:
-    """The usable name of a stored row, of the same method in another chart if need be; None if there is none."""
-    method = split_name(row)[0]
-    return next((name for name in (row, *usable) if name in usable and split_name(name)[0] == method), None)
+def _same(variant: str, usable: Sequence[str]) -> str | None:
+    """The usable name of a stored variant, of the same method in another chart if need be; None if there is none."""
+    method = split_name(variant)[0]
+    return next((name for name in (variant, *usable) if name in usable and split_name(name)[0] == method), None)
 
 
 def _candidates(
@@ -229,8 +229,8 @@ def _candidates(
     for place in ranking.cheapest(cell, accuracy, stored_as):
         name = _same(place.integrator, usable)
         if name is not None and name not in cheapest:
-            row = cell.sel(variant=place.integrator).isel(setting=place.setting)
-            cheapest[name] = _setting(row, scene, stored[closest])
+            run = cell.sel(variant=place.integrator).isel(setting=place.setting)
+            cheapest[name] = _setting(run, scene, stored[closest])
     served = _served(near, usable)
     chosen = {name: cheapest.get(name) for name in [*served, *cheapest][:CANDIDATES]}
     if not chosen:
@@ -244,15 +244,15 @@ def _candidates(
 
 def _served(near: Near | None, usable: Sequence[str]) -> list[str]:
     """The usable methods that served one of the nearest tops or more, the most first."""
-    rows = [row for row, count in near.served.items() if count] if near is not None else []
-    return list(dict.fromkeys(filter(None, (_same(row, usable) for row in rows))))
+    names = [_same(variant, usable) for variant, count in near.served.items() if count] if near is not None else []
+    return list(dict.fromkeys(filter(None, names)))
 
 
-def _setting(row: xr.Dataset, scene: Scene, stored: Scene) -> float:
+def _setting(run: xr.Dataset, scene: Scene, stored: Scene) -> float:
     """A stored step, scaled by the ratio of the nutation periods, or a stored tolerance."""
-    step = float(row["step_size"])
+    step = float(run["step_size"])
     if not math.isfinite(step):
-        return float(row["tolerance"])
+        return float(run["tolerance"])
     scale = scene.nutation_period / stored.nutation_period
     return step * scale if math.isfinite(scale) and scale > 0.0 else step
 
@@ -328,9 +328,13 @@ def _lines(question: _Question, met: settings.Met) -> dict[str, str]:
 
 
 def _on_nearest(near: Near | None, name: str) -> str:
-    """How many of the nearest random tops a method served; empty if its rows are not in the study."""
-    rows = [row for row in near.served if split_name(row)[0] == split_name(name)[0]] if near is not None else []
-    return near.words(name if name in rows else rows[0]) if near is not None and rows else ""
+    """How many of the nearest random tops a method served; empty if its variants are not in the study."""
+    variants = (
+        [variant for variant in near.served if split_name(variant)[0] == split_name(name)[0]]
+        if near is not None
+        else []
+    )
+    return near.words(name if name in variants else variants[0]) if near is not None and variants else ""
 
 
 def _without_steps(question: _Question, best: float) -> str:

@@ -13,9 +13,9 @@ import numpy as np
 import symtop
 from benchmarks.engines import Setting
 from benchmarks.engines.common import Path, body_of, velocities
-from symtop.methods.engines.engines import SINGLE
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import integrator
 from symtop.model import charts
 from symtop.model.scenes import Scene
 
@@ -65,5 +65,5 @@ def row(setting: Setting) -> dict[str, Any]:
 
 def agrees(made: dict[str, Any]) -> bool:
     """Is the map that of the engine, on every scene, after one step?"""
-    level = LEVEL[made["method"].endswith(SINGLE)]
+    level = LEVEL[integrator(made["method"]).precision == "single"]
     return bool(made["method"]) and all(made.get(f"{name}_step", math.inf) <= level for name in STEPS)

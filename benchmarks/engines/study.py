@@ -5,7 +5,7 @@ from typing import Any
 
 from benchmarks.engines.measure import COMPARED, COUNT, LEVEL, STEPS, agrees
 from symtop.core import netcdf
-from symtop.methods.engines.engines import SINGLE
+from symtop.methods.framework.registry import integrator
 from symtop.report.sentences import counted, few
 
 NAME = "live-engines"  # of the findings; `engines` is the study of the maps
@@ -46,7 +46,7 @@ def verdict(rows: Sequence[dict[str, Any]]) -> list[str]:
     """How many settings have the map of the catalogue, to what, and which have not."""
     said, compared = [], [made for made in rows if made["method"]]
     for precision, single in (("double", False), ("single", True)):
-        part = [made for made in compared if made["method"].endswith(SINGLE) is single]
+        part = [made for made in compared if (integrator(made["method"]).precision == "single") is single]
         same = [made for made in part if agrees(made)]
         if part:
             said.append(
@@ -76,6 +76,6 @@ def findings(rows: Sequence[dict[str, Any]], missing: Sequence[str], measured: s
         "question": "Are the maps of the catalogue those that the engines take?",
         "how_to_read": HOW_TO_READ, "verdict": verdict(rows), "tables": [table], "charts": [], "opening": None,
         "pictures": [], "failures": [*missing, *failed], "cases": len(rows), "quick": False,
-        "provenance": netcdf.provenance(), "measured": measured, "rows": list(rows),
+        "provenance": netcdf.provenance(changes=True), "measured": measured, "rows": list(rows),
         "missing": list(missing),
     }  # fmt: skip

@@ -32,7 +32,8 @@ from symtop.methods.framework.registry import Integrator, methods
 from symtop.model import charts
 from symtop.model.scenes import Scene
 from symtop.run.reference.truth import reference
-from symtop.run.simulation import as_dataset, make_plan
+from symtop.run.simulation import make_plan
+from symtop.run.trajectory import Trajectory
 
 SCENES = ("spheroid", "goldstein")
 TARGETS = (1e-3, 1e-6, 1e-9)
@@ -72,7 +73,7 @@ def accuracy(scene: Scene, method: Integrator, setting: float) -> Point:
         elapsed, axis = time.process_time() - begun, states[:, :3]
     else:
         times, run = plan.times, solve(scene.top, scene.start, plan)
-        elapsed, axis = time.process_time() - begun, as_dataset(scene, chart, plan, run)["axis"].values
+        elapsed, axis = time.process_time() - begun, Trajectory.of_run(scene, chart, plan, run).axis
     truth = reference(scene, times, precision="closed-form")
     error = float(np.max(charts.axis_distance(axis, truth["axis"].values)))
     failed = not math.isfinite(error) or (run is not None and run.outcome != "ok")

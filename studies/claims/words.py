@@ -32,13 +32,13 @@ def tables(data: xr.Dataset) -> list[Table]:
     """Declared, measured and verdict of every cell; what was refuted or left open, in words; the long runs."""
     judged = findings(data)
     rows = [[name, *map(_cell, row)] for name, row in judged.items()]
-    table = Table(f"Declared | measured, and the verdict: {LEGEND}", ["variant", *map(claim_name, CLAIMS)], rows)
+    table = Table(f"Declared | measured, and the verdict: {LEGEND}", ["integrator", *map(claim_name, CLAIMS)], rows)
     reasons = [
         [name, claim_name(finding.claim), finding.declared, finding.verdict, finding.why]
         for name, finding in with_verdict(judged, "refuted", "undecided")
     ]
     title = f"What was refuted or left open, on {SCENE} where no other scene is named, and why"
-    open_ = [Table(title, ["variant", "claim", "declared", "verdict", "why"], reasons)] if reasons else []
+    open_ = [Table(title, ["integrator", "claim", "declared", "verdict", "why"], reasons)] if reasons else []
     by_steps: dict[int, list[str]] = {}
     for name, made in steps_run(data).items():
         by_steps.setdefault(made, []).append(name)

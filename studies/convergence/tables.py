@@ -18,7 +18,7 @@ from symtop.measure.order import LARGEST_ERROR, Fit, order_verdict, power_law
 from symtop.measure.order_table import observable, order_fit
 from symtop.methods.framework.registry import Integrator, integrator, integrators, split_name
 from symtop.model.scenes import Scene, scene
-from symtop.run.simulation import simulate
+from symtop.run.simulation import integrate
 
 MAIN = "axis"  # every chart shows it
 OTHERS = ("attitude", "theta", "energy")
@@ -135,10 +135,10 @@ def energy_history(on: Scene, variant: Integrator, nutations: float) -> xr.Datas
     """
     period, tolerance = on.nutation_period, variant.default_tolerance or HISTORY_TOLERANCE
     setting = {"step_size": period / HISTORY_STEPS} if variant.fixed_step else {"tolerance": tolerance}
-    run = simulate(on, variant, horizon=nutations * period, samples=801, guard=False, **setting)
+    run = integrate(on, variant, horizon=nutations * period, samples=801, **setting)
     return xr.Dataset(
         {
-            "history_time": ("moment", run["time"].values / period),
+            "history_time": ("moment", run.time / period),
             "history_energy": ("moment", np.abs(residuals(on, run)["energy"])),
             "history_tolerance": np.nan if variant.fixed_step else tolerance,
         }

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.methods.engines.engines import SINGLE
 from symtop.methods.framework.registry import integrator, split_name
 from symtop.report.sentences import counted, few
 
@@ -56,7 +55,7 @@ def of_catalogue(variant: str) -> bool:
 
 def single(variant: str) -> bool:
     """Is it a map in single precision?"""
-    return split_name(variant)[0].endswith(SINGLE)
+    return integrator(variant).precision == "single"
 
 
 def curve(data: xr.DataTree, variant: str, scene: str = SLOW) -> tuple[np.ndarray, np.ndarray]:

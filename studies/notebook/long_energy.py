@@ -14,7 +14,7 @@ import xarray as xr
 from symtop.measure.conservation import residuals
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
-from symtop.run.simulation import simulate
+from symtop.run.simulation import integrate
 
 from .tables import SOLVER, Column
 
@@ -27,11 +27,11 @@ def long_energy(scene: Scene, name: str, setting: float, horizon: float) -> xr.D
     """Largest relative energy error so far of one variant, at times from `FIRST` to `horizon`; dimension ``long``."""
     method = integrator(name)
     control = method.setting(setting).kwargs()
-    run = simulate(scene, method, observe="nutation", samples=SAMPLES, horizon=horizon, guard=False, **control)
+    run = integrate(scene, method, observe="nutation", samples=SAMPLES, horizon=horizon, **control)
     largest = np.fmax.accumulate(np.abs(residuals(scene, run)["energy"]))
     times = np.geomspace(FIRST, horizon, TIMES)
-    seen = np.maximum(np.searchsorted(run["time"].values, times * (1.0 + 1e-12), side="right") - 1, 0)
-    values = np.where(times <= run.attrs["reached_time"] * (1.0 + 1e-12), largest[seen], math.nan)
+    seen = np.maximum(np.searchsorted(run.time, times * (1.0 + 1e-12), side="right") - 1, 0)
+    values = np.where(times <= run.reached_time * (1.0 + 1e-12), largest[seen], math.nan)
     columns: dict[str, Any] = {Column.LONG_TIME: ("long", times), Column.LONG_ENERGY: ("long", values)}
     return xr.Dataset(columns)
 

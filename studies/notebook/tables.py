@@ -18,7 +18,7 @@ from symtop.methods.library.scipy_ivp import integrated
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.run.modified_energy import modified_energy
-from symtop.run.simulation import simulate
+from symtop.run.simulation import integrate
 from symtop.runner.grid import grid_variants
 
 from .derivations import easy_way, energies, hard_way, nutation_cubic, six_variables, with_alpha
@@ -74,10 +74,10 @@ def residual_history(scene: Scene, name: str, setting: float, samples: int = SAM
     `setting` is a step size in seconds or a tolerance, whichever the integrator takes.
     """
     control = integrator(name).setting(setting).kwargs()
-    run = simulate(scene, name, observe="nutation", samples=samples, guard=False, **control)
-    columns: dict[str, Any] = {Column.OUTCOME: run.attrs["outcome"], Column.SAMPLE_TIME: ("sample", run["time"].values)}
+    run = integrate(scene, name, observe="nutation", samples=samples, **control)
+    columns: dict[str, Any] = {Column.OUTCOME: run.outcome, Column.SAMPLE_TIME: ("sample", run.time)}
     for constant, values in residuals(scene, run).items():
-        columns[constant] = ("sample", run[constant].values)
+        columns[constant] = ("sample", getattr(run, constant))
         columns[f"{constant}_residual"] = ("sample", values)
         columns[f"{constant}_largest"] = float(np.nanmax(np.abs(values)))
     return xr.Dataset(columns)
@@ -133,14 +133,14 @@ def modified_energy_table(scene: Scene, name: str, steps: Sequence[float]) -> xr
 
     Dimensions ``shadow_setting`` and ``shadow_sample``; relative to the scale of energies.
     """
-    runs = [simulate(scene, name, step_size=h, observe="nutation", samples=SAMPLES, guard=False) for h in steps]
-    used = [run.attrs["step_size"] for run in runs]
+    runs = [integrate(scene, name, step_size=h, observe="nutation", samples=SAMPLES) for h in steps]
+    used = [run.step_size for run in runs]
     modified = [
-        modified_energy(scene, name, "angles", np.stack([run["theta"].values, run["p_theta"].values], axis=1), h)
+        modified_energy(scene, name, "angles", np.stack([run.theta, run.p_theta], axis=1), h)
         for run, h in zip(runs, used, strict=True)
     ]
-    energy = [run["energy"].values for run in runs]
-    time = ("shadow_sample", runs[0]["time"].values)
+    energy = [run.energy for run in runs]
+    time = ("shadow_sample", runs[0].time)
     data: dict[str, Any] = {Column.MODIFIED_STEP: ("shadow_setting", used), Column.MODIFIED_TIME: time}
     for column, curves in ((Column.ENERGY_CHANGE, energy), (Column.MODIFIED_CHANGE, modified)):
         changes = [(values - values[0]) / scene.energy_scale for values in curves]
@@ -151,8 +151,8 @@ def modified_energy_table(scene: Scene, name: str, steps: Sequence[float]) -> xr
 
 def film_table(scene: Scene, name: str, step: float, horizon: float, frames: int) -> xr.Dataset:
     """The attitude of a run and the true one at every frame of an animation; dimension ``frame``."""
-    run = simulate(scene, name, step_size=step, horizon=horizon, observe="attitude", samples=frames, guard=False)
-    attitude = charts.quaternion_from_angles(run["theta"].values, run["phi"].values, run["psi"].values)
-    times = run["time"].values
+    run = integrate(scene, name, step_size=step, horizon=horizon, observe="attitude", samples=frames)
+    attitude = charts.quaternion_from_angles(run.theta, run.phi, run.psi)
+    times = run.time
     data = xr.Dataset({Column.FRAME_TIME: ("frame", times), Column.FRAME_ATTITUDE: (("frame", "part"), attitude)})
     return data.assign({Column.TRUE_ATTITUDE: (("frame", "part"), closed_form(scene).quaternion(times))})

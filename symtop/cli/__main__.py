@@ -1,7 +1,7 @@
 """The command ``symtop``, also ``python -m symtop.cli``: `main`, and then the end of the process at once.
 
-Python would first take apart what was compiled: up to 3 s for 600 megabytes of kernels, in which the answer stands on
-the terminal and the prompt does not come back. Where other threads still work, they are waited for as usual.
+Python would first take apart what was compiled: seconds for hundreds of megabytes of kernels, in which the prompt does
+not come back. Where other threads still work, they are waited for as usual.
 """
 
 import atexit

@@ -19,7 +19,7 @@ from symtop.core import files
 from symtop.core.errors import SymtopError, SymtopWarning, UnknownNameError, at_home, check_replaceable, file_path
 from symtop.core.signals import INTERRUPTED, told_apart
 
-LONGEST_NAME = 80  # characters of a file that are told
+LONGEST_NAME = 80  # characters of the name of a file that are shown
 ENDINGS = {"figure": (".png", ".svg", ".pdf"), "card": (".html", ".htm"), "badge": (".svg",)}  # by option
 PLUGINS = "symtop.plugins"  # in the context of a command: plug-ins were given
 

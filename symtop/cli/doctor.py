@@ -202,31 +202,6 @@ SCENE = "goldstein"
 PERIODS = 0.02  # of a nutation: the length of a run that compiles
 
 
-def _truth(_: str) -> None:
-    from symtop.core.lazy_kernel import LAZY
-    from symtop.model.scenes import scene
-    from symtop.run.reference.truth import reference
-    from symtop.run.simulation import simulate
-
-    for kernel in LAZY:
-        kernel.compile()
-    period = scene(SCENE).nutation_period
-    run = simulate(SCENE, "strang", step_size=period / 100.0, horizon=period, samples=3)
-    reference(SCENE, run["time"].values)
-
-
-def _alone(name: str) -> None:
-    from symtop.run.simulation import simulate
-
-    simulate(SCENE, name, **_two_steps(name))
-
-
-def _together(name: str) -> None:
-    from symtop.run.ensemble.ensemble import ensemble
-
-    ensemble([SCENE] * 2, name, **_two_steps(name), threads=1, quiet=True)
-
-
 def _two_steps(name: str) -> dict[str, Any]:
     """The settings of two steps of a variant, or so."""
     from symtop.methods.framework.registry import integrator
@@ -239,14 +214,26 @@ def _two_steps(name: str) -> dict[str, Any]:
     return {**setting.kwargs(), "horizon": span, "samples": 2, "observe": observe}
 
 
-_RUNS: dict[str, Callable[[str], None]] = {"truth": _truth, "alone": _alone, "together": _together}
-
-
 def _run(task: tuple[str, str]) -> str:
-    """Do one of the runs; returns why it could not be done, or nothing."""
+    """Make the runs of a variant alone or together, or those of the truth; returns why it could not be done."""
+    from symtop.core.lazy_kernel import LAZY
+    from symtop.model.scenes import scene
+    from symtop.run.ensemble.ensemble import ensemble
+    from symtop.run.reference.truth import reference
+    from symtop.run.simulation import simulate
+
     kind, name = task
     try:
-        _RUNS[kind](name)
+        if kind == "alone":
+            simulate(SCENE, name, **_two_steps(name))
+        elif kind == "together":
+            ensemble([SCENE] * 2, name, **_two_steps(name), threads=1, quiet=True)
+        else:
+            for kernel in LAZY:
+                kernel.compile()
+            period = scene(SCENE).nutation_period
+            run = simulate(SCENE, "strang", step_size=period / 100.0, horizon=period, samples=3)
+            reference(SCENE, run["time"].values)
     except Exception as error:  # noqa: BLE001  (one that fails must not keep the others from being compiled)
         return f"{name or kind}: {words_of(error)}"
     return ""
@@ -262,7 +249,7 @@ def tasks() -> list[tuple[str, str]]:
 
 
 def kernels() -> int:
-    """How many kernels are kept on disk."""
+    """The number of kernels on disk."""
     return sum(1 for _ in (cache_root() / "kernels").glob("*"))
 
 

@@ -10,7 +10,7 @@ from symtop.cli.common import File, as_text, check_outputs, completing, json_opt
 from symtop.core.errors import SymtopError, whole
 from symtop.core.progress import ticking
 
-SAME = 0.01  # a step that differs by more from the one asked for is told
+SAME = 0.01  # relative difference of the step used from --step-size that is printed
 COMPARED = 100_000  # tops whose errors are shown, the first of the population: those of a million take 1 GB
 
 OUTCOME = {"ok": "reached the horizon"}  # which says nothing yet of their errors

@@ -132,18 +132,18 @@ def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick
     studies = [scripts.load(name) for name in chosen]
     if not only:
         return studies
-    kept, reasons = [], []
+    remaining, reasons = [], []
     for narrowed in (one.only(only) for one in studies):
         try:
             narrowed.grid(quick=quick)
-            kept.append(narrowed)
+            remaining.append(narrowed)
         except SymtopError as error:
             reasons.append(error)
-    if not kept:
+    if not remaining:
         raise reasons[0]
     for reason in reasons:
         warn(f"{reason}; it is left out")
-    return kept
+    return remaining
 
 
 def run_all(

@@ -3,8 +3,8 @@
 numba stamps a cached kernel with the file of the function itself and does not see edits in the files it calls, so that
 an old kernel can return old numbers in silence; and it compiles again what only moved down by a line. Here the folder
 of a kernel is named after a hash of everything it is compiled from (`symtop.core.code_hash`): instructions, constants
-and values of its functions, wherever they stand, and the versions of Python and numba. A kernel found on disk loads in
-a few milliseconds; a cold one compiles in about half a second.
+and values of its functions, wherever they stand, and the versions of Python and numba. A kernel found on disk loads
+a hundred times sooner than it compiles.
 
 Each kernel has a folder of its own, about 100 kilobytes. Every use of it is noted, once a day. The first time a process
 saves a kernel it removes those that nobody used for 30 days, and the oldest ones beyond `MOST_BYTES`.
@@ -41,19 +41,12 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from symtop.core.code_hash import Walk, by_name, digest, hashed
 from symtop.core.files import cache_root, on_cold, prune, touch
-from symtop.core.jit_functions import fused, inlined_parts, shared_parts, two_product
+from symtop.core.jit_functions import Function, fused, inlined_parts, shared_parts, two_product
 from symtop.core.sines import polynomials, sincos
 
 __all__ = [
-    "code_of",
-    "combined",
-    "compile_kernel",
-    "fused",
-    "is_kept",
-    "register_jitable",
-    "set_item",
-    "to_fixed_tuple",
-]
+    "code_of", "combined", "compile_kernel", "fused", "is_cached", "register_jitable", "set_item", "to_fixed_tuple",
+]  # fmt: skip
 
 set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple
 
@@ -74,7 +67,7 @@ overload(sincos, jit_options=INLINED, strict=False)(lambda *_: polynomials)
 
 
 @by_name
-def register_jitable(function: Callable[..., Any]) -> Any:
+def register_jitable(function: Function) -> Function:
     """Let kernels call a plain function, inlined wherever they do.
 
     Left to itself LLVM keeps the larger ones, such as the drift of a splitting, as calls that pass their results
@@ -160,8 +153,8 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
 
     def _load_data(self, name: str) -> Any:
         whole = Path(self._data_path(name)).read_bytes()
-        said, code = whole[:HASH], whole[HASH:]
-        if hashlib.sha256(code).digest() != said:
+        checksum, code = whole[:HASH], whole[HASH:]
+        if hashlib.sha256(code).digest() != checksum:
             raise ValueError("the code on disk is damaged")
         return pickle.loads(code)  # noqa: S301  (it has its hash)
 
@@ -255,7 +248,7 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     return kernel
 
 
-def is_kept(kernel: Any, signature: Any) -> bool:
+def is_cached(kernel: Any, signature: Any) -> bool:
     """Is a kernel compiled for this signature, in memory or in the cache?"""
     if signature in kernel.overloads:
         return True

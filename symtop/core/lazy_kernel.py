@@ -40,7 +40,7 @@ class LazyKernel:
         if self._spent < (LOADING if "numba" in sys.modules else LOADING + IMPORTING):
             return False
         with self._lock:
-            if self._spent < self.patience and not self._kept():
+            if self._spent < self.patience and not self._is_cached():
                 return False
         self.compile()
         return True
@@ -49,18 +49,18 @@ class LazyKernel:
         """Compile now, or load from the cache."""
         with self._lock:
             if self.compiled is None:
-                self._kept()
+                self._is_cached()
                 self._kernel.compile(self._signature)
                 self.compiled = self._kernel
 
-    def _kept(self) -> bool:
+    def _is_cached(self) -> bool:
         """Is the compiled function in the cache?"""
         if self._kernel is None:
             from numba.core import sigutils  # 0.3 s
 
-            from symtop.core.jit import compile_kernel, is_kept
+            from symtop.core.jit import compile_kernel, is_cached
 
             self._kernel = compile_kernel(self.function)
             self._signature, _ = sigutils.normalize_signature(self.arguments)
-            self._in_cache = is_kept(self._kernel, self._signature)
+            self._in_cache = is_cached(self._kernel, self._signature)
         return self._in_cache

@@ -74,25 +74,47 @@ LITTLE = 1_000_000  # with fewer free bytes a write error is reported as a full 
 _DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")  # told in every file
 
 
-def _git(*words: str) -> str:
-    root = Path(__file__).resolve().parents[2]
-    if not (root / ".git").exists():
-        return ""
-    command = ["git", "-C", str(root), *words]
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def _revision() -> str:
+    """The commit that the checkout is at, read from its git folder; "unknown" where there is none."""
     try:
-        return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()  # noqa: S603
+        folder = ROOT / ".git"
+        if folder.is_file():  # of a second work tree: "gitdir: PATH"
+            folder = ROOT / folder.read_text(encoding="utf-8").split(maxsplit=1)[1].strip()
+        commit = (folder / "HEAD").read_text(encoding="utf-8").strip()
+        if commit.startswith("ref: "):
+            branch = commit.removeprefix("ref: ")
+            shared = folder / "commondir"
+            folder = folder / shared.read_text(encoding="utf-8").strip() if shared.is_file() else folder
+            loose, packed = folder / branch, folder / "packed-refs"
+            lines = [] if loose.is_file() else packed.read_text(encoding="utf-8").splitlines()
+            commit = next((line.split()[0] for line in lines if line.endswith(f" {branch}")), "") or loose.read_text()
+        return commit[:12]
+    except (OSError, IndexError):
+        return "unknown"
+
+
+def _has_changes() -> bool:
+    """Does the checkout hold code that is not committed? Starts git."""
+    command = ["git", "-C", str(ROOT), "status", "--porcelain", "--", "symtop", "studies"]
+    try:
+        status = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)  # noqa: S603
     except (OSError, subprocess.SubprocessError):
-        return ""
+        return False
+    return (ROOT / ".git").exists() and bool(status.stdout.strip())
 
 
 @functools.cache
-def provenance() -> dict[str, str]:
-    """What made a dataset: versions, revision, machine. Flat strings, as netCDF wants them."""
-    revision = _git("rev-parse", "--short=12", "HEAD") or "unknown"
-    dirty = bool(_git("status", "--porcelain", "--", "symtop", "studies"))
+def provenance(*, changes: bool = False) -> dict[str, str]:
+    """What made a dataset: versions, revision, machine. Flat strings, as netCDF wants them.
+
+    With `changes`, the revision is marked if the checkout holds code that is not committed (a report says so).
+    """
     return {
         "symtop_version": __version__,
-        "symtop_revision": revision + ("+changes" if dirty else ""),
+        "symtop_revision": _revision() + ("+changes" if changes and _has_changes() else ""),
         "python_version": platform.python_version(),
         "dependencies": json.dumps({package: version(package) for package in _DEPENDENCIES}, sort_keys=True),
         "platform": f"{platform.system()} {platform.machine()}",
@@ -108,10 +130,11 @@ def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
 
 
 @functools.cache
-def _words(name: str, units: str) -> dict[str, str]:
-    """The attributes of a variable."""
-    long_name, *choice = VARIABLES[name]
-    return {"long_name": long_name} | ({"units": choice[0 if units == "SI" else -1]} if choice else {})
+def variable_attributes(name: str, units: str) -> dict[str, str]:
+    """The long name and units of a variable; none of one that symtop does not know."""
+    long_name, *choice = VARIABLES.get(name, ("",))
+    named = {"long_name": long_name} if long_name else {}
+    return named | ({"units": choice[0 if units == "SI" else -1]} if choice else {})
 
 
 def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree:
@@ -121,11 +144,15 @@ def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree
     """
     for group in groups(data).values():
         for name, variable in group.variables.items():  # ``group[name]`` would make a DataArray, 6 us for each
-            if name in VARIABLES:
-                variable.attrs.update(_words(str(name), units))
-    plain = {key: _plain(value) for key, value in attributes.items()}
-    data.attrs.update({**CONVENTIONS, "title": title, **plain, **provenance()})
+            variable.attrs.update(variable_attributes(str(name), units))
+    data.attrs.update(attributes_of(title, **attributes))
     return data
+
+
+def attributes_of(title: str, **attributes: Any) -> dict[str, Any]:
+    """The attributes of a dataset: conventions, title, those given and provenance."""
+    plain = {key: _plain(value) for key, value in attributes.items()}
+    return {**CONVENTIONS, "title": title, **plain, **provenance()}
 
 
 def _plain(value: Any) -> Any:

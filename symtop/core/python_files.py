@@ -1,4 +1,4 @@
-"""A user's Python file: found, run as a module, and its errors said in one sentence."""
+"""A file of Python of the user: looked up by its path, and run as a module."""
 
 import importlib.util
 import sys

@@ -1,7 +1,7 @@
 """Four doubles in one register: operations that a kernel writes down where LLVM does not find them by itself.
 
 A recurrence whose every term needs all terms before it, a Taylor series, is unrolled completely and has no loop that
-could be vectorised. Written as arithmetic of `Vectors` it is: 64 ns for an order of 20, where plain code takes 353.
+could be vectorised. Written as arithmetic of `Vectors` it is, and an order of 20 takes a fifth of the time.
 Every operation rounds as IEEE 754 says, and products are fused with sums where `fma` stands and nowhere else, so that
 the result does not hang on the processor. One without AVX does the same on two or four registers.
 

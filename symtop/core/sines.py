@@ -12,7 +12,7 @@ at most 1.1e-16 for |x| < 1e12, absolute. Beyond 1e15 doubles are no angles any 
 mean nothing. NaN and infinities give NaN.
 
 The C library is as exact and alone as fast, but LLVM vectorises no loop over tops that calls it: a step of 32 takes
-9.0 ns for each, and 3.2 with the polynomials (`benchmarks/sines.py`). The operations are the same in such a loop and
+a third of the time with the polynomials (`benchmarks/sines.py`). The operations are the same in such a loop and
 outside of it, and so are the bits. Source: Muller, Elementary Functions, chapters 3, 5 and 11.
 """
 

@@ -22,13 +22,14 @@ import xarray as xr
 from symtop import __version__
 from symtop.core.errors import SymtopError, finite, positive
 from symtop.measure.conservation import CONSTANTS, residuals
+from symtop.methods.framework.plan import sentence
 from symtop.methods.framework.registry import Integrator, integrator, integrators
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.scenes import Scene, closed_form, horizon_of, scenes
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.ensemble.ensemble import ensemble
-from symtop.run.simulation import simulate
+from symtop.run.simulation import integrate, simulate
 
 TOP = ("I1", "I3", "mgl")
 START = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
@@ -66,6 +67,12 @@ class Setup:
         wanted = SAMPLES_A_NUTATION * self.scene.horizon / period if resolved else FEWEST_SAMPLES
         return round(min(max(wanted, FEWEST_SAMPLES), MOST_SAMPLES))
 
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The arguments of `simulate` beside the scene, the method and the guard."""
+        control = {} if self.setting is None else self.method.setting(self.setting).kwargs()
+        return control | {"observe": "attitude", "samples": self.samples, "budget": self.budget}
+
 
 _budgets: dict[tuple[str, int], float] = {}  # by method and decade of the tolerance: the same for a run and its script
 
@@ -73,8 +80,8 @@ _budgets: dict[tuple[str, int], float] = {}  # by method and decade of the toler
 def _budget(chosen: Setup) -> float:
     """As much work as takes two seconds, from a trial of the run itself, and at most `MOST_WORK`.
 
-    An evaluation costs 0.03 us to 40 us, and a step of a Taylor method 0.2 us to 1 ms, which grows as the tolerance
-    shrinks: no field of an integrator says as much.
+    The cost of an evaluation differs a thousandfold between methods, and that of a Taylor step also grows as the
+    tolerance shrinks: no field of an integrator says as much.
     """
     tolerance = chosen.setting or 1.0
     key = chosen.method.name, math.floor(math.log10(tolerance))
@@ -84,11 +91,10 @@ def _budget(chosen: Setup) -> float:
 
     def trial(work: float) -> tuple[float, bool]:
         before = time.thread_time()  # what other threads do meanwhile does not count
-        run = simulate(
-            chosen.scene, chosen.method, tolerance=chosen.setting, observe="attitude", samples=2, guard=False,
-            budget=work,
-        )  # fmt: skip
-        return time.thread_time() - before, run.attrs["outcome"] == "out_of_budget"
+        run = integrate(
+            chosen.scene, chosen.method, tolerance=chosen.setting, observe="attitude", samples=2, budget=work
+        )
+        return time.thread_time() - before, run.outcome == "out_of_budget"
 
     trial(FIRST_TRIAL)  # its kernels are compiled
     work, (fixed, longer) = FIRST_TRIAL, trial(FIRST_TRIAL)
@@ -115,7 +121,7 @@ def setup(fields: Mapping[str, Any]) -> Setup:
     top = SymmetricTop(*(finite(name, fields[name]) for name in TOP))
     start = Angles(*(finite(name, fields[name]) for name in START))
     method = integrator(str(fields["integrator"]))
-    method.chart_for("attitude")  # refuses a row such as rk4[axis]: the page shows the whole attitude
+    method.chart_for("attitude")  # refuses a variant such as rk4[axis]: the page shows the whole attitude
     scene = Scene(str(fields.get("scene", "explored")), top, start, horizon_of(fields["horizon"]))
     if method.control is None:
         return Setup(scene, method, None)
@@ -130,11 +136,7 @@ def setup(fields: Mapping[str, Any]) -> Setup:
 
 def dataset(chosen: Setup, warn: Callable[[str], object]) -> xr.Dataset:
     """The run as `simulate` returns it; `warn` gets the sentence of the guard, if it has one."""
-    controls = {} if chosen.setting is None else chosen.method.setting(chosen.setting).kwargs()
-    return simulate(
-        chosen.scene, chosen.method, **controls, observe="attitude", samples=chosen.samples, guard=warn,
-        budget=chosen.budget,
-    )  # fmt: skip
+    return simulate(chosen.scene, chosen.method, **chosen.arguments, guard=warn)
 
 
 def answer(chosen: Setup) -> dict[str, Any]:
@@ -147,34 +149,33 @@ def answer(chosen: Setup) -> dict[str, Any]:
     """
     began = time.perf_counter()
     warnings: list[str] = []
-    run = dataset(chosen, warnings.append)
+    run = integrate(chosen.scene, chosen.method, **chosen.arguments, guard=warnings.append)
     ran = time.perf_counter()
-    times = run["time"].values
+    times = run.time
     truth = closed_form(chosen.scene).quaternion(times)
-    angles = (run[name].values for name in ("theta", "phi", "psi"))
     period = float(np.nan_to_num(chosen.scene.nutation_period, posinf=0.0))
     once = closed_form(chosen.scene)(np.linspace(0.0, period or chosen.scene.horizon, PORTRAIT))
-    attitude = run["quaternion"].values if "quaternion" in run else charts.quaternion_from_angles(*angles)
+    attitude = charts.quaternion_from_angles(run.theta, run.phi, run.psi) if run.quaternion is None else run.quaternion
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
         arrays = {
             "time": times,
             "attitude": attitude,
             "truth": truth,
-            "theta": run["theta"].values,
-            "p_theta": run["p_theta"].values,
+            "theta": run.theta,
+            "p_theta": run.p_theta,
             "true_theta": once.theta,
             "true_p_theta": chosen.scene.top.I1 * once.theta_dot,
             **residuals(chosen.scene, run),
-            "axis_error": charts.axis_distance(run["axis"].values, charts.axis_from_quaternion(truth)),
+            "axis_error": charts.axis_distance(run.axis, charts.axis_from_quaternion(truth)),
             "attitude_error": charts.attitude_distance(attitude, truth),
         }
         coded = {name: _float32(values) for name, values in arrays.items()}
     return {
-        "outcome": run.attrs["outcome"],
-        "message": run.attrs["outcome_message"],
+        "outcome": run.outcome,
+        "message": sentence(run.outcome, run.reached_time, chosen.scene.horizon),
         "warnings": warnings,
-        "steps": int(run.attrs["steps"]),
-        "force_evaluations": int(run.attrs["force_evaluations"]),
+        "steps": int(run.steps),
+        "force_evaluations": int(run.force_evaluations),
         "period": period,
         "run_ms": 1e3 * (ran - began),
         "all_ms": 1e3 * (time.perf_counter() - began),

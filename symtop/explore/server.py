@@ -98,7 +98,7 @@ class Handler(BaseHTTPRequestHandler):
 
     @property
     def place(self) -> str:
-        """What is asked for, without its query."""
+        """The path of the request, without its query."""
         return self.path.partition("#")[0].partition("?")[0]
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:  # noqa: ARG002
@@ -106,8 +106,8 @@ class Handler(BaseHTTPRequestHandler):
         self.close_connection = True
         if code == 501:
             code, message = 405, f"{self.command} is not answered here; GET, HEAD and POST are"
-        said = message or self.responses[code][0] if code in self.responses else message or "refused"
-        self._reply(int(code), f"{said}\n".encode(), "text/plain; charset=utf-8")
+        sentence = message or self.responses[code][0] if code in self.responses else message or "refused"
+        self._reply(int(code), f"{sentence}\n".encode(), "text/plain; charset=utf-8")
 
     def do_POST(self) -> None:
         """One of the actions."""

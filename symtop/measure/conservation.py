@@ -32,7 +32,8 @@ from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop
-from symtop.run.simulation import simulate
+from symtop.run.simulation import integrate
+from symtop.run.trajectory import Trajectory
 
 CONSTANTS = ("energy", "p_phi", "p_psi")
 BLOCKS = 24
@@ -84,16 +85,15 @@ def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:
     and ``law``, its name; where one law gives way to another, ``change`` is the time, ``before`` and ``after`` are the
     exponents (NaN where none does).
     """
-    run = simulate(scene, method, observe="nutation", guard=False, **settings)
-    time = run["time"].values
-    columns: dict[str, Any] = {"sample_time": ("sample", time), "outcome": run.attrs["outcome"]}
-    columns["steps"] = run.attrs["steps"]
+    run = integrate(scene, method, observe="nutation", **settings)
+    time = run.time
+    columns: dict[str, Any] = {"sample_time": ("sample", time), "outcome": run.outcome, "steps": run.steps}
     period = scene.nutation_period
     late = time > (SETTLED * period if math.isfinite(period) else 0.0)
     for name, values in residuals(scene, run).items():
         columns[f"{name}_residual"] = ("sample", values)
         columns |= _columns(name, constant_of(time, values)._asdict(), time[late], values[late])
-    phase = nutation_phase(scene, time, run["theta"].values, run["p_theta"].values / scene.top.I1)
+    phase = nutation_phase(scene, time, run.theta, run.p_theta / scene.top.I1)
     changed = constant_of(time, phase, 1.0)._asdict()
     without_trend = {part: value for part, value in changed.items() if part not in Trend._fields}
     return xr.Dataset(columns | _columns("phase", without_trend, time[late], phase[late]))
@@ -107,10 +107,11 @@ def _columns(name: str, changed: dict[str, Any], time: np.ndarray, values: np.nd
     return {f"{name}_{part}": value for part, value in parts.items()}
 
 
-def residuals(scene: Scene, run: xr.Dataset) -> dict[str, np.ndarray]:
+def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
     """Relative change of energy, p_phi and p_psi since the start, signed."""
     scales = {"energy": scene.energy_scale, "p_phi": scene.momentum_scale, "p_psi": scene.momentum_scale}
-    return {name: (run[name].values - run[name].values[0]) / scales[name] for name in CONSTANTS}
+    values = {name: getattr(run, name) for name in CONSTANTS}
+    return {name: (values[name] - values[name][0]) / scales[name] for name in CONSTANTS}
 
 
 def trend(time: ArrayLike, residual: ArrayLike) -> Trend:

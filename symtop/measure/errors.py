@@ -24,11 +24,11 @@ import xarray as xr
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, one_of, positive
 from symtop.core.numbers import EPSILON
-from symtop.core.over_time import over_time
 from symtop.model import charts
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.reference.truth import PRECISIONS, reference
+from symtop.run.trajectory import dataset
 
 QUANTITIES: dict[str, str] = {
     "axis": "angle between axes (rad)",
@@ -117,7 +117,7 @@ def errors_against(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> xr.Datas
 def _beside(run: xr.Dataset, columns: dict[str, charts.Array]) -> xr.Dataset:
     """Columns over the times of a run."""
     time = run.variables["time"]
-    shown = over_time(np.asarray(time.values, dtype=float), columns)
+    shown = dataset(time.values, columns)
     shown.variables["time"].attrs.update(time.attrs)
     return shown
 

@@ -78,8 +78,8 @@ def bundle(results: Path, target: Path | None = None) -> Path:
 def _stored(results: Path) -> list[Path]:
     """The files of a results folder that are bundled: no cases, and no figure that the report does not show."""
     shown = {results / "figures" / picture["file"] for study in page.gather(results) for picture in study["pictures"]}
-    kept = [path for ending in ("*.nc", "*.json", "report.html", "report.md") for path in results.glob(ending)]
-    return sorted([*kept, *shown])
+    files = [path for ending in ("*.nc", "*.json", "report.html", "report.md") for path in results.glob(ending)]
+    return sorted([*files, *shown])
 
 
 def _test_set() -> dict[str, bytes]:
@@ -107,9 +107,9 @@ def readme(results: Path, files: Mapping[str, bytes]) -> str:
 
 def _described(name: str, data: xr.Dataset | xr.DataTree) -> str:
     """One dataset: what it is, where it was made, and its variables, group by group."""
-    told = [data.attrs.get(key, "") for key in ("title", "question")]
+    about = [data.attrs.get(key, "") for key in ("title", "question")]
     made = ", ".join(str(data.attrs[key]) for key in ("symtop_revision", "processor") if key in data.attrs)
-    parts = [f"### {name}", " ".join(filter(None, map(str, told))), f"Made by: {made}." if made else ""]
+    parts = [f"### {name}", " ".join(filter(None, map(str, about))), f"Made by: {made}." if made else ""]
     for group, variables in netcdf.groups(data).items():
         rows = [
             [str(key), " x ".join(f"{dimension} ({length})" for dimension, length in variable.sizes.items()),

@@ -48,18 +48,18 @@ def _order(axis: Any, ledger: StepLedger) -> None:
     traces, finding = ledger.traces, ledger["order"]
     axis.set(title=f"order: {finding.measured or 'not measured'}", xlabel="step size", ylabel="error at the end (rad)")
     steps, errors = (np.asarray(traces.get(name, [])) for name in ("step_size", "error"))
-    seen = np.isfinite(steps) & (errors > 0.0)
-    if not seen.any():
+    valid = np.isfinite(steps) & (errors > 0.0)
+    if not valid.any():
         _nothing(axis, finding)
         return
     fitted = np.asarray(traces["fitted"]) == 1.0
-    axis.plot(steps[seen], errors[seen], "o", color=GREY, fillstyle="none", label="not in the fit")
-    axis.plot(steps[seen & fitted], errors[seen & fitted], "o", color=BLUE, label="in the fit")
+    axis.plot(steps[valid], errors[valid], "o", color=GREY, fillstyle="none", label="not in the fit")
+    axis.plot(steps[valid & fitted], errors[valid & fitted], "o", color=BLUE, label="in the fit")
     axis.set(xscale="log", yscale="log")
     claimed = finding.declared.isdigit()
     order = int(finding.declared) if claimed else _integer(finding.value)
     if order is not None:
-        used = np.flatnonzero(seen & fitted) if (seen & fitted).any() else np.flatnonzero(seen)
+        used = np.flatnonzero(valid & fitted) if (valid & fitted).any() else np.flatnonzero(valid)
         first, last = used[np.argmin(steps[used])], used[np.argmax(steps[used])]
         ends = steps[[first, last]]
         label = f"h^{order}{', as claimed' if claimed else ''}"
@@ -78,11 +78,11 @@ def _energy(axis: Any, ledger: StepLedger) -> None:
         ylabel="|change|, of the nutation's energy",
     )  # fmt: skip
     times, change = (np.asarray(traces.get(name, [])) for name in ("long_nutations", "energy_change"))
-    seen = np.isfinite(change) & np.isfinite(times)
-    if not seen.any():
+    valid = np.isfinite(change) & np.isfinite(times)
+    if not valid.any():
         _nothing(axis, finding)
         return
-    axis.plot(times[seen], np.maximum(change[seen], LEAST), color=ORANGE, label=f"{int(traces['steps_run'])} steps")
+    axis.plot(times[valid], np.maximum(change[valid], LEAST), color=ORANGE, label=f"{int(traces['steps_run'])} steps")
     axis.set(xscale="log", yscale="log")
     if math.isfinite(finding.resolution):
         axis.axhline(finding.resolution, color=GREY, lw=0.9, ls=(0, (5, 3)), label="what rounding explains")

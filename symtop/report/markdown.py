@@ -55,8 +55,8 @@ def spoken(study: Mapping[str, Any]) -> str:
 
 def measured(parts: Sequence[Part]) -> str:
     """How it was measured: the same words as on the page, formulas in LaTeX."""
-    said = [f"### {part.title}\n\n" + "\n\n".join(map(_block, part.blocks)) for part in parts]
-    return "\n\n".join(["## How it was measured", *said])
+    sections = [f"### {part.title}\n\n" + "\n\n".join(map(_block, part.blocks)) for part in parts]
+    return "\n\n".join(["## How it was measured", *sections])
 
 
 def _block(block: Block) -> str:

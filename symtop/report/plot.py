@@ -33,6 +33,7 @@ from symtop.report.style import (
     panels,
     save,
 )  # fmt: skip
+from symtop.run.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -161,7 +162,7 @@ def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Datase
     for name in ("axis", "attitude", "theta"):
         if name in errors:
             _line(angles, times, errors[name].values, COLORS[name], QUANTITIES[name])
-    for name, values in residuals(scene, run).items():
+    for name, values in residuals(scene, Trajectory.of_data(run)).items():
         _line(constants, times, np.abs(values), COLORS[name], f"residual of {name}, relative")
     angles.set(yscale="log", ylabel="error (rad)")
     constants.set(yscale="log", ylabel="|change| since the start", xlabel="time")

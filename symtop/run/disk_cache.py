@@ -36,7 +36,7 @@ def place(maker: str, *key: object, data: bytes = b"") -> Path:
     return cache_root() / "reference" / f"{name}.nc"
 
 
-def kept(path: Path, compute: Callable[[], xr.Dataset], depth: int | None) -> xr.Dataset:
+def cached(path: Path, compute: Callable[[], xr.Dataset], depth: int | None) -> xr.Dataset:
     """The dataset in a file, or the one that `compute` returns, which is then written to it.
 
     Warnings point `depth` calls up, 1 being this function; with None there are none, because nobody asked for a file.

@@ -6,10 +6,11 @@ that is sampled at multiples of the nutation period reads 1e5 times too small); 
 golden ratio, and the dataset says so.
 """
 
+import functools
 import math
 import warnings
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -17,16 +18,16 @@ import xarray as xr
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, boolean, one_of, positive, shown, whole
 from symtop.core.numbers import GOLDEN
-from symtop.core.over_time import over_time
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan, Run, sentence
-from symtop.methods.framework.registry import Integrator, integrator
-from symtop.model.charts import View, continuous, readings
-from symtop.model.scenes import OBSERVABLES, Scene, closed_form, horizon_of, scene
+from symtop.methods.framework.registry import Integrator, integrator as find_integrator
+from symtop.model.scenes import OBSERVABLES, Scene, horizon_of, scene as find_scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.guard.forecast import repeats
 from symtop.run.guard.guard import MOST_STEPS, warning
+from symtop.run.trajectory import Trajectory, dataset
 
+MOST_SAMPLES = 10_000_000
 MOST_SWINGS = 1e8  # of an adaptive run: several minutes of the fastest, taylor
 WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider stretch of phases unseen are dithered
 USUAL = 1e-3  # rad, the accuracy of a step that is proposed where none was given
@@ -170,63 +171,79 @@ def simulate(
 
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
-    chosen, method = _scene(scene), _integrator(integrator)
-    guard = guard if callable(guard) else boolean("guard", guard)
+    heard = guard if callable(guard) else _warn if boolean("guard", guard) else None
+    run = _prepared(scene, integrator, step_size, tolerance, horizon, samples, observe, budget)
+    trajectory, caution = _guarded(run, heard)
+    chosen, method, plan = run.scene, run.method, run.plan
+    data = dataset(trajectory.time, trajectory.columns, chosen.units)
+    data.attrs = netcdf.attributes_of(
+        f"{method.name} on {chosen.name}", integrator=method.name, scene=chosen.name, chart=run.chart,
+        implementation=method.implementation, horizon=plan.horizon, step_size=plan.step_size, tolerance=plan.tolerance,
+        steps=trajectory.steps, force_evaluations=trajectory.force_evaluations,
+        newton_iterations=trajectory.newton_iterations, outcome=trajectory.outcome,
+        outcome_message=sentence(trajectory.outcome, trajectory.reached_time, plan.horizon),
+        reached_time=trajectory.reached_time, guard=caution, sampling="dithered" if run.dithered else "uniform",
+        top=_json(chosen.top), start=_json(chosen.start),
+    )  # fmt: skip
+    return data
+
+
+def integrate(
+    scene: "str | Scene", integrator: "str | Integrator", *, guard: Callable[[str], object] | None = None,
+    **settings: Any,
+) -> Trajectory:  # fmt: skip
+    """The run of `simulate` as plain arrays; without a function for the sentence there is no guard."""
+    return _guarded(_prepared(scene, integrator, **settings), guard)[0]
+
+
+class _Run(NamedTuple):
+    """A run that has not begun: what a solver is called with, and whether its samples are dithered."""
+
+    scene: Scene
+    method: Integrator
+    chart: str
+    plan: Plan
+    dithered: bool
+
+    def solve(self) -> Run:
+        """Make the run."""
+        return solve(self.method, self.chart, self.scene.top, self.scene.start, self.plan, f" on {self.scene.name}")
+
+
+def _prepared(
+    scene: "str | Scene", integrator: "str | Integrator", step_size: object = None, tolerance: object = None,
+    horizon: object = None, samples: int = 501, observe: str | None = None, budget: object = None,
+) -> _Run:  # fmt: skip
+    """Check the arguments of `simulate`, and choose chart, steps and samples."""
+    chosen, method = find_scene(scene), find_integrator(integrator)
     end = chosen.horizon if horizon is None else horizon_of(horizon)
     count = whole("samples", samples, 2, MOST_SAMPLES)
     chart = chart_of(method, chosen.observes, observe)
     limit = None if budget is None else positive("budget", budget)
     plan, dithered = make_plan(chosen, method, step_size, tolerance, horizon=end, samples=count, budget=limit)
-    context = f" on {chosen.name}"
-    # a run that its probe would repeat step by step comes first, and the probe reads it: a third of the guard's time
-    guarded = guard is not False
-    done = solve(method, chart, chosen.top, chosen.start, plan, context) if guarded and repeats(method, plan) else None
-    caution = warning(chosen, method, chart, plan, done) if guarded else "off"
-    if guarded and caution:
-        if callable(guard):
+    return _Run(chosen, method, chart, plan, dithered)
+
+
+def _guarded(run: _Run, guard: Callable[[str], object] | None) -> tuple[Trajectory, str]:
+    """Make a run, after the guard's sentence if there is one; "off" is the sentence of no guard.
+
+    A run that the guard's probe would repeat step by step is made first, and the probe reads it: that saves a third of
+    the guard's time.
+    """
+    states, caution = None, "off"
+    if guard is not None:
+        states = run.solve() if repeats(run.method, run.plan) else None
+        caution = warning(run.scene, run.method, run.chart, run.plan, states)
+        if caution:
             guard(caution)
-        else:
-            warnings.warn(caution, SymtopWarning, stacklevel=2)
-    run = solve(method, chart, chosen.top, chosen.start, plan, context) if done is None else done
-    return netcdf.describe(
-        as_dataset(chosen, chart, plan, run), title=f"{method.name} on {chosen.name}", units=chosen.units,
-        integrator=method.name, scene=chosen.name, chart=chart, implementation=method.implementation, horizon=end,
-        step_size=plan.step_size, tolerance=plan.tolerance, steps=run.steps, force_evaluations=run.force_evaluations,
-        newton_iterations=run.newton_iterations, outcome=run.outcome,
-        outcome_message=sentence(run.outcome, run.reached, end), reached_time=run.reached, guard=caution,
-        sampling="dithered" if dithered else "uniform",
-        top=_told(chosen.top), start=_told(chosen.start),
-    )  # fmt: skip
+    return Trajectory.of_run(run.scene, run.chart, run.plan, states or run.solve()), caution
 
 
-def _told(record: SymmetricTop | Angles) -> str:
+def _warn(sentence: str) -> None:
+    warnings.warn(sentence, SymtopWarning, stacklevel=4)  # where `simulate` was called
+
+
+@functools.lru_cache(maxsize=256)
+def _json(record: SymmetricTop | Angles) -> str:
     """Its numbers as the JSON of an attribute; `json.dumps` takes three times as long."""
     return "{" + ", ".join(f'"{name}": {getattr(record, name)!r}' for name in sorted(record.__slots__)) + "}"
-
-
-MOST_SAMPLES = 10_000_000
-
-
-_scene, _integrator = scene, integrator  # the public argument names shadow these
-
-
-def as_dataset(scene: Scene, chart: str, plan: Plan, run: Run) -> xr.Dataset:
-    """The observables of a run, whatever chart it was computed in; phi and psi are made continuous."""
-    with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up, and that is a result
-        seen = View(chart, scene.top, run.states, run.p_phi, run.p_psi)
-        angles = {"phi": seen.phi} if seen.psi is None else {"phi": seen.phi, "psi": seen.psi}
-        if chart != "angles":
-            guides = closed_form(scene).turns(plan.times)[: len(angles)]
-            angles = dict(zip(angles, continuous(np.array([*angles.values()]), guides), strict=True))
-        axis, energy, p_theta = readings(seen)
-        columns = {
-            "theta": seen.theta,
-            **angles,
-            "axis": axis,
-            **({"quaternion": seen.quaternion} if chart == "attitude" else {}),
-            "energy": energy,
-            "p_theta": p_theta,
-            "p_phi": run.p_phi,
-            "p_psi": run.p_psi,
-        }
-    return over_time(plan.times, columns)

@@ -91,7 +91,7 @@ def findings_of(
         "failures": failures,
         "cases": cases,
         "quick": False,
-        "provenance": netcdf.provenance(),
+        "provenance": netcdf.provenance(changes=True),
     }
 
 

@@ -13,7 +13,6 @@ import symtop
 from benchmarks import engines
 from benchmarks.engines import drivers, measure, study
 from benchmarks.engines.common import body_of
-from symtop.methods.engines.engines import SINGLE
 from symtop.methods.framework import registry
 
 SCENES = {body_of(symtop.scene(name)).velocity.tobytes(): symtop.scene(name) for name in measure.STEPS}
@@ -118,7 +117,7 @@ def test_each_setting_of_a_driven_engine_names_a_map_of_the_catalogue_or_none(na
     made = adapter.settings()
     assert {setting.method for setting in made} <= {"", *registry.engines()}
     assert all(not setting.method for setting in made if setting.held == engines.JOINT)
-    single = {setting.method.endswith(SINGLE) for setting in made if setting.method}
+    single = {setting.method.endswith("-float32") for setting in made if setting.method}
     assert single == {"jolt": {True}, "physx": {True}, "havok": {True}, "bullet": {True, False}, "simbody": set()}.get(
         name, {False}
     )

@@ -28,6 +28,7 @@ from symtop.explore.server import STATIC, address, serve
 from symtop.methods.framework.registry import engines
 from symtop.model import charts
 from symtop.model.scenes import closed_form
+from symtop.run.simulation import integrate
 from tests.browser import Browser
 
 
@@ -393,11 +394,12 @@ def test_a_person_can_use_it(site, tmp_path):
 
 
 def test_a_warning_is_shown_on_the_page(site, monkeypatch):
-    def worried(*args, guard, **controls):
-        guard("the phase will be <lost>")
-        return symtop.simulate(*args, guard=False, **controls)
+    def worried(*args, guard=None, **controls):
+        if guard is not None:
+            guard("the phase will be <lost>")
+        return integrate(*args, **controls)
 
-    monkeypatch.setattr(answers, "simulate", worried)
+    monkeypatch.setattr(answers, "integrate", worried)
     with Browser() as browser:
         browser.open(address(site))
         browser.wait_for("document.querySelector('#warnings').textContent === 'the phase will be <lost>'")

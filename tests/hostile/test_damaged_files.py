@@ -9,9 +9,9 @@ import xarray as xr
 
 import symtop
 from symtop.core import netcdf
-from symtop.core.jit import compile_kernel, is_kept
+from symtop.core.jit import compile_kernel, is_cached
 from symtop.run import long_run as longrun
-from symtop.run.disk_cache import kept
+from symtop.run.disk_cache import cached
 from symtop.run.reference import truth as references
 
 FLIPS = [pytest.param(12, id="few"), pytest.param(200, id="many", marks=pytest.mark.slow)]
@@ -51,7 +51,7 @@ def test_a_damaged_kernel_is_compiled_again(tmp_path, monkeypatch, flips):
     for file in (code, index, code):
         flipped(file, draw)
         again = compile_kernel(_tripled)
-        assert is_kept(again, signature) in (True, False)
+        assert is_cached(again, signature) in (True, False)
         assert again(2.0) == 6.0
         assert compile_kernel(_tripled)._cache._cache_file.load(key) is not None  # it is whole on disk again
     for k in range(flips):
@@ -59,7 +59,7 @@ def test_a_damaged_kernel_is_compiled_again(tmp_path, monkeypatch, flips):
         again = compile_kernel(_tripled)
         if k < 10:
             assert again(2.0) == 6.0
-        assert is_kept(again, signature) in (True, False)
+        assert is_cached(again, signature) in (True, False)
         index.write_bytes(whole)
 
 
@@ -78,10 +78,10 @@ def test_a_damaged_reference_is_computed_again(tmp_path, flips):
         made.append(1)
         return _MADE.copy()
 
-    kept(path, compute, None)
+    cached(path, compute, None)
     for _ in range(flips):
         whole = flipped(path, draw)
-        data = kept(path, compute, None)
+        data = cached(path, compute, None)
         assert np.array_equal(data["theta"], _MADE["theta"])
         assert np.array_equal(data["time"], _MADE["time"])
         path.write_bytes(whole)

@@ -13,7 +13,7 @@ from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.exact.digits import PreciseForm
 from symtop.model.top import flat
 from symtop.run.guard import guard
-from symtop.run.reference.sensitivity import conditioning, departure
+from symtop.run.reference.sensitivity import conditioning, displacement
 from symtop.run.simulation import make_plan
 
 # I1, I3, mgl, theta, theta', psi', method, observed, tolerance, horizon: of random runs, those that nobody warned of
@@ -85,7 +85,7 @@ def test_conditioning_is_the_growth_of_the_motion():
     flat, steep = conditioning(symtop.scene("spheroid"), 5.0), conditioning(sleeper(1e-6), 60.0)
     assert 1.0 <= flat < 100.0
     assert steep > 1e5
-    assert departure(sleeper(1e-6), 1e-9, 60.0) > 1e-5
+    assert displacement(sleeper(1e-6), 1e-9, 60.0) > 1e-5
     assert "rounding" not in symtop.reference("spheroid", [5.0]).attrs["conditioning"]
 
 

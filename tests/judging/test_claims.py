@@ -23,6 +23,7 @@ from symtop.methods.framework.plan import Run
 from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
 from symtop.report import style
+from symtop.run.simulation import integrate
 from symtop.runner import plugins, run as runner
 from tests.conftest import random_scenes
 
@@ -167,7 +168,7 @@ def test_a_claim_about_several_charts_is_judged_in_the_worst_of_them():
 
 def test_the_cayley_energy_is_kept_by_nobody_else():
     for name, kept in (("cayley", True), ("cayley-tuned", True), ("strang", False)):
-        run = symtop.simulate("spheroid", name, step_size=0.01, horizon=20.0, observe="axis", guard=False)
+        run = integrate("spheroid", name, step_size=0.01, horizon=20.0, observe="axis")
         assert bool(np.abs(long.constants(SPHEROID, run)["cayley_energy"]).max() < 1e-13) is kept
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from symtop.measure.order_conditions import commutator, conditions, element, exponential, logarithm, product, vanishing
+from symtop.measure.order_conditions import commutator, element, exponential, logarithm, product, vanishing
 
 FREE = [2, 1, 2, 3, 6, 9, 18, 30, 56, 99]  # dimensions of the free Lie algebra of two letters: Witt's formula
 ROOT = 19**0.5
@@ -27,12 +27,12 @@ def test_log_undoes_exp_and_begins_as_baker_campbell_and_hausdorff_say():
 
 
 def test_known_splittings_have_their_orders():
-    assert conditions((1.0,), (1.0, 0.0)).order == 1
-    assert conditions((1.0,), (0.5, 0.5)).order == 2
-    assert conditions((1.0,), (0.5, 0.4)).order == 0
+    assert splitting_conditions((1.0,), (1.0, 0.0)).order == 1
+    assert splitting_conditions((1.0,), (0.5, 0.5)).order == 2
+    assert splitting_conditions((1.0,), (0.5, 0.4)).order == 0
     a, b = (1.0, -2 / 3, 2 / 3), (-1 / 24, 3 / 4, 7 / 24)
-    assert conditions(a, (0.0, *b)).order == 3  # Ruth 1983
-    assert conditions(a, (0.0, *reversed(b))).order < 3
+    assert splitting_conditions(a, (0.0, *b)).order == 3  # Ruth 1983
+    assert splitting_conditions(a, (0.0, *reversed(b))).order < 3
 
 
 def composed(first, second):
@@ -45,9 +45,9 @@ def test_a_public_library_composed_a_method_of_order_4_in_the_wrong_order():
     """McLachlan, SIAM J. Sci. Comput. 16 (1995) 151, five stages: the adjoint comes first (a library had it second)."""
     alpha = ((146 + 5 * ROOT) / 540, (-2 + 10 * ROOT) / 135, 1 / 5, (-23 - 20 * ROOT) / 270, (14 - ROOT) / 108)
     right, wrong = composed(alpha[::-1], alpha), composed(alpha, alpha[::-1])
-    assert conditions(*right).order == 4
-    assert conditions(*wrong).order == 2
-    assert conditions(*wrong).defect[2] == pytest.approx(0.0633, rel=1e-2)
+    assert splitting_conditions(*right).order == 4
+    assert splitting_conditions(*wrong).order == 2
+    assert splitting_conditions(*wrong).defect[2] == pytest.approx(0.0633, rel=1e-2)
 
 
 @pytest.mark.parametrize(("off", "order"), [(3e-8, 2), (1e-11, 2), (1e-13, 4)])
@@ -55,11 +55,11 @@ def test_a_coefficient_that_is_off_shows_beyond_rounding(off, order):
     outer = 1 / (2 - 2 ** (1 / 3)) + off
     inner = 1 - 2 * outer
     half = (outer + inner) / 2
-    assert conditions((outer, inner, outer), (outer / 2, half, half, outer / 2)).order == order
+    assert splitting_conditions((outer, inner, outer), (outer / 2, half, half, outer / 2)).order == order
 
 
 def test_gradients_and_processors_count():
-    assert conditions((0.5, 0.5), (1 / 6, 2 / 3, 1 / 6), (0.0, -1 / 72, 0.0)).order == 4
-    assert conditions((0.5, 0.5), (1 / 6, 2 / 3, 1 / 6), (0.0, 1 / 72, 0.0)).order == 2
-    assert conditions((1.0,), (0.5, 0.5), (-1 / 48, -1 / 48), 1 / 12).order == 4
-    assert conditions((1.0,), (0.5, 0.5), (-1 / 48, -1 / 48)).order == 2
+    assert splitting_conditions((0.5, 0.5), (1 / 6, 2 / 3, 1 / 6), (0.0, -1 / 72, 0.0)).order == 4
+    assert splitting_conditions((0.5, 0.5), (1 / 6, 2 / 3, 1 / 6), (0.0, 1 / 72, 0.0)).order == 2
+    assert splitting_conditions((1.0,), (0.5, 0.5), (-1 / 48, -1 / 48), 1 / 12).order == 4
+    assert splitting_conditions((1.0,), (0.5, 0.5), (-1 / 48, -1 / 48)).order == 2

@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 import symtop
 from symtop.judging.battery import judge
 from symtop.measure.settings import compared
-from symtop.methods.engines.engines import SINGLE
 from symtop.methods.framework import registry
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.many import members_of
@@ -32,7 +31,7 @@ ENERGY = {  # relative to |E| + mgl, after 1000 s with h = 0.025
     "mujoco-implicit": -0.22, "bullet": -0.073, "jolt": 2.1, "physx": -0.49, "rapier": -0.40, "ode": -0.15,
     "lammps-rigid": 0.0104, "yade": 2.8, "rkmk4": -8.8e-6, "jsbsim-buss2": 0.046,
 }  # fmt: skip
-ROUNDED = tuple(name.removesuffix(SINGLE) for name in registry.engines() if name.endswith(SINGLE))
+ROUNDED = tuple(name.removesuffix("-float32") for name in registry.engines() if name.endswith("-float32"))
 
 
 def axis_error(row, steps, scene=GOLDSTEIN, horizon=10.0, against=None):
@@ -216,7 +215,7 @@ def test_a_member_of_an_ensemble_has_the_bits_of_the_run_alone(name):
 
 @pytest.mark.parametrize("name", ROUNDED)
 def test_in_single_precision_a_step_is_the_same_but_for_rounding(name):
-    exact, rounded = (one_step(one, GOLDSTEIN, 0.01) for one in (name, name + SINGLE))
+    exact, rounded = (one_step(one, GOLDSTEIN, 0.01) for one in (name, name + "-float32"))
     size = np.abs(exact).max()
     assert 1e-9 < np.abs(rounded - exact).max() / size < 2e-6  # rapier rounds four times
     assert (rounded[:4] == rounded[:4].astype(np.float32)).all()
@@ -230,7 +229,7 @@ def test_in_single_precision_a_step_is_the_same_but_for_rounding(name):
 def test_in_single_precision_there_is_a_best_step(name, best, error):
     """Error and step of the engines' own runs: the map meets the error within a factor of 2.5, and then gets worse."""
     counts = [best // 8, best, 32 * best if name != "bullet" else 64 * best]
-    coarse, fine, finest = (axis_error(f"{name}{SINGLE}[attitude]", steps) for steps in counts)
+    coarse, fine, finest = (axis_error(f"{name}{'-float32'}[attitude]", steps) for steps in counts)
     assert error / 2.5 < fine < 2.5 * error
     assert fine < coarse
     assert finest > 1.5 * fine

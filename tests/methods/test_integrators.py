@@ -179,23 +179,6 @@ def test_discrete_momenta_are_those_of_the_discrete_lagrangian(name, nodes, weig
             assert -slope(k, 1, q[j], q[j + 1]) == pytest.approx(momentum, abs=2e-8)
 
 
-def test_rk45_is_scipys_to_the_bit():
-    from scipy.integrate import solve_ivp
-
-    from symtop.methods.framework.angles import field_angles, with_rates
-    from symtop.methods.library.scipy_ivp import RightHandSide
-
-    where = symtop.scene("spheroid")
-    run = symtop.simulate(where, "rk45", tolerance=1e-7, samples=81)
-    y0 = [getattr(where.start, key) for key in ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")]
-    times = run["time"].values
-    rhs = RightHandSide(field_angles, with_rates(where.top, where.start)[0])
-    done = solve_ivp(rhs, (0.0, 8.0), y0, t_eval=times, rtol=1e-7, atol=1e-7)
-    assert np.array_equal(done.y[0], run["theta"].values)
-    assert np.array_equal(done.y[1], run["phi"].values)
-    assert done.nfev == run.attrs["force_evaluations"]
-
-
 def test_compensated_sums_keep_a_million_small_increments():
     """A kernel that adds 0.1 a million times: the loop's sum is exact to rounding, the naive one is not."""
 

@@ -11,7 +11,7 @@ from symtop.methods.lie_group.generalised_alpha import generalised_alpha
 from symtop.methods.lie_group.runge_kutta import LieTable, lie_runge_kutta
 from symtop.methods.lie_group.variational import EULER_POINCARE, Variational, lie_variational
 from symtop.methods.splitting.coefficients import SUZUKI_4
-from tests.methods.test_lanes import FAR, SOLVERS, assert_runs_alone, left_alone, members, times_faster
+from tests.methods.test_lanes import FAR, SOLVERS, assert_runs_alone, left_alone, members
 from tests.methods.test_newton_lanes import spread
 
 EXPLICIT = ("rkmk-se3-2", "rkmk-se3-4", "crouch-grossman-3", "commutator-free-4")
@@ -124,26 +124,3 @@ def test_a_lane_that_takes_more_iterations_changes_no_other(name):
     for one, other in zip(before, after, strict=True):
         np.testing.assert_array_equal(one[others], other[others])
     assert_runs_alone(solver, numbers, h, marks, after)
-
-
-@pytest.mark.parametrize("name", ["rkmk-se3-2", "generalised-alpha", "euler-poincare"])
-def test_a_member_does_not_see_its_neighbours(name):
-    """Bits of the members that were not touched; those that were differ (the negative control)."""
-    numbers, h, marks = members(200)
-    solver = SOLVERS[f"{name}[attitude]"]
-    before = solver.many(numbers, h, marks)
-    numbers[100, 5], h[101], numbers[102, 8] = numbers[100, 5] + 1.0, 1e200, np.nan
-    after = solver.many(numbers, h, marks)
-    assert OUTCOMES[after.outcome[102]] != "ok"
-    moved = [i for i in range(200) if not np.array_equal(before.states[i], after.states[i], equal_nan=True)]
-    assert moved == [100, 101, 102]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "times"), [*((name, 4.0) for name in EXPLICIT), *((name, 2.5) for name in ITERATED)])
-def test_lanes_are_faster_than_members_one_after_another(name, times):
-    """So many times in any case: what LLVM does not turn into vectors gains nothing (`make bench` measures)."""
-    numbers, h, marks = spread(128, 500)
-    solver = SOLVERS[f"{name}[axis]"]
-    assert left_alone(solver, numbers, h, marks).size == 0
-    assert times_faster(solver, numbers, h, marks) > times

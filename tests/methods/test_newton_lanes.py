@@ -6,10 +6,9 @@ import pytest
 from symtop.methods.framework.lanes import W
 from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.lagrangian.discrete_lagrangian import discrete_lagrangian
-from symtop.methods.lagrangian.unreduced import built_in as unreduced
 from symtop.model.scenes import scene
 from symtop.model.top import flat
-from tests.methods.test_lanes import SOLVERS, assert_runs_alone, left_alone, members, times_faster
+from tests.methods.test_lanes import SOLVERS, assert_runs_alone, left_alone, members
 
 IMPLICIT = ("midpoint[angles]", "trapezoidal[angles]", "simpson-linear[angles]", "galerkin-simpson[angles]")
 
@@ -36,10 +35,6 @@ def test_sweeps_of_gauss_have_the_bits_of_runs_alone(name):
     assert {OUTCOMES[k] for k in done.outcome} == {"ok", "not_converged"}
 
 
-def test_gauss_methods_of_more_stages_run_alone():
-    assert not any(SOLVERS[name].in_lanes for name in ("gauss-12[axis]", "gauss-6[attitude]"))
-
-
 def test_a_rule_of_ones_own_runs_in_lanes():
     """Two nodes at the start, one inside, one at the end, and weights that are not symmetric."""
     method = discrete_lagrangian("mixed", (0.0, 0.0, 0.3, 1.0), (0.1, 0.2, 0.3, 0.4))
@@ -61,10 +56,6 @@ def test_a_lane_that_takes_more_iterations_changes_no_other():
         np.testing.assert_array_equal(one[others], other[others])
 
 
-def test_the_unreduced_kernels_run_alone():
-    assert not any(method.solvers["angles"].in_lanes for method in unreduced())
-
-
 def spread(count, steps):
     """Starts and tops around a scene, all of them with 300 steps to its nutation."""
     draw, at = np.random.default_rng(0), scene("spheroid")
@@ -72,21 +63,3 @@ def spread(count, steps):
     numbers[:, 3:] *= draw.uniform(0.8, 1.2, (count, 6))
     numbers[:, 1] *= draw.uniform(0.8, 1.2, count)
     return numbers, np.full(count, at.nutation_period / 300), np.tile([0, steps], (count, 1))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "times"),
-    [
-        ("midpoint[angles]", 4.0),
-        ("trapezoidal[angles]", 4.0),
-        ("galerkin-simpson[angles]", 2.5),
-        ("gauss-8[axis]", 2.5),
-        ("gauss-4[attitude]", 2.5),
-    ],
-)
-def test_lanes_are_faster_than_members_one_after_another(name, times):
-    """So many times in any case: what LLVM does not turn into vectors gains nothing (`make bench` measures)."""
-    numbers, h, marks = spread(128, 500)
-    assert left_alone(SOLVERS[name], numbers, h, marks).size == 0
-    assert times_faster(SOLVERS[name], numbers, h, marks) > times

@@ -416,13 +416,3 @@ def test_the_first_use_in_a_new_process_is_quick():
 def test_bad_tables_are_refused_in_one_sentence(words, arguments, more):
     with pytest.raises(symtop.SymtopError, match=words):
         composition("bad", *arguments, **more)
-
-
-def test_every_method_has_a_citation():
-    for name in symtop.integrators():
-        entry = symtop.citation(name)
-        assert entry.startswith("@")
-        assert "year = {" in entry
-    assert "Takahashi" in symtop.citation("takahashi-imada")
-    with pytest.raises(symtop.SymtopError, match="names no source that is known here"):
-        symtop.citation(composition("mine", (1.0,), (0.5, 0.5)))

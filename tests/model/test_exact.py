@@ -3,8 +3,6 @@
 import dataclasses
 import json
 import math
-import subprocess
-import sys
 from decimal import Decimal
 from pathlib import Path
 
@@ -489,11 +487,3 @@ def test_working_precision_of_the_caller_does_not_matter():
         low = PreciseForm(*SPHEROID, digits=40)(8)
         assert mp.mp.dps == 5
     assert low == PreciseForm(*SPHEROID, digits=40)(8)
-
-
-def test_importing_the_module_does_not_import_slow_libraries():
-    slow = "{'mpmath', 'scipy', 'numba', 'heyoka'}"
-    code = f"import sys, symtop.model.exact.closed_form; print(*({slow} & set(sys.modules)))"
-    root = Path(__file__).parents[2]
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root)
-    assert found.stdout.strip() == ""

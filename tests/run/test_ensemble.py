@@ -89,9 +89,9 @@ def test_every_method_runs_and_every_member_is_the_run_of_simulate():
 def test_threads_and_pieces_change_nothing(monkeypatch):
     asked = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
     one = symtop.ensemble(SOME, "strang[axis]", threads=1, **asked)
-    monkeypatch.setattr(chunks, "PIECE", 21 * 5)
+    monkeypatch.setattr(chunks, "CHUNK", 21 * 5)
     assert symtop.ensemble(SOME, "strang[axis]", threads=3, **asked).identical(one)
-    monkeypatch.setattr(chunks, "PIECE_STEPS", 100)
+    monkeypatch.setattr(chunks, "CHUNK_STEPS", 100)
     assert symtop.ensemble(SOME, "strang[axis]", threads=2, **asked).identical(one)
 
 
@@ -105,7 +105,7 @@ def test_pieces_are_shares_of_the_work_and_whole_blocks(n, steps, most):
     counts = None if steps is None else np.broadcast_to(steps, n)
     method = symtop.integrator("strang" if steps is not None else "rk45-compiled").variant("axis")
     job = chunks.Job(method, "axis", np.zeros((n, 9)), np.ones(n), counts, None, 11, None, ("axis",))
-    cut = list(job.pieces())
+    cut = list(job.chunks())
     assert [piece.start for piece in cut] == [0, *(piece.stop for piece in cut[:-1])]
     assert cut[-1].stop == n
     work = np.ones(n) if counts is None else counts
@@ -317,7 +317,7 @@ def test_numbers_that_leave_the_range_fail_alone():
 
 @pytest.mark.parametrize("path", [None, "runs.nc"])
 def test_a_member_on_which_a_solver_raises_is_lost_alone_and_told(path, tmp_path, monkeypatch):
-    monkeypatch.setattr(chunks, "PIECE", 21 * 5)
+    monkeypatch.setattr(chunks, "CHUNK", 21 * 5)
     more = {} if path is None else {"path": tmp_path / path}
     asked = {"step_size": 0.1, "horizon": 2.0, "samples": 21, "quiet": True, **more}
     one = symtop.ensemble(SOME, "rk4[axis]", **asked).load()

@@ -8,9 +8,10 @@ import pytest
 import xarray as xr
 
 import symtop
-from symtop.core import netcdf, over_time
+from symtop.core import netcdf
 from symtop.core.numbers import GOLDEN
-from symtop.run.simulation import WIDEST_GAP, sample_times
+from symtop.run.simulation import WIDEST_GAP, integrate, sample_times
+from symtop.run.trajectory import Trajectory, dataset
 
 
 def test_the_dataset_is_the_one_that_is_promised():
@@ -112,21 +113,51 @@ def test_samples_are_those_of_a_sort_whether_it_was_needed_or_not():
 
 @pytest.mark.parametrize("row", ["strang[axis]", "strang[attitude]", "midpoint[angles]", "rk45[angles]"])
 @pytest.mark.parametrize("scene", ["spheroid", "goldstein", "grazing"])
-def test_the_dataset_is_the_one_of_xarray_itself(scene, row, monkeypatch):
+def test_the_dataset_is_the_one_of_xarray_itself(scene, row, monkeypatch, tmp_path):
     """With the public constructor in place of the quick one: values, types, order, coordinates, attributes."""
-    control = {"tolerance": 1e-6} if row.startswith("rk45") else {"step_size": 0.01}
-    quick, public = [], []
-    for kept in (quick, public):
-        kept.append(symtop.simulate(scene, row, samples=101, horizon=2.0, guard=False, **control))
-        monkeypatch.setattr(over_time, "fits", lambda: False)
-    xr.testing.assert_identical(quick[0], public[0])
-    assert over_time._alike(quick[0], public[0])
-    assert list(quick[0].attrs.items()) == list(public[0].attrs.items())
+    settings = {"samples": 101, "horizon": 2.0, "tolerance" if row.startswith("rk45") else "step_size": 1e-3}
+    quick = symtop.simulate(scene, row, guard=False, **settings)
+    private, refused = xr.Dataset._construct_direct, []
+
+    def missing_once(*given, **named):
+        if not refused:
+            raise AttributeError(refused.append("_construct_direct"))
+        return private(*given, **named)
+
+    monkeypatch.setattr(xr.Dataset, "_construct_direct", staticmethod(missing_once))
+    public = symtop.simulate(scene, row, guard=False, **settings)
+    assert refused
+    xr.testing.assert_identical(quick, public)
+    assert list(quick.variables) == list(public.variables)
+    assert [type(part) for part in quick.variables.values()] == [type(part) for part in public.variables.values()]
+    assert quick.sel(time=2.0).identical(public.sel(time=2.0))
+    files = [netcdf.write(data, tmp_path / f"{k}.nc").read_bytes() for k, data in enumerate((quick, public))]
+    assert files[0] == files[1]
     for record in ("top", "start"):
-        told = json.loads(quick[0].attrs[record])
-        held = getattr(symtop.scene(scene), record)
-        assert told == {name: getattr(held, name) for name in held.__slots__}
-        assert quick[0].attrs[record] == json.dumps(told, sort_keys=True)
+        numbers, held = json.loads(quick.attrs[record]), getattr(symtop.scene(scene), record)
+        assert numbers == {name: getattr(held, name) for name in held.__slots__}
+        assert quick.attrs[record] == json.dumps(numbers, sort_keys=True)
+
+
+def test_two_datasets_share_nothing_that_can_be_written_to():
+    trajectory = integrate("spheroid", "strang[attitude]", step_size=0.1)
+    first, second = (dataset(trajectory.time, trajectory.columns) for _ in range(2))
+    for name in ("time", "component", "part", "theta"):
+        first[name].attrs["mark"] = 1
+        first[name].encoding["mark"] = 1
+        assert "mark" not in second[name].attrs
+        assert "mark" not in second[name].encoding
+    assert not np.shares_memory(first["time"].values, trajectory.time)
+
+
+def test_a_trajectory_has_the_numbers_of_the_dataset():
+    settings = {"step_size": 0.01, "observe": "attitude", "horizon": 1.0}
+    data = symtop.simulate("spheroid", "midpoint", guard=False, **settings)
+    trajectory = integrate("spheroid", "midpoint", **settings)
+    np.testing.assert_equal(Trajectory.of_data(data)._asdict(), trajectory._asdict())
+    assert {name: data[name].values.tobytes() for name in data.data_vars} == {
+        name: values.tobytes() for name, values in trajectory.columns.items()
+    }
 
 
 def test_files_are_whole_reproducible_and_readable(tmp_path):

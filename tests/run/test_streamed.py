@@ -29,7 +29,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 @pytest.fixture
 def small_pieces(monkeypatch):
-    monkeypatch.setattr(chunks, "PIECE", 21 * 7)
+    monkeypatch.setattr(chunks, "CHUNK", 21 * 7)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_the_beginning_of_another_ensemble_and_a_damaged_piece_are_refused(tmp_p
     with pytest.raises(symtop.SymtopError, match="beginning of another ensemble"):
         symtop.ensemble(SOME, "cayley[axis]", path=path, **ASKED)
     monkeypatch.undo()
-    monkeypatch.setattr(chunks, "PIECE", 21 * 7)
+    monkeypatch.setattr(chunks, "CHUNK", 21 * 7)
     (folder / "7-14.npz").write_bytes((folder / "7-14.npz").read_bytes()[:-300])
     with pytest.raises(symtop.SymtopError, match=r"7-14.npz is damaged .*: remove it"):
         symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
@@ -147,7 +147,7 @@ def test_a_piece_that_was_removed_is_not_called_damaged(tmp_path, small_pieces, 
     with pytest.raises(symtop.SymtopError, match=r"7-14.npz is not there any more, so somebody has removed it"):
         symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
     monkeypatch.undo()
-    monkeypatch.setattr(chunks, "PIECE", 21 * 7)
+    monkeypatch.setattr(chunks, "CHUNK", 21 * 7)
     with symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED) as data:
         assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **ASKED))
 
@@ -166,7 +166,7 @@ def test_pieces_that_do_not_say_whose_they_are_belong_to_nobody(tmp_path, small_
     with pytest.raises(KeyboardInterrupt):
         symtop.ensemble(SOME, "strang[axis]", **asked)
     monkeypatch.undo()
-    monkeypatch.setattr(chunks, "PIECE", 21 * 7)
+    monkeypatch.setattr(chunks, "CHUNK", 21 * 7)
     others = symtop.population(60, seed=6)
     with pytest.raises(symtop.SymtopError, match="holds the beginning of another ensemble"):
         symtop.ensemble(others, "strang[axis]", **asked)
@@ -211,7 +211,7 @@ def test_what_a_killed_writer_left_is_swept_and_a_library_without_room_says_so(t
     assert not left.exists()
     assert {file.name for file in tmp_path.iterdir()} == {"runs.nc.parts"}
     monkeypatch.undo()
-    monkeypatch.setattr(chunks, "PIECE", 21 * 7)
+    monkeypatch.setattr(chunks, "CHUNK", 21 * 7)
     monkeypatch.setattr(chunks.Job, "columns", no_room)  # nothing is left to be computed
     symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED).close()
     assert path.exists()

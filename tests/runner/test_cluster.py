@@ -96,7 +96,7 @@ def test_a_case_that_fails_there_is_recorded_here(cluster, tmp_path):
 
 def test_an_ensemble_computed_there_is_the_one_computed_here(cluster, tmp_path, monkeypatch):
     members, asked = population(90, seed=4), {"per_nutation": 20, "nutations": 2, "samples": 11, "quiet": True}
-    monkeypatch.setattr(chunks, "PIECE", 11 * 20)
+    monkeypatch.setattr(chunks, "CHUNK", 11 * 20)
     for name in ("strang", "cayley-tuned[axis]"):
         here = ensemble(members, name, **asked)
         assert ensemble(members, name, scheduler=cluster.scheduler_address, **asked).identical(here)

@@ -369,7 +369,7 @@ def test_a_call_that_is_dearer_makes_no_evaluation_dearer(name, monkeypatch):
     row = integrator(name)
     solver = row.solvers["axis"]
     plain = float(prices([name], 9, 2e-3)["alone"][0])
-    monkeypatch.setattr(pricing, "variant", lambda _: dataclasses.replace(row, solvers={"axis": waiting}))
+    monkeypatch.setattr(pricing, "integrator", lambda _: dataclasses.replace(row, solvers={"axis": waiting}))
     assert float(prices([name], 9, 2e-3)["alone"][0]) == pytest.approx(plain, rel=0.3)
 
 

@@ -22,7 +22,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from symtop.measure.conservation import Changed, Difference, constant_of, from_increments, residuals
 from symtop.measure.growth import behaviour, tops
@@ -32,7 +31,8 @@ from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import space_momenta
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop
-from symtop.run.simulation import as_dataset, make_plan
+from symtop.run.simulation import make_plan
+from symtop.run.trajectory import Trajectory
 
 STEPS, QUICK_STEPS = 1_000_000, 50_000
 STEPS_A_NUTATION = 118.02
@@ -107,7 +107,7 @@ class LongRun(NamedTuple):
 
 def _run(
     method: Integrator, scene: Scene, chart: str, steps: float, step: float, samples: int
-) -> tuple[xr.Dataset, Run, Plan]:
+) -> tuple[Trajectory, Run, Plan]:
     """A run for `steps` times `step`: with the momenta of its states, as the solver returned it, and its plan."""
     horizon = (round(steps) if method.fixed_step else steps) * step
     control = {"step_size": step} if method.fixed_step else {}
@@ -120,8 +120,7 @@ def _run(
         with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up
             p_phi, p_psi = space_momenta(chart, run.states)
         own = run._replace(p_phi=p_phi, p_psi=p_psi)
-    data = as_dataset(scene, chart, plan, own)
-    return data.assign_attrs(chart=chart, step_size=plan.step_size), run, plan
+    return Trajectory.of_run(scene, chart, plan, own), run, plan
 
 
 def long_run(
@@ -137,16 +136,16 @@ def long_run(
             share = QUICK_SHARE if quick else 1.0
             limit = share * EVALUATIONS[method.implementation] / cost if most is None else most
             steps = max(min(QUICK_STEPS if quick else STEPS, limit) * method.speed, PILOT)
-        data, run, plan = _run(method, scene, chart, steps, step, SAMPLES)
+        shown, run, plan = _run(method, scene, chart, steps, step, SAMPLES)
         if run.outcome == "ok" or not method.fixed_step:
             break
     _, other, _ = _run(method, scene, chart, PILOT, 0.21 * step, PILOT + 1)
-    made, changes, small = max(run.steps, 1), constants(scene, data), constants(scene, pilot)
+    made, changes, small = max(run.steps, 1), constants(scene, shown), constants(scene, pilot)
     grains = {name: scene.energy_grain if name == "energy" else 1.0 for name in changes}
     if chart == "angles":
         reported = from_increments(method, scene, plan) if method.fixed_step else None
     else:
-        reported = _reported(scene, data, run)
+        reported = _reported(scene, shown, run)
     return LongRun(
         constants={name: change_of(plan.times, changes[name], small[name], made, grains[name]) for name in changes},
         outcome=run.outcome,
@@ -170,32 +169,32 @@ def windows(nutations: Array, change: Array) -> tuple[Array, Array]:
     return middles, largest
 
 
-def _reported(scene: Scene, data: xr.Dataset, run: Run) -> Difference:
+def _reported(scene: Scene, shown: Trajectory, run: Run) -> Difference:
     """How far the reported momenta are from those of the states, over the long run."""
     apart = {}
     for name in ("p_phi", "p_psi"):
-        gap = np.abs(getattr(run, name) - data[name].values) / scene.momentum_scale
+        gap = np.abs(getattr(run, name) - getattr(shown, name)) / scene.momentum_scale
         apart[name] = float(np.max(gap[np.isfinite(gap)], initial=0.0))
     name = max(apart, key=lambda one: apart[one])
     return Difference(name, apart[name], REPORTED, f"of the larger momentum in {run.steps} steps")
 
 
-def constants(scene: Scene, run: xr.Dataset) -> dict[str, Array]:
+def constants(scene: Scene, run: Trajectory) -> dict[str, Array]:
     """Relative change of every constant that the run's chart has, at its samples."""
     changes = residuals(scene, run)
-    if run.attrs["chart"] != "angles":
-        changes["axis_length"] = np.linalg.norm(run["axis"].values, axis=1) - 1.0
-    if run.attrs["chart"] != "angles" and math.isfinite(run.attrs["step_size"]):
+    if run.chart != "angles":
+        changes["axis_length"] = np.linalg.norm(run.axis, axis=1) - 1.0
+    if run.chart != "angles" and math.isfinite(run.step_size):
         changes["cayley_energy"] = _cayley_residual(scene.top, run)
     return changes
 
 
-def _cayley_residual(top: SymmetricTop, run: xr.Dataset) -> Array:
+def _cayley_residual(top: SymmetricTop, run: Trajectory) -> Array:
     """|L|^2/2 + c u - k^2 (1-u^2)/8 with the best c, relative to its size; |L|^2 is in the energy."""
-    u = run["axis"].values[:, 2]
-    spin: Array = 0.5 * run["p_psi"].values ** 2 * (1.0 / top.I3 - 1.0 / top.I1)
-    square: Array = top.I1 * (run["energy"].values - top.mgl * u - spin)  # |L|^2 / 2
-    kick = float(run.attrs["step_size"]) * top.mgl
+    u = run.axis[:, 2]
+    spin: Array = 0.5 * run.p_psi**2 * (1.0 / top.I3 - 1.0 / top.I1)
+    square: Array = top.I1 * (run.energy - top.mgl * u - spin)  # |L|^2 / 2
+    kick = run.step_size * top.mgl
     rest = square - kick * kick * (1.0 - u) * (1.0 + u) / 8.0
     good = np.isfinite(rest) & np.isfinite(u)
     if good.sum() < 8 or np.ptp(u[good]) == 0.0:

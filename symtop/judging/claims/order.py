@@ -35,7 +35,7 @@ from symtop.measure.order_conditions import Conditions, conditions, splitting_co
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.plan import Array
+from symtop.methods.framework.plan import Array, sentence
 from symtop.methods.framework.preparation import Scaled
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import Tableau
@@ -43,7 +43,7 @@ from symtop.methods.splitting.loop import Composition
 from symtop.methods.splitting.rotor import EXACT
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
-from symtop.run.simulation import simulate
+from symtop.run.simulation import integrate
 
 NUTATIONS = 1.37  # length of the runs that the slope is fitted to
 FALLBACK, LONGER = "goldstein", (8.37, 40.0)
@@ -236,16 +236,15 @@ def limit(method: Integrator, scene: Scene, power: int, finest: float | None = N
 
 
 def _signed_error(method: Integrator, scene: Scene, horizon: float, steps: int) -> Array:
-    run = simulate(
-        scene, method, step_size=horizon / steps, horizon=horizon, samples=2, observe=observable(method), guard=False
-    )
-    if run.attrs["outcome"] != "ok":
-        raise SymtopError(f"a run of {steps} steps over {horizon:.3g} {run.attrs['outcome_message']}")
-    last, true = run.isel(time=-1), closed_form(scene)(np.array([horizon]))
+    run = integrate(scene, method, step_size=horizon / steps, horizon=horizon, samples=2, observe=observable(method))
+    if run.outcome != "ok":
+        ended = sentence(run.outcome, run.reached_time, horizon)
+        raise SymtopError(f"a run of {steps} steps over {horizon:.3g} {ended}")
+    true = closed_form(scene)(np.array([horizon]))
     axis = charts.axis_from_angles(true.theta[0], true.phi[0])
-    slip = (float(last["p_theta"]) - scene.top.I1 * float(true.theta_dot[0])) / scene.momentum_scale
-    turn = [float(last["psi"]) - float(true.psi[0])] if "psi" in run else []
-    return np.array([*(last["axis"].values - axis), slip, *turn])
+    slip = (float(run.p_theta[-1]) - scene.top.I1 * float(true.theta_dot[0])) / scene.momentum_scale
+    turn = [] if run.psi is None else [float(run.psi[-1]) - float(true.psi[0])]
+    return np.array([*(run.axis[-1] - axis), slip, *turn])
 
 
 def settings_shown(fitted: Order) -> dict[str, Array]:

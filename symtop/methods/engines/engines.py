@@ -9,7 +9,7 @@ runs it. An engine that works in single precision has its map in both, as ``jolt
 the method, the second what rounding makes of it, and of a limit h -> 0 it claims nothing.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from symtop.methods.engines import maps, maps as kicks, maps as schemes
@@ -28,21 +28,19 @@ from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.registry import ENGINE, Integrator
 
-SINGLE = "-float32"  # what the name of a map in single precision ends with
-
 
 def _entry(
     name: str, loops: dict[str, Loop], order: int | None, summary: str, reference: str, keeps: str = "", *,
-    carried: Carried = VELOCITY, rule: Any = None, forces: int = 1, symplectic: bool = False,
-    energy_error: str | None = None, needs: str = "group",
+    carried: Mapping[str, Carried] = VELOCITY, rule: Any = None, forces: int = 1, symplectic: bool = False,
+    energy_error: str | None = None, precision: str = "double", needs: str = "group",
 ) -> Integrator:  # fmt: skip
     """The record of a map from its loops, by chart; `keeps` names the momenta that it conserves."""
     return Integrator(
         name=name, family=ENGINE, summary=summary, reference=reference, order=order, explicit=True,
         symplectic=symplectic, symmetric=symplectic, conserves=frozenset(keeps.split()), energy_error=energy_error,
-        needs=needs, general=True,
+        precision=precision, needs=needs, general=True,
         solvers={
-            chart: FixedStep(loop, rule or Substeps(), carried.prepare[chart], forces, implicit=False)
+            chart: FixedStep(loop, rule or Substeps(), carried[chart].prepare, forces, implicit=False)
             for chart, loop in loops.items()
         },
     )  # fmt: skip
@@ -50,10 +48,13 @@ def _entry(
 
 def _engine(
     name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, keeps: str = "", *,
-    carried: Carried = VELOCITY, reused: Callable[..., Any] = nothing, **said: Any,
+    carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = nothing, **said: Any,
 ) -> Integrator:  # fmt: skip
     """A map in double, on the axis and on the attitude."""
-    loops = {"axis": axis_loop(step, carried, reused), "attitude": attitude_loop(step, carried, reused)}
+    loops = {
+        "axis": axis_loop(step, carried["axis"], reused),
+        "attitude": attitude_loop(step, carried["attitude"], reused),
+    }
     return _entry(name, loops, order, summary, reference, keeps, carried=carried, **said)
 
 
@@ -62,11 +63,11 @@ def _both(
     rule: Any = None, energy_error: str | None = None,
 ) -> list[Integrator]:  # fmt: skip
     """A map in double and in the single precision of the engine, there on the attitude as the engine steps it."""
-    rounded = {"attitude": attitude_loop(step, VELOCITY, number=single)}
+    rounded = {"attitude": attitude_loop(step, VELOCITY["attitude"], number=single)}
     said = f"{summary}, in single precision"
     return [
         _engine(name, step, order, summary, reference, keeps, rule=rule, energy_error=energy_error),
-        _entry(name + SINGLE, rounded, None, said, reference, rule=rule),
+        _entry(f"{name}-float32", rounded, None, said, reference, rule=rule, precision="single"),
     ]
 
 

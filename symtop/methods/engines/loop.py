@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.loop import Loop, kernel_loop
+from symtop.methods.framework.loop import Loop, as_stepped, kernel_loop
 from symtop.methods.framework.preparation import Body, Preparation
 from symtop.methods.framework.space import (
     axis_parts,
@@ -55,44 +55,25 @@ class EngineTop(NamedTuple):
     one: float = 1.0
 
 
-@register_jitable
-def _numbers(top: Any) -> Any:
-    return EngineTop(top.I1, top.I3, top.mgl, 0.0, 0.5, 1.0)
+def _prepared(place_parts: Callable[..., Any], size: int, *, rates: bool) -> Preparation:
+    """A start as (e, L) or (q, L), or with `rates` w for L: the angular momentum of a body whose moments are one."""
+
+    def prepare(top, at):  # type: ignore[no-untyped-def]
+        body: Any = Body(1.0, 1.0, 0.0) if rates else Body(top.I1, top.I3, top.mgl)
+        v = momentum_parts(math, body, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
+        return EngineTop(top.I1, top.I3, top.mgl, 0.0, 0.5, 1.0), (*place_parts(at), *v)
+
+    return Preparation(prepare, size)
 
 
 @register_jitable
-def _velocity(at: Any) -> Any:
-    """The angular velocity in space: the angular momentum of a body whose moments are one."""
-    return momentum_parts(math, Body(1.0, 1.0, 0.0), at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
-
-
-def _rates_on_axis(top: Any, at: Any) -> Any:
-    """Kernel parameters and state (e, w) of a start."""
-    return _numbers(top), (*axis_parts(math, at.theta, at.phi), *_velocity(at))
-
-
-def _rates_on_attitude(top: Any, at: Any) -> Any:
-    """Kernel parameters and state (q, w) of a start."""
-    return _numbers(top), (*quaternion_parts(math, at.theta, at.phi, at.psi), *_velocity(at))
+def _axis_of_start(at: Any) -> Any:
+    return axis_parts(math, at.theta, at.phi)
 
 
 @register_jitable
-def _momentum(top: Any, at: Any) -> Any:
-    return momentum_parts(math, top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
-
-
-def _momentum_on_axis(top: Any, at: Any) -> Any:
-    """Kernel parameters and state (e, L) of a start."""
-    return _numbers(top), (*axis_parts(math, at.theta, at.phi), *_momentum(top, at))
-
-
-def _momentum_on_attitude(top: Any, at: Any) -> Any:
-    """Kernel parameters and state (q, L) of a start."""
-    return _numbers(top), (*quaternion_parts(math, at.theta, at.phi, at.psi), *_momentum(top, at))
-
-
-RATES = {"axis": Preparation(_rates_on_axis, 6), "attitude": Preparation(_rates_on_attitude, 7)}
-MOMENTUM = {"axis": Preparation(_momentum_on_axis, 6), "attitude": Preparation(_momentum_on_attitude, 7)}
+def _quaternion_of_start(at: Any) -> Any:
+    return quaternion_parts(math, at.theta, at.phi, at.psi)
 
 
 @register_jitable
@@ -206,11 +187,6 @@ def _observe_rates_on_attitude(par: Any, rule: Any, before: Any, dstate: Any, h:
     return _momenta(par, axis((before[0] + dstate[0], *_after(before, dstate, 1))), _after(before, dstate, 4))
 
 
-def _enter(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """The start is prepared as the map carries it."""
-    return state
-
-
 def _present_rates_on_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     """(e, L) of (e, w)."""
     e = state[0], state[1], state[2]
@@ -223,29 +199,24 @@ def _present_rates_on_attitude(par: Any, rule: Any, state: Any, k: int, h: float
     return (*q, *momentum(par, axis(q), (state[4], state[5], state[6])))
 
 
-def _present_momentum(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """The state is shown as it is carried."""
-    return state
-
-
 class Carried(NamedTuple):
-    """What a map carries beside an orientation: how it starts, is observed and is shown, by chart."""
+    """What a map carries beside an orientation in a chart: how it starts, is observed and is shown."""
 
-    prepare: dict[str, Preparation]
-    observe: dict[str, Callable[..., Any]]
-    present: dict[str, Callable[..., Any]]
+    prepare: Preparation
+    observe: Callable[..., Any]
+    present: Callable[..., Any] = as_stepped
 
 
-VELOCITY = Carried(
-    RATES,
-    {"axis": _observe_rates_on_axis, "attitude": _observe_rates_on_attitude},
-    {"axis": _present_rates_on_axis, "attitude": _present_rates_on_attitude},
-)
-ANGULAR_MOMENTUM = Carried(
-    MOMENTUM,
-    {"axis": observe_axis, "attitude": observe_attitude},
-    {"axis": _present_momentum, "attitude": _present_momentum},
-)
+VELOCITY = {
+    "axis": Carried(_prepared(_axis_of_start, 6, rates=True), _observe_rates_on_axis, _present_rates_on_axis),
+    "attitude": Carried(
+        _prepared(_quaternion_of_start, 7, rates=True), _observe_rates_on_attitude, _present_rates_on_attitude
+    ),
+}
+ANGULAR_MOMENTUM = {
+    "axis": Carried(_prepared(_axis_of_start, 6, rates=False), observe_axis),
+    "attitude": Carried(_prepared(_quaternion_of_start, 7, rates=False), observe_attitude),
+}
 
 
 @register_jitable
@@ -273,7 +244,7 @@ def axis_loop(step: Callable[..., Any], carried: Carried, reused: Callable[..., 
         total = dstate[0] + dstate[1] + dstate[2] + dstate[3] + dstate[4] + dstate[5]
         return dstate, carry, 1, finite_outcome(total)
 
-    return kernel_loop(begin, increment, carried.observe["axis"], _enter, carried.present["axis"])
+    return kernel_loop(begin, increment, carried.observe, present=carried.present)
 
 
 def attitude_loop(
@@ -299,7 +270,7 @@ def attitude_loop(
         total = dstate[0] + dstate[1] + dstate[2] + dstate[3] + dstate[4] + dstate[5] + dstate[6]
         return dstate, carry, 1, finite_outcome(total)
 
-    return kernel_loop(begin, increment, carried.observe["attitude"], _enter, carried.present["attitude"])
+    return kernel_loop(begin, increment, carried.observe, present=carried.present)
 
 
 class Substeps(NamedTuple):

@@ -54,7 +54,7 @@ from symtop.methods.engines.loop import (
     turned,
     velocity,
 )
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import kernel_loop, no_carry
 from symtop.methods.framework.space import finite_outcome, observe_attitude
 from symtop.methods.vectors import cross, dot, plus, product, scaled
 
@@ -309,11 +309,6 @@ def _third_turn(par: Any, q: Any, L: Any, h: float) -> Any:
     return q, (C * L[0] + S * L[1], C * L[1] - S * L[0], L[2])
 
 
-def begin_no_squish(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """A step depends on its start alone."""
-    return 0.0
-
-
 def increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (q, L); the free rotation leaves L in space as it is."""
     q, half = (state[0], state[1], state[2], state[3]), 0.5 * h
@@ -321,13 +316,17 @@ def increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) -
     kicked = state[4] + kick[0], state[5] + kick[1], state[6] + kick[2]
     L = plus(kicked, 1.0, turned((q[0], -q[1], -q[2], -q[3]), kicked))
     if par.I3 < par.I1:
-        q, L = _second_turn(par, *_first_turn(par, q, L, half), half)
+        q, L = _first_turn(par, q, L, half)
+        q, L = _second_turn(par, q, L, half)
         q, L = _third_turn(par, q, L, h)
-        q, L = _first_turn(par, *_second_turn(par, q, L, half), half)
+        q, L = _second_turn(par, q, L, half)
+        q, L = _first_turn(par, q, L, half)
     else:
-        q, L = _second_turn(par, *_third_turn(par, q, L, half), half)
+        q, L = _third_turn(par, q, L, half)
+        q, L = _second_turn(par, q, L, half)
         q, L = _first_turn(par, q, L, h)
-        q, L = _third_turn(par, *_second_turn(par, q, L, half), half)
+        q, L = _second_turn(par, q, L, half)
+        q, L = _third_turn(par, q, L, half)
     q = normalised(par, q)
     kick = plus(kick, half, torque(par, axis(q)))
     dstate = (
@@ -338,4 +337,4 @@ def increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) -
     return dstate, carry, 1, finite_outcome(total)
 
 
-march_no_squish = kernel_loop(begin_no_squish, increment_no_squish, observe_attitude)
+march_no_squish = kernel_loop(no_carry, increment_no_squish, observe_attitude)

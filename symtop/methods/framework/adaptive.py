@@ -23,11 +23,6 @@ from symtop.model.top import Angles, SymmetricTop, flat
 Loop = Callable[..., tuple[int, int, int, int]]
 
 
-def one(tolerance: float) -> int:
-    """The unit of effort is a force evaluation."""
-    return 1
-
-
 @dataclass(frozen=True)
 class Adaptive:
     """A solver around compiled loops with a tolerance; a run is one call where it ends within `block`."""
@@ -38,7 +33,7 @@ class Adaptive:
     time: int  # which of them is the time that was reached
     most: float  # units of effort of a run without a budget
     block: int  # units between returns to Python, so that an interrupt is heard within a second
-    unit: Callable[[float], int] = one  # force evaluations of a unit of effort, of a tolerance
+    unit: Callable[[float], int] = lambda _: 1  # force evaluations of a unit of effort, of a tolerance
     check: Requirement | None = None  # what a start must meet
 
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:

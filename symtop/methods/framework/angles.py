@@ -124,8 +124,7 @@ def ended_angles(y: Any) -> int:
     """Is the state finite and theta a point of the chart?"""
     # zero, or NaN where any of them is not finite: one question about theta then answers for all six, without a branch
     nothing = 0.0 * (y[1] + y[2] + y[3] + y[4] + y[5])
-    outcome: int = chart_outcome(y[0] + nothing)
-    return outcome
+    return chart_outcome(y[0] + nothing)
 
 
 def sampled_momenta(par: Any, states: Array) -> tuple[Array, Array]:

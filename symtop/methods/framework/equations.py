@@ -41,28 +41,20 @@ class Formulation(NamedTuple):
     momenta: Callable[[Any, Array], tuple[Array, Array]]  # (par, states) -> p_phi and p_psi of samples
 
 
-def _axis_momenta(par: Any, states: Array) -> tuple[Array, Array]:
-    return space_momenta("axis", states)
-
-
-def _attitude_momenta(par: Any, states: Array) -> tuple[Array, Array]:
-    return space_momenta("attitude", states)
-
-
 FORMULATIONS = {
     "angles": Formulation(
-        angles.field_angles,
-        angles.ended_angles,
-        angles.observe_angles,
-        angles.with_rates,
-        angles.to_angles,
+        angles.field_angles, angles.ended_angles, angles.observe_angles, angles.with_rates, angles.to_angles,
         angles.sampled_momenta,
     ),
-    "axis": Formulation(space.field_axis, space.ended_space, space.observe_axis, space.on_axis, None, _axis_momenta),
-    "attitude": Formulation(
-        space.field_attitude, space.ended_space, space.observe_attitude, space.on_attitude, None, _attitude_momenta
+    "axis": Formulation(
+        space.field_axis, space.ended_space, space.observe_axis, space.on_axis, None,
+        lambda _, states: space_momenta("axis", states),
     ),
-}
+    "attitude": Formulation(
+        space.field_attitude, space.ended_space, space.observe_attitude, space.on_attitude, None,
+        lambda _, states: space_momenta("attitude", states),
+    ),
+}  # fmt: skip
 
 
 def as_run(

@@ -62,7 +62,7 @@ class FixedStep:
     `present(par, times, states)` makes states of the chart from the kernel's, where they differ.
 
     Where `prepare` is a `Preparation` and `present`, if there is one, is `Shown`, a run is one compiled call; where
-    they are functions of Python, it takes 5 to 10 microseconds more.
+    they are functions of Python, a run of few steps takes five times as long.
     """
 
     loop: Loop | Callable[..., March]
@@ -79,11 +79,11 @@ class FixedStep:
         return par, self.rule(top, start, h) if callable(self.rule) else self.rule, state
 
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        """Start to horizon, in one compiled call where that is possible: 1.9 us and the steps."""
+        """Start to horizon, in one compiled call where that is possible."""
         whole, h, marks = self._whole, plan.step_size, plan.marks
         if whole is None or marks.item(-1) > loops.BLOCK:
             return self._in_stretches(top, start, plan)
-        # a field at a time, `counts`, and the class's constructor, which passes its arguments on, take 0.6 us more
+        # a field at a time, `counts`, and the class's constructor, which passes its arguments on, take a third more
         run, rule, check, size, evaluations, each_step, counted = whole.alone
         if check is not None:
             check(start)

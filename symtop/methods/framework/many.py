@@ -61,8 +61,8 @@ def in_turn(
 ) -> None:  # fmt: skip
     """The chosen members one after another, by ``run(numbers, rule, h, marks, states, momenta)``.
 
-    A member takes 2 us and its steps. A kernel around the loop over members would save most of that, and takes as long
-    to compile as a million members.
+    A kernel around the loop over members would save most of what a call takes, and takes as long to compile as a
+    million members.
     """
     momenta = np.empty((2, marks.shape[1]))
     for i, plain, step in zip(chosen.tolist(), map(tuple, numbers[chosen].tolist()), h[chosen].tolist(), strict=True):

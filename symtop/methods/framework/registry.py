@@ -69,6 +69,7 @@ ALLOWED: dict[str, tuple[Any, ...]] = {
     **dict.fromkeys(("explicit", "symplectic", "symmetric"), (True, False, None)), "exact_steps": (True, False),
     "control": ("step_size", "tolerance", None), "energy_error": ENERGY_ERRORS,
     "needs": (*NEEDS, None), "general": (True, False, None), "inner_loop": INNER_LOOPS,
+    "precision": ("single", "double", "longdouble", "quad"),
 }  # fmt: skip
 KINDS: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("summary", "reference", "about"), (str, "text")), "same_steps_as": (str | None, "a name or None"),
@@ -135,6 +136,7 @@ class Integrator:
     sleeps_from: Callable[[float], float] | None = None  # spin of the sleeping top (I1 = I3 = mgl = 1) at a step h
     exact_steps: bool = False  # a step of any size is the motion itself but for rounding: there is no order
     same_steps_as: str | None = None  # a compiled integrator that takes the same steps
+    precision: str = "double"  # of its arithmetic: "single", "double", "longdouble" (80 bits) or "quad" (128)
     speed: float = 1.0  # of a step, in units of others of its implementation: 0.002 for arithmetic in software
     needs: str | None = field(default=None, metadata={"words": True})
     general: bool | None = field(default=None, metadata={"words": True})

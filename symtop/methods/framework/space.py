@@ -137,8 +137,7 @@ def ended_space(y: Any) -> int:
     total = 0.0
     for value in y:
         total += value
-    outcome: int = finite_outcome(total)
-    return outcome
+    return finite_outcome(total)
 
 
 @register_jitable

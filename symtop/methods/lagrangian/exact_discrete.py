@@ -66,7 +66,7 @@ import numpy as np
 from symtop.core.jit import fused, register_jitable, set_item
 from symtop.core.jit_functions import two_product
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.lanes import Lanes, one_loop
+from symtop.methods.framework.lanes import one_loop
 from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
@@ -277,15 +277,11 @@ def _side_by_side(par: Any, rule: Any, state: Any, carry: Any) -> Any:
     return step, carry, finite_outcome(step[0] + step[2] + (0.0 if rule.parts == 1.0 else np.inf))
 
 
-_lanes = one_loop(_side_by_side, Map, top=OscillatorTop, dimension=8, carry=12, add=accumulate_plainly)
-
-
-def _in_lanes(rule: Map) -> Lanes:
-    return _lanes
-
-
-march_axis = kernel_loop(begin, increment, observe, enter, present_axis, accumulate_plainly, lanes=_in_lanes)
-march_attitude = kernel_loop(begin, increment, observe, enter, present_attitude, accumulate_plainly, lanes=_in_lanes)
+_LANES = one_loop(_side_by_side, Map, top=OscillatorTop, dimension=8, carry=12, add=accumulate_plainly)
+march_axis, march_attitude = (
+    kernel_loop(begin, increment, observe, enter, present, accumulate_plainly, lanes=lambda _: _LANES)
+    for present in (present_axis, present_attitude)
+)
 
 
 def built_in() -> list[Integrator]:

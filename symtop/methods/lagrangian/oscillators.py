@@ -192,6 +192,6 @@ numbers = Scaled(Map(), _mapped)
 
 
 def exact_map(top: SymmetricTop, start: Angles, h: float) -> Map:
-    """The numbers of the exact step h from a start: 2 us."""
+    """The numbers of the exact step h from a start."""
     made: Map = numbers(top, start, h)
     return made

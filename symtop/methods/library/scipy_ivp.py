@@ -34,7 +34,7 @@ from symtop.methods.framework.registry import Integrator, Solver
 from symtop.methods.framework.space import SpaceTop
 from symtop.model.top import Angles, SymmetricTop
 
-# a run's limit: about 25 s at 4.2, 3.7, 2.8 and 13.5 us with SciPy's own work; other classes have the last
+# a run's limit: about half a minute each; other classes have the last
 EVALUATIONS = {"RK45": 6_000_000, "DOP853": 7_000_000, "LSODA": 9_000_000, "Radau": 1_800_000}
 
 

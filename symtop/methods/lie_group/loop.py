@@ -30,7 +30,7 @@ from symtop.core.jit import register_jitable
 from symtop.core.simd import wide_vectors
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
-from symtop.methods.framework.loop import Loop, kernel_loop
+from symtop.methods.framework.loop import Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.preparation import Body, Preparation, Shown, as_it_steps
 from symtop.methods.framework.space import (
@@ -121,23 +121,14 @@ def composed(step: Any, q: Any, m: float, v: Any, dL: Any) -> Any:
 def ended(step: Any) -> int:
     """The outcome of a step that was solved."""
     a, b, c, d, X, Y, Z = step
-    outcome: int = finite_outcome(a + b + c + d + X + Y + Z)
-    return outcome
-
-
-def _nothing(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """A step depends on its start alone."""
-    return 0.0
-
-
-def _alone(rule: Any) -> None:
-    return None
+    return finite_outcome(a + b + c + d + X + Y + Z)
 
 
 def lie_loop(
-    turn: Callable[..., Any], begin: Callable[..., Any] = _nothing, lanes: Callable[[Any], Lanes | None] = _alone
+    turn: Callable[..., Any], begin: Callable[..., Any] = no_carry,
+    lanes: Callable[[Any], Lanes | None] = lambda _: None,
 ) -> Loop:  # fmt: skip
-    """The loop on (q, L) around a map; `lanes` is how it steps many, by its rule (`lie_lanes`)."""
+    """The loop on (q, L) around a map; `lanes` is how it steps many, by its rule."""
     register_jitable(turn)
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
@@ -194,12 +185,6 @@ LOW, STEP, FLAG, WORK, CARRY = SIZE, 2 * SIZE, 3 * SIZE, 3 * SIZE + 1, 3 * SIZE 
 
 
 @register_jitable
-def _empty_carry(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """A step depends on its start alone, and an empty tuple has no type of entry."""
-    return (0.0,)
-
-
-@register_jitable
 def entered(block: Any, j: int) -> Any:
     """The quaternion that lane j has come to, its axis, and the momentum."""
     q, L = reached(column(block, 0, j, STILL), column(block, STEP, j, STILL))
@@ -225,7 +210,7 @@ def _read(numbers: Any) -> Any:
 
 def stepped(
     part: Callable[..., None], lay: Callable[..., None], fields: int, each: int, *,
-    carried: Carried, carry: int = 1, begin: Callable[..., Any] = _empty_carry, room: int = 0,
+    carried: Carried, carry: int = 1, begin: Callable[..., Any] = no_carry, room: int = 0,
     effort: Callable[[Any], int] = lambda _: 0,
 ) -> Lanes:  # fmt: skip
     """A map in lanes: ``part(block, table, row)`` is one share of all lanes, whose own numbers begin with `row`.
@@ -264,7 +249,7 @@ def no_numbers(rule: Any) -> Any:
 def iterated(  # noqa: C901  (the loops of one step, read in one piece)
     start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int, *,
     opened: int, unknowns: int, numbers: Callable[..., Any] = no_numbers, count: int = 1,
-    begin: Callable[..., Any] = _empty_carry, carry: int = 1,
+    begin: Callable[..., Any] = no_carry, carry: int = 1,
 ) -> Lanes:  # fmt: skip
     """An iterated map of a body in lanes, from the parts of which its `turn` is made.
 

@@ -128,8 +128,7 @@ def _sum(terms: int, first: int) -> Part:
             (w, f), weight = before(slopes, row, j), row[at * W + j]
             return plus(w, weight, slopes[last][0]), plus(f, weight, slopes[last][1])
 
-    registered: Part = register_jitable(summed)
-    return registered
+    return register_jitable(summed)
 
 
 def _product(count: int, terms: int, first: int, stages: int) -> Part:
@@ -147,8 +146,7 @@ def _product(count: int, terms: int, first: int, stages: int) -> Part:
             square = half_square(w)
             return acted(so_far, L, w, f, near(square)), w, f, far if square < 1.0 else 1.0
 
-    registered: Part = register_jitable(made)
-    return registered
+    return register_jitable(made)
 
 
 def _stages(counts: tuple[int, ...], stages: int, bent: bool) -> Part:
@@ -169,8 +167,7 @@ def _stages(counts: tuple[int, ...], stages: int, bent: bool) -> Part:
                 slope, g = bent_back(w, f, slope, g)
             return (*known, (slope, g)), max(far, too_far)
 
-    registered: Part = register_jitable(slopes)
-    return registered
+    return register_jitable(slopes)
 
 
 @functools.cache
@@ -189,11 +186,7 @@ def _of_shape(counts: tuple[int, ...], bent: bool) -> Lanes:
             give_up(block, j, max(far, too_far) != 0.0)
 
     each = sum(counts) * stages
-    return stepped(part, lay, 0, each, carried=UNSPUN, effort=_evaluations)
-
-
-def _evaluations(rule: Any) -> int:
-    return len(rule.counts) * len(rule.shares)
+    return stepped(part, lay, 0, each, carried=UNSPUN, effort=lambda rule: len(rule.counts) * len(rule.shares))
 
 
 def in_lanes(rule: Any) -> Lanes:

@@ -132,8 +132,7 @@ def _solving(equation: Equation) -> Callable[..., Any]:
                 return (*rates(par, A, x), k + 1, not lost)
         return (*rates(par, A, x), MOST, False)
 
-    registered: Callable[..., Any] = register_jitable(solve)
-    return registered
+    return register_jitable(solve)
 
 
 _moser_veselov, _euler_poincare = _solving(RIGID_BODY), _solving(RETRACTION)

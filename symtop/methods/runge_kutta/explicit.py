@@ -33,17 +33,11 @@ from symtop.methods.framework.angles import BareTop
 from symtop.methods.framework.equations import FORMULATIONS, Formulation
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, W, column, put
-from symtop.methods.framework.loop import Loop, kernel_loop
+from symtop.methods.framework.loop import Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop
 from symtop.methods.vectors import accumulate
-
-
-@register_jitable
-def begin_in_lanes(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """Nothing is carried from step to step, and an empty tuple has no type of entry."""
-    return (0.0,)
 
 
 def lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
@@ -73,8 +67,7 @@ def _sum(add: Callable[..., Any], terms: int, weights: int) -> Callable[..., Any
         def added(place, slopes, table, j):  # type: ignore[no-untyped-def]
             return add(before(place, slopes, table, j), slopes[last], table[weight * W + j])
 
-    registered: Callable[..., Any] = register_jitable(added)
-    return registered
+    return register_jitable(added)
 
 
 def _stages(field: Callable[..., Any], add: Callable[..., Any], count: int, tops: int) -> Callable[..., Any]:
@@ -91,8 +84,7 @@ def _stages(field: Callable[..., Any], add: Callable[..., Any], count: int, tops
             made = before(par, state, table, j)
             return (*made, field(par, place(state, made, table, j)))
 
-    registered: Callable[..., Any] = register_jitable(slopes)
-    return registered
+    return register_jitable(slopes)
 
 
 def explicit_in_lanes(
@@ -117,18 +109,11 @@ def explicit_in_lanes(
                 put(block, d, j, low)
                 put(block, step_at, j, step)
 
-        return Lanes(step, lay, read, _size, top, d, 1, effort=_evaluations, begin=begin_in_lanes)
+        return Lanes(
+            step, lay, read, lambda _: count * (count + 1) // 2, top, d, 1, effort=lambda _: count, begin=no_carry
+        )
 
     return lambda rule: lanes(len(rule.b))
-
-
-def _size(rule: Any) -> int:
-    n = len(rule.b)
-    return n * (n + 1) // 2
-
-
-def _evaluations(rule: Any) -> int:
-    return len(rule.b)
 
 
 Row = Sequence[float] | NDArray[Any]

@@ -25,7 +25,7 @@ import numpy as np
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import kernel_loop, no_carry
 from symtop.methods.framework.plan import OUTCOMES, Run
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
@@ -34,11 +34,6 @@ from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 from symtop.model.top import Angles, SymmetricTop
 
 frame_sample = frame_to_attitude.sample
-
-
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """A step depends on its start alone."""
-    return 0.0
 
 
 @register_jitable
@@ -94,10 +89,8 @@ def _attitude_shown(par: Any, t: float, y: Any) -> Any:
     return frame_sample(par, t, (*e, y[3], y[4], y[5], *a))
 
 
-march_axis, march_frame = (
-    kernel_loop(begin, increment_axis, observe_axis),
-    kernel_loop(begin, increment_frame, observe_frame),
-)
+march_axis = kernel_loop(no_carry, increment_axis, observe_axis)
+march_frame = kernel_loop(no_carry, increment_frame, observe_frame)
 
 
 class Onward(FixedStep):

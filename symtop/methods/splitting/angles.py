@@ -97,8 +97,7 @@ def _drift_in_lanes(state: Any, step: Any, tau: float) -> Any:
 @register_jitable
 def _ended(state: Any, step: Any) -> int:
     """Is theta still a point of the chart?"""
-    outcome: int = chart_outcome(state[0] + step[0])
-    return outcome
+    return chart_outcome(state[0] + step[0])
 
 
 _LANES = composed(force_angles, kick_angles, _drift_in_lanes, _ended, top=ReducedTop, dimension=4, carry=3)

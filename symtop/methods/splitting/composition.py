@@ -8,7 +8,7 @@ A composition alternates kicks b_0 .. b_n with drifts a_1 .. a_n (`splitting_loo
 Every method here is explicit, symplectic and symmetric, and keeps p_phi and p_psi. `stormer-verlet` and its
 compositions live in the angles chart, all others in the space frame; one drift with its kick takes four fifths of a
 Stormer-Verlet step there. On the violent `spheroid`, `takahashi-imada` is the cheapest way to an attitude error of
-1e-7, `srkn-14-6` to 1e-9 and `sofroniou-spaletta-10` to 1e-11: 36, 60 and 77 us for t = 8 (Verlet: 30 ns a step).
+1e-7, `srkn-14-6` to 1e-9 and `sofroniou-spaletta-10` to 1e-11.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, chapters II.5 and V.3.
 """
 

@@ -56,8 +56,7 @@ def _opened(n: int) -> Callable[[Any], Composition]:
         gradient = to_fixed_tuple(row[n + m : end], m)
         return Composition(drift, kick, gradient, int(row[end]), int(row[end + 1]), row[end + 2])
 
-    making: Callable[[Any], Composition] = opened
-    return making
+    return opened
 
 
 @register_jitable
@@ -70,9 +69,8 @@ def _of_any_length(row: Any) -> Composition:
 def packed(rule: Any) -> tuple[Callable[[Any], Composition], NDArray[np.float64]]:
     """How a composition travels into compiled code: what opens an array of numbers, and the array.
 
-    numba looks at every number of a tuple, 20 ns each, and at an array as a whole, 0.1 us. Short tables are tuples
-    inside, longer ones are rows of the array, so that one kernel is compiled for all of them, 1 to 2 s: their steps
-    take as long as with tuples, to 1 %.
+    A call looks at every number of a tuple, and at an array as a whole. Short tables are tuples inside, longer ones are
+    rows of the array, so that one kernel is compiled for all of them: their steps take as long as with tuples, to 1 %.
     """
     drift, kick, gradient = rule[:3]
     opened = _opened(len(drift)) if len(drift) <= SHORT else _of_any_length
@@ -80,7 +78,7 @@ def packed(rule: Any) -> tuple[Callable[[Any], Composition], NDArray[np.float64]
 
 
 def packed_for_lanes(rule: Any) -> tuple[Callable[[Any], Any], Any]:
-    """The same of many members: short tables travel as they are, for to open an array costs 0.15 us a member."""
+    """The same of many members: short tables travel as they are, for to open an array takes longer."""
     short = type(rule) is not Composition or len(rule.drift) <= SHORT
     return as_fields(rule) if short else packed(rule)
 
@@ -228,12 +226,7 @@ def composed(
         for j in range(W):
             last(block, row, table, j)
 
-    return Lanes(step, lay, read, _size, top, dimension, carry, effort=_forces, pack=packed_for_lanes)
-
-
-def _size(rule: Composition) -> int:
-    return 3 * len(rule.kick)
-
-
-def _forces(rule: Composition) -> int:
-    return rule.forces
+    return Lanes(
+        step, lay, read, lambda rule: 3 * len(rule.kick), top, dimension, carry,
+        effort=lambda rule: int(rule.forces), pack=packed_for_lanes,
+    )  # fmt: skip

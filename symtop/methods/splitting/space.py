@@ -142,8 +142,7 @@ def drift_axis(rule: Any, state: Any, step: Any, half: float) -> Any:
 @register_jitable
 def ended_axis(state: Any, step: Any) -> int:
     """Is the step finite?"""
-    outcome: int = finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4])
-    return outcome
+    return finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4])
 
 
 def begin_axis(par: Any, rule: Any, state: Any, h: float) -> Any:
@@ -206,8 +205,7 @@ def drift_attitude(rule: Any, state: Any, step: Any, half: float) -> Any:
 @register_jitable
 def ended_attitude(state: Any, step: Any) -> int:
     """Is the step finite?"""
-    outcome: int = finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4] + step[5])
-    return outcome
+    return finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4] + step[5])
 
 
 def begin_attitude(par: Any, rule: Any, state: Any, h: float) -> Any:

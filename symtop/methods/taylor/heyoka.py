@@ -89,7 +89,7 @@ def arithmetic(precision: str) -> Arithmetic:
 
 
 def stepper(chart: str, precision: str, tolerance: float) -> Any:
-    """A compiled heyoka integrator; building one costs 0.1 s the first time, then milliseconds from its disk cache."""
+    """A compiled heyoka integrator; building one is slow the first time, then comes from its disk cache."""
     import heyoka as hy
 
     system, working = equations(chart), arithmetic(precision)
@@ -187,7 +187,7 @@ def solver(chart: str, precision: str, read: Read | None = None) -> Solver:
 def _padded(values: Any, size: int) -> Array:
     """Values as doubles, and NaN for the times that were not reached."""
     if len(values) == size and values.dtype == np.float64:
-        whole: Array = values  # of a run's own, 2 us sooner
+        whole: Array = values  # of a run's own: no copy
         return whole
     padded = np.full((size, *values.shape[1:]), np.nan)
     padded[: len(values)] = values
@@ -236,5 +236,6 @@ def _entry(precision: str, solvers: dict[str, Solver]) -> Integrator:
         least_tolerance=epsilon / 1000.0,
         default_tolerance=epsilon / 100.0,
         reference="biscani-izzo-2021", needs="expression", general=True, inner_loop="heyoka",
+        precision=precision,
         speed=0.002 if precision == "quad" else 1.0,
     )  # fmt: skip

@@ -65,7 +65,7 @@ from symtop.core.simd import Components, Vectors
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, one_loop
-from symtop.methods.framework.loop import Loop, kernel_loop
+from symtop.methods.framework.loop import Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import Body, Scaled, Start
 from symtop.methods.framework.registry import Integrator
@@ -188,39 +188,6 @@ def axis_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..., A
     return compiled
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """A step has nothing for the next one."""
-    return (0.0,)
-
-
-@functools.cache
-def march_axis(order: int) -> Loop:
-    """The loop of one order."""
-    series = axis_sum(order)
-
-    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        x, y, u, wx, wy, _, _ = series(state, rule.turn, rule.pull)
-        return (x, y, u, wx, wy, 0.0), carry, 1, finite_outcome(x + y + u + wx + wy)
-
-    return kernel_loop(begin, increment, observe_axis, lanes=functools.partial(_axis_lanes, order))
-
-
-@functools.cache
-def _axis_in_lanes(order: int) -> Lanes:
-    series = axis_sum(order, Components)
-
-    def advance(par, rule, state, carry):  # type: ignore[no-untyped-def]
-        x, y, u, wx, wy, _, _ = series(state, rule.turn, rule.pull)
-        return (x, y, u, wx, wy, 0.0), carry, finite_outcome(x + y + u + wx + wy)
-
-    return one_loop(advance, Scale, top=SpaceTop, dimension=6, carry=1)
-
-
-def _axis_lanes(order: int, rule: Scale) -> Lanes:
-    """What runs an order in lanes."""
-    return _axis_in_lanes(order)
-
-
 def _first_halves(v: Vectors, q: Any, w: Any, a: Any, P: Any) -> tuple[Any, Any]:
     """X_0 and X_1: chi' = -(i/2) (P chi_1 + conj(a w) chi_2), -(i/2) (a w chi_1 - P chi_2)."""
     b = v.builder
@@ -293,34 +260,50 @@ def present(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     return with_spin(par, state, k * h)
 
 
-@functools.cache
-def march_attitude(order: int) -> Loop:
-    """The loop of one order."""
-    series = attitude_sum(order)
+def _loop(
+    series_of: Callable[..., Any], size: int, observe: Callable[..., Any], **present: Any
+) -> Callable[[int], Loop]:
+    """The loop of an order on states of `size` numbers, of which the last, L_z, does not move."""
+    still = size - 1
 
-    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        w, x, y, z, wx, wy, _, _ = series(state, rule.turn, rule.pull)
-        return (w, x, y, z, wx, wy, 0.0), carry, 1, finite_outcome(w + x + y + z + wx + wy)
+    def stepping(order: int, arithmetic: type[Vectors]) -> Callable[..., Any]:
+        series, zeros = series_of(order, arithmetic), (0.0,) * size
 
-    return kernel_loop(
-        begin, increment, observe_attitude, present=present, lanes=functools.partial(_attitude_lanes, order)
-    )
+        @register_jitable
+        def stepped(rule, state):  # type: ignore[no-untyped-def]
+            made, step, total = series(state, rule.turn, rule.pull), zeros, 0.0
+            for i in range(still):
+                step = set_item(step, i, made[i])
+                total += made[i]
+            return step, finite_outcome(total)
+
+        return stepped
+
+    @functools.cache
+    def in_lanes(order: int) -> Lanes:
+        stepped = stepping(order, Components)
+
+        def advance(par, rule, state, carry):  # type: ignore[no-untyped-def]
+            step, outcome = stepped(rule, state)
+            return step, carry, outcome
+
+        return one_loop(advance, Scale, top=SpaceTop, dimension=size, carry=1)
+
+    @functools.cache
+    def loop(order: int) -> Loop:
+        stepped = stepping(order, Vectors)
+
+        def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+            step, outcome = stepped(rule, state)
+            return step, carry, 1, outcome
+
+        return kernel_loop(no_carry, increment, observe, lanes=lambda _: in_lanes(order), **present)
+
+    return loop
 
 
-@functools.cache
-def _attitude_in_lanes(order: int) -> Lanes:
-    series = attitude_sum(order, Components)
-
-    def advance(par, rule, state, carry):  # type: ignore[no-untyped-def]
-        w, x, y, z, wx, wy, _, _ = series(state, rule.turn, rule.pull)
-        return (w, x, y, z, wx, wy, 0.0), carry, finite_outcome(w + x + y + z + wx + wy)
-
-    return one_loop(advance, Scale, top=SpaceTop, dimension=7, carry=1)
-
-
-def _attitude_lanes(order: int, rule: Scale) -> Lanes:
-    """What runs an order in lanes."""
-    return _attitude_in_lanes(order)
+march_axis = _loop(axis_sum, 6, observe_axis)
+march_attitude = _loop(attitude_sum, 7, observe_attitude, present=present)
 
 
 ORDERS = (8, 12, 16, 20)

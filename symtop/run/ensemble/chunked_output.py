@@ -1,6 +1,6 @@
-"""An ensemble that goes to a netCDF file piece by piece, and is resumed after it was killed.
+"""An ensemble that goes to a netCDF file chunk by chunk, and is resumed after it was killed.
 
-Each piece is kept in a file of its own, whole or absent, in the folder ``PATH.parts``, beside a file that says which
+Each chunk is kept in a file of its own, whole or absent, in the folder ``PATH.parts``, beside a file that says which
 ensemble it is of. When all are there they are put together, one after another, into the netCDF file, which replaces
 `PATH` in one move; then they are removed, and what says whose they are last. The bytes of the file do not hang on how
 often the work was interrupted. While it is put together it takes its size twice. One process at a time may do so: it
@@ -22,8 +22,7 @@ from symtop.core.code_hash import Walk, digest, file_reasons, hashed, packages
 from symtop.core.errors import SymtopError, check_replaceable
 from symtop.core.files import locked
 from symtop.core.signals import ending_on_sigterm
-from symtop.run.ensemble.chunks import PIECE, PIECE_STEPS, Job
-from symtop.run.ensemble.columns import as_dataset, same_times
+from symtop.run.ensemble.chunks import CHUNK, CHUNK_STEPS, Job, as_dataset, same_times
 
 IDENTITY = "identity"  # the file that says which ensemble a folder belongs to
 
@@ -39,7 +38,7 @@ def streaming(path: Path, job: Job, labels: dict[str, Any], words: dict[str, Any
 
 
 def _folder(path: Path) -> Path:
-    """Where the pieces of a file are."""
+    """Where the chunks of a file are."""
     return path.with_name(f"{path.name}.parts")
 
 
@@ -64,38 +63,38 @@ class Stream:
         with netcdf.replacing(told) as partial:
             partial.write_text(identity, encoding="utf-8")
 
-    def missing(self, pieces: list[slice]) -> list[slice]:
-        """The pieces that are not on disk."""
-        return [piece for piece in pieces if not self._part(piece).is_file()]
+    def missing(self, chunks: list[slice]) -> list[slice]:
+        """The chunks that are not on disk."""
+        return [chunk for chunk in chunks if not self._part(chunk).is_file()]
 
-    def keep(self, piece: slice, columns: dict[str, Any]) -> None:
-        """Put a piece on disk."""
-        with ending_on_sigterm(), netcdf.replacing(self._part(piece), ".npz") as partial:
+    def keep(self, chunk: slice, columns: dict[str, Any]) -> None:
+        """Put a chunk on disk."""
+        with ending_on_sigterm(), netcdf.replacing(self._part(chunk), ".npz") as partial:
             np.savez(partial, **columns)
 
-    def finish(self, pieces: list[slice]) -> xr.Dataset:
-        """Put the pieces together; the dataset reads from the file what it is asked for."""
+    def finish(self, chunks: list[slice]) -> xr.Dataset:
+        """Put the chunks together; the dataset reads from the file what it is asked for."""
         with self._writing(), netcdf.alone(), netcdf.replacing(self.path) as partial:
-            first = self._columns(pieces[0])
+            first = self._columns(chunks[0])
             times = first["time"][0]
-            shared = all(same_times(self._columns(piece, "time")["time"], times) for piece in pieces)
-            size = pieces[0].stop
+            shared = all(same_times(self._columns(chunk, "time")["time"], times) for chunk in chunks)
+            size = chunks[0].stop
             labels = {name: values[:size] for name, values in self.labels.items()}
             pattern = netcdf.describe(as_dataset(first, labels, shared=shared), **self.words)
             with contextlib.closing(netCDF4.Dataset(partial, "w")) as file:
                 _lay_out(file, pattern, self.n)
-                for piece in pieces:
-                    columns = self._columns(piece) | {name: values[piece] for name, values in self.labels.items()}
+                for chunk in chunks:
+                    columns = self._columns(chunk) | {name: values[chunk] for name, values in self.labels.items()}
                     if shared:
                         del columns["time"]
                     for name, values in columns.items():
-                        file[name][piece] = values.astype(object) if values.dtype.kind == "U" else values
-        self.forget(pieces)
+                        file[name][chunk] = values.astype(object) if values.dtype.kind == "U" else values
+        self.forget(chunks)
         return xr.open_dataset(self.path, engine="netcdf4")
 
-    def forget(self, pieces: list[slice]) -> None:
-        """Remove the pieces, what says whose they are last."""
-        for kept in (*(self._part(piece) for piece in pieces), self.folder / IDENTITY):
+    def forget(self, chunks: list[slice]) -> None:
+        """Remove the chunks, what says whose they are last."""
+        for kept in (*(self._part(chunk) for chunk in chunks), self.folder / IDENTITY):
             kept.unlink(missing_ok=True)
         with contextlib.suppress(OSError):  # something of somebody else's is in it
             self.folder.rmdir()
@@ -111,12 +110,12 @@ class Stream:
                 "same call goes on from there"
             ) from error
 
-    def _part(self, piece: slice) -> Path:
-        return self.folder / f"{piece.start}-{piece.stop}.npz"
+    def _part(self, chunk: slice) -> Path:
+        return self.folder / f"{chunk.start}-{chunk.stop}.npz"
 
-    def _columns(self, piece: slice, *names: str) -> dict[str, Any]:
-        """The columns of a piece, or some of them."""
-        path = self._part(piece)
+    def _columns(self, chunk: slice, *names: str) -> dict[str, Any]:
+        """The columns of a chunk, or some of them."""
+        path = self._part(chunk)
         try:
             with path.open("rb") as file, np.load(file) as held:
                 return {name: held[name] for name in names or held.files}
@@ -154,7 +153,7 @@ def _identity(job: Job, labels: dict[str, Any]) -> str:
     made = Walk("integrator")
     made.add((job.method, Job))
     arrays = job.numbers, job.horizon, job.steps, job.tolerance
-    limits = job.chart, job.samples, job.budget, job.shown, PIECE, PIECE_STEPS
+    limits = job.chart, job.samples, job.budget, job.shown, CHUNK, CHUNK_STEPS
     return digest({
         **made.values(), **file_reasons(made.closure()), **packages(),
         "numbers": hashed(*(netcdf.array_hash(values) for values in (*arrays, *labels.values()))),

@@ -1,4 +1,4 @@
-"""A piece of an ensemble: plans, runs and observables of some members, each step made for all of them at once.
+"""A chunk of an ensemble: plans, runs and observables of some members, each step made for all of them at once.
 
 A member has the bits of `simulate` alone: the same steps, samples and observables. Steps are made in one compiled call
 (`FixedStep.many`, or the closed form's) where the method has one, or in one for each member (`Adaptive.many`); any
@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError
@@ -27,12 +28,13 @@ from symtop.model.charts import View
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import SymmetricTop
 from symtop.run.sampling import Schedule, nutation_periods, schedule
+from symtop.run.trajectory import LABELS
 
 Array = NDArray[np.float64]
 
-PIECE = 65_536  # values of one column in a piece: half a megabyte, which stays in a core's cache
-PIECE_STEPS = 5_000_000  # in a piece: a hundredth of a second in lanes, to a second
-SHARES, LEAST_STEPS = 16, 200_000  # threads share even a small ensemble, in pieces of a millisecond or more
+CHUNK = 65_536  # values of one column in a chunk: half a megabyte, which stays in a core's cache
+CHUNK_STEPS = 5_000_000  # in a chunk: a hundredth of a second in lanes, to a second
+SHARES, LEAST_STEPS = 16, 200_000  # threads share even a small ensemble, in chunks of a millisecond or more
 UNKNOWN_STEPS = 1000  # what a member counts for that chooses its steps, or makes none
 RAISED = "raised"  # outcome of a member on which a solver raised an exception
 ENDS = (*OUTCOMES, RAISED)
@@ -52,7 +54,7 @@ TOLD = (  # of each member, beside what it shows
 
 
 class _Top(NamedTuple):
-    """The tops of a piece with the names of `SymmetricTop`, each (n, 1)."""
+    """The tops of a chunk with the names of `SymmetricTop`, each (n, 1)."""
 
     I1: Array
     I3: Array
@@ -64,7 +66,7 @@ class _Top(NamedTuple):
 
 
 class _Runs(NamedTuple):
-    """The runs of a piece."""
+    """The runs of a chunk."""
 
     states: Array  # (n, samples, dimension)
     momenta: Array  # (n, samples, 2)
@@ -114,14 +116,14 @@ class Job:
             return IN_PYTHON
         return IN_LANES if solver.in_lanes else IN_TURN
 
-    def pieces(self) -> Iterator[slice]:
-        """Members in stretches that neither hold more than `PIECE` values a column nor make too many steps.
+    def chunks(self) -> Iterator[slice]:
+        """Members in stretches that neither hold more than `CHUNK` values a column nor make too many steps.
 
         They do not depend on who computes them, and have whole blocks of lanes where they are longer than some.
         """
-        n, begin, size = len(self.numbers), 0, max(1, PIECE // self.samples)
+        n, begin, size = len(self.numbers), 0, max(1, CHUNK // self.samples)
         ends = np.cumsum(np.full(n, UNKNOWN_STEPS) if self.steps is None else self.steps)
-        most = min(PIECE_STEPS, max(LEAST_STEPS, ends[-1] // SHARES))
+        most = min(CHUNK_STEPS, max(LEAST_STEPS, ends[-1] // SHARES))
         while begin < n:
             done = ends[begin - 1] if begin else 0
             length = min(int(np.searchsorted(ends, done + most)) - begin, size)
@@ -208,7 +210,7 @@ class Job:
         return Plan.until(plan.times[i, :count], tolerance, self.budget)
 
     def _observables(self, runs: _Runs, times: Array) -> dict[str, Array]:
-        """Of what `simulation.as_dataset` shows of one run, what is asked for, of all."""
+        """Of what a `Trajectory` shows of one run, what is asked for, of all."""
         top: Any = _Top(*(self.numbers[:, k : k + 1] for k in range(3)))
         seen = View(self.chart, top, runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
         turned = [name for name in ("phi", "psi") if name in self.shown and self.chart != "angles"]
@@ -253,3 +255,34 @@ def _whole(runs: _Runs, plan: Schedule) -> _Runs:
     first = finite[bad].argmin(axis=1)
     outcome[bad], reached[bad] = NOT_FINITE, np.where(first > 0, plan.times[bad, first - 1], 0.0)
     return runs._replace(outcome=outcome, reached=reached)
+
+
+def same_times(times: Any, row: Any) -> bool:
+    """Are these times of members (n, samples) all that row? NaN is what both have beyond runs of few steps."""
+    if (times == row).all():
+        return True
+    return bool(np.isnan(row).any() and np.array_equal(times, np.broadcast_to(row, times.shape), equal_nan=True))
+
+
+def as_dataset(columns: dict[str, Any], labels: dict[str, Any], *, shared: bool | None = None) -> xr.Dataset:
+    """Columns (n, ...) and labels (n,) as a dataset; times that all members share are one row.
+
+    `shared` says so where the columns are not those of all members.
+    """
+    times = columns["time"]
+    if shared is None:
+        shared = same_times(times, times[0])
+    parts = [name for name, held in (("component", "axis"), ("part", "quaternion")) if held in columns]
+    ends = {"axis": "component", "quaternion": "part"}
+    variables = {
+        name: (("member", "time", *([ends[name]] if name in ends else []))[: values.ndim], values)
+        for name, values in columns.items()
+        if name != "time"
+    }
+    return xr.Dataset(
+        {**variables, **{name: ("member", values) for name, values in labels.items()}},
+        {
+            "time": ("time", times[0]) if shared else (("member", "time"), times),
+            **{name: list(LABELS[name]) for name in parts},
+        },
+    )

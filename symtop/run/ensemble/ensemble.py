@@ -1,6 +1,6 @@
 """ensemble(): many tops, one integrator, each with a step and a horizon of its own -> one dataset.
 
-Members are computed in pieces (`symtop.run.ensemble.chunks`), on threads or on a cluster, and a member has the bits of
+Members are computed in chunks (`symtop.run.ensemble.chunks`), on threads or on a cluster, and a member has the bits of
 `simulate` alone. What does not fit into memory goes to a file as it is computed (`symtop.run.ensemble.chunked_output`).
 """
 
@@ -24,8 +24,7 @@ from symtop.methods.framework.registry import Integrator, integrator as find_int
 from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run.ensemble.chunked_output import streaming
-from symtop.run.ensemble.chunks import RAISED, SHOWN, Job
-from symtop.run.ensemble.columns import as_dataset
+from symtop.run.ensemble.chunks import RAISED, SHOWN, Job, as_dataset
 from symtop.run.ensemble.inputs import Members, called, for_each, read_members
 from symtop.run.guard.guard import MOST_STEPS
 from symtop.run.sampling import nutation_periods
@@ -90,39 +89,39 @@ def ensemble(
     job = _job(read, method, chart, asked, count, limit, names)
     if scheduler is not None:
         cluster.check_sent(scheduler, job.part(slice(0, 1)), method.name)
-    n, pieces = len(read.numbers), list(job.pieces())
+    n, chunks = len(read.numbers), list(job.chunks())
     words = {
         "title": f"{method.name} on {n} tops", "units": read.units, "integrator": method.name, "chart": chart,
         "implementation": method.implementation, "execution": job.execution,
     }  # fmt: skip
 
     def compute(rest: list[slice], keep: Callable[[slice, dict[str, Any]], object]) -> _Raised:
-        left, raised = sum(piece.stop - piece.start for piece in rest), _Raised(0, "")
+        left, raised = sum(chunk.stop - chunk.start for chunk in rest), _Raised(0, "")
         with (
             beating(
                 tqdm(total=n, initial=n - left, desc=words["title"], unit="top", disable=silent or None, leave=False)
             ) as bar,
             contextlib.closing(_computed(job, rest, workers, scheduler)) as parts,
         ):
-            for piece, part in zip(rest, parts, strict=True):
+            for chunk, part in zip(rest, parts, strict=True):
                 raised = raised.and_of(part)
-                keep(piece, part)
-                bar.update(piece.stop - piece.start)
+                keep(chunk, part)
+                bar.update(chunk.stop - chunk.start)
         return raised
 
     if path is None:
         columns = dict[str, Any]()
-        raised = compute(pieces, lambda piece, part: _fill(columns, part, piece, n))
+        raised = compute(chunks, lambda chunk, part: _fill(columns, part, chunk, n))
         raised.refuse(n)
         said = {RAISED: raised.first} if raised.members else {}
         data = netcdf.describe(as_dataset(columns, read.labels), **words, **said)
     else:
         with streaming(file_path("path", path), job, read.labels, words) as stream:
-            raised = compute(stream.missing(pieces), stream.keep)
+            raised = compute(stream.missing(chunks), stream.keep)
             if raised.members == n:
-                stream.forget(pieces)  # there is nothing to resume
+                stream.forget(chunks)  # there is nothing to resume
             raised.refuse(n)
-            data = stream.finish(pieces)
+            data = stream.finish(chunks)
     if raised.members:
         sentence = f"{raised.members} of {n} members raised an exception, the first: {raised.first}"
         warnings.warn(sentence, SymtopWarning, stacklevel=2)
@@ -130,10 +129,10 @@ def ensemble(
 
 
 def _computed(
-    job: Job, pieces: list[slice], threads: int, scheduler: str | None
+    job: Job, chunks: list[slice], threads: int, scheduler: str | None
 ) -> Generator[dict[str, Any], None, None]:
-    """The columns of each piece, in their order."""
-    parts = map(job.part, pieces)
+    """The columns of each chunk, in their order."""
+    parts = map(job.part, chunks)
     if scheduler is None:
         yield from in_threads(Job.columns, parts, threads)
     else:
@@ -148,7 +147,7 @@ class _Raised(NamedTuple):
     first: str
 
     def and_of(self, part: dict[str, Any]) -> "_Raised":
-        """With those of a piece, whose sentence is taken out of it."""
+        """With those of a chunk, whose sentence is taken out of it."""
         said = part.pop(RAISED, "")
         return _Raised(self.members + int((part["outcome"] == RAISED).sum()), self.first or said) if said else self
 
@@ -158,13 +157,13 @@ class _Raised(NamedTuple):
             raise SymtopError(self.first)
 
 
-def _fill(columns: dict[str, Any], part: dict[str, Any], piece: slice, n: int) -> None:
-    """Put a piece into columns of n members, which the first one makes."""
+def _fill(columns: dict[str, Any], part: dict[str, Any], chunk: slice, n: int) -> None:
+    """Put a chunk into columns of n members, which the first one makes."""
     for name, values in part.items():
         if name not in columns:
             kind = f"U{max(map(len, OUTCOMES))}" if name == "outcome" else values.dtype
             columns[name] = np.empty((n, *values.shape[1:]), dtype=kind)
-        columns[name][piece] = values
+        columns[name][chunk] = values
 
 
 def _shown(variables: Iterable[str] | None, chart: str) -> tuple[str, ...]:

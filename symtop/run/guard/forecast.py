@@ -26,7 +26,7 @@ from symtop.model import charts
 from symtop.model.charts import axes
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
-from symtop.run.reference.sensitivity import SMALL, departure
+from symtop.run.reference.sensitivity import SMALL, displacement
 
 STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take these, 0.05 to 3 ms
 AT_LEAST = 0.25  # of them a probe takes in any case, up to the whole run
@@ -172,13 +172,13 @@ def _probe(
 def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
     """The largest error of a probe, grown to the horizon; `straight` if the method's error grows linearly."""
     half = 0.5 * float(probe.times[-1])
-    whole = float(np.max(probe.error))
+    whole = float(probe.error.max())
     n = horizon / half
     if n <= 2.0 * (1.0 + 1e-9) or not math.isfinite(whole):
         return whole
     if whole < ROUNDED:
         return whole * math.pow(0.5 * n, 1.5)
-    first = float(np.max(probe.error[probe.times <= half], initial=0.0))
+    first = float(probe.error[probe.times <= half].max(initial=0.0))
     if straight:
         return whole + max(whole - first, LEAST_GROWTH * whole) * (n - 2.0)
     return n * first + 0.5 * max(abs(whole - 2.0 * first), LEAST_GROWTH * whole) * n * (n - 1.0)
@@ -186,7 +186,7 @@ def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
 
 def _amplifies(scene: Scene, change: float, horizon: float, marks: Landmarks) -> bool:
     """Whether the motion multiplies a change of its start by far more than the shear of a stable one does."""
-    return departure(scene, change, horizon) > change * UNSTABLE * (1.0 + horizon / marks.period)
+    return displacement(scene, change, horizon) > change * UNSTABLE * (1.0 + horizon / marks.period)
 
 
 def _fixed(scene: Scene, method: Integrator, probe: Probe, horizon: float, marks: Landmarks) -> float:
@@ -210,14 +210,16 @@ def _unstable(scene: Scene, method: Integrator, plan: Plan, marks: Landmarks) ->
     """What becomes of the errors of an adaptive method by the horizon, rad; 0 if the motion is stable.
 
     A method in Python is probed for less than the run, and an unstable motion amplifies what it does elsewhere. In 44
-    runs of SciPy's methods beside an unstable motion that were wrong, the error was up to 3600 times the departure of
-    one tolerance for those of a fixed order, and up to 1.6e6 times for LSODA, which takes long steps of a high order
-    while the top stands almost still; half of the errors were below twice the departure.
+    runs of SciPy's methods beside an unstable motion that were wrong, the error was up to 3600 times the displacement
+    by one tolerance for those of a fixed order, and up to 1.6e6 times for LSODA, which takes long steps of a high order
+    while the top stands almost still; half of the errors were below twice the displacement.
     """
     if not _amplifies(scene, plan.tolerance, plan.horizon, marks):
         return 0.0
     committed = COMMITTED[method.order is None] * plan.tolerance
-    return max(float(np.nan_to_num(departure(scene, change, plan.horizon))) for change in (plan.tolerance, committed))
+    return max(
+        float(np.nan_to_num(displacement(scene, change, plan.horizon))) for change in (plan.tolerance, committed)
+    )
 
 
 def _closest_time(scene: Scene, period: float) -> float:
@@ -297,7 +299,7 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, done: Run
     partly = method.adaptive and method.implementation == "python"
     partly = partly and not probe.times[-1] >= plan.horizon
     if partly and chart == "angles" and marks.gap < CLOSE:
-        expected = max(expected, float(np.nan_to_num(departure(scene, PASSING * plan.tolerance, plan.horizon))))
+        expected = max(expected, float(np.nan_to_num(displacement(scene, PASSING * plan.tolerance, plan.horizon))))
     unstable = _unstable(scene, method, plan, marks) if partly else 0.0
     turns = plan.horizon / marks.period
     rounding = marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0

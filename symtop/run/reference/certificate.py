@@ -23,7 +23,7 @@ import xarray as xr
 from symtop.core.files import cache_root
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
-from symtop.run.disk_cache import kept, place
+from symtop.run.disk_cache import cached, place
 from symtop.run.reference.bounds import SUSPICIOUS, closed_bounds, closed_values
 from symtop.run.reference.independent_checks import (
     DIGITS,
@@ -57,7 +57,7 @@ class Certificate(NamedTuple):
 
     @property
     def doubt(self) -> float:
-        """Rad by which the formulas may be wrong: a distance from another witness that is more than rounding."""
+        """Rad by which the formulas may be wrong: a distance from an independent check that exceeds rounding."""
         return max((gap for gap in (self.map_apart, self.apart) if gap > SUSPICIOUS), default=0.0)
 
     @property
@@ -70,10 +70,10 @@ class Certificate(NamedTuple):
             f"{DIGITS} digits at {self.times} times up to t = {self.reach:.3g}, largest error {self.share:.2g} of its "
             "bound"
         )
-        for witness, gap in (("discrete map", self.map_apart), ("long double integration", self.apart)):
+        for check, gap in (("discrete map", self.map_apart), ("long double integration", self.apart)):
             if not math.isnan(gap):
                 apart = "no further apart than its own error" if gap == 0.0 else f"{gap:.1g} rad apart"
-                words += f"; {witness} up to t = {self.overlap:.3g}, {apart}"
+                words += f"; {check} up to t = {self.overlap:.3g}, {apart}"
         return words
 
 
@@ -85,7 +85,7 @@ def certificate(scene: Scene, kind: str | None = None) -> Certificate | None:
     if kind is None:
         return _on_disk(scene, cache_root())
     wanted = kind if kind != "integration" or have_heyoka() else "discrete-map"
-    data = kept(_path(scene, wanted), lambda: _compared(scene, wanted), None)
+    data = cached(_path(scene, wanted), lambda: _compared(scene, wanted), None)
     _on_disk.cache_clear()
     return _read(data)
 
@@ -103,7 +103,7 @@ def _read(data: xr.Dataset) -> Certificate:
 def _on_disk(scene: Scene, _root: Path) -> Certificate | None:
     for kind in reversed(KINDS):
         if (path := _path(scene, kind)).is_file():
-            return _read(kept(path, functools.partial(_compared, scene, kind), None))
+            return _read(cached(path, functools.partial(_compared, scene, kind), None))
     return None
 
 

@@ -1,4 +1,4 @@
-"""Witnesses of the truth: integrations, the discrete map iterated, and the closed form in 40 digits that judges them.
+"""Independent checks of the truth: integrations, the discrete map iterated, and the closed form in 40 digits.
 
 heyoka integrates the space-frame equations in double, long double or quadruple precision (never in angles, which lose
 digits near a pole), at a tolerance of a hundredth of the rounding unit, from a start that is built in 60 digits. The
@@ -7,7 +7,7 @@ grows, so the bound at a time t is `SAFETY` times the largest error seen at any 
 
 `exact-discrete` iterated shares with the others nothing but the start: no series in time, no theta function, no
 integral over the motion. Its own error is what becomes of a last place of mgl at another step size, so that no other
-witness vouches for it.
+check is needed for it.
 """
 
 import functools

@@ -1,4 +1,4 @@
-"""How far a motion departs if its start is changed: what no arithmetic and no method can undo.
+"""The sensitivity of a motion to its start: what no arithmetic and no method can undo.
 
 A motion that is unstable somewhere on its way (beside a separatrix, or almost upright below the spin at which the top
 would sleep) multiplies a change of its start. The closed form answers for the start as it is given, nine exact doubles,
@@ -20,10 +20,10 @@ from symtop.model.top import flat
 POINTS = 100  # of the motion that are compared
 SMALL = 64.0 * EPSILON  # a change whose effect the closed form shows: rounding is a tenth of it
 LEAST = 2.0 * EPSILON  # the least change that any theta in [0, pi] and every rate can take
-FAR = 0.1  # rad: beyond it a departure no longer grows with the change, and it ends at pi
+FAR = 0.1  # rad: beyond it a displacement no longer grows with the change, and it ends at pi
 
 
-def departure(scene: Scene, change: float, horizon: float) -> float:
+def displacement(scene: Scene, change: float, horizon: float) -> float:
     """How far the axis will be, rad, from where it would be if the start were changed by so little: the most.
 
     Three starts are tried: theta moved by `change` rad, theta' by that part of the fastest rate, and all rates by that
@@ -46,16 +46,16 @@ def departure(scene: Scene, change: float, horizon: float) -> float:
 def conditioning(scene: Scene, horizon: float) -> float:
     """Rad by which the axis moves up to the horizon for each of the start, or relative; 1 at least, or NaN.
 
-    Where a change departs `FAR`, a smaller one is tried, which the start takes less exactly: `LEAST` to a third. What
-    is `unbounded` departs `FAR` even so, and moves by that much at least.
+    Where a change displaces the axis by `FAR`, a smaller one is tried, which the start takes less exactly: `LEAST` to a
+    third. What is `unbounded` is displaced by `FAR` even so, and moves by that much at least.
     """
     for change in (SMALL, 8.0 * EPSILON, LEAST):
-        apart = departure(scene, change, horizon)
+        apart = displacement(scene, change, horizon)
         if not apart > FAR:
             break
     return float(np.maximum(apart / change, 1.0))
 
 
 def unbounded(factor: float) -> bool:
-    """Is a `conditioning` only the least that it can be: does the smallest change of the start depart `FAR`?"""
+    """Is a `conditioning` only a lower bound, because the smallest change of the start moves the axis by `FAR`?"""
     return factor * LEAST > FAR

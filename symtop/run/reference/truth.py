@@ -1,4 +1,4 @@
-"""The true motion of a scene with a bound on every error: the closed form, and witnesses that are asked for.
+"""The true motion of a scene with a bound on every error: the closed form, and independent checks on request.
 
 By default the values are the closed form in double, and their bounds follow from its arithmetic
 (`symtop.run.reference.bounds`), checked at every time asked for: 0.2 milliseconds and 0.7 microseconds a time. A
@@ -6,7 +6,7 @@ certificate (`symtop.run.reference.certificate`) holds the closed form of a scen
 integration; it takes half a second, is made when it is asked for, kept on disk, and told from then on.
 
 With a `precision` the values are heyoka's integration of the equations of motion in that arithmetic, judged by the
-closed form in 40 digits at some thirty times (`symtop.run.reference.independent_checks`): a second witness, and digits
+closed form in 40 digits at some thirty times (`symtop.run.reference.independent_checks`): a check, and digits
 beyond double, stored as pairs, ``theta + theta_lo``. An integration that visibly differs from the closed form has that
 distance as its bound. Such a result is kept on disk under a hash of the top, the start, the times, the precision, the
 sources and the libraries.
@@ -24,11 +24,10 @@ from numpy.typing import ArrayLike
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, one_of
 from symtop.core.numbers import EPSILON, TINY, real_numbers
-from symtop.core.over_time import over_time
 from symtop.methods.taylor import heyoka
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
-from symtop.run.disk_cache import kept, place
+from symtop.run.disk_cache import cached, place
 from symtop.run.reference.bounds import closed_bounds, closed_values
 from symtop.run.reference.certificate import KINDS, certificate
 from symtop.run.reference.independent_checks import (
@@ -43,6 +42,7 @@ from symtop.run.reference.independent_checks import (
     integrated,
 )
 from symtop.run.reference.sensitivity import conditioning, unbounded
+from symtop.run.trajectory import dataset
 
 PRECISIONS = ("closed-form", "double", "longdouble", "quad")
 MOST_CACHED = 200_000  # times; larger results are not kept on disk
@@ -118,7 +118,7 @@ def _by_integration(scene: Scene, times: charts.Array, precision: str) -> tuple[
     if distinct.size > MOST_CACHED:
         data = _integration(scene, distinct, precision)
     else:
-        data = kept(_cache_path(scene, distinct, precision), lambda: _integration(scene, distinct, precision), 5)
+        data = cached(_cache_path(scene, distinct, precision), lambda: _integration(scene, distinct, precision), 5)
     if not np.array_equal(times, distinct):
         data = data.isel(time=order)
     words = {
@@ -157,7 +157,7 @@ def _dataset(
     form = closed_form(scene)
     constants = {"energy": form.energy, "p_phi": form.p_phi, "p_psi": form.p_psi}
     columns = columns | {f"{name}_error_bound": bound for name, bound in bounds.items()}
-    return over_time(times, columns | {name: np.full(times.size, value) for name, value in constants.items()})
+    return dataset(times, columns | {name: np.full(times.size, value) for name, value in constants.items()})
 
 
 def _integration(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
