@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from symtop.measure.order_conditions import commutator, element, exponential, logarithm, product, vanishing
+from symtop.measure.order_conditions import (
+    commutator,
+    element,
+    exponential,
+    logarithm,
+    product,
+    splitting_conditions,
+    vanishing,
+)
 
 FREE = [2, 1, 2, 3, 6, 9, 18, 30, 56, 99]  # dimensions of the free Lie algebra of two letters: Witt's formula
 ROOT = 19**0.5
