@@ -13,7 +13,8 @@ import time
 from pathlib import Path
 
 from symtop.runner import run as runner
-from symtop.runner.pools import Workers
+from symtop.runner.cases import StudyCases
+from symtop.runner.pool import Pool
 
 ENOUGH = 1.7  # times faster
 
@@ -22,11 +23,11 @@ def seconds(name: str, jobs: int, *, quick: bool = False) -> float:
     """Wall time of computing a study's grid."""
     study = runner.load(name)
     with tempfile.TemporaryDirectory() as results:
-        grid = runner.Round(study, Path(results))
-        missing = grid.add(study.grid(quick=quick), fresh=True)
+        cases = StudyCases(study, Path(results).resolve())
+        missing = cases.add(study.grid(quick=quick))
         start = time.perf_counter()
-        with Workers(jobs) as workers:
-            grid.compute(missing, workers, study.limit, fresh=True, quiet=True)
+        with Pool(jobs) as pool:
+            cases.compute(missing, pool, study.limit, fresh=True, quiet=True)
         return time.perf_counter() - start
 
 

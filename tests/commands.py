@@ -10,6 +10,7 @@ from pathlib import Path
 import xarray as xr
 
 from symtop.core import netcdf
+from symtop.runner import store
 
 PROBE = Path(__file__).parent / "probe.py"
 
@@ -47,13 +48,14 @@ def ended(process: subprocess.Popen, seconds: float = 240.0) -> tuple[int, str, 
     return process.returncode, out, err
 
 
-def contents(results: Path) -> dict[str, xr.Dataset]:
-    """Every dataset of a results folder by its place in it, without its attributes of provenance."""
+def contents(results: Path, *, provenance: bool = False) -> dict[str, xr.Dataset]:
+    """Every dataset of a results folder by its place in it, of cases as well, without attributes of provenance."""
     found = {}
-    for path in sorted(results.rglob("*.nc")):
-        data = netcdf.read(path)
+    for path in sorted([*results.rglob("*.nc"), *results.rglob("cases/*/*.npz")]):
+        data = netcdf.read(path) if path.suffix == ".nc" else store.load_case(path)
+        assert data is not None, path
         found[str(path.relative_to(results))] = data.drop_attrs().assign_attrs(
-            {key: value for key, value in data.attrs.items() if key not in netcdf.provenance()}
+            {key: value for key, value in data.attrs.items() if provenance or key not in netcdf.provenance()}
         )
     return found
 

@@ -66,7 +66,7 @@ def processes_with_dask():
 @contextlib.contextmanager
 def _registered_for_a_while():
     registry.integrators()  # the built-in ones are registered first
-    stores = (registry._registry, scenes._added, plugins._loaded, plugins._owners)
+    stores = (registry._registry, scenes._added, plugins._loaded)
     before = [kept.copy() for kept in stores]
     yield
     for kept, entries in zip(stores, before, strict=True):

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import xarray as xr
 
 from symtop.core import netcdf
+from symtop.runner import store
 from symtop.runner.check import differences
 from tests.commands import ended, leftovers, symtop
 
@@ -61,7 +62,7 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
         _, said = process.communicate()
         assert process.returncode in (0, -signal.SIGKILL), said
         time.sleep(1.5)  # workers whose parent was killed have ended by then
-        files = {path: path.stat() for path in results.rglob("cases/*/*.nc")}
+        files = {path: path.stat() for path in results.rglob("cases/*/*.npz")}
         now = {path: (about.st_ino, about.st_mtime_ns) for path, about in files.items()}
         assert done.items() <= now.items()  # not one was written a second time
         begun = sum(lock.stat().st_mtime >= start for lock in _begun(results))
@@ -85,7 +86,11 @@ def _begun(results: Path) -> set[Path]:
 
 def assert_same(results: Path, calm: Path) -> None:
     """All cases and datasets of both folders are the same but for measured times, and for what is chosen by them."""
-    names = [sorted(str(path.relative_to(folder)) for path in folder.rglob("*.nc")) for folder in (results, calm)]
+    kinds = ("*.nc", "cases/*/*.npz")
+    names = [
+        sorted(str(path.relative_to(folder)) for kind in kinds for path in folder.rglob(kind))
+        for folder in (results, calm)
+    ]
     names = [[name for name in some if CHOSEN_BY_TIMES not in name] for some in names]
     assert names[0] == names[1]
     differing = {name: differences(_read(results / name), _read(calm / name)) for name in names[0]}
@@ -93,7 +98,8 @@ def assert_same(results: Path, calm: Path) -> None:
 
 
 def _read(path: Path) -> xr.Dataset | xr.DataTree:
-    data = netcdf.read_any(path)
+    data = netcdf.read_any(path) if path.suffix == ".nc" else store.load_case(path)
+    assert data is not None, path
     return data.drop_nodes("checks") if isinstance(data, xr.DataTree) and "checks" in data.children else data
 
 

@@ -51,7 +51,7 @@ def test_a_study_in_workers_is_run_and_resumed(poorer, tmp_path):
     done = poorer("study", PROBE, "--jobs", 2, "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)[0]["computed"] == 12
-    next((tmp_path / "results" / "cases" / "probe").glob("loop--rk4*.nc")).unlink()
+    next((tmp_path / "results" / "cases" / "probe").glob("loop--rk4*.npz")).unlink()
     assert json.loads(poorer("study", PROBE, "--jobs", 1, "--json").stdout)[0]["computed"] == 1
 
 

@@ -36,7 +36,7 @@ STRANGERS = {"methods": {"xarray", "matplotlib"}}  # packages that a room does n
 NAMED = {  # strings that name a module above on purpose
     "symtop": "the lazy table of the public names",
     "symtop.runner.scripts": "loads studies by the name of their package",
-    "symtop.runner.settled": "hashes the files of the studies, which it does not import",
+    "symtop.runner.manifest": "hashes the files of the studies, which it does not import",
 }
 
 

@@ -60,4 +60,5 @@ STUDY = Study(
         "error; a useful one lies close to it. Points of other figures within ten times of the bound are drawn hollow."
     ),
     cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
+    uses=lambda _: ["exact-discrete"],  # the discrete map
 )  # fmt: skip

@@ -141,7 +141,7 @@ def _caches() -> list[Finding]:
 
 def _results(results: Path) -> list[Finding]:
     writable = _writable("results", results, "name another folder with --results")
-    sizes = [path.stat().st_size for path in results.glob("**/cases/*/*.nc")]
+    sizes = [path.stat().st_size for path in results.glob("**/cases/*/*.npz")]
     return [writable, Finding("stored cases", f"{len(sizes)} in {results}, {_bytes(sum(sizes))}")]
 
 

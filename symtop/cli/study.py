@@ -25,7 +25,7 @@ from symtop.core.signals import INTERRUPTED, TERMINATED, TerminatedError, ending
 from symtop.report.sentences import counted
 
 if TYPE_CHECKING:
-    from symtop.runner.pools import Workers
+    from symtop.runner.pool import Pool
     from symtop.runner.study import Study
 
 MOST_NAMED = 8  # integrators and scenes in a line of the status
@@ -89,14 +89,14 @@ def study(
     studies = choose(names, every=every, only=chosen, quick=quick)
     if status:
         sys.exit(show_status(studies, folder, why, as_json, grid))
-    from symtop.runner.pools import Workers
+    from symtop.runner.pool import Pool
 
     try:
-        with ending_on_sigterm(), Workers(jobs, scheduler) as workers:
+        with ending_on_sigterm(), Pool(jobs, scheduler) as pool:
             if check:
-                code = check_all(workers, studies, folder, as_json, grid, everything=fresh)
+                code = check_all(pool, studies, folder, as_json, grid, everything=fresh)
             else:
-                code = run_all(workers, studies, folder, as_json, grid, fresh=fresh, limit=limit, whole=whole)
+                code = run_all(pool, studies, folder, as_json, grid, fresh=fresh, limit=limit, whole=whole)
     except (KeyboardInterrupt, TerminatedError) as stop:
         word, code = ("interrupted", INTERRUPTED) if isinstance(stop, KeyboardInterrupt) else ("terminated", TERMINATED)
         warn(f"{word}; what was computed is kept, and the same command goes on from there")
@@ -105,10 +105,10 @@ def study(
 
 def _nothing_to_do(results: Path, as_json: bool, grid: dict[str, bool]) -> bool:
     """Is every study up to date? Then its findings are printed."""
-    from symtop.runner import settled
+    from symtop.runner import manifest
 
     began = time.monotonic()
-    known = settled.findings(results, settled.grid_of(**grid))
+    known = manifest.all_findings(results.resolve(), grid)
     if known is None:
         return False
     took = {"computed": 0, "seconds": time.monotonic() - began}
@@ -147,28 +147,26 @@ def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick
 
 
 def run_all(
-    workers: "Workers", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], *, fresh: bool,
+    pool: "Pool", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], *, fresh: bool,
     limit: float | None, whole: bool,
 ) -> int:  # fmt: skip
     """Bring studies up to date, each concluded while the next one is computed; 1 if cases failed."""
     from symtop.report import style
-    from symtop.runner import settled
+    from symtop.runner import manifest
 
-    made = settled.made_by(settled.grid_of(**grid)) if whole else ""  # before an edit of the code may change it
+    made_of = manifest.all_made_of(grid) if whole else ""  # before an edit of the code may change it
     save = style.sketch if grid["quick"] else style.publish  # quick figures are to look at, not to print
     options = {"fresh": fresh, "limit": limit, "save": save, "beside": len(studies) > 1, **grid}
-    ended = _in_order(workers, studies, results, options)
+    ended = _in_order(pool, studies, results, options)
     summaries = [_summary(findings, results, as_json) for findings in ended]
     failed = any(summary["failures"] for summary in summaries)
     if whole and not failed:
-        settled.note(results.resolve(), [study.name for study in studies], made)
+        manifest.note_all(results.resolve(), [study.name for study in studies], made_of)
     _end(summaries, results, as_json)
     return 1 if failed else 0
 
 
-def _in_order(
-    workers: "Workers", studies: "list[Study]", results: Path, options: dict[str, Any]
-) -> Iterator[dict[str, Any]]:
+def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """The findings of studies in their order, while later ones are computed; then what stopped one, if any."""
     from symtop.runner import run, store
     from symtop.runner.study import StudyError
@@ -179,7 +177,7 @@ def _in_order(
     def findings() -> Iterator[dict[str, Any]]:
         """Those of the first that waits; a study that has none, as one that compares methods, stops no other."""
         try:
-            yield waiting[0][1]()
+            yield waiting[0][1].result()
         except StudyError as error:
             refused.append(error)
         waiting.popleft()
@@ -187,17 +185,16 @@ def _in_order(
     try:
         for study in studies:
             try:
-                waiting.append((study, run.begin(study, results, workers, **options)))
+                waiting.append((study, run.start(study, results, pool, **options)))
             except SymtopError as error:
                 refused.append(error)
                 break
-            while len(waiting) > 1 and waiting[0][1].ready():
+            while len(waiting) > 1 and waiting[0][1].done():
                 yield from findings()
-        workers.finish()
         while waiting:
             yield from findings()
     except BaseException:
-        workers.close()
+        pool.close()
         for study, _ in waiting:
             store.tidy(results.resolve(), study)
         raise
@@ -274,12 +271,12 @@ def _names(rows: list[Row], key: str) -> str:
 
 
 def check_all(
-    workers: "Workers", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], *, everything: bool
+    pool: "Pool", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], *, everything: bool
 ) -> int:
     """Compute stored cases again and compare; 1 if anything is different."""
     from symtop.runner import check
 
-    checks = [check.check(study, results, workers, everything=everything, **grid) for study in studies]
+    checks = [check.check(study, results, pool, everything=everything, **grid) for study in studies]
     if not any(entry.stored for entry in checks):
         names = ", ".join(study.name for study in studies)
         raise SymtopError(f"no case of {names} is up to date in {results}; run it first")

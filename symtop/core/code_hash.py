@@ -1,26 +1,24 @@
 """What a number was made of: a mapping from labels to hashes, found without running anything.
 
-    file symtop/methods/runge_kutta/gauss.py                     a file that counts as a whole
-    function symtop_studies/drift/study.py:measure   a function that counts by its code
-    constant symtop_studies/drift/study.py:STEPS     a value that such a function names
-    integrator gauss-2, scene goldstein, settings    values: coefficients, numbers, what a case is given
-    package numba, python, processor                 where it was computed
+    code symtop/methods/runge_kutta/gauss.py    the functions and classes of a file that are reached
+    integrator gauss-2, scene goldstein         values: coefficients, numbers
+    package numba, processor, settings          where it was computed, and what was asked for
 
 The digest of a mapping is the hash of all of it; two mappings are compared label by label, which says *why* a stored
-number is stale. Cases of studies, cached kernels and references, checkpoints and plug-ins are all told apart this way.
+number is stale. Cases of studies, cached kernels and references, checkpoints and figures are all identified this way.
 
-`Walk` goes from object to object. A function counts in one of two ways.
+`Code` goes from object to object: from a function to its instructions, constants, names and defaults, to what it closes
+over, to the globals that it names, with attributes of modules among them, and to what it imports when it runs; from a
+class to its methods and bases; from an instance to its class and attributes. Comments, docstrings, line numbers and
+places of files are no part of code. What counts less:
 
-    by its file    a function of a known package (`roots`), with all files that its file imports
-    by its code    a function of a script or a plug-in, and every function if `whole` is false (kernels, checkpoints):
-                   instructions, constants and names, defaults, what it closes over, the globals that it names, modules'
-                   attributes among them, and so on; a module that it imports when it runs counts by its file
-
-Comments, docstrings, line numbers and places of files are no part of the code. Libraries count by name; `packages` has
-their versions. Of a dataclass, fields with the metadata ``words`` do not count: they are said and not computed with.
+    by name       functions that look up what they are given (`by_name`), whose answers are counted by themselves;
+                  `PLUMBING`, which moves numbers without making any; libraries, with their version (`packages`)
+    not at all    lists, dicts and sets under a module's lower-case names, which are the state of a process; fields of a
+                  dataclass with the metadata ``words``, which are only shown
+    as a whole    a file of a known package that a constant names by its path
 """
 
-import ast
 import contextlib
 import dis
 import functools
@@ -29,7 +27,6 @@ import importlib.metadata
 import importlib.util
 import inspect
 import platform
-import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
@@ -77,22 +74,6 @@ def file_hash(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()[:LENGTH]
 
 
-def file_label(path: Path) -> str:
-    """The name of a file: with its package if that is known, by itself otherwise."""
-    root = root_of(path)
-    return _within(root, roots[root], path) if root else path.name
-
-
-@functools.cache  # 60 us in Python 3.12, asked for twice for each function of a kernel
-def _within(root: str, folder: Path, path: Path) -> str:
-    return f"{root}/{path.relative_to(folder).as_posix()}"
-
-
-def file_reasons(files: Iterable[Path]) -> Reasons:
-    """Hashes of files."""
-    return {f"file {file_label(path)}": file_hash(path) for path in files}
-
-
 @functools.cache
 def version(package: str) -> str:
     """The installed version of a package, or ``absent``."""
@@ -120,116 +101,18 @@ def packages(*names: str) -> Reasons:
 
 PACKAGE = Path(__file__).resolve().parent.parent
 PLUMBING = frozenset(
-    Path(__file__).resolve().with_name(f"{name}.py")
-    for name in ("cache", "clock", "datasets", "fingerprint", "imports", "progress", "signals", "validate", "walk")
+    Path(__file__).with_name(f"{name}.py").resolve()
+    for name in ("cluster", "code_hash", "errors", "files", "memoize", "netcdf", "parallel", "progress", "signals")
 )
-roots: dict[str, Path] = {PACKAGE.name: PACKAGE}  # name of a package: its folder
-Imported = tuple[str, tuple[str, ...]]  # module, names
-
-# parsing whole files takes 3 ms each, their import statements alone 0.1 ms
-_STATEMENT = re.compile(
-    rb"^[ \t]*(?:import[ \t]|from[ \t]+[.\w]+[ \t]+import\b)(?:[^\n(]*\([^)]*\)|[^\n]*)", re.MULTILINE
-)
+roots: dict[str, Path] = {PACKAGE.name: PACKAGE}  # name of a known package: its folder
 
 
 def add_root(name: str, folder: Path) -> None:
     """Make a package known."""
     if roots.get(name) != folder.resolve():
         roots[name] = folder.resolve()
-        for cached in (root_of, imported, imports_of):
+        for cached in (_path, file_label, is_library):
             cached.cache_clear()
-
-
-@functools.cache
-def root_of(file: Path) -> str:
-    """The name of the known package that a file belongs to; empty if it belongs to none."""
-    return next((name for name, folder in roots.items() if folder in file.parents), "")
-
-
-def module_file(name: str) -> Path | None:
-    """The file of a module of a known package, by its dotted name."""
-    first, *rest = name.split(".")
-    if first not in roots:
-        return None
-    place = roots[first].joinpath(*rest)
-    return next((path for path in (place.with_suffix(".py"), place / "__init__.py") if path.is_file()), None)
-
-
-@functools.cache
-def imported(file: Path) -> list[Imported]:
-    """(module, names) of every import statement of a file."""
-    root = root_of(file)
-    package = [root, *file.relative_to(roots[root]).parent.parts] if root else []
-    return list(_statements(file.read_bytes(), package))
-
-
-def _statements(source: bytes, package: list[str]) -> Iterator[Imported]:
-    for statement in _STATEMENT.findall(source):
-        try:
-            (node,) = ast.parse(statement.strip()).body
-        except (SyntaxError, ValueError):  # prose that begins like a statement
-            continue
-        if isinstance(node, ast.Import):
-            yield from ((alias.name, ()) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else []
-            module = ".".join([*base, *([node.module] if node.module else [])])
-            yield module, tuple(alias.name for alias in node.names)
-
-
-def files_of(statements: Iterable[Imported]) -> Iterator[Path]:
-    """The files of known packages that import statements lead to, without the plumbing."""
-    for module, names in statements:
-        places = [module_file(name) for name in (module, *(f"{module}.{name}" for name in names))]
-        yield from (place for place in places if place is not None and not is_plumbing(place))
-
-
-@functools.cache
-def imports_of(file: Path) -> frozenset[Path]:
-    """The files of known packages that a file imports, without the plumbing."""
-    return frozenset(files_of(imported(file)))
-
-
-def is_plumbing(file: Path) -> bool:
-    """Does a file move numbers without making any?"""
-    return file.name == "__init__.py" or file in PLUMBING
-
-
-def closure(files: Iterable[Path], stops: frozenset[Path] = frozenset()) -> frozenset[Path]:
-    """Those files, the files they import, and so on, without the plumbing; what `stops` import is left out."""
-    reached: set[Path] = set()
-    ahead = {file for file in files if not is_plumbing(file)}
-    while ahead:
-        reached |= ahead
-        ahead = {path for file in ahead - stops for path in imports_of(file)} - reached
-    return frozenset(reached)
-
-
-Parts = Callable[[Any], Iterable[Any]]
-Function = TypeVar("Function", bound=Callable[..., Any])
-
-LIBRARIES = sys.stdlib_module_names | {
-    "numpy", "scipy", "numba", "llvmlite", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath", "pandas", "tqdm",
-    "click", "dask", "distributed", "packaging",
-}  # fmt: skip
-_IMPORT = dis.opmap["IMPORT_NAME"]
-
-by_code: set[Path] = set()  # files of known packages whose functions count by their code
-_look_ups: set[Callable[..., Any]] = set()
-_CONTAINERS: tuple[tuple[Any, Parts], ...] = (
-    (functools.partial, lambda thing: (thing.func, thing.args, thing.keywords)),
-    (MethodType, lambda thing: (thing.__func__, thing.__self__)),
-    (property, lambda thing: (thing.fget, thing.fset)),
-    (Mapping, lambda thing: [part for key in sorted(thing, key=repr) for part in (key, thing[key])]),
-    ((set, frozenset), lambda thing: sorted(thing, key=repr)),
-    ((tuple, list), lambda thing: (type(thing), *thing)),
-)
-
-
-def by_name(function: Function) -> Function:
-    """Let a function count by its name, as a decorator: it looks up what it is given, and that is counted by itself."""
-    _look_ups.add(function)
-    return function
 
 
 @functools.cache
@@ -237,42 +120,131 @@ def _path(name: str) -> Path:
     return Path(name).resolve()
 
 
-def is_library(module: str | None) -> bool:
-    """Does a module belong to a library, which counts by name and version?"""
-    return (module or "").partition(".")[0] in LIBRARIES
+@functools.cache
+def file_label(path: Path) -> str:
+    """The name of a file: with its package if that is known, by itself otherwise."""
+    root = next((name for name, folder in roots.items() if folder in path.parents), "")
+    return f"{root}/{path.relative_to(roots[root]).as_posix()}" if root else path.name
 
 
-@dataclass
-class Walk:
-    """Collects what things are made of; `label` is what values count for until a function has a label of its own."""
+@functools.cache
+def is_library(package: str) -> bool:
+    """Does a top-level package count by name and version: one of Python's own, or one that is installed?"""
+    if package in roots:
+        return False
+    module = sys.modules.get(package)
+    places = [getattr(module, "__file__", None), *getattr(module, "__path__", ())]
+    installed = any({"site-packages", "dist-packages"} & {*Path(place).parts} for place in places if place)
+    return installed or package in sys.stdlib_module_names or package in sys.builtin_module_names
+
+
+def _of_library(module: str | None) -> bool:
+    return is_library((module or "").partition(".")[0])
+
+
+Parts = Callable[[Any], Iterable[Any]]
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_PYTHON = Path(contextlib.__file__).resolve().parent  # where Python's own modules are
+STATE = (list, dict, set)  # under a module's lower-case name
+_IMPORT = dis.opmap["IMPORT_NAME"]
+_by_name: set[Callable[..., Any]] = set()
+_CONTAINERS: tuple[tuple[Any, Parts], ...] = (
+    (functools.partial, lambda thing: (thing.func, thing.args, thing.keywords)),
+    (MethodType, lambda thing: (thing.__func__, thing.__self__)),
+    (property, lambda thing: (thing.fget, thing.fset)),
+    (functools.cached_property, lambda thing: (thing.func,)),
+    (Mapping, lambda thing: [part for key in sorted(thing, key=_order) for part in (key, thing[key])]),
+    ((set, frozenset), lambda thing: sorted(thing, key=_order)),
+    ((tuple, list), lambda thing: (type(thing), *thing)),
+)
+
+
+def by_name(function: Function) -> Function:
+    """Let a function count by its name, as a decorator: it looks up what it is given, and that is counted by itself."""
+    _by_name.add(function)
+    return function
+
+
+def _order(key: object) -> str:
+    """By what the keys of a dict are sorted: the same in every process, unlike the address in a function's `repr`."""
+    return f"{key.__module__}.{key.__qualname__}" if isinstance(key, (FunctionType, type)) else repr(key)
+
+
+@dataclass(eq=False)
+class Part:
+    """A function, class or constant: its label, what it holds itself, and the parts that it leads to."""
 
     label: str
-    whole: bool = True  # functions of known packages count by their files
-    also: Parts = lambda _: ()  # what stands for a function once it is compiled
-    files: set[Path] = field(default_factory=set)  # that count, without those they import
-    strings: set[str] = field(default_factory=set)  # constants of the functions that count by their code
-    functions: set[FunctionType] = field(default_factory=set)  # every function that was reached
-    _values: dict[str, list[str]] = field(default_factory=dict, repr=False)
-    _seen: dict[tuple[str, int], object] = field(default_factory=dict, repr=False)
+    file: str  # its label; empty for values that no file holds
+    thing: object = field(repr=False)  # held, so that its id stays its own
+    values: list[str] = field(default_factory=list, repr=False)
+    parts: "dict[int, Part]" = field(default_factory=dict, repr=False)
 
-    def add(self, thing: Any, label: str = "") -> None:
-        """Walk anything that a solver or a measure may hold, for a label."""
-        before, self.label = self.label, label or self.label
-        try:
+
+class Code:
+    """Functions, classes and constants that things lead to, each looked at once.
+
+    `also` says what stands for a function once it is compiled.
+    """
+
+    def __init__(self, also: Parts = lambda _: ()) -> None:
+        self._also = also
+        self._parts: dict[tuple[str, int], Part] = {}
+        self._open: list[Part] = []
+        self._at = Part("", "", None)
+        self._held: dict[int, object] = {}  # values of the present part that were added, by id
+
+    def reached(self, label: str, *things: object) -> list[Part]:
+        """The parts that things lead to, the first of them, under that label, the things themselves."""
+        reached: dict[int, Part] = {}
+        ahead = [self._filled(Part(label, "", things), lambda: self._add_all(things))]
+        while self._open:
+            part = self._open.pop()
+            self._filled(part, functools.partial(self._look_into, part.thing))
+        while ahead:
+            part = ahead.pop()
+            reached[id(part)] = part
+            ahead += [other for key, other in part.parts.items() if key not in reached]
+        return list(reached.values())
+
+    def reasons(self, label: str, *things: object) -> Reasons:
+        """Hashes of things and of all that they lead to, by file; values that no file holds have that label."""
+        return by_file(self.reached(label, *things))
+
+    def _filled(self, part: Part, add: Callable[[], None]) -> Part:
+        self._at, self._held = part, {}
+        add()
+        return part
+
+    def _look_into(self, thing: object) -> None:
+        if isinstance(thing, FunctionType):
+            self._add_code(thing)
+        elif isinstance(thing, type):
+            own = ((name, getattr(part, "__func__", part)) for name, part in sorted(vars(thing).items()))
+            self._add_all(
+                part for name, part in own if isinstance(part, (FunctionType, property)) or not name.startswith("__")
+            )
+            self._add_all(thing.__bases__)
+        else:
             self._add(thing)
-        finally:
-            self.label = before
-
-    def values(self) -> Reasons:
-        """Hashes of the values of each label."""
-        return {label: hashed(*values) for label, values in self._values.items()}
-
-    def closure(self) -> frozenset[Path]:
-        """The files that count, and those that they import."""
-        return closure(self.files)
 
     def _note(self, *values: str) -> None:
-        self._values.setdefault(self.label, []).extend(values)
+        self._at.values.extend(values)
+
+    def _lead_to(self, kind: str, name: str, file: str, thing: object) -> None:
+        """Let the present part lead to another one."""
+        label = f"{kind} {file}:{name}"
+        part = self._parts.get((label, id(thing)))
+        if part is None:
+            part = self._parts[label, id(thing)] = Part(label, file, thing)
+            self._open.append(part)
+        self._note(label)
+        self._at.parts[id(part)] = part
+
+    def _add_all(self, things: Iterable[object]) -> None:
+        for thing in things:
+            self._add(thing)
 
     def _add(self, thing: Any) -> None:
         if isinstance(thing, (type(None), bool, int, float, complex, str, bytes, np.generic)):
@@ -282,90 +254,85 @@ class Walk:
             if hasattr(thing, "targetoptions"):
                 self._note(repr(sorted(thing.targetoptions.items())))
             thing = getattr(thing, "py_func", getattr(thing, "__wrapped__", thing))
-        key = (self.label, id(thing))
-        if key not in self._seen:
-            self._seen[key] = thing  # held, so that its id stays its own
-            parts = next((parts(thing) for kind, parts in _CONTAINERS if isinstance(thing, kind)), None)
-            if parts is None:
-                self._add_one(thing)
-            else:
-                self._add_all(parts)
-
-    def _add_all(self, things: Iterable[Any]) -> None:
-        for thing in things:
-            self._add(thing)
-
-    def _add_one(self, thing: Any) -> None:
         if isinstance(thing, FunctionType):
             self._add_function(thing)
-        elif isinstance(thing, ModuleType):
-            self._note(thing.__name__)
-            self._add_file(getattr(thing, "__file__", None))
         elif isinstance(thing, type):
             self._add_class(thing)
+        elif isinstance(thing, ModuleType):
+            self._note(thing.__name__)
+        elif id(thing) not in self._held:
+            self._held[id(thing)] = thing
+            self._add_value(thing)
+
+    def _add_function(self, function: FunctionType) -> None:
+        path, library = _path(function.__code__.co_filename), _of_library(function.__module__)
+        if library or function in _by_name or path in PLUMBING or _PYTHON in path.parents:
+            self._note(f"{function.__module__}.{function.__qualname__}")
+            if not library and function not in _by_name:
+                self._add_all(held(function))  # a wrapper: what it calls
+        else:
+            self._lead_to("function", function.__qualname__, file_label(path), function)
+
+    def _add_class(self, kind: type) -> None:
+        file = getattr(sys.modules.get(kind.__module__), "__file__", None)
+        if _of_library(kind.__module__) or (file and _path(file) in PLUMBING):
+            self._note(f"{kind.__module__}.{kind.__qualname__}")
+        else:
+            self._lead_to("class", kind.__qualname__, file_label(_path(file)) if file else kind.__module__, kind)
+
+    def _add_value(self, thing: Any) -> None:
+        parts = next((parts(thing) for kind, parts in _CONTAINERS if isinstance(thing, kind)), None)
+        if parts is not None:
+            self._add_all(parts)
         elif isinstance(thing, np.ndarray):
             self._note(f"{thing.dtype}{thing.shape}{hashlib.sha256(thing.tobytes()).hexdigest()}")
+        elif isinstance(thing, Path):
+            path = thing.resolve()
+            if any(folder in path.parents for folder in roots.values()) and path.is_file():
+                self._note(file_label(path), file_hash(path))
         elif is_dataclass(thing):
             counted = [part.name for part in fields(thing) if not part.metadata.get("words")]
             self._add_all((type(thing), *(getattr(thing, name) for name in counted)))
         else:
-            self._add(type(thing))
-            if not is_library(type(thing).__module__):
+            self._add_class(type(thing))
+            self._note(str(getattr(thing, "__name__", "")))  # of a function of C
+            if not _of_library(type(thing).__module__):
                 self._add(getattr(thing, "__dict__", None))
-
-    def _add_file(self, name: str | None) -> bool:
-        """Count a file as a whole if it is one that does."""
-        path = _path(name) if name else None
-        if not self.whole or path is None or not root_of(path) or path in by_code:
-            return False
-        self.files.add(path)
-        return True
-
-    def _add_class(self, kind: type) -> None:
-        self._note(f"{kind.__module__}.{kind.__qualname__}")
-        if is_library(kind.__module__) or self._add_file(getattr(sys.modules.get(kind.__module__), "__file__", None)):
-            return
-        parts = ((name, getattr(part, "__func__", part)) for name, part in sorted(vars(kind).items()))
-        self._add_all(
-            part for name, part in parts if isinstance(part, (FunctionType, property)) or not name.startswith("__")
-        )
-        self._add_all(kind.__bases__)
-
-    def _add_function(self, function: FunctionType) -> None:
-        file = function.__code__.co_filename
-        if is_library(function.__module__):
-            self._note(f"{function.__module__}.{function.__qualname__}")
-        elif self._add_file(file):
-            self._note(function.__qualname__)
-            self._add_all(held(function))
-        else:
-            name = f"{file_label(_path(file))}:{function.__qualname__}"
-            self._note(name)
-            if function not in _look_ups and function not in self.functions:
-                self.functions.add(function)
-                before, self.label = self.label, f"function {name}"
-                self._add_code(function)
-                self.label = before
-        self.functions.add(function)
+                names = (name for kind in type(thing).__mro__ for name in kind.__dict__.get("__slots__", ()))
+                self._add_all(getattr(thing, name, None) for name in names)
 
     def _add_code(self, function: FunctionType) -> None:
-        """The code of a function, what it imports, what it holds and the globals that it names."""
-        parts = list(codes(function.__code__))
-        for part in parts:
+        """The code of a function, what it holds, the globals that it names and what it imports."""
+        for part in codes(function.__code__):
             constants = [value for value in part.co_consts if not isinstance(value, CodeType)]
             if part is function.__code__ and constants[:1] == [function.__doc__]:
                 del constants[0]
             self._note(part.co_code.hex(), part.co_exceptiontable.hex(), *map(_constant, constants))
             counts = part.co_argcount, part.co_kwonlyargcount, _flags(part)
             self._note(repr((part.co_names, part.co_freevars, *counts)))
-            self.strings |= {value for value in constants if isinstance(value, str)}
-            self.files |= set(files_of(_imports(part, function.__globals__.get("__package__") or "")))
         self._add_all(held(function))
-        self._add_all(self.also(function))
+        self._add_all(self._also(function))
         file = file_label(_path(function.__code__.co_filename))
         for name, value in named(function):
-            plain = not callable(value) and not isinstance(value, ModuleType)
-            self.add(value, f"constant {file}:{name}" if plain else "")
+            if callable(value) or isinstance(value, ModuleType):
+                self._add(value)
+            elif not (isinstance(value, STATE) and name == name.lower()):
+                self._add_constant(file, name, value)
+
+    def _add_constant(self, file: str, name: str, value: object) -> None:
+        if isinstance(value, (type(None), bool, int, float, complex, str, bytes, np.generic)):
+            self._note(f"{name} = {value!r}")
+        else:
+            self._lead_to("constant", name, file, value)
+
+
+def by_file(parts: Iterable[Part]) -> Reasons:
+    """Hashes of parts, those of a file together."""
+    texts: dict[str, set[str]] = {}
+    for part in parts:
+        label = f"code {part.file}" if part.file else part.label
+        texts.setdefault(label, set()).add("\n".join((part.label, *part.values)))
+    return {label: hashed(*sorted(several)) for label, several in texts.items()}
 
 
 def codes(code: CodeType) -> Iterator[CodeType]:
@@ -386,15 +353,6 @@ def _constant(value: Any) -> str:
     return f"frozenset({sorted(map(repr, value))})" if isinstance(value, frozenset) else repr(value)
 
 
-def _imports(code: CodeType, package: str) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """(module, names) of the import statements in a function's code."""
-    if _IMPORT in code.co_code[::2]:
-        steps = [step for step in dis.get_instructions(code) if step.opname != "EXTENDED_ARG"]
-        for level, names, step in zip(steps, steps[1:], steps[2:], strict=False):
-            if step.opname == "IMPORT_NAME":
-                yield importlib.util.resolve_name("." * level.argval + step.argval, package), names.argval or ()
-
-
 def held(function: FunctionType) -> Iterator[object]:
     """What a function holds besides its code: defaults and what it closes over."""
     yield from function.__defaults__ or ()
@@ -407,12 +365,53 @@ def held(function: FunctionType) -> Iterator[object]:
 
 
 def named(function: FunctionType) -> Iterator[tuple[str, object]]:
-    """The globals that a function names, sorted, and what it may take from the modules among them."""
-    names = sorted({name for code in codes(function.__code__) for name in code.co_names})
-    for name in names:
-        if name not in function.__globals__:
-            continue
-        value = function.__globals__[name]
+    """The globals that a function names and what it imports when it runs, with the attributes of modules among them."""
+    inside = list(codes(function.__code__))
+    names = sorted({name for code in inside for name in code.co_names})
+    package = function.__globals__.get("__package__") or ""
+    found = [(name, function.__globals__[name]) for name in names if name in function.__globals__]
+    found += [pair for code in inside for pair in _imports(code, package)]
+    expanded = set[str]()
+    while found:
+        name, value = found.pop()
         yield name, value
-        if isinstance(value, ModuleType) and not is_library(value.__name__):
-            yield from ((f"{name}.{part}", getattr(value, part)) for part in names if hasattr(value, part))
+        if isinstance(value, ModuleType) and value.__name__ not in expanded and not _of_library(value.__name__):
+            expanded.add(value.__name__)
+            found += [(f"{name}.{part}", getattr(value, part)) for part in names if hasattr(value, part)]
+
+
+def _imports(code: CodeType, package: str) -> Iterator[tuple[str, object]]:
+    """What the import statements in a function's code give, by name; libraries count by theirs."""
+    if _IMPORT not in code.co_code[::2]:
+        return
+    steps = [step for step in dis.get_instructions(code) if step.opname != "EXTENDED_ARG"]
+    for level, names, step in zip(steps, steps[1:], steps[2:], strict=False):
+        if step.opname == "IMPORT_NAME":
+            module = importlib.util.resolve_name("." * level.argval + step.argval, package)
+            if not _is_installed(module):
+                yield from _imported(module, names.argval or ())
+
+
+def _is_installed(module: str) -> bool:
+    """Does a module belong to a library, which is not imported only to see that?"""
+    top = module.partition(".")[0]
+    if top in sys.modules or top in sys.stdlib_module_names:
+        return is_library(top)
+    try:
+        spec = importlib.util.find_spec(top)
+    except (ImportError, ValueError):
+        return False
+    return spec is not None and "site-packages" in str(spec.origin or spec.submodule_search_locations)
+
+
+def _imported(module: str, names: Iterable[str]) -> Iterator[tuple[str, object]]:
+    try:
+        whole = importlib.import_module(module)
+        for name in names:
+            given = hasattr(whole, name)
+            yield f"{module}.{name}", getattr(whole, name) if given else importlib.import_module(f"{module}.{name}")
+    except ImportError:  # of an optional package
+        yield module, "absent"
+    else:
+        if not names:
+            yield module, whole

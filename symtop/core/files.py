@@ -1,21 +1,25 @@
-"""The folder of what can be made again: compiled kernels, references, checkpoints of long runs.
+"""Files: the cache of what can be made again, locks, and Python files that a user names.
 
-Every use of an entry sets its time of modification, at most once a day. An entry that nobody used for `UNUSED` days is
-removed, and then the entries used longest ago until the folder is small enough. Another process may be doing the same.
+The cache holds compiled kernels, references and checkpoints of long runs. Every use of an entry sets its time of
+modification, at most once a day. An entry that nobody used for `UNUSED` days is removed, and then the entries used
+longest ago until the folder is small enough. Another process may be doing the same.
 """
 
 import contextlib
 import errno
 import functools
+import importlib.util
 import os
 import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
+from types import ModuleType
 from typing import TextIO
 
-from symtop.core.errors import SymtopError
+from symtop.core.errors import SymtopError, at_home
 
 DAY = 86_400.0  # seconds
 UNUSED = 30  # days
@@ -112,7 +116,7 @@ def _taken(file: int, *, wait: bool) -> bool:
 def locked(path: Path, *, wait: bool) -> Iterator[bool]:
     """Hold a file's lock, so that nobody else computes it; yields False if somebody else holds it and `wait` is false.
 
-    The lock's file is there while it is held, and afterwards if its holder was killed (see `was_begun`).
+    The lock's file is there while it is held, and afterwards if its holder was killed.
     """
     if fcntl is None:
         yield True
@@ -138,9 +142,38 @@ def locked(path: Path, *, wait: bool) -> Iterator[bool]:
             return
 
 
-def was_begun(path: Path) -> bool:
-    """Did somebody begin to compute a case, and end before it was done?"""
-    if fcntl is None or not lock_path(path).is_file():
-        return False
-    with locked(path, wait=False) as ours:
-        return ours
+def python_file(path: str | Path, name: str, wanted: str) -> Path:
+    """A file by its path; SymtopError that argument `name` must be what is `wanted` if it is not there."""
+    try:
+        file = at_home(path).resolve()
+        if file.is_file():
+            return file
+    except (OSError, ValueError):  # a name that is too long, or holds a null character
+        pass
+    raise SymtopError(f"{name} must be {wanted}, not {str(path)!r}", name)
+
+
+class _Reader(SourceFileLoader):
+    """Leaves nothing beside what it loads: Python would write a ``__pycache__`` into the user's folder."""
+
+    def set_data(self, path: str, data: object, *, _mode: int = 0) -> None:
+        """Keep no bytecode."""
+
+
+def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
+    """A module of that name from a file, or a package if its `places` are given."""
+    for stale in [known for known in sys.modules if known.startswith(f"{name}.")]:
+        del sys.modules[stale]  # of another folder with the same name
+    if file.suffix != ".py":
+        raise SymtopError(f"{str(file)!r} cannot be loaded: its name must end in .py")
+    reader = _Reader(name, str(file))
+    spec = importlib.util.spec_from_file_location(name, file, loader=reader, submodule_search_locations=places)
+    assert spec is not None  # noqa: S101  (it has a loader)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # also because kernels are cached under the name of their module
+    try:
+        reader.exec_module(module)
+    except BaseException:
+        sys.modules.pop(name)
+        raise
+    return module

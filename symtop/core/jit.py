@@ -39,7 +39,7 @@ from numba.cpython.unsafe.tuple import tuple_setitem
 from numba.extending import intrinsic, overload, register_jitable as _register
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from symtop.core.code_hash import Walk, by_name, digest, hashed
+from symtop.core.code_hash import Code, Part, by_file, by_name, digest, hashed
 from symtop.core.files import cache_root, on_cold, prune, touch
 from symtop.core.jit_functions import Function, fused, inlined_parts, shared_parts, two_product
 from symtop.core.sines import polynomials, sincos
@@ -102,12 +102,15 @@ def _overloads(function: FunctionType) -> Iterator[object]:
         yield getattr(template, "_jit_options", None)
 
 
-def code_of(thing: object) -> Walk:
+def code_of(thing: object) -> list[Part]:
     """What a kernel, or anything that holds kernels, is compiled from; the same whatever a process has run before."""
+    return code().reached("kernel", thing, OPTIONS, sys.version_info[:2], numba.__version__)
+
+
+def code() -> Code:
+    """What looks for code, as numba compiles it."""
     _register_parts()
-    walk = Walk("kernel", whole=False, also=_overloads)
-    walk.add((thing, OPTIONS, sys.version_info[:2], numba.__version__))
-    return walk
+    return Code(_overloads)
 
 
 class _Folder:
@@ -239,10 +242,11 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     _register_parts()
     kernel = njit(**OPTIONS)(function)
     kernel.compile = _without_collecting(kernel.compile)
-    walk = code_of(function)
-    written = [part for part in walk.functions if not part.__module__.startswith("namedtuple_")]
+    parts = code_of(function)
+    functions = (part.thing for part in parts if isinstance(part.thing, FunctionType))
+    written = [part for part in functions if not part.__module__.startswith("namedtuple_")]
     if all(Path(part.__code__.co_filename).is_file() for part in written):
-        folder = cache_root() / "kernels" / digest(walk.values())
+        folder = cache_root() / "kernels" / digest(by_file(parts))
         touch(folder)
         kernel._cache = _Cache(function, folder)
     return kernel

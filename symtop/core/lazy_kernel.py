@@ -25,7 +25,7 @@ class LazyKernel:
     """A plain function and the types of its arguments as a kernel, in numba's words: ``"(float64, float64[::1])"``."""
 
     def __init__(self, function: Callable[..., Any], arguments: str, patience: float) -> None:
-        self.function, self.arguments, self.patience = function, arguments, patience
+        self.py_func, self.arguments, self.patience = function, arguments, patience  # the name that numba has for it
         self.compiled: Any = None
         self._kernel: Any = None
         self._spent = 0.0
@@ -60,7 +60,7 @@ class LazyKernel:
 
             from symtop.core.jit import compile_kernel, is_cached
 
-            self._kernel = compile_kernel(self.function)
+            self._kernel = compile_kernel(self.py_func)
             self._signature, _ = sigutils.normalize_signature(self.arguments)
             self._in_cache = is_cached(self._kernel, self._signature)
         return self._in_cache

@@ -276,22 +276,6 @@ def read(path: str | os.PathLike[str]) -> xr.Dataset:
         return data.load()
 
 
-def read_own(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Load a file without groups that `write` wrote: as `read`, in 8 ms instead of 13, for it reads nothing lazily."""
-    import netCDF4
-
-    with _netcdf(path), netCDF4.Dataset(path) as file:
-        file.set_auto_maskandscale(False)  # xarray does it
-        held = {name: _held(variable) for name, variable in file.variables.items()}
-        return xr.decode_cf(xr.backends.InMemoryDataStore(held, file.__dict__)).load()
-
-
-def _held(variable: Any) -> xr.Variable:
-    """A variable of an open file with all its values."""
-    values = np.asarray(variable[...], str if variable.dtype is str else None)
-    return xr.Variable(variable.dimensions, values, variable.__dict__)
-
-
 def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:
     """Load a netCDF file completely into memory and close it: a tree if it has groups, otherwise a dataset.
 

@@ -82,25 +82,28 @@ def deferred() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def at_most(seconds: float) -> Iterator[None]:
-    """Raise TimeoutError in Python code of the main thread that has taken so much processor time, and every second on.
+def at_most(seconds: float | None, *, processor: bool = True) -> Iterator[None]:
+    """Raise TimeoutError in Python code of the main thread after so much time of the processor, or of the clock.
 
-    Compiled code hears it when it returns; elsewhere, and where the system has no such timer, there is no limit.
+    It is raised again each second, for code that catches everything. Compiled code hears it when it returns; elsewhere,
+    where the system has no such timer, and for None, there is no limit.
     """
-    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
+    main = threading.current_thread() is threading.main_thread()
+    if seconds is None or not main or not hasattr(signal, "setitimer"):
         yield
         return
 
     def stop(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
         raise TimeoutError(f"it was not done after {seconds:g} s")
 
-    before = signal.signal(signal.SIGVTALRM, stop)
-    signal.setitimer(signal.ITIMER_VIRTUAL, seconds, 1.0)
+    number, timer = (signal.SIGVTALRM, signal.ITIMER_VIRTUAL) if processor else (signal.SIGALRM, signal.ITIMER_REAL)
+    before = signal.signal(number, stop)
+    signal.setitimer(timer, seconds, 1.0)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
-        signal.signal(signal.SIGVTALRM, before)
+        signal.setitimer(timer, 0.0)
+        signal.signal(number, before)
 
 
 def is_of_user(error: BaseException) -> bool:

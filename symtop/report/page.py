@@ -20,9 +20,9 @@ from symtop.core.errors import SymtopError
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.report import markdown, method, tables
 from symtop.report.style import look
-from symtop.report.unchanged import PAGE, WORDS, made_of
-from symtop.runner import plugins, run as runner, store
+from symtop.runner import manifest, plugins, run as runner, store
 
+WORDS = "report.md"
 TITLE = "Integrators on the heavy symmetric top"
 INTRODUCTION = (
     "Every method is run on rigid bodies whose exact motion is known, and measured against it: accuracy, conservation, "
@@ -141,7 +141,8 @@ def write(results: Path, *, embed: bool = False) -> Path:
         loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    mark, studies = made_of(results, embed=embed, plugins=plugins.loaded()), gather(results, embed=embed)
+    made_of, sources = manifest.report_hash(results, embed=embed), manifest.report_files(results)
+    studies = gather(results, embed=embed)
     _named(studies)
     titles = {study["study"]: study["title"] for study in studies}
     provenance = next((study for study in reversed(studies) if not study["measured"]), studies[-1])["provenance"]
@@ -152,7 +153,6 @@ def write(results: Path, *, embed: bool = False) -> Path:
     measured = method.parts()
     text = environment.get_template("report.html").render(
         title=TITLE,
-        made_of=mark,
         introduction=INTRODUCTION,
         rows=ROWS,
         css="".join((templates / name).read_text(encoding="utf-8") for name in ("style.css", "report.css")),
@@ -169,9 +169,10 @@ def write(results: Path, *, embed: bool = False) -> Path:
         quick=any(study["quick"] for study in studies),
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
     )
-    target = results / PAGE
+    target = results / manifest.PAGE
     store.write_text(target, text)
     opening = ["# " + TITLE, INTRODUCTION, *(markdown.opening(study, titles) for study in studies), ROWS]
     opening.append(markdown.measured(measured))
     store.write_text(results / WORDS, markdown.page(studies, opening, facts))
+    manifest.note(results, manifest.PAGE, "" if plugins.loaded() else made_of, [target, results / WORDS, *sources])
     return target

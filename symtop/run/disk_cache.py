@@ -11,6 +11,7 @@ import itertools
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
@@ -23,15 +24,18 @@ OFTEN = 50  # files that a process writes between two looks at the size of the f
 _written = itertools.count()
 
 
+COMPILED = tuple(code_hash.PACKAGE / "core" / name for name in ("jit.py", "sines.py"))  # without importing numba
+
+
 @functools.lru_cache(maxsize=8)
-def _sources(maker: str) -> str:
-    """Hash of the files that a module computes by, itself and all that it imports, and of the libraries."""
-    files = code_hash.closure(frozenset([Path(maker).resolve()]))
-    return code_hash.digest(code_hash.file_reasons(files) | code_hash.packages("numpy", "heyoka", "mpmath"))
+def _sources(maker: Callable[..., Any]) -> str:
+    """Hash of the code that a function reaches, and of the libraries."""
+    code = code_hash.Code().reasons("reference", maker, COMPILED)
+    return code_hash.digest(code | code_hash.packages("numpy", "heyoka", "mpmath"))
 
 
-def place(maker: str, *key: object, data: bytes = b"") -> Path:
-    """The file of a result, of the ``__file__`` of the module that makes it and of what it is made from."""
+def place(maker: Callable[..., Any], *key: object, data: bytes = b"") -> Path:
+    """The file of a result, of the function that makes it and of what it is made from."""
     name = hashlib.sha256(repr([_sources(maker), *key]).encode() + data).hexdigest()[:32]
     return cache_root() / "reference" / f"{name}.nc"
 

@@ -23,7 +23,7 @@ import xarray as xr
 from tqdm import tqdm
 
 from symtop.core import netcdf
-from symtop.core.code_hash import digest, file_reasons, hashed
+from symtop.core.code_hash import by_file, digest, hashed
 from symtop.core.errors import SymtopError, SymtopWarning, check_replaceable, file_path, positive, whole
 from symtop.core.files import cache_root
 from symtop.core.jit import code_of
@@ -201,7 +201,7 @@ def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensate
     numbers = [[getattr(record, name) for name in record.__slots__] for record in (scene.top, scene.start)]
     made = code_of((method, watch, windows, scattered, summary))
     return digest({
-        **made.values(), **file_reasons(made.closure()),
+        **by_file(made),
         "numbers": hashed(json.dumps([numbers, h, steps, compensated, FIRST, PER_DECADE, LONGEST, SAMPLES])),
     })  # fmt: skip
 

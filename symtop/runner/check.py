@@ -13,10 +13,10 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.runner import store
-from symtop.runner.cases import Round
-from symtop.runner.pools import Workers
+from symtop.runner.cases import StudyCases
+from symtop.runner.execute_case import ATTRIBUTES
+from symtop.runner.pool import Pool
 from symtop.runner.study import Combined, Study
-from symtop.runner.work import TOLD
 
 SAMPLE = 5  # cases of each study
 # in the names of variables of measured times, or of such a time over a count
@@ -55,7 +55,7 @@ def _differences(stored: xr.Dataset, again: xr.Dataset) -> list[str]:
             differing.append(f"{name} has another shape: {dict(one.sizes)} and {dict(other.sizes)}")
         elif not any(word in name for word in CLOCKED) and not _same(one, other):
             differing.append(f"{name} differs{_how_much(one, other)}")
-    kept = sorted((set(stored.attrs) | set(again.attrs)) - set(netcdf.provenance()) - {"content", *TOLD.values()})
+    kept = sorted((set(stored.attrs) | set(again.attrs)) - set(netcdf.provenance()) - {"content", *ATTRIBUTES.values()})
     pairs = [(key, stored.attrs.get(key), again.attrs.get(key)) for key in kept]
     return [
         *differing,
@@ -84,24 +84,24 @@ def _how_much(one: xr.DataArray, other: xr.DataArray) -> str:
 
 
 def check(
-    study: Study, results: Path, workers: Workers, *, quick: bool = False, full: bool = False, everything: bool = False
+    study: Study, results: Path, pool: Pool, *, quick: bool = False, full: bool = False, everything: bool = False
 ) -> Checked:
     """Compute `SAMPLE` stored cases again, or every one, and compare; likewise the dataset that they make together."""
-    cases = Round.stored(study, results, quick=quick, full=full)
+    cases = StudyCases.stored(study, results, quick=quick, full=full)
     # in the order of their digests, so that a sample is one of all parts of the grid
-    stored = sorted(cases.done.items(), key=lambda item: store.digest_of(item[0]))
-    chosen = {path.name: case for path, case in stored[: None if everything else SAMPLE]}
+    stored = sorted(cases.data.items(), key=lambda item: store.digest_of(item[0]))
+    chosen = {path.name: data for path, data in stored[: None if everything else SAMPLE]}
     with tempfile.TemporaryDirectory(prefix="symtop-check-") as elsewhere:
-        again = Round(study, Path(elsewhere).resolve())
-        missing = again.add([case for case, _ in chosen.values()], fresh=True)
-        again.compute(missing, workers, study.limit, fresh=False, quiet=True)
-        again.look(missing)
+        again = StudyCases(study, Path(elsewhere).resolve())
+        missing = again.add(case for path, case in cases.cases.items() if path.name in chosen)
+        again.compute(missing, pool, study.limit, fresh=False, quiet=True)
+        again.read(missing)
     differing = again.failures
-    for path, (case, data) in again.done.items():
-        label = f"{case.integrator} on {case.scene}"
-        differing += [f"{label}: {text}" for text in differences(chosen[path.name][1], data)]
+    for path, data in again.data.items():
+        label = f"{again.cases[path].integrator} on {again.cases[path].scene}"
+        differing += [f"{label}: {text}" for text in differences(chosen[path.name], data)]
     whole = results / f"{study.name}.nc"
-    if whole.is_file() and len(stored) == len(cases.paths):
+    if whole.is_file() and len(stored) == len(cases.cases):
         kept, made = _bare(netcdf.read_any(whole)), _bare(cases.combined())
         differing += [f"{whole.name}: {text}" for text in differences(kept, made)]
     return Checked(study.name, len(stored), len(chosen), differing)

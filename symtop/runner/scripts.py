@@ -3,19 +3,17 @@
 A study that ships with symtop is a package of its own, ``symtop_studies.NAME``, whose module ``study`` defines
 ``STUDY``. Its folder lies beside the package: `studies` in a checkout, `symtop_studies` in an installed wheel; both are
 imported under the second name, in the same way. Any other study is a Python file that the user names, alone or in a
-package of its own (a folder with an ``__init__.py``), so that it may import what stands beside it. Files of both kinds
-of packages count as wholes in a fingerprint, but for the scripts: a new caption measures nothing again.
+package of its own (a folder with an ``__init__.py``), so that it may import what stands beside it.
 """
 
 import importlib
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
 from symtop.core import code_hash
 from symtop.core.errors import SymtopError, foreign_code, one_of
-from symtop.core.python_files import execute, python_file
+from symtop.core.files import execute, python_file
 from symtop.runner.study import Study
 
 STUDIES = "symtop_studies"  # the package that every shipped study belongs to
@@ -37,15 +35,14 @@ def _once(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
     return module if module is not None and module.__file__ == str(file) else execute(name, file, places)
 
 
-def _package(name: str, place: Path, scripts: Iterable[Path]) -> ModuleType:
+def _package(name: str, place: Path) -> ModuleType:
     code_hash.add_root(name, place)
-    code_hash.by_code.update(scripts)
     return _once(name, place / "__init__.py", [str(place)])
 
 
 def install() -> ModuleType:
     """Make ``import symtop_studies`` work, wherever the studies lie."""
-    return _package(STUDIES, folder(), folder().glob("*/study.py"))
+    return _package(STUDIES, folder())
 
 
 def names() -> list[str]:
@@ -66,7 +63,7 @@ def _module(file: Path) -> ModuleType:
     if file.parent.parent == folder():
         return importlib.import_module(f"{install().__name__}.{file.parent.name}.{file.stem}")
     if (file.parent / "__init__.py").is_file():
-        package = _package(f"symtop_study_{file.parent.name}", file.parent, [file])
+        package = _package(f"symtop_study_{file.parent.name}", file.parent)
         return importlib.import_module(f"{package.__name__}.{file.stem}")
     return _once(f"symtop_study_{file.stem}", file)
 

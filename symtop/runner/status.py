@@ -13,10 +13,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from symtop.core import code_hash, netcdf
-from symtop.core.errors import SymtopError
-from symtop.runner import depends, store
-from symtop.runner.cases import Round
+from symtop.core import code_hash
+from symtop.runner import fingerprint, store
+from symtop.runner.cases import StudyCases
 from symtop.runner.study import Case, Study
 
 DONE, FAILED, STALE, MISSING = STATES = ("done", "failed", "stale", "missing")
@@ -29,15 +28,15 @@ def status(
 
     The second round of a study is known only when its first is done.
     """
-    cases = Round.stored(study, results, quick=quick, full=full)
+    cases = StudyCases.stored(study, results, quick=quick, full=full)
     stored = store.stored(cases.results, study)
-    older = store.superseded(stored, cases.paths)
+    older = store.superseded(stored, cases.cases)
     rows = []
-    for path, case in cases.paths.items():
+    for path, case in cases.cases.items():
         record = store.read_json(store.failure_path(path))
         earlier = [old for old in older if store.identity_of(old) == store.identity_of(path)]
         message, causes = "", list[str]()
-        if path in cases.done:
+        if path in cases.data:
             state = DONE
         elif isinstance(record, dict):
             state, message = FAILED, str(record.get("message", ""))
@@ -56,7 +55,7 @@ def changed(study: Study, case: Case, path: Path) -> list[str]:
     before = _attribute(path, "made_of")
     if not before:
         return ["its file does not say what it was made of"]
-    return code_hash.changes(before, store.short(depends.reasons(study, case)))
+    return code_hash.changes(before, store.short(fingerprint.reasons(study, case)))
 
 
 def other_settings(case: Case, stored: list[Path]) -> list[str]:
@@ -71,9 +70,7 @@ def other_settings(case: Case, stored: list[Path]) -> list[str]:
 
 
 def _attribute(path: Path, name: str) -> Mapping[str, Any]:
-    """A mapping that a case's file holds as JSON; empty if the file is damaged or another program's."""
-    try:
-        content = json.loads(netcdf.read(path).attrs[name])
-    except (SymtopError, KeyError, TypeError, ValueError):
-        return {}
+    """A mapping that a case's file holds; empty if the file is damaged or another program's."""
+    data = store.load_case(path)
+    content = {} if data is None else data.attrs.get(name)
     return content if isinstance(content, dict) else {}

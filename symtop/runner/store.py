@@ -1,19 +1,19 @@
 """Where a study's results live: one file a case, one dataset a study, written whole or not at all.
 
-results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.nc             what one case measured
+results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.npz            what one case measured
 results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.failed.json    or how it failed, with its traceback
 results/cases/STUDY/.SCENE--INTEGRATOR--SETTINGS--DIGEST.lock          while it is being computed
-results/cases/STUDY/seen.json                                sizes and times of the files that were read (`seen`)
-results/STUDY.nc                                             all of them, with labelled dimensions
-results/STUDY.json                                           verdict, tables and captions for the report
+results/STUDY.nc                                                       all of them, with labelled dimensions
+results/STUDY.json                                                     verdict, tables and captions for the report
 results/figures/STUDY-NAME.png
+results/cases/manifest.json                                            what these were made of (`manifest`)
 
 SETTINGS is a hash of what the case was asked to do, DIGEST one of everything that its numbers depend on. Its file holds
-the settings and the reasons that make up the digest, and a hash of its values: a truncated, damaged or foreign file
-counts as none. A file is removed only when a case with the same SETTINGS and another DIGEST takes its place; what was
-computed for another grid stays, until a user deletes it: remove ``cases/STUDY`` and run the study again, which computes
-its grid, or remove single files, of which nothing depends on any. The lock is the operating system's, so that it ends
-with the process that holds it, however that ends.
+the settings and the reasons that make up the digest, and a hash of all that it holds: a truncated, damaged or foreign
+file counts as none. A file is removed only when a case with the same SETTINGS and another DIGEST takes its place; what
+was computed for another grid stays, until a user deletes it: remove ``cases/STUDY`` and run the study again, which
+computes its grid, or remove single files, of which nothing depends on any. The lock is the operating system's, so that
+it ends with the process that holds it, however that ends.
 """
 
 import json
@@ -28,11 +28,11 @@ import numpy as np
 import xarray as xr
 
 from symtop.core import netcdf
-from symtop.core.code_hash import LENGTH, Reasons
+from symtop.core.code_hash import LENGTH, Reasons, hashed
 from symtop.core.errors import SymtopError
 from symtop.core.files import locked
 from symtop.model.scenes import scenes
-from symtop.runner import depends
+from symtop.runner import fingerprint
 from symtop.runner.study import Case, Combined, Study
 
 SEED = 0  # of the order in which batches are timed; nothing else here is random
@@ -41,10 +41,10 @@ SEED = 0  # of the order in which batches are timed; nothing else here is random
 def case_paths(results: Path, study: Study, cases: Sequence[Case]) -> list[Path]:
     """The files of cases; their names hold the digest of everything the numbers depend on."""
     folder = results / "cases" / study.name
-    keys = [depends.settings_key(study, case)[:8] for case in cases]
-    made_of = depends.digests(study, cases)
+    keys = [fingerprint.settings_key(study, case)[:8] for case in cases]
+    digests = fingerprint.digests(study, cases)
     return [
-        folder / f"{case.label}--{key}--{digest}.nc" for case, key, digest in zip(cases, keys, made_of, strict=True)
+        folder / f"{case.label}--{key}--{digest}.npz" for case, key, digest in zip(cases, keys, digests, strict=True)
     ]
 
 
@@ -78,20 +78,18 @@ def prepare(results: Path, study: Study) -> None:
 
 
 def save_case(data: xr.Dataset, path: Path, study: Study, case: Case) -> None:
-    """Store what a case measured, with what it was made from."""
-    described = netcdf.describe(
-        data, f"{study.name}: {case.integrator} on {case.scene}", units=units_of([case.scene]), study=study.name,
-        settings=dict(case.settings), sources=digest_of(path), made_of=short(depends.reasons(study, case)), seed=SEED,
-        content=netcdf.content_hash(data),
-    )  # fmt: skip
-    netcdf.write(described, path)
+    """Store what a case measured, with what it was made from: arrays, and all that is said of them as JSON."""
+    attributes = data.attrs | netcdf.provenance() | {
+        "study": study.name, "settings": dict(case.settings), "sources": digest_of(path),
+        "made_of": short(fingerprint.reasons(study, case)), "seed": SEED,
+    }  # fmt: skip
+    arrays = {str(k): _plain(variable.values) for k, variable in enumerate(data.variables.values())}
+    variables = [[str(name), list(variable.dims), variable.attrs, name in data.coords]
+                 for name, variable in data.variables.items()]  # fmt: skip
+    about = json.dumps({"variables": variables, "attributes": attributes}, default=_as_json)
+    with netcdf.replacing(path) as partial, partial.open("wb") as file:
+        np.savez(file, about=about, content=_content(about, arrays), **arrays)
     failure_path(path).unlink(missing_ok=True)
-
-
-def units_of(names: Iterable[str]) -> str:
-    """The units that some scenes have in common: "SI", or empty."""
-    catalogue = scenes()
-    return "SI" if all(name in catalogue and catalogue[name].units == "SI" for name in names) else ""
 
 
 def load_case(path: Path) -> xr.Dataset | None:
@@ -99,11 +97,43 @@ def load_case(path: Path) -> xr.Dataset | None:
     if not path.is_file():
         return None
     try:
-        data = netcdf.read_own(path)
-    except SymtopError:
+        with path.open("rb") as stream, np.load(stream) as file:
+            arrays = {name: file[name] for name in file.files}
+        text, content = str(arrays.pop("about")), str(arrays.pop("content"))
+        about = json.loads(text)
+    except Exception:  # noqa: BLE001  (a damaged archive raises nearly anything)
         return None
-    whole = data.attrs.get("sources") == digest_of(path) and data.attrs.get("content") == netcdf.content_hash(data)
-    return data if whole else None
+    if content != _content(text, arrays) or about["attributes"]["sources"] != digest_of(path):
+        return None
+    variables = {
+        name: (dims, arrays[str(k)], attributes, coordinate)
+        for k, (name, dims, attributes, coordinate) in enumerate(about["variables"])
+    }
+    return xr.Dataset(
+        {name: one[:3] for name, one in variables.items() if not one[3]},
+        {name: one[:3] for name, one in variables.items() if one[3]},
+        about["attributes"],
+    )
+
+
+def _content(about: str, arrays: dict[str, Any]) -> str:
+    return hashed(about, *(netcdf.array_hash(arrays[name]) for name in sorted(arrays)))
+
+
+def _plain(values: Any) -> Any:
+    """Text of any length as text of one length: archives hold no objects."""
+    return values.astype(str) if values.dtype == object else values
+
+
+def _as_json(value: Any) -> Any:
+    """Numbers and arrays of NumPy as JSON has them; anything else in words."""
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)
+
+
+def units_of(names: Iterable[str]) -> str:
+    """The units that some scenes have in common: "SI", or empty."""
+    catalogue = scenes()
+    return "SI" if all(name in catalogue and catalogue[name].units == "SI" for name in names) else ""
 
 
 def failure_path(path: Path) -> Path:
@@ -116,11 +146,6 @@ def save_failure(path: Path, case: Case, message: str, trace: str) -> None:
     question = {"scene": case.scene, "integrator": case.integrator, "settings": dict(case.settings)}
     write_json(failure_path(path), {**question, "message": message, "traceback": trace.splitlines()})
     path.unlink(missing_ok=True)
-
-
-def trace_path(path: Path) -> Path:
-    """Where a worker that hangs in compiled code writes its traceback before it ends."""
-    return path.with_name(f".{path.stem}.trace")
 
 
 def combine(cases: list[tuple[Case, xr.Dataset]]) -> Combined:
@@ -227,7 +252,7 @@ def read_json(path: Path) -> Any:
 
 def stored(results: Path, study: Study) -> list[Path]:
     """The files of all cases of a study that were ever computed and not replaced."""
-    return sorted((results / "cases" / study.name).glob("[!.]*.nc"))
+    return sorted((results / "cases" / study.name).glob("[!.]*.npz"))
 
 
 def superseded(paths: Iterable[Path], keep: Iterable[Path]) -> list[Path]:
@@ -248,11 +273,10 @@ def forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
 def tidy(results: Path, study: Study) -> None:
     """Remove what processes that were killed have left of a study's files, and nobody holds any more."""
     for lock in (results / "cases" / study.name).glob(".*.lock"):
-        path = lock.with_name(f"{lock.stem[1:]}.nc")
+        path = lock.with_name(f"{lock.stem[1:]}.npz")
         with locked(path, wait=False) as ours:
             if ours:
                 netcdf.sweep(path)
-                trace_path(path).unlink(missing_ok=True)
     with locked(results / f"{study.name}.nc", wait=False) as ours:
         if ours:
             for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):

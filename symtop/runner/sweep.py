@@ -5,7 +5,6 @@ compiled kernels let run at once. With a file, cells are kept in it as they are 
 its numbers depend on (`symtop.core.code_hash`), as the cases of a study are: what is up to date is not run again.
 """
 
-import functools
 import math
 import time
 from collections.abc import Iterable, Iterator
@@ -17,7 +16,6 @@ import xarray as xr
 from tqdm import tqdm
 
 from symtop.core import code_hash, netcdf
-from symtop.core.code_hash import Walk
 from symtop.core.errors import SymtopError, boolean, file_path, positive, row, whole
 from symtop.core.parallel import MOST_THREADS, cores, in_threads
 from symtop.core.progress import beating
@@ -27,7 +25,7 @@ from symtop.measure.settings import ANGLES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.simulation import chart_of, make_plan
-from symtop.runner import depends
+from symtop.runner.fingerprint import made_of
 
 KEEP_EVERY = 5.0  # seconds between two writings of the file
 RAISED = "raised"  # outcome of a run whose integrator raised an exception
@@ -190,20 +188,10 @@ def _cell(
     return _Cell(scene, method, tuple(settings), until, observe, _made_of(scene, method, (settings, until, observe)))
 
 
-def _made_of(scene: Scene, method: Integrator, asked: object) -> str:
+def _made_of(scene: Scene, method: Integrator, settings: object) -> str:
     """The digest of all that the numbers of a cell depend on."""
-    walk = Walk("sweep")
-    walk.add((scene, method, repr(asked)))
-    measured, files = _measure()
-    return code_hash.digest(
-        {**code_hash.packages(), **walk.values(), **measured, **depends.hashes(files | walk.closure())}
-    )
-
-
-@functools.cache
-def _measure() -> tuple[code_hash.Reasons, frozenset[Path]]:
-    base = depends.basis(error_row)
-    return base.values, base.files
+    parts = [made_of("measure", error_row), made_of("scene", scene), made_of("integrator", method)]
+    return code_hash.digest(code_hash.merged(parts) | code_hash.packages() | {"settings": repr(settings)})
 
 
 def _table(cell: _Cell) -> xr.Dataset:

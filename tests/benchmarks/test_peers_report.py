@@ -14,7 +14,7 @@ from benchmarks import measured
 from benchmarks.peers import measure, study, summary, together
 from symtop.core import netcdf
 from symtop.report import page, style
-from symtop.runner import conclude, run as runner, store
+from symtop.runner import analyse, run as runner, store
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -78,7 +78,7 @@ def test_noise_is_not_called_a_win():
 
 def _peers_into(folder):
     data = _stored({"symtop": (1e-3, 2e-5), "scipy[axis] C": (6e-3, 4e-3)})
-    found = conclude.findings_of(study.STUDY, data, folder, style.save, failures=["drake was skipped."], cases=2)
+    found = analyse.findings_of(study.STUDY, data, folder, style.save, failures=["drake was skipped."], cases=2)
     found["provenance"] = {**found["provenance"], "processor": "an abacus"}
     store.write_json(folder / "peers.json", found | {"measured": study.measured(data)})
 

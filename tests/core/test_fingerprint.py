@@ -17,8 +17,8 @@ import pytest
 
 import symtop
 from symtop.core import code_hash, files, jit, signals
-from symtop.core.code_hash import Walk, changes, digest, file_reasons, merged
-from symtop.runner import depends
+from symtop.core.code_hash import Code, by_file, changes, digest, merged
+from symtop.runner import fingerprint
 
 
 def loaded(path: Path, name: str):
@@ -35,12 +35,14 @@ import math
 from symtop.methods.runge_kutta import gauss
 from symtop.runner.check import differences
 
-STEPS = 5
+STEPS = (5,)
 CAPTION = "unused"
+state = {"calls": 0}
 
 def measure():
-    from symtop.measure.errors import energy_scale
-    return part() + STEPS
+    from symtop.measure.errors import error_bound
+    state["calls"] += 1
+    return part() + STEPS[0]
 
 def part():
     return math.sin(gauss.STILL)
@@ -49,16 +51,16 @@ def part():
 
 def test_a_script_counts_by_the_functions_and_globals_that_are_reached(tmp_path):
     (tmp_path / "script.py").write_text(SCRIPT)
-    walk = Walk("measure")
-    walk.add(loaded(tmp_path / "script.py", "fingerprint_script").measure)
-    reasons = walk.values() | file_reasons(walk.closure())
-    assert set(walk.values()) == {
-        "measure", "function script.py:measure", "function script.py:part", "constant script.py:STEPS",
-        "constant script.py:gauss.STILL",
-    }  # fmt: skip
-    assert "file symtop/methods/runge_kutta/gauss.py" in reasons
-    assert "file symtop/measure/errors.py" in reasons  # imported when the function runs
-    assert "file symtop/runner/check.py" not in reasons  # imported, and not named by what is reached
+    module = loaded(tmp_path / "script.py", "fingerprint_script")
+    labels = {part.label for part in Code().reached("measure", module.measure)}
+    assert {"function script.py:measure", "function script.py:part", "constant script.py:STEPS"} <= labels
+    assert "function symtop/measure/errors.py:error_bound" in labels  # imported when the function runs
+    assert not any(name in label for label in labels for name in ("check.py", "CAPTION", "state"))
+    before = Code().reasons("measure", module.measure)
+    module.state["calls"] = 9  # what calls leave behind is no part of code
+    assert Code().reasons("measure", module.measure) == before
+    module.STEPS = (6,)
+    assert changes(before, Code().reasons("measure", module.measure)) == ["code script.py"]
 
 
 def test_changes_name_what_differs():
@@ -71,43 +73,9 @@ def test_changes_name_what_differs():
     assert merged([{"a": "1"}, {"a": "2"}])["a"] not in ("1", "2")
 
 
-def test_relative_imports_of_a_study_are_followed():
-    file = code_hash.roots["symtop_studies"] / "drift" / "study.py"
-    assert code_hash.roots["symtop_studies"] / "drift" / "phase_loss.py" in code_hash.imports_of(file)
-    assert code_hash.PACKAGE / "run" / "long_run.py" in code_hash.imports_of(file)
-    assert not any(path.name == "__init__.py" for path in code_hash.closure(frozenset([file])))
-
-
-def test_the_import_statements_are_those_that_the_parser_finds():
-    """Of every file of the package and of the studies; prose is no statement."""
-    import ast
-
-    for folder in (code_hash.PACKAGE, code_hash.roots["symtop_studies"]):
-        for file in folder.rglob("*.py"):
-            nodes = ast.walk(ast.parse(file.read_bytes()))
-            parsed = sum(
-                len(node.names) if isinstance(node, ast.Import) else 1
-                for node in nodes
-                if isinstance(node, (ast.Import, ast.ImportFrom))
-            )
-            assert len(code_hash.imported(file)) == parsed, file
-
-
-def test_a_study_depends_on_its_tables_and_not_on_its_figures():
-    from symtop.runner.scripts import load
-
-    drift = load("drift")
-    files = {label for case in drift.cases(True) for label in depends.reasons(drift, case) if "drift/" in label}
-    assert "file symtop_studies/drift/phase_loss.py" in files
-    assert not any(name in label for label in files for name in ("figures.py", "words.py"))
-    assert "function symtop_studies/drift/study.py:measure" in files
-
-
 def test_words_do_not_count_and_numbers_do():
     def made(thing):
-        walk = Walk("thing")
-        walk.add(thing)
-        return walk.values()
+        return Code().reasons("thing", thing)
 
     scene = symtop.scene("spheroid")
     assert made(dataclasses.replace(scene, purpose="said otherwise", units="")) == made(scene)
@@ -127,11 +95,11 @@ def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again()
     try:
         for order in range(2, 12):
             symtop.register(dataclasses.replace(plain, order=order), replace=True)
-            digests.append(depends.digest(study, case))
+            digests += fingerprint.digests(study, [case])
     finally:
         symtop.register(plain, replace=True)
     assert len(set(digests)) == 10
-    assert digests[0] == depends.digest(study, case)
+    assert digests[:1] == fingerprint.digests(study, [case])
 
 
 CLASSES = """
@@ -156,27 +124,24 @@ def test_a_script_counts_by_code_with_its_classes_and_their_bases_and_without_co
         text = CLASSES.format(*numbers)
         space = {"__name__": "few", "__package__": "unknown"}
         exec(text, space)
-        walk = Walk("measure")
-        walk.add(space["measure"])
-        return walk.values()
+        return Code().reasons("measure", space["measure"])
 
     plain = made(2, 1, "words", "comment")
     assert made(2, 1, "other words", "another comment") == plain
-    assert changes(plain, made(2, 3, "words", "comment")) == ["constant <string>:BASE"]
+    assert changes(plain, made(2, 3, "words", "comment")) == ["code <string>"]
     assert made(4, 1, "words", "comment") != plain
 
 
-def test_an_import_inside_a_function_counts_by_its_file_at_every_level():
+def test_an_import_inside_a_function_is_followed_at_every_level():
     space = {"__name__": "symtop.measure.made", "__package__": "symtop.measure"}
     exec(
-        "def measure():\n    from . import errors\n    from ..methods.runge_kutta.gauss import STILL\n"
-        "    import symtop.run.guard.guard",
+        "def measure():\n    from . import errors\n    from ..methods.runge_kutta.gauss import farthest\n"
+        "    import symtop.run.guard.guard as other\n    return errors.error_bound, other.guard\n",
         space,
     )
-    walk = Walk("measure")
-    walk.add(space["measure"])
-    names = {"measure/errors.py", "methods/runge_kutta/gauss.py", "run/guard/guard.py"}
-    assert walk.files == {code_hash.PACKAGE / name for name in names}
+    labels = {part.label for part in Code().reached("measure", space["measure"])}
+    for name in ("measure/errors.py:error_bound", "methods/runge_kutta/gauss.py:farthest"):
+        assert f"function symtop/{name}" in labels
 
 
 # ---- kernels ---------------------------------------------------------------------------------------------------------
@@ -231,7 +196,7 @@ def test_a_kernel_is_told_by_what_it_calls():
             """Words."""
             return part(x)  # more words
 
-        return digest(jit.code_of(kernel).values())
+        return digest(by_file(jit.code_of(kernel)))
 
     def made(source):
         space = {"__name__": "part"}
@@ -253,12 +218,10 @@ def test_a_kernel_is_told_by_what_it_calls():
 def test_what_numba_compiles_in_place_of_a_function_counts():
     from symtop.core import jit
 
-    names = {part.__qualname__ for part in jit.code_of(lambda a: jit.fused(a, a, a)).functions}
-    assert names  # the control: the walk went somewhere
-    walk = Walk("kernel", whole=False, also=jit._overloads)
-    walk.add(jit.fused)
-    reached = {part.__name__ for part in walk.functions}
-    assert {"fused", "_fused", "_fma"} <= reached
+    labels = {part.label.rpartition(":")[2] for part in jit.code_of(jit.fused)}
+    assert {"fused", "_fused", "_fma"} <= labels
+    plain = {part.label.rpartition(":")[2] for part in Code().reached("kernel", jit.fused)}
+    assert plain == {"kernel", "fused"}  # the control
 
 
 def test_a_kernel_is_the_same_to_a_profiler():
@@ -268,7 +231,7 @@ def test_a_kernel_is_the_same_to_a_profiler():
 
         return kernel
 
-    plain = digest(jit.code_of(made(1.0)).values())
+    plain = digest(by_file(jit.code_of(made(1.0))))
     watching = cProfile.Profile()
     watching.enable()
     try:
@@ -277,7 +240,7 @@ def test_a_kernel_is_the_same_to_a_profiler():
         watching.disable()
     cleared = not made(1.0).__code__.co_flags & inspect.CO_OPTIMIZED  # by numba, for all that share the code
     assert cleared is (sys.version_info < (3, 12))
-    assert digest(jit.code_of(made(1.0)).values()) == plain
+    assert digest(by_file(jit.code_of(made(1.0)))) == plain
 
 
 def test_the_walk_of_a_kernel_takes_less_than_a_millisecond():
@@ -285,7 +248,7 @@ def test_the_walk_of_a_kernel_takes_less_than_a_millisecond():
     times = []
     for _ in range(20):
         begin = time.perf_counter()
-        digest(jit.code_of(march).values())
+        digest(by_file(jit.code_of(march)))
         times.append(time.perf_counter() - begin)
     assert min(times) < 1e-3
 

@@ -2,7 +2,7 @@
 
 import xarray as xr
 
-from symtop.core.code_hash import Walk, digest
+from symtop.core.code_hash import Code, digest
 from symtop.core.memoize import of_one_dataset
 
 
@@ -30,9 +30,7 @@ def test_what_is_remembered_is_no_part_of_a_fingerprint():
         return seen.setdefault("size", len(data))
 
     def made_of():
-        walk = Walk("measure")
-        walk.add(size)
-        return digest(walk.values())
+        return digest(Code().reasons("measure", size))
 
     before = made_of()
     seen["other"] = 1  # the control: this a function closes over

@@ -27,7 +27,7 @@ def study(tmp_path):
 
 
 def cases_in(results):
-    return {path.name: (path.stat().st_ino, path.stat().st_mtime_ns) for path in results.rglob("cases/*/*.nc")}
+    return {path.name: (path.stat().st_ino, path.stat().st_mtime_ns) for path in results.rglob("cases/*/*.npz")}
 
 
 @pytest.mark.parametrize("order", [(False, True), (True, False)])

@@ -37,7 +37,6 @@ CHARTS = ("angles", "axis", "attitude")
 def clean_registry(monkeypatch):
     monkeypatch.setattr(registry, "_registry", registry.integrators())
     monkeypatch.setattr(plugins, "_loaded", {})
-    monkeypatch.setattr(plugins, "_owners", {})
 
 
 def one_finding(subject, method, claim):

@@ -12,7 +12,7 @@ import symtop
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError
 from symtop.report import archive, style
-from symtop.runner import conclude, store
+from symtop.runner import analyse, store
 from symtop.runner.study import Case, Picture, Study, Table
 
 
@@ -44,7 +44,7 @@ def results(tmp_path_factory):
     (case,) = STUDY.cases(True)
     data = netcdf.describe(store.combine([(case, STUDY.measure(case))]), "Small", question=STUDY.question)
     netcdf.write(data, folder / "small.nc")
-    found = conclude.findings_of(STUDY, data, folder, style.save, failures=[], cases=1)
+    found = analyse.findings_of(STUDY, data, folder, style.save, failures=[], cases=1)
     store.write_json(folder / "peers.json", found | {"study": "peers", "measured": "once"})
     (folder / "cases" / "small").mkdir(parents=True)
     (folder / "cases" / "small" / "one.nc").write_bytes(b"a case")

@@ -13,8 +13,7 @@ from symtop.core.errors import SymtopError
 from symtop.run.ensemble import chunks
 from symtop.run.ensemble.ensemble import ensemble
 from symtop.run.ensemble.population import population
-from symtop.runner import run as runner
-from symtop.runner.pools import Workers
+from symtop.runner.pool import Pool
 from tests.commands import PROBE, contents, ended, leftovers, symtop
 
 distributed = pytest.importorskip("distributed")
@@ -120,24 +119,10 @@ def test_a_cluster_without_workers_is_one_sentence(monkeypatch):
         distributed.LocalCluster(n_workers=0, dashboard_address=None, silence_logs=50) as empty,
         pytest.raises(SymtopError, match="has workers"),
     ):
-        Workers(scheduler=empty.scheduler_address)
+        Pool(scheduler=empty.scheduler_address)
 
 
 def test_without_the_package_it_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(SymtopError, match=r"pip install 'symtop\[distributed\]'"):
-        Workers(scheduler="tcp://127.0.0.1:8786")
-
-
-def test_timed_cases_stay_at_home():
-    from symtop.runner.execute import size_for
-    from symtop.runner.pools import CLUSTER
-    from symtop.runner.work import Task
-
-    workers = Workers(2)
-    workers.scheduler = "somewhere"
-    study = runner.load(str(PROBE))
-    tasks = [Task("", case, "", (), 1.0) for case in study.cases(False)]
-    assert size_for(tasks, workers, timed=False) == CLUSTER
-    assert 0 <= size_for(tasks, workers, timed=True) <= workers.jobs
-    workers.close()
+        Pool(scheduler="tcp://127.0.0.1:8786")

@@ -23,7 +23,6 @@ def clean_registry(monkeypatch):
     monkeypatch.setattr(registry, "_registry", registry.integrators())
     monkeypatch.setattr(scenes, "_added", {})
     monkeypatch.setattr(plugins, "_loaded", {})
-    monkeypatch.setattr(plugins, "_owners", {})
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
@@ -18,7 +19,8 @@ from click.testing import CliRunner
 from symtop.cli.main import main
 from symtop.core import files, jit, netcdf
 from symtop.core.errors import SymtopError
-from symtop.runner import run as runner, store, work
+from symtop.core.signals import at_most
+from symtop.runner import execute_case as work, run as runner, store
 from tests.commands import PROBE, contents, ended, leftovers, stop, symtop
 from tests.kills import survive
 
@@ -45,18 +47,18 @@ def refused(results, says):
 
 
 def test_a_full_disk_ends_the_run_and_what_was_computed_is_kept(tmp_path, monkeypatch):
-    real, count = xr.Dataset.to_netcdf, []
+    real, count = np.savez, []
 
-    def full(self, *arguments, **options):
+    def full(*arguments, **options):
         count.append(1)
         if len(count) > 2:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        return real(self, *arguments, **options)
+        return real(*arguments, **options)
 
-    monkeypatch.setattr(xr.Dataset, "to_netcdf", full)
+    monkeypatch.setattr(np, "savez", full)
     refused(tmp_path, "No space left on device")
     assert len(count) == 3  # the third case was the last one tried
-    assert len(list(tmp_path.rglob("cases/probe/*.nc"))) == 2
+    assert len(list(tmp_path.rglob("cases/probe/*.npz"))) == 2
     monkeypatch.undo()
     code, output = probe(tmp_path)
     assert code == 0
@@ -87,7 +89,7 @@ def test_a_real_limit_on_the_size_of_files(tmp_path):
     assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("symtop: cannot write")
     assert "Traceback" not in done.stderr
-    assert not list((tmp_path / "small").rglob("*.nc"))
+    assert not list((tmp_path / "small").rglob("*.npz"))
     assert not leftovers(tmp_path / "small")
 
 
@@ -166,7 +168,7 @@ def test_a_folder_where_a_file_should_be(tmp_path):
         target.mkdir()
         refused(tmp_path, "it is a folder")
         target.rmdir()
-    case = next((tmp_path / "quick" / "cases" / "probe").glob("*.nc"))
+    case = next((tmp_path / "quick" / "cases" / "probe").glob("*.npz"))
     case.unlink()
     case.mkdir()
     refused(tmp_path, "it is a folder")
@@ -178,12 +180,13 @@ def test_a_folder_where_a_file_should_be(tmp_path):
 def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
     assert probe(tmp_path)[0] == 0
     before = contents(tmp_path)
-    cases = sorted((tmp_path / "quick" / "cases" / "probe").glob("*.nc"))
+    cases = sorted((tmp_path / "quick" / "cases" / "probe").glob("*.npz"))
     whole = cases[0].read_bytes()
-    values = netcdf.read(cases[1])
+    with np.load(cases[1]) as file:
+        arrays = dict(file)
     cases[0].write_bytes(whole[: len(whole) // 2])
-    netcdf.write(values.assign(energy=values["energy"] * (1.0 + 1e-15)), cases[1])  # readable, and not what it says
-    netcdf.write(xr.Dataset({"energy": ("sample", [1.0])}), cases[2])  # somebody else's
+    np.savez(cases[1], **arrays | {"0": arrays["0"] * (1.0 + 1e-15)})  # readable, and not what it says
+    np.savez(cases[2], energy=[1.0])  # somebody else's
     cases[3].write_bytes(whole)  # another case's file under this name
     assert "4 of 4 cases computed" in probe(tmp_path)[1]
     after = contents(tmp_path)
@@ -219,12 +222,10 @@ def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
         waiting.start()
         time.sleep(0.1)
         assert order == []
-        assert not files.was_begun(path)  # it is being computed
     waiting.join(5.0)
     assert order == [True]
     assert not list(tmp_path.iterdir())
     files.lock_path(path).touch()  # what a killed process leaves
-    assert files.was_begun(path)
     with files.locked(path, wait=False) as ours:
         assert ours
 
@@ -252,9 +253,13 @@ def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
 def test_what_a_killed_worker_left_beside_a_case_goes_when_it_is_computed_here(tmp_path):
     code, output = probe(tmp_path)
     assert code == 0, output
-    (case,) = tmp_path.rglob("cases/probe/goldstein--midpoint--*.nc")
+    (case,) = tmp_path.rglob("cases/probe/goldstein--midpoint--*.npz")
     case.unlink()
-    for name in (store.trace_path(case), files.lock_path(case), case.with_name(f".{case.name}.x.part.nc")):
+    for name in (
+        case.with_name(f".{case.stem}.trace"),
+        files.lock_path(case),
+        case.with_name(f".{case.name}.x.part.nc"),
+    ):
         name.touch()
     code, output = probe(tmp_path)
     assert "1 of 4 cases computed" in output
@@ -291,7 +296,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quic
     assert ended_with == code
     assert err == f"symtop: {says}; what was computed is kept, and the same command goes on from there\n"
     assert not leftovers(tmp_path / "r")
-    kept = len(list((tmp_path / "r").rglob("cases/probe/*.nc")))
+    kept = len(list((tmp_path / "r").rglob("cases/probe/*.npz")))
     assert kept >= 1
     code, out, err = ended(symtop(*words, PROBE_LOG=log))
     assert code == 0, err
@@ -400,10 +405,10 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
     assert states.count("done") == 14
 
 
-def test_a_case_has_its_time_and_a_call_that_ends_in_time_is_left_alone(tmp_path):
-    with pytest.raises(work.OverdueError, match="not done after"), work.limited(0.05, tmp_path / "trace"):
+def test_a_case_has_its_time_and_a_call_that_ends_in_time_is_left_alone():
+    with pytest.raises(TimeoutError, match="not done after"), at_most(0.05, processor=False):
         time.sleep(60.0)
-    with work.limited(0.2, tmp_path / "trace"):
+    with at_most(0.2, processor=False):
         pass
     time.sleep(0.3)  # nothing comes later
     assert signal.getitimer(signal.ITIMER_REAL)[0] == 0.0
@@ -413,7 +418,7 @@ def test_the_limit_is_heard_by_the_runner(tmp_path, monkeypatch):
     monkeypatch.setenv("PROBE_PAUSE", "1.0")
     code, output = probe(tmp_path, "--limit", 0.05)
     assert code == 2  # not one case could be measured
-    assert "OverdueError: it was not done after 0.05 s" in output
+    assert "TimeoutError: it was not done after 0.05 s" in output
     assert probe(tmp_path, "--limit", -1)[0] == 2
 
 
@@ -457,12 +462,12 @@ def test_errors_of_the_place_are_not_errors_of_a_case(tmp_path):
     study = runner.load(str(PROBE))
     case = study.cases(True)[0]
     [path] = store.case_paths(tmp_path, study, [case])
-    task = work.Task(str(PROBE), case, str(path), (), 10.0)
-    assert work.compute(task).state == "computed"
-    assert work.compute(task).state == "found"
-    assert work.compute(task._replace(fresh=True)).state == "computed"
+    task = work.Task(str(PROBE), case, path, (), 10.0)
+    assert work.execute_case(task).state == "computed"
+    assert work.execute_case(task).state == "found"
+    assert work.execute_case(task._replace(fresh=True)).state == "computed"
     other = path.with_name(path.name.replace(store.digest_of(path), "0" * 20))
     with pytest.raises(SymtopError, match="not those that the study was started with"):
-        work.compute(task._replace(path=str(other)))
+        work.execute_case(task._replace(path=other))
     with files.locked(path, wait=False):
-        assert work.compute(task).state == "busy"
+        assert work.execute_case(task).state == "busy"

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from symtop_studies.work_precision.timing_rounds import TimedRun
 
-from symtop.core import netcdf
-from symtop.runner import execute, run as runner
-from symtop.runner.cases import Round
-from symtop.runner.pools import Workers
+from symtop.runner import pool as pools, run as runner, store
+from symtop.runner.cases import StudyCases
+from symtop.runner.pool import Pool
 
 ROUNDS = """
 import os
@@ -47,8 +46,12 @@ def study(tmp_path):
     return runner.load(str(tmp_path / "rounds.py"))
 
 
+def manifest_of(results: Path) -> dict:
+    return json.loads((results / "cases" / "manifest.json").read_text())
+
+
 def cases_of(results: Path, timed: bool) -> list[Path]:
-    return [path for path in (results / "cases" / "rounds").glob("*.nc") if ("--together--" in path.name) == timed]
+    return [path for path in (results / "cases" / "rounds").glob("*.npz") if ("--together--" in path.name) == timed]
 
 
 def test_a_case_that_is_missing_is_computed_again_whichever_its_round(study, tmp_path):
@@ -59,12 +62,12 @@ def test_a_case_that_is_missing_is_computed_again_whichever_its_round(study, tmp
 
     assert computed() == 3
     assert computed() == 0
-    first = json.loads((results / "rounds.json").read_text())
+    first = manifest_of(results)
     (later,) = cases_of(results, timed=True)
     later.unlink()
     assert computed() == 1
     assert later.is_file()
-    assert json.loads((results / "rounds.json").read_text())["stamp"] == first["stamp"]
+    assert manifest_of(results)["rounds"]["made_of"] == first["rounds"]["made_of"]
     cases_of(results, timed=False)[0].unlink()
     assert computed() == 1
     later.write_bytes(later.read_bytes()[:100])
@@ -77,13 +80,13 @@ def test_timed_cases_that_alone_are_missing_run_in_new_workers(study, tmp_path, 
     results = tmp_path / "r"
     assert runner.run(study, results, quiet=True)["failures"] == []
     (later,) = cases_of(results, timed=True)
-    assert set(np.ravel(netcdf.read(later)["process"])) == {os.getpid()}  # the control: few cases need no workers
+    assert set(np.ravel(store.load_case(later)["process"])) == {os.getpid()}  # the control: few cases need no workers
     later.unlink()
-    monkeypatch.setattr(execute, "WORTH_A_POOL", 1)
-    with Workers(2) as workers:
-        done = runner.run(study, results, quiet=True, workers=workers)
+    monkeypatch.setattr(pools, "WORTH_WORKERS", 1)
+    with Pool(2) as pool:
+        done = runner.run(study, results, quiet=True, pool=pool)
     assert (done["computed"], done["failures"]) == (1, [])
-    again = netcdf.read(later)
+    again = store.load_case(later)
     assert os.getpid() not in set(np.ravel(again["process"]))
     assert set(np.ravel(again["later"])) == {2.0}
 
@@ -105,12 +108,12 @@ def timed(tmp_path_factory):
 
 def test_methods_are_timed_in_new_workers_when_nothing_else_is_missing(timed, monkeypatch):
     study, results = timed
-    monkeypatch.setattr(execute, "WORTH_A_POOL", 1)
-    for path, case in Round.stored(study, results, quick=False, full=False).paths.items():
+    monkeypatch.setattr(pools, "WORTH_WORKERS", 1)
+    for path, case in StudyCases.stored(study, results, quick=False, full=False).cases.items():
         if study.is_timed(case):
             path.unlink()
-    with Workers(2) as workers:
-        done = runner.run(study, results, quiet=True, workers=workers)
+    with Pool(2) as pool:
+        done = runner.run(study, results, quiet=True, pool=pool)
     assert done["computed"] > 0
     assert done["failures"] == []
 
@@ -145,6 +148,6 @@ def test_settings_of_the_first_round_are_values_of_json(name):
 
 def test_settings_of_the_second_round_are_values_of_json(timed):
     study, results = timed
-    later = [case for case in Round.stored(study, results, quick=False, full=False).paths.values() if case.timed]
+    later = [case for case in StudyCases.stored(study, results, quick=False, full=False).cases.values() if case.timed]
     assert later
     assert all(survives(dict(case.settings)) for case in later)

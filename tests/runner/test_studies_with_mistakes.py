@@ -1,6 +1,5 @@
 """A mistake in a study of one's own is told in one sentence that names the study and its function; cases are kept."""
 
-import json
 import sys
 
 import numpy as np
@@ -108,7 +107,7 @@ def test_an_answer_of_the_wrong_kind_is_refused_and_the_cases_are_kept(tmp_path,
     assert output.startswith("symtop: study mine: ")
     assert output.count("\n") == 1
     assert says in output
-    assert len(list(tmp_path.rglob("cases/mine/*.nc"))) == 2
+    assert len(list(tmp_path.rglob("cases/mine/*.npz"))) == 2
     code, output = ran(tmp_path, "")
     assert code == 0, output
     assert "0 of 2 cases computed, 1 figure" in output
@@ -125,15 +124,6 @@ def test_measures_that_do_not_fit_together_are_told_of(tmp_path):
     shape = "('k', [1.0]) if case.integrator == 'rk4' else 1.0"
     code, output = ran(tmp_path, f"measure = lambda case: xr.Dataset({{'err': {shape}}})")
     assert code in (0, 2), output  # what fits is the store's matter; a traceback it is not
-
-
-def test_findings_of_an_older_version_are_not_told_letter_by_letter(tmp_path):
-    assert ran(tmp_path, "")[0] == 0
-    file = tmp_path / "results" / "mine.json"
-    for verdict in (None, "one sentence"):
-        file.write_text(json.dumps(json.loads(file.read_text()) | {"verdict": verdict}))
-        code, output = ran(tmp_path, "")
-        assert (code, output) == (2, f"symtop: study mine: verdict must return a list of sentences, not {verdict!r}\n")
 
 
 def test_sentences_may_come_in_any_order_of_things():

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from symtop.core.errors import SymtopError, foreign_code, one_of
-from symtop.core.python_files import execute, python_file
+from symtop.core.files import execute, python_file
 from symtop.judging.adapters.adapter import Stepper
 from symtop.judging.adapters.batch_step import BatchStep
 from symtop.judging.adapters.diffrax_solver import DiffraxSolver, is_solver

@@ -18,9 +18,10 @@ import numpy as np
 import xarray as xr
 
 from symtop.core import netcdf
-from symtop.core.code_hash import Walk, digest, file_reasons, hashed, packages
+from symtop.core.code_hash import digest, hashed, packages
 from symtop.core.errors import SymtopError, check_replaceable
 from symtop.core.files import locked
+from symtop.core.jit import code
 from symtop.core.signals import ending_on_sigterm
 from symtop.run.ensemble.chunks import CHUNK, CHUNK_STEPS, Job, as_dataset, same_times
 
@@ -149,13 +150,11 @@ def _lay_out(file: Any, pattern: xr.Dataset, n: int) -> None:
 
 
 def _identity(job: Job, labels: dict[str, Any]) -> str:
-    """A hash of all that decides the bytes of the file: code by its files, as in studies, and what it is given."""
-    made = Walk("integrator")
-    made.add((job.method, Job))
+    """A hash of all that decides the bytes of the file: code, and what it is given."""
     arrays = job.numbers, job.horizon, job.steps, job.tolerance
     limits = job.chart, job.samples, job.budget, job.shown, CHUNK, CHUNK_STEPS
     return digest({
-        **made.values(), **file_reasons(made.closure()), **packages(),
+        **code().reasons("integrator", job.method, Job), **packages(),
         "numbers": hashed(*(netcdf.array_hash(values) for values in (*arrays, *labels.values()))),
         "limits": hashed(repr(limits)),
     })  # fmt: skip

@@ -136,8 +136,8 @@ def _computed(
     if scheduler is None:
         yield from in_threads(Job.columns, parts, threads)
     else:
-        with cluster.connected(scheduler) as client, cluster.Watched(client) as pool:
-            yield from in_order(pool, Job.columns, parts, cluster.width(client))
+        with cluster.connected(scheduler) as client:
+            yield from in_order(client.get_executor(pure=False), Job.columns, parts, cluster.width(client))
 
 
 class _Raised(NamedTuple):

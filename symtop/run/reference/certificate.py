@@ -91,7 +91,7 @@ def certificate(scene: Scene, kind: str | None = None) -> Certificate | None:
 
 
 def _path(scene: Scene, kind: str) -> Path:
-    return place(__file__, "certificate", kind, scene.top, scene.start)
+    return place(_compared, "certificate", kind, scene.top, scene.start)
 
 
 def _read(data: xr.Dataset) -> Certificate:

@@ -147,7 +147,7 @@ def conditioned(scene: Scene, horizon: float) -> str:
 
 
 def _cache_path(scene: Scene, times: charts.Array, precision: str) -> Any:
-    return place(__file__, scene.top, scene.start, precision, CHECKS, DIGITS, SAFETY, data=times.tobytes())
+    return place(_integration, scene.top, scene.start, precision, CHECKS, DIGITS, SAFETY, data=times.tobytes())
 
 
 def _dataset(

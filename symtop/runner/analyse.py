@@ -1,9 +1,4 @@
-"""What the cases of a study show: its dataset, its pictures and its findings, in this process or beside the next study.
-
-Combining and drawing take up to half a minute on one core. A study may be `Asked` to be concluded in a process of its
-own, from the files of its cases, while the workers compute untimed cases of the next ones. Timed cases wait until it is
-done if it has begun, and if it has not, it waits for them.
-"""
+"""What the cases of a study show: its dataset, its figures and its findings."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,8 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from symtop.core import files, netcdf
 from symtop.core.errors import label, shown
-from symtop.runner import depends, plugins, scripts, seen, store
-from symtop.runner.cases import Round
+from symtop.runner import fingerprint, manifest, scripts, store
+from symtop.runner.cases import StudyCases
+from symtop.runner.execute_case import prepare
 from symtop.runner.study import Case, Chart, Combined, Opening, Picture, Study, StudyError, Table, door, sentences
 
 if TYPE_CHECKING:
@@ -21,51 +17,52 @@ if TYPE_CHECKING:
 Save = Callable[["Figure", Path], object]  # writes a picture's figure to a file
 
 
-class Asked(NamedTuple):
-    """What another process must know to conclude a study whose cases are stored."""
+class Analysis(NamedTuple):
+    """What a worker must know to analyse a study whose cases are stored."""
 
     script: str
     results: Path
-    paths: dict[Path, Case]
+    cases: dict[Path, Case]
     failures: list[str]
     plugins: tuple[str, ...]
-    stamp: str
-    code: str
+    made_of: str  # of the findings, for the manifest
+    drawing: str  # the part of it that is code
     save: Save | None
     quick: bool
 
 
-def conclude_stored(asked: Asked) -> dict[str, Any]:
-    """The findings of a study from the files of its cases, written as `conclude` does."""
-    for file in asked.plugins:
-        plugins.load(file)
-    cases = Round(scripts.load(asked.script), asked.results, paths=asked.paths, failures=asked.failures)
-    cases.look_again()
-    edited = code_of(cases.study, asked.save) != asked.code  # since the cases were computed: drawn again the next time
-    return conclude(cases, "" if edited else asked.stamp, asked.save, quick=asked.quick)
+def analyse_stored(work: Analysis) -> dict[str, Any]:
+    """The findings of a study from the files of its cases, written as `analyse` does."""
+    study = prepare(work.script, work.plugins)
+    cases = StudyCases(study, work.results, cases=work.cases, failures=work.failures)
+    cases.read_all()
+    edited = drawing_digest(study, work.save) != work.drawing  # since the cases were computed: drawn again next time
+    return analyse(cases, "" if edited else work.made_of, work.save, quick=work.quick)
 
 
-def code_of(study: Study, save: Save | None) -> str:
-    """Hash of the code that combines, draws and judges."""
-    return depends.script_digest(scripts.file_of(study.name), store, save)
+def drawing_digest(study: Study, save: Save | None) -> str:
+    """Hash of what combines, draws and judges."""
+    return fingerprint.drawing_digest(study, scripts.file_of(study.name), store.combine, save)
 
 
-def conclude(cases: Round, stamp: str, save: Save | None, *, quick: bool) -> dict[str, Any]:
+def analyse(cases: StudyCases, made_of: str, save: Save | None, *, quick: bool) -> dict[str, Any]:
     """Combine, draw, judge and write."""
     study, results = cases.study, cases.results
-    with files.locked(results / f"{study.name}.nc", wait=True):
-        for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):
+    dataset, words = results / f"{study.name}.nc", results / f"{study.name}.json"
+    with files.locked(dataset, wait=True):
+        for file in (dataset, words):
             netcdf.sweep(file)
         combined = cases.combined()
-        units = store.units_of(case.scene for case in cases.paths.values())
+        units = store.units_of(case.scene for case in cases.cases.values())
         combined = netcdf.describe(combined, study.title, units=units, question=study.question)
-        netcdf.write(combined, results / f"{study.name}.nc")
-        store.forget(results, study, cases.paths)
-        findings = findings_of(study, combined, results, save, failures=cases.failures, cases=len(cases.paths))
-        findings |= {"quick": quick, "stamp": stamp if not cases.failures else ""}
-        store.write_json(results / f"{study.name}.json", findings)
-        if not cases.failures and stamp:
-            seen.note(results, study, stamp, cases.paths)
+        netcdf.write(combined, dataset)
+        store.forget(results, study, cases.cases)
+        findings = findings_of(study, combined, results, save, failures=cases.failures, cases=len(cases.cases))
+        findings["quick"] = quick
+        store.write_json(words, findings)
+        if not cases.failures and made_of:
+            pictures = [results / "figures" / picture["file"] for picture in findings["pictures"]]
+            manifest.note(results, study.name, made_of, [dataset, words, *pictures, *cases.cases])
     return findings
 
 
@@ -73,7 +70,7 @@ def findings_of(
     study: Study, data: Combined, results: Path, save: Save | None, *, failures: list[str], cases: int
 ) -> dict[str, Any]:
     """Draw a dataset and say what it shows, as the report wants it."""
-    said = sentences(study.name, lambda: study.verdict(data))
+    verdict = sentences(study.name, lambda: study.verdict(data))
     tables = door(study.name, "tables").each(lambda: study.tables(data), Table, "a list of Table")
     charts = door(study.name, "charts").each(lambda: study.charts(data), Chart, "a list of Chart")
     rest = {
@@ -85,7 +82,7 @@ def findings_of(
     return {
         "study": study.name,
         **{name: getattr(study, name) for name in ("title", "question", "how_to_read")},
-        "verdict": said,
+        "verdict": verdict,
         **rest,
         "pictures": pictures,
         "failures": failures,
@@ -98,11 +95,11 @@ def findings_of(
 def _opening(study: Study, data: Combined) -> dict[str, Any] | None:
     if study.opening is None:
         return None
-    asked = door(study.name, "opening")
-    with asked:
+    within = door(study.name, "opening")
+    with within:
         opening = study.opening(data)
         if not isinstance(opening, Opening):
-            raise asked.refuse("an Opening", opening)
+            raise within.refuse("an Opening", opening)
         return opening._asdict() | {"table": opening.table._asdict(), "explained": dict(opening.explained)}
 
 

@@ -1,0 +1,195 @@
+"""Studies that are concluded in a process of their own, beside the next one: the same files, whatever happens to it."""
+
+import json
+import os
+import time
+from dataclasses import replace
+
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+import symtop
+from symtop.cli.main import main
+from symtop.core import files
+from symtop.core.errors import SymtopError
+from symtop.runner import manifest, run as runner, store
+from symtop.runner.analyse import Analysis, analyse_stored, drawing_digest
+from symtop.runner.cases import StudyCases
+from symtop.runner.pool import Pool
+from symtop.runner.study import Case
+from tests.commands import contents, leftovers
+
+SCRIPT = """
+import os, signal
+import xarray as xr
+from symtop.core.errors import SymtopError
+from symtop.runner.study import Case, Study
+
+def cases(quick):
+    if NAME == "refused":
+        raise SymtopError("study refused has no grid")
+    return [Case("spheroid", name) for name in ("midpoint", "strang")]
+
+def measure(case):
+    return xr.Dataset({"letters": float(len(case.integrator))})
+
+def verdict(data):
+    if NAME == "killed" and os.getpid() != int(os.environ["SYMTOP_TESTS_PARENT"]):
+        os.kill(os.getpid(), signal.SIGKILL)
+    if NAME == "silent":
+        raise SymtopError("study silent has nothing to say")
+    return [str(float(data["letters"].sum())), f"said by {os.getpid()}"]
+
+STUDY = Study(NAME, NAME, "Who?", "", cases, measure, lambda data: [], verdict)
+"""
+
+
+@pytest.fixture
+def script(tmp_path, monkeypatch):
+    """Writes the study of a name, and returns its file."""
+    monkeypatch.setenv("SYMTOP_TESTS_PARENT", str(os.getpid()))
+
+    def written(name):
+        file = tmp_path / f"{name}.py"
+        file.write_text(f"NAME = {name!r}\n{SCRIPT}")
+        return str(file)
+
+    return written
+
+
+def studied(results, *files):
+    """Exit code and output of one command for several studies."""
+    done = CliRunner().invoke(main, ["study", *files, "--results", str(results), "--jobs", "2"])
+    return done.exit_code, done.output
+
+
+def said_by(results, name):
+    (sentence,) = [one for one in json.loads((results / f"{name}.json").read_text())["verdict"] if "said by" in one]
+    return int(sentence.split()[-1])
+
+
+def test_each_of_several_is_concluded_by_another_process_to_the_same_files(script, tmp_path):
+    files = [script("first"), script("second")]
+    code, told = studied(tmp_path / "together", *files)
+    assert code == 0, told
+    assert told.index("first: 2 of 2") < told.index("second: 2 of 2")
+    assert {said_by(tmp_path / "together", name) == os.getpid() for name in ("first", "second")} == {False}
+    for file in files:
+        assert studied(tmp_path / "alone", file)[0] == 0  # the control: one by itself has nothing to run beside
+    assert {said_by(tmp_path / "alone", name) for name in ("first", "second")} == {os.getpid()}
+    one, other = contents(tmp_path / "together"), contents(tmp_path / "alone")
+    assert one.keys() == other.keys()
+    assert len(one) == 6
+    assert all(one[name].identical(other[name]) for name in one)
+    assert "0 of 2 cases computed" in studied(tmp_path / "together", *files)[1]
+    assert not leftovers(tmp_path / "together")
+
+
+def test_a_process_that_is_killed_is_done_without(script, tmp_path):
+    code, told = studied(tmp_path / "r", script("killed"), script("second"))
+    assert code == 0, told
+    assert said_by(tmp_path / "r", "killed") == os.getpid()
+    assert "second: 2 of 2 cases computed" in told  # by whichever process was left
+    assert not leftovers(tmp_path / "r")
+
+
+def test_a_case_whose_file_is_gone_has_failed(script, tmp_path):
+    """The study is not taken for whole without it, and the next run computes it again."""
+    study, results = runner.load(script("first")), tmp_path / "r"
+    with Pool(2) as pool:
+        answer = runner.start(study, results, pool, quiet=True, beside=True)
+        gone, other = sorted((results / "cases" / "first").glob("*.npz"))
+        gone.unlink()
+        (failure,) = answer.result()["failures"]
+        assert gone.name in failure
+        assert other.name not in failure
+        again = runner.start(study, results, pool, quiet=True).result()
+        assert (again["failures"], again["computed"]) == ([], 1)
+
+
+def test_a_study_that_is_edited_before_it_is_concluded_is_drawn_again(script, tmp_path):
+    files = {"first": script("first"), "second": script("second")}  # the second one, the control, is left as it is
+    for name, file in files.items():
+        study = runner.load(file)
+        cases = StudyCases(study, tmp_path / "r")
+        runner.run(study, tmp_path / "r", quiet=True)
+        cases.add(study.grid())
+        manifest.path_of(tmp_path / "r").unlink()
+        drawing = drawing_digest(study, None) if name == "second" else "before the edit"
+        analyse_stored(Analysis(file, tmp_path / "r", cases.cases, [], (), "made of", drawing, None, quick=False))
+        assert manifest.is_current(tmp_path / "r", name, "made of") is (name == "second")
+
+
+def test_files_of_cases_are_not_read_where_they_are_handed_out(script, tmp_path, monkeypatch):
+    """Only who concludes reads them, unless a second round hangs on them (the control)."""
+    read, load = [], store.load_case
+
+    def counted(path):
+        data = load(path)
+        if data is not None:
+            read.append(path)
+        return data
+
+    monkeypatch.setattr(store, "load_case", counted)
+    first, second = runner.load(script("first")), runner.load(script("second"))
+    with Pool(2) as pool:
+        answer = runner.start(first, tmp_path / "r", pool, quiet=True, beside=True)
+        assert read == []
+        assert answer.result()["cases"] == 2
+        assert read == []
+        runner.start(replace(second, follow_up=lambda _: []), tmp_path / "r", pool, quiet=True)
+        assert len(read) == 2
+
+
+@pytest.mark.parametrize("bad", ["refused", "silent"])
+def test_what_stops_one_study_does_not_stop_the_others(script, tmp_path, bad):
+    """A grid that is refused ends the command after those before it; of findings that fail the next go on."""
+    code, told = studied(tmp_path / "r", script("first"), script(bad), script("second"))
+    assert code == 2
+    assert "first: 2 of 2 cases computed" in told
+    assert (tmp_path / "r" / "first.json").is_file()
+    assert f"study {bad} has" in told
+    assert ("second: 2 of 2 cases computed" in told) == (bad == "silent")
+    assert (tmp_path / "r" / "second.json").is_file() == (bad == "silent")
+    assert not leftovers(tmp_path / "r")
+
+
+def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
+    study = runner.load(script("first"))
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "cases" / "first").mkdir(parents=True)
+    left = [tmp_path / name for name in (".first.nc.x.part", ".first.json.y.part", "figures/.first-a.png.z.part.png")]
+    others = [tmp_path / name for name in (".other.nc.x.part", "figures/.other-a.png.z.part.png")]
+    for file in (*left, *others):
+        file.touch()
+    with files.locked(tmp_path / "first.nc", wait=True):
+        store.tidy(tmp_path, study)
+        assert all(file.is_file() for file in left)  # somebody writes them
+    store.tidy(tmp_path, study)
+    assert not any(file.is_file() for file in left)
+    assert all(file.is_file() for file in others)
+
+
+def test_a_study_that_says_nothing_is_told_when_it_is_asked(script, tmp_path):
+    with Pool(2) as pool:
+        answer = runner.start(runner.load(script("silent")), tmp_path / "r", pool, quiet=True, beside=True)
+        with pytest.raises(SymtopError, match="study silent has nothing to say"):
+            answer.result()
+
+
+def test_timed_cases_wait_for_the_analysis_of_the_study_before(script, tmp_path):
+    done = []
+    with Pool(2) as pool:
+        future = pool.analyse(time.sleep, 1.0)
+
+        def measure(_):
+            done.append(future.done())
+            return xr.Dataset()
+
+        for timed in (False, True):
+            study = replace(runner.load(script("first")), timed=timed, measure=measure)
+            symtop.register_scene(replace(symtop.scene("spheroid"), name=f"here-{timed}"))  # cases of this process
+            here = replace(study, cases=lambda _, name=f"here-{timed}": [Case(name, "midpoint")])
+            runner.start(here, tmp_path / "r", pool, quiet=True)
+    assert done == [False, True]
