@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from symtop.core.errors import SymtopError as SymtopError, SymtopWarning as SymtopWarning
     from symtop.judging.judge_step import judge as judge
     from symtop.measure.errors import errors as errors
+    from symtop.measure.sweep import sweep as sweep
     from symtop.methods.framework.angles import chart_outcome as chart_outcome, on_angles as on_angles
     from symtop.methods.framework.equations import field as field
     from symtop.methods.framework.fixed_step import FixedStep as FixedStep
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
     from symtop.run.reference.truth import reference as reference
     from symtop.run.simulation import simulate as simulate
     from symtop.runner.study import Case as Case, Picture as Picture, Study as Study, Table as Table
-    from symtop.runner.sweep import sweep as sweep
 
 __version__ = "0.2.0"
 
@@ -75,7 +75,7 @@ _NAMES = {  # by the module that holds them
     "report.card": "card",
     "report.plot": "plot",
     "runner.study": "Case Picture Study Table",
-    "runner.sweep": "sweep",
+    "measure.sweep": "sweep",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 

@@ -145,7 +145,6 @@ def _of_library(module: str | None) -> bool:
 Parts = Callable[[Any], Iterable[Any]]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-_PYTHON = Path(contextlib.__file__).resolve().parent  # where Python's own modules are
 STATE = (list, dict, set)  # under a module's lower-case name
 _IMPORT = dis.opmap["IMPORT_NAME"]
 _by_name: set[Callable[..., Any]] = set()
@@ -158,6 +157,12 @@ _CONTAINERS: tuple[tuple[Any, Parts], ...] = (
     ((set, frozenset), lambda thing: sorted(thing, key=_order)),
     ((tuple, list), lambda thing: (type(thing), *thing)),
 )
+
+
+@functools.cache
+def _is_plumbing(file: str) -> bool:
+    """Does a file move numbers without making any, as Python's own do?"""
+    return _path(file) in PLUMBING or _path(contextlib.__file__).parent in _path(file).parents
 
 
 def by_name(function: Function) -> Function:
@@ -265,17 +270,17 @@ class Code:
             self._add_value(thing)
 
     def _add_function(self, function: FunctionType) -> None:
-        path, library = _path(function.__code__.co_filename), _of_library(function.__module__)
-        if library or function in _by_name or path in PLUMBING or _PYTHON in path.parents:
+        file, library = function.__code__.co_filename, _of_library(function.__module__)
+        if library or function in _by_name or _is_plumbing(file):
             self._note(f"{function.__module__}.{function.__qualname__}")
             if not library and function not in _by_name:
                 self._add_all(held(function))  # a wrapper: what it calls
         else:
-            self._lead_to("function", function.__qualname__, file_label(path), function)
+            self._lead_to("function", function.__qualname__, file_label(_path(file)), function)
 
     def _add_class(self, kind: type) -> None:
         file = getattr(sys.modules.get(kind.__module__), "__file__", None)
-        if _of_library(kind.__module__) or (file and _path(file) in PLUMBING):
+        if _of_library(kind.__module__) or (file and _is_plumbing(file)):
             self._note(f"{kind.__module__}.{kind.__qualname__}")
         else:
             self._lead_to("class", kind.__qualname__, file_label(_path(file)) if file else kind.__module__, kind)

@@ -34,13 +34,15 @@ from typing import Any
 import numba
 from numba import njit, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.typing.templates import builtin_registry
 from numba.cpython.unsafe.tuple import tuple_setitem
 from numba.extending import intrinsic, overload, register_jitable as _register
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from symtop.core.code_hash import Code, Part, by_file, by_name, digest, hashed
-from symtop.core.files import cache_root, on_cold, prune, touch
+from symtop.core.errors import SymtopError
+from symtop.core.files import cache_root, locked, on_cold, prune, touch
 from symtop.core.jit_functions import Function, fused, inlined_parts, shared_parts, two_product
 from symtop.core.sines import polynomials, sincos
 
@@ -217,15 +219,24 @@ def _not_collecting() -> Iterator[None]:
                 gc.enable()
 
 
-def _without_collecting(compiling: Callable[..., Any]) -> Callable[..., Any]:
-    """The same while Python looks for no cyclic garbage: numba's trees are none before the end, and grow to millions.
+def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
+    """numba's compilation, of a kernel that is not on disk by one process at a time: the next ones load it.
 
-    It takes 9 % less time, and 100 MB more for the largest kernel there is.
+    Python looks for no cyclic garbage meanwhile: numba's trees are none before the end, and grow to millions. It takes
+    9 % less time, and 100 MB more for the largest kernel there is. numba's lock is taken first, as its own nested
+    compilations take it first.
     """
 
     @functools.wraps(compiling)
     def compile_now(signature: Any) -> Any:
-        with _not_collecting():
+        folder = getattr(kernel._cache, "_cache_path", None)
+        if folder is None or is_cached(kernel, signature):
+            with _not_collecting():
+                return compiling(signature)
+        with global_compiler_lock, contextlib.ExitStack() as stack:
+            with contextlib.suppress(SymtopError):  # a cache that cannot be written costs time and no run
+                stack.enter_context(locked(Path(folder) / "code", wait=True))
+            stack.enter_context(_not_collecting())
             return compiling(signature)
 
     return compile_now
@@ -241,7 +252,7 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     """
     _register_parts()
     kernel = njit(**OPTIONS)(function)
-    kernel.compile = _without_collecting(kernel.compile)
+    kernel.compile = _once(kernel, kernel.compile)
     parts = code_of(function)
     functions = (part.thing for part in parts if isinstance(part.thing, FunctionType))
     written = [part for part in functions if not part.__module__.startswith("namedtuple_")]

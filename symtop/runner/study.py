@@ -140,7 +140,7 @@ class Case:
     scene: str
     integrator: str
     settings: Mapping[str, Any] = field(default_factory=dict)
-    timed: bool = False  # untimed cases must not run beside it, nor timed ones that disturb it (see `trial`)
+    timed: bool = False  # untimed cases must not run beside it, nor timed ones that disturb it
     group: str = ""
 
     @property
@@ -200,7 +200,7 @@ class Study:
     full: Callable[[], list[Case]] | None = None  # a grid that takes much longer, for `--full`
     timed: bool = False  # all cases are
     follow_up: Callable[[Any], list[Case]] | None = None  # a second round, made from what the first one found
-    uses: Callable[[Case], Sequence[str]] | None = None  # integrators a case runs; "*" for all; None: found out
+    uses: Callable[[Case], Sequence[str]] | None = None  # integrators a case runs; "*": all; None: `integrators`
     limit: float = 3600.0  # seconds after which a case counts as hanging
 
     def __post_init__(self) -> None:

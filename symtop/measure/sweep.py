@@ -5,6 +5,7 @@ compiled kernels let run at once. With a file, cells are kept in it as they are 
 its numbers depend on (`symtop.core.code_hash`), as the cases of a study are: what is up to date is not run again.
 """
 
+import functools
 import math
 import time
 from collections.abc import Iterable, Iterator
@@ -25,7 +26,6 @@ from symtop.measure.settings import ANGLES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.simulation import chart_of, make_plan
-from symtop.runner.fingerprint import made_of
 
 KEEP_EVERY = 5.0  # seconds between two writings of the file
 RAISED = "raised"  # outcome of a run whose integrator raised an exception
@@ -190,8 +190,15 @@ def _cell(
 
 def _made_of(scene: Scene, method: Integrator, settings: object) -> str:
     """The digest of all that the numbers of a cell depend on."""
-    parts = [made_of("measure", error_row), made_of("scene", scene), made_of("integrator", method)]
-    return code_hash.digest(code_hash.merged(parts) | code_hash.packages() | {"settings": repr(settings)})
+    code = _code().reasons("sweep", error_row, scene, method)
+    return code_hash.digest(code | code_hash.packages() | {"settings": repr(settings)})
+
+
+@functools.cache
+def _code() -> code_hash.Code:
+    from symtop.core.jit import code  # numba
+
+    return code()
 
 
 def _table(cell: _Cell) -> xr.Dataset:

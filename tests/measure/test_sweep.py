@@ -8,8 +8,8 @@ import xarray as xr
 
 import symtop
 from symtop.core import netcdf
+from symtop.measure import sweep as module
 from symtop.measure.accuracy import error_row
-from symtop.runner import sweep as module
 
 STEPS = [0.02, 0.01, 0.005]
 METHODS = ["strang", "rk4[axis]", "rk45-compiled", "exact"]
