@@ -277,6 +277,7 @@ def tidy(results: Path, study: Study) -> None:
         with locked(path, wait=False) as ours:
             if ours:
                 netcdf.sweep(path)
+                path.with_name(f".{path.stem}.trace").unlink(missing_ok=True)
     with locked(results / f"{study.name}.nc", wait=False) as ours:
         if ours:
             for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):

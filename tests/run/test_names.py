@@ -129,6 +129,14 @@ def test_a_row_is_a_method_in_one_chart_and_every_table_can_name_it():
     assert {row.charts()[0] for row in registry.variants("attitude")} == {"angles", "attitude"}
 
 
+def test_a_variant_is_made_once_and_again_when_its_method_is_replaced(monkeypatch):
+    monkeypatch.setattr(registry, "_registry", dict(symtop.integrators()))
+    first = symtop.integrator("rk4[axis]")
+    assert symtop.integrator("rk4[axis]") is first
+    symtop.register(dataclasses.replace(symtop.integrator("rk4"), order=3), replace=True)
+    assert (first.order, symtop.integrator("rk4[axis]").order) == (4, 3)
+
+
 @pytest.mark.parametrize("name", ["strang[angles]", "rk4[nutation]", "rk5[axis]", "[axis]"])
 def test_a_row_that_does_not_exist_is_refused(name):
     with pytest.raises(symtop.SymtopError, match=r"is unknown; (known|did you mean)"):

@@ -262,6 +262,7 @@ _registry: dict[str, Integrator] = {}
 _loaded: list[str] = []
 _announced: list[str] = []
 _missing: dict[str, str] = {}  # names that cannot be had on this machine, with the reason
+_variants: dict[str, tuple[Integrator, Integrator]] = {}  # by name: the integrator, and its variant
 _shipped: set[str] = set()  # by symtop or an installed package: every process has them
 _loading = threading.RLock()  # the first call of one thread loads; a package that is being loaded may register
 
@@ -374,7 +375,11 @@ def integrator(name: "str | Integrator") -> Integrator:
     if isinstance(method, str) and method in _missing:
         raise SymtopError(_missing[method])
     entry = _registry[one_of("integrator", method, _registry)]
-    return entry.variant(chart) if chart else entry
+    if not chart:
+        return entry
+    if _variants.get(name, (None,))[0] is not entry:  # none yet, or of an integrator that was replaced
+        _variants[name] = entry, entry.variant(chart)
+    return _variants[name][1]
 
 
 @by_name
