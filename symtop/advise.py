@@ -3,7 +3,7 @@
     1. Candidates. A stored population study counts on how many of the random tops nearest to this one a method was
        the cheapest or nearly so; a stored work-precision study lists the methods that were cheapest on the nearest
        scene. The distance is that of four dimensionless numbers which fix the motion of the axis
-       (`symtop.measure.nearest`). Without a stored study every compiled method is a candidate.
+       (`symtop.measure.ranking`). Without a stored study every compiled method is a candidate.
     2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
        (`symtop.measure.settings`). The error is measured against the closed form, its target is lowered by the law of
        growth, and one run is timed.
@@ -17,8 +17,7 @@ The confidence of the advice is one of:
     extrapolated               it was not run to the end
     none                       no method meets the accuracy; the integrator is None
 
-An accuracy below the bound of the reference is answered with ``none`` before any run, because no run could show it.
-
+An accuracy below the bound of the reference is answered with ``none`` before any run.
 The closed form is no candidate: it is what errors are measured by, and a top with friction, drive or another body
 attached has none. For the top as it stands it is mostly the fastest way, and the advice says so with its time.
 """
@@ -36,13 +35,13 @@ from symtop.core import netcdf
 from symtop.core.errors import SymtopError, one_of, positive
 from symtop.measure import ranking, settings
 from symtop.measure.errors import QUANTITIES
-from symtop.measure.nearest import STORED, Near, distances, nearest, regime
 from symtop.measure.phase import FREQUENCIES
+from symtop.measure.ranking import STORED, Near, distances, nearest, regime
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import Integrator, integrator, integrators, is_built_in, split_name
 from symtop.model import scenes
 from symtop.model.scenes import Scene, horizon_of
-from symtop.run.guard.guard import MOST_STEPS
+from symtop.run.guard import MOST_STEPS
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
 STORED_STUDY = "work_precision.nc"
@@ -70,13 +69,13 @@ class Advice:
     quantity: str
     accuracy: float
     horizon: float
-    integrator: str | None
-    step_size: float | None
-    tolerance: float | None
-    expected_error: float
-    seconds: float
-    confidence: str
-    reason: str
+    integrator: str | None = None
+    step_size: float | None = None
+    tolerance: float | None = None
+    expected_error: float = math.nan
+    seconds: float = math.nan
+    confidence: str = "none"
+    reason: str = ""
     runner_up: str = ""
     closed_form: str = ""
     nearest: str = ""
@@ -85,12 +84,11 @@ class Advice:
     python: str = ""
 
     def __str__(self) -> str:
-        named = {"Runner-up": self.runner_up, "": self.nearest, " ": self.closed_form}
-        lines = [f"{name}: {text}" if name.strip() else text for name, text in named.items() if text]
-        last = {"Run it": self.command, "In Python": self.python}
-        return "\n".join(
-            [self.reason, *lines, *self.fails, *(f"{name}: {text}" for name, text in last.items() if text)]
-        )
+        lines = [
+            self.reason, self.runner_up and f"Runner-up: {self.runner_up}", self.nearest, self.closed_form, *self.fails,
+            self.command and f"Run it: {self.command}", self.python and f"In Python: {self.python}",
+        ]  # fmt: skip
+        return "\n".join(filter(None, lines))
 
 
 class _Question(NamedTuple):
@@ -146,8 +144,7 @@ def recommend(
     patience = math.inf
     methods = {name: integrator(name) for name in guesses}
     # Methods of high order first: they are the cheapest at most accuracies, and their cost ends the other searches.
-    ordered = sorted(guesses, key=lambda name: -(methods[name].order or 0))
-    for name in ordered:
+    for name in sorted(guesses, key=lambda name: -(methods[name].order or 0)):
         trial = _try(question, methods[name], guesses[name], patience)
         if isinstance(trial, _Trial):
             trials.append(trial)
@@ -165,8 +162,12 @@ def recommend(
         else:
             fails.setdefault(confirmed, []).append(trial.met.integrator.name)
     ranked.sort(key=lambda trial: trial.seconds)
+    # Times of the user's own methods in plain Python say nothing beside those of compiled ones.
+    own = [one.name for one in integrators().values() if one.implementation == "python" and not is_built_in(one.name)]
+    if own:
+        fails["Not tried, as only compiled methods are timed"] = own
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
-    return _advice(question, ranked, sentences + _not_tried(), source, near)
+    return _advice(question, ranked, sentences, source, near)
 
 
 def _stored(file: Path) -> xr.Dataset:
@@ -195,12 +196,6 @@ def _usable(quantity: str) -> list[str]:
     ]
 
 
-def _not_tried() -> tuple[str, ...]:
-    """A sentence on the user's own methods in plain Python, whose times say nothing beside those of compiled ones."""
-    names = [own.name for own in integrators().values() if own.implementation == "python" and not is_built_in(own.name)]
-    return (f"Not tried, as only compiled methods are timed: {', '.join(names)}.",) if names else ()
-
-
 def _same(variant: str, usable: Sequence[str]) -> str | None:
     """The usable name of a stored variant, of the same method in another chart if need be; None if there is none."""
     method = split_name(variant)[0]
@@ -224,37 +219,26 @@ def _candidates(
     closest = min(stored, key=lambda name: float(distances(regime(stored[name])[np.newaxis], numbers)[0]))
     column = int(np.argmin(np.abs(np.log(data["horizon"].values / max(horizon / scene.nutation_period, 1e-3)))))
     cell = data.sel(scene=closest).isel(horizon=column)
+    served = [_same(name, usable) for name, count in near.served.items() if count] if near is not None else []
+    often = dict.fromkeys(filter(None, served))  # the methods that served most of the nearest tops first
+    scale = scene.nutation_period / stored[closest].nutation_period
     cheapest: dict[str, float | None] = {}
     stored_as = "axis" if quantity == "attitude" else quantity  # the study runs what shows the axis
     for place in ranking.cheapest(cell, accuracy, stored_as):
         name = _same(place.integrator, usable)
         if name is not None and name not in cheapest:
             run = cell.sel(variant=place.integrator).isel(setting=place.setting)
-            cheapest[name] = _setting(run, scene, stored[closest])
-    served = _served(near, usable)
-    chosen = {name: cheapest.get(name) for name in [*served, *cheapest][:CANDIDATES]}
+            step, fixed = float(run["step_size"]), bool(np.isfinite(run["step_size"]))
+            scaled = step * scale if math.isfinite(scale) and scale > 0.0 else step
+            cheapest[name] = scaled if fixed else float(run["tolerance"])
+    chosen = {name: cheapest.get(name) for name in [*often, *cheapest][:CANDIDATES]}
     if not chosen:
         return everyone, f"tried all {len(everyone)} compiled methods (none met it on {closest}, the nearest scene)"
-    count = sum(name in served for name in chosen)
+    count = sum(name in often for name in chosen)
     words = [f"{count} methods that served the {near.tops} nearest random tops most often"] if near and count else []
     if len(chosen) > count:
         words.append(f"{len(chosen) - count} methods that are cheapest on {closest}, the nearest stored scene")
     return chosen, f"tried the {' and '.join(words)}"
-
-
-def _served(near: Near | None, usable: Sequence[str]) -> list[str]:
-    """The usable methods that served one of the nearest tops or more, the most first."""
-    names = [_same(variant, usable) for variant, count in near.served.items() if count] if near is not None else []
-    return list(dict.fromkeys(filter(None, names)))
-
-
-def _setting(run: xr.Dataset, scene: Scene, stored: Scene) -> float:
-    """A stored step, scaled by the ratio of the nutation periods, or a stored tolerance."""
-    step = float(run["step_size"])
-    if not math.isfinite(step):
-        return float(run["tolerance"])
-    scale = scene.nutation_period / stored.nutation_period
-    return step * scale if math.isfinite(scale) and scale > 0.0 else step
 
 
 def _try(question: _Question, method: Integrator, guess: float | None, patience: float) -> "_Trial | str":
@@ -297,19 +281,18 @@ def _advice(
     goal = f"{quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}"
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}."
-        return Advice(
-            scene.name, quantity, accuracy, horizon, integrator=None, step_size=None, tolerance=None,
-            expected_error=math.nan, seconds=math.nan, confidence="none", reason=reason,
-            closed_form=_without_steps(question, math.nan), fails=fails,
-        )  # fmt: skip
+        without = _without_steps(question, math.nan)
+        return Advice(scene.name, quantity, accuracy, horizon, reason=reason, closed_form=without, fails=fails)
     best = ranked[0]
+    name, fixed = best.met.integrator.name, best.met.integrator.fixed_step
     worth = f"error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
     runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
-    step, tolerance = (best.met.setting, None) if best.met.integrator.fixed_step else (None, best.met.setting)
+    served = _same(name, list(near.served)) if near is not None else None  # None: the study has no chart of it
     return Advice(
-        scene.name, quantity, accuracy, horizon, best.met.integrator.name, step, tolerance, best.error, best.seconds,
-        best.confidence, f"{best.words()} meets {goal}: {worth}; {source}.", runner_up="".join(runners),
-        closed_form=_without_steps(question, best.seconds), nearest=_on_nearest(near, best.met.integrator.name),
+        scene.name, quantity, accuracy, horizon, name, best.met.setting if fixed else None,
+        None if fixed else best.met.setting, best.error, best.seconds, best.confidence,
+        f"{best.words()} meets {goal}: {worth}; {source}.", runner_up="".join(runners),
+        closed_form=_without_steps(question, best.seconds), nearest=near.words(served) if near and served else "",
         fails=fails, **_lines(question, best.met),
     )  # fmt: skip
 
@@ -325,16 +308,6 @@ def _lines(question: _Question, met: settings.Met) -> dict[str, str]:
     of, until = f'"{scene.name}"' if known else "scene", "" if whole else f", horizon={horizon!r}"
     python = f'symtop.simulate({of}, "{name}", {control}={value!r}{until})'
     return {"command": command if known else "", "python": python}
-
-
-def _on_nearest(near: Near | None, name: str) -> str:
-    """How many of the nearest random tops a method served; empty if its variants are not in the study."""
-    variants = (
-        [variant for variant in near.served if split_name(variant)[0] == split_name(name)[0]]
-        if near is not None
-        else []
-    )
-    return near.words(name if name in variants else variants[0]) if near is not None and variants else ""
 
 
 def _without_steps(question: _Question, best: float) -> str:

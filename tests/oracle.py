@@ -11,11 +11,13 @@ import argparse
 import hashlib
 import itertools
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+RENAMED = {"integrator": "variant", "row": "variant"}  # dimensions and coordinates; "row" is "variant" in texts, too
 LABELS = "OU"  # kinds of coordinates that name things: strings
 
 
@@ -40,9 +42,14 @@ def of_dataset(data: xr.Dataset, prefix: str) -> dict[str, str]:
             whole = np.sort(whole.astype(str))
         for place in itertools.product(*(range(len(texts)) for texts in labels)):
             cell = ", ".join(sorted(texts[i] for texts, i in zip(labels, place, strict=True)))
-            alias = "variant" if name == "integrator" else name
-            hashes[f"{prefix} {alias} {cell}"] = _digest(whole[place])
+            hashes[f"{prefix} {RENAMED.get(name, name)} {cell}"] = _digest(whole[place])
     return hashes
+
+
+def _text(said: object) -> str:
+    """The hash of a finding or of a table's line, the old word for a variant replaced."""
+    plain = re.sub(r"\brow(s?)\b", r"variant\1", str(said).lower())
+    return hashlib.sha256(plain.encode()).hexdigest()[:16]
 
 
 def of_folder(results: Path) -> dict[str, str]:
@@ -55,10 +62,10 @@ def of_folder(results: Path) -> dict[str, str]:
     for path in sorted(results.glob("*.json")):
         found = json.loads(path.read_text())
         for index, text in enumerate(found.get("verdict", [])):
-            hashes[f"{path.name} finding {index}"] = hashlib.sha256(text.encode()).hexdigest()[:16]
-        for table in found.get("tables", []):
+            hashes[f"{path.name} finding {index}"] = _text(text)
+        for place, table in enumerate(found.get("tables", [])):
             for index, row in enumerate(table["rows"]):
-                hashes[f"{path.name} {table['title']} {index}"] = hashlib.sha256(repr(row).encode()).hexdigest()[:16]
+                hashes[f"{path.name} table-{place} {index}"] = _text(row)
     return hashes
 
 

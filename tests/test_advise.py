@@ -14,7 +14,7 @@ from symtop.advise import regime
 from symtop.cli.main import main
 from symtop.measure import settings
 from symtop.measure.errors import errors_against
-from symtop.measure.nearest import Near
+from symtop.measure.ranking import Near
 from symtop.methods.framework.registry import methods
 
 
@@ -156,16 +156,13 @@ def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_wi
     assert run.attrs["integrator"] == advice.integrator
 
 
-def test_candidates_start_from_the_nearest_random_tops_and_the_advice_counts_them():
+def test_a_variant_that_the_nearest_random_tops_were_not_run_with_is_counted_by_its_method():
     near = Near({"rk4[axis]": 40, "strang[axis]": 7, "stormer-verlet[angles]": 0}, 50, "axis", 1e-6, 10.0)
-    assert advise._served(near, advise._usable("axis")) == ["rk4[axis]", "strang[axis]"]
-    assert advise._served(near, advise._usable("attitude")) == ["rk4[angles]", "strang[attitude]"]  # by method
-    assert "on 40 of the 50 nearest random tops" in advise._on_nearest(near, "rk4[axis]")
-    assert "stormer-verlet[angles] was" in advise._on_nearest(near, "stormer-verlet")
-    assert "on 0 of the 50" in advise._on_nearest(near, "stormer-verlet")  # and it says so
-    assert advise._on_nearest(near, "gauss-4[axis]") == ""
-    assert advise._on_nearest(None, "rk4[axis]") == ""
-    assert advise._served(None, ["rk4[axis]"]) == []
+    assert advise._same("rk4[axis]", advise._usable("attitude")) == "rk4[angles]"
+    assert advise._same("stormer-verlet", list(near.served)) == "stormer-verlet[angles]"
+    assert advise._same("gauss-4[axis]", list(near.served)) is None
+    assert "on 40 of the 50 nearest random tops" in near.words("rk4[axis]")
+    assert "on 0 of the 50" in near.words("stormer-verlet[angles]")  # and it says so
 
 
 def test_nothing_is_said_of_random_tops_without_results(monkeypatch):

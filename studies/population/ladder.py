@@ -42,7 +42,7 @@ from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import DIMENSIONS, Array
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.run.guard.forecast import forecast
+from symtop.run.guard import forecast
 
 from .costs import cost_to_reach
 from .tops import ASKED, FIRST, MOMENTA, Tops

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from symtop.core.memoize import of_one_dataset
 from symtop.model.charts import Array
-from symtop.run.guard.guard import EXPECTED
+from symtop.run.guard import EXPECTED
 
 from .costs import Detection, Share, Winner, detection, quantiles, slowdowns, winner, wins
 from .ladder import KEPT, TENTHS, WRONG

@@ -43,6 +43,11 @@ class File(click.Path):
         return super().convert(str(at_home(value)) if home else value, param, ctx)
 
 
+def separated(_: click.Context, __: click.Parameter, names: str | None) -> list[str] | None:
+    """The names between commas."""
+    return None if names is None else [name.strip() for name in names.split(",")]
+
+
 def completing(kind: str) -> Callable[[click.Context, click.Parameter, str], list[str]]:
     """Shell completion of the names of all scenes, integrators or studies; after a bracket, of variants, rk4[axis]."""
     return lambda _, __, prefix: [name for name in _names(kind, prefix) if name.startswith(prefix)]
@@ -163,13 +168,28 @@ def say(sentence: str) -> None:
 
 def fitted(text: str, stream: TextIO | None) -> str:
     """The text in lines that fit the terminal, if a terminal is what the stream goes to."""
-    if not files.is_terminal(stream):
-        return text
+    return filled(text) if files.is_terminal(stream) else text
+
+
+def filled(text: str) -> str:
+    """The text in lines that fit the terminal."""
     width = terminal_width()
     return "\n".join(
-        textwrap.fill(line, width, break_on_hyphens=False, break_long_words=False, subsequent_indent="  ")
+        textwrap.fill(
+            line,
+            width,
+            break_on_hyphens=False,
+            break_long_words=False,
+            subsequent_indent=" " * (2 + 2 * (line[:1] == " ")),
+        )
         for line in text.splitlines()
     )
+
+
+def say_written(*files: str | None, err: bool = False) -> None:
+    """Print the name of each file, except None."""
+    for file in filter(None, files):
+        click.echo(f"written to {file}", err=err)
 
 
 def check_outputs(**files: str | None) -> None:

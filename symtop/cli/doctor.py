@@ -1,10 +1,6 @@
 """``symtop doctor``: checks of the packages, the caches, the folders and a few computed numbers.
 
-Each finding is healthy or says what to do. The self-check takes some seconds: published values of this problem, the
-closed form against heyoka's Taylor series, and one compiled method against the closed form.
-
-With ``--warm`` every kernel is compiled first, so that no run waits for the compiler later. A kernel is compiled when a
-run needs it that the cache does not hold: every method is run for two steps in each of its charts, alone and in an
+With ``--warm`` every kernel is compiled first: every method is run for two steps in each of its charts, alone and in an
 ensemble of two tops, beside the truth and its errors, in a process a core.
 """
 
@@ -47,35 +43,30 @@ class Finding(NamedTuple):
 
 def examine(results: Path) -> list[Finding]:
     """Run every check; one that raises becomes a finding that is not healthy."""
-    checks: list[Callable[[], list[Finding]]] = [
-        _python, _packages, _heyoka, _caches, lambda: _results(results), _tools, _self_check,
-    ]  # fmt: skip
-    findings = []
     from tqdm import tqdm
 
-    with beating(tqdm(total=len(checks), desc="checking", unit="check", disable=None, leave=False)) as bar:
-        for check in checks:
+    findings = []
+    with beating(tqdm(total=len(CHECKS), desc="checking", unit="check", disable=None, leave=False)) as bar:
+        for topic, check in CHECKS.items():
             try:
-                findings += check()
+                findings += check(results)
             except Exception as error:  # noqa: BLE001  (one check that fails must not hide the others)
-                topic = check.__name__.strip("_").replace("_", " ")
                 findings.append(Finding(topic, words_of(error), False, "report this with all of this page"))
             bar.update()
     return findings
 
 
-def page(findings: list[Finding]) -> str:
-    """The findings as text, one a line, and the advice at the end."""
-    width = max(len(finding.topic) for finding in findings)
-    lines = [f"{'ok ' if f.healthy else 'BAD'}  {f.topic.ljust(width)}  {f.result}" for f in findings]
-    advice = [f"{finding.topic}: {finding.advice}" for finding in findings if not finding.healthy]
-    return "\n".join([*lines, "", *(advice or ["No faults were found."])])
+def _machine() -> list[Finding]:
+    from symtop.runner import scripts
 
-
-def _python() -> list[Finding]:
-    result = f"{platform.python_version()} at {sys.executable}, {platform.system()} {platform.machine()}"
+    python = f"{platform.python_version()} at {sys.executable}, {platform.system()} {platform.machine()}"
     oldest = ".".join(map(str, OLDEST_PYTHON))
-    return [Finding("python", result, sys.version_info >= OLDEST_PYTHON, f"symtop needs Python {oldest} or newer")]
+    return [
+        Finding("python", python, sys.version_info >= OLDEST_PYTHON, f"symtop needs Python {oldest} or newer"),
+        Finding("studies", f"{len(scripts.names())} in {scripts.folder()}"),
+        Finding("cores", f"{os.cpu_count()}"),
+        Finding("gcc", shutil.which("gcc") or "absent; only the benchmarks of a checkout (make bench) need it"),
+    ]
 
 
 def _packages() -> list[Finding]:
@@ -156,16 +147,6 @@ def _writable(topic: str, folder: Path, advice: str) -> Finding:
     return Finding(topic, f"{folder}, {_bytes(free)} free", free > LEAST_SPACE, f"make room, or {advice}")
 
 
-def _tools() -> list[Finding]:
-    from symtop.runner import scripts
-
-    return [
-        Finding("studies", f"{len(scripts.names())} in {scripts.folder()}"),
-        Finding("cores", f"{os.cpu_count()}"),
-        Finding("gcc", shutil.which("gcc") or "absent; only the benchmarks of a checkout (make bench) need it"),
-    ]
-
-
 def _self_check() -> list[Finding]:
     """Published values, and three ways to compute one motion, against each other."""
     import numpy as np
@@ -198,49 +179,53 @@ def _bytes(size: float) -> str:
     return f"{size:.1f} GB"
 
 
+CHECKS: dict[str, Callable[[Path], list[Finding]]] = {
+    "machine": lambda _: _machine(),
+    "packages": lambda _: _packages(),
+    "heyoka": lambda _: _heyoka(),
+    "caches": lambda _: _caches(),
+    "results": _results,
+    "self-check": lambda _: _self_check(),
+}
 SCENE = "goldstein"
 PERIODS = 0.02  # of a nutation: the length of a run that compiles
 
 
-def _two_steps(name: str) -> dict[str, Any]:
-    """The settings of two steps of a variant, or so."""
-    from symtop.methods.framework.registry import integrator
-    from symtop.model.scenes import scene
-
-    variant, span = integrator(name), PERIODS * scene(SCENE).nutation_period
-    (chart,) = variant.charts()
-    setting = variant.setting(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance))
-    observe = "attitude" if chart == "angles" else chart
-    return {**setting.kwargs(), "horizon": span, "samples": 2, "observe": observe}
-
-
 def _run(task: tuple[str, str]) -> str:
-    """Make the runs of a variant alone or together, or those of the truth; returns why it could not be done."""
+    """Make the run of a variant alone or in an ensemble, or those of the truth; returns why it could not be done."""
     from symtop.core.lazy_kernel import LAZY
+    from symtop.methods.framework.registry import integrator
     from symtop.model.scenes import scene
     from symtop.run.ensemble.ensemble import ensemble
     from symtop.run.reference.truth import reference
     from symtop.run.simulation import simulate
 
-    kind, name = task
+    (kind, name), period = task, scene(SCENE).nutation_period
     try:
-        if kind == "alone":
-            simulate(SCENE, name, **_two_steps(name))
-        elif kind == "together":
-            ensemble([SCENE] * 2, name, **_two_steps(name), threads=1, quiet=True)
-        else:
+        if kind == "truth":
             for kernel in LAZY:
                 kernel.compile()
-            period = scene(SCENE).nutation_period
             run = simulate(SCENE, "strang", step_size=period / 100.0, horizon=period, samples=3)
             reference(SCENE, run["time"].values)
+            return ""
+        variant, span = integrator(name), PERIODS * period
+        (chart,) = variant.charts()
+        setting: dict[str, Any] = {
+            **variant.setting(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance)).kwargs()
+        }
+        observe = "attitude" if chart == "angles" else chart
+        if kind == "alone":
+            simulate(SCENE, name, **setting, horizon=span, samples=2, observe=observe)
+        else:
+            tops = [SCENE] * 2
+            ensemble(tops, name, **setting, horizon=span, samples=2, observe=observe, threads=1, quiet=True)
     except Exception as error:  # noqa: BLE001  (one that fails must not keep the others from being compiled)
         return f"{name or kind}: {words_of(error)}"
     return ""
 
 
 def tasks() -> list[tuple[str, str]]:
-    """Every run that compiles something: what it is, and the variant ``method[chart]``."""
+    """Every run that compiles something: its kind, and the variant ``method[chart]``."""
     from symtop.methods.framework.registry import integrators
 
     compiled = [method for method in integrators().values() if method.implementation in {"compiled", "heyoka"}]
@@ -260,12 +245,12 @@ def compile_all(jobs: int | None = None) -> tuple[int, list[str]]:
     from symtop.core.parallel import context, cores
 
     before, todo = kernels(), tasks()
-    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), context()) as pool:
+    bar = tqdm(desc="compiling", total=len(todo), unit="run", disable=None, leave=False)
+    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), context()) as pool, beating(bar):
         reasons = []
-        with beating(tqdm(desc="compiling", total=len(todo), unit="run", disable=None, leave=False)) as bar:
-            for reason in pool.map(_run, todo):
-                reasons.append(reason)
-                bar.update()
+        for reason in pool.map(_run, todo):
+            reasons.append(reason)
+            bar.update()
     return kernels() - before, list(filter(None, reasons))
 
 
@@ -287,6 +272,10 @@ def doctor(results: str, warm: bool, as_json: bool) -> None:
     if as_json:
         click.echo(as_text([finding._asdict() for finding in findings]))
     else:
-        click.echo(page(findings))
+        width = max(len(finding.topic) for finding in findings)
+        for finding in findings:
+            click.echo(f"{'ok ' if finding.healthy else 'BAD'}  {finding.topic.ljust(width)}  {finding.result}")
+        advice = [f"{finding.topic}: {finding.advice}" for finding in findings if not finding.healthy]
+        click.echo("\n".join(["", *(advice or ["No faults were found."])]))
     if not all(finding.healthy for finding in findings):
         sys.exit(1)

@@ -1,10 +1,22 @@
 """``symtop claims`` and ``symtop judge``: what an integrator claims, measured; one of symtop's or anybody's."""
 
 import sys
+from typing import Any
 
 import click
 
-from symtop.cli.common import File, as_text, check_outputs, completing, json_option, plugin_option, say, terminal_width
+from symtop.cli.common import (
+    File,
+    as_text,
+    check_outputs,
+    completing,
+    json_option,
+    plugin_option,
+    say,
+    say_written,
+    separated,
+    terminal_width,
+)  # fmt: skip
 from symtop.core.progress import ticking
 
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
@@ -19,7 +31,10 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 @click.option("--symplectic/--not-symplectic", default=None, help="Claim that the step is symplectic, or not.")
 @click.option("--symmetric/--not-symmetric", default=None, help="Claim that a step of -h undoes one of h, or not.")
 @click.option("--explicit/--implicit", default=None, help="Claim that it solves no equations, or that it does.")
-@click.option("--conserves", metavar="NAMES", help="Claim constants: energy, p_phi, p_psi, axis_length, with commas.")
+@click.option(
+    "--conserves", metavar="NAMES", callback=separated,
+    help="Claim constants: energy, p_phi, p_psi, axis_length, with commas.",
+)  # fmt: skip
 @click.option("--energy", type=click.Choice(["kept", "bounded"]), help="Claim what becomes of the energy.")
 @click.option("--adaptive", is_flag=True, help="Judge a class of SciPy's at a tolerance, not at fixed steps.")
 @click.option("--quick", is_flag=True, help="Ten seconds at most: shorter runs.")
@@ -29,10 +44,8 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 @plugin_option
 @json_option
 def judge(
-    target: str, form: str | None, chart: str, scene: str, order: int | None, symplectic: bool | None,
-    symmetric: bool | None, explicit: bool | None, conserves: str | None, energy: str | None, adaptive: bool,
-    quick: bool, output: str | None, card: str | None, badge: str | None, as_json: bool,
-) -> None:  # fmt: skip
+    target: str, scene: str, output: str | None, card: str | None, badge: str | None, as_json: bool, **options: Any
+) -> None:
     """Judge TARGET: its order, structure, invariants and drift on the top, beside what you claim of it.
 
     \b
@@ -58,19 +71,13 @@ def judge(
     from symtop.judging.sandbox import About
 
     def tell(event: About | Finding) -> None:
-        shown = (
-            text_report.heading(event._asdict(), scene) if isinstance(event, About) else text_report.line(event, width)
-        )
-        if shown:
-            click.echo(shown)
+        if isinstance(event, About):
+            click.echo(text_report.heading(event._asdict(), scene))
+        elif line := text_report.line(event, terminal_width()):
+            click.echo(line)
 
     check_outputs(output=output, card=card, badge=badge)
-    width = terminal_width()
-    ledger = judged(
-        target, form=form, chart=chart, scene=scene, order=order, symplectic=symplectic, symmetric=symmetric,
-        explicit=explicit, conserves=None if conserves is None else conserves.split(","), energy=energy,
-        adaptive=adaptive, quick=quick, tell=None if as_json else tell,
-    )  # fmt: skip
+    ledger = judged(target, scene=scene, tell=None if as_json else tell, **options)
     if as_json:
         click.echo(as_text([finding.plain() for finding in ledger.findings]))
     else:
@@ -79,13 +86,13 @@ def judge(
         from symtop.core import netcdf
 
         netcdf.write(ledger.dataset(), output)
-        click.echo(f"written to {output}", err=as_json)
     if card is not None or badge is not None:
         from symtop.report import card as cards
 
         for file, write in ((card, cards.card), (badge, cards.write_badge)):
             if file is not None:
-                click.echo(f"written to {write(ledger, file)}", err=as_json)
+                write(ledger, file)
+    say_written(output, card, badge, err=as_json)
     if ledger.refuted:
         sys.exit(1)
 

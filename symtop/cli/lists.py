@@ -3,7 +3,6 @@
 import contextlib
 import math
 import textwrap
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -21,15 +20,12 @@ Record = dict[str, Any]  # what is shown of one entry, by column
 FLAGS = "e explicit, i implicit, s symplectic, t symmetric in time, - not so, ? not known"
 
 
-def _show(records: list[Record], short: list[Record], chosen: Record | None, page: Callable[[Record, int], str],
-          note: str, wide: bool, as_json: bool) -> None:  # fmt: skip
-    """Print the chosen record as a page, or all of them as a table of the `short` ones; or all columns, or JSON."""
+def _list(records: list[Record], short: list[Record], note: str, wide: bool, as_json: bool) -> None:
+    """Print all records as a table of the `short` ones, or with all columns, or as JSON."""
     if as_json:
-        click.echo(as_text(records if chosen is None else [chosen]))
+        click.echo(as_text(records))
     elif wide:
         click.echo(table(*tables.columns(records)))
-    elif chosen is not None:
-        click.echo(page(chosen, terminal_width()))
     else:
         click.echo(table(*tables.columns(short), terminal_width()))
         click.echo(textwrap.fill(note, terminal_width()))
@@ -61,6 +57,10 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, eng
     if markdown and not as_json:
         click.echo(tables.table(*tables.columns(records)))
         return
+    if name is not None and (as_json or not wide):
+        described = _described(methods[0])
+        click.echo(as_text([described]) if as_json else _integrator_page(described, terminal_width()))
+        return
     short: list[Record] = [
         {
             "name": method.name, "order": str(method.order or "?"), "flags": _flags(method),
@@ -68,11 +68,10 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, eng
         }
         for method in methods
     ]  # fmt: skip
-    chosen = None if name is None else _described(methods[0])
     needs = "; ".join(f"{name}, {words}" for name, words in registry.NEEDS.items())
     note = f"flags: {FLAGS}. needs, the weakest thing that suffices: {needs}."
     note += " One in full: symtop integrators NAME; in one chart: NAME[CHART]."
-    _show(records, short, chosen, _integrator_page, note, wide, as_json)
+    _list(records, short, note, wide, as_json)
 
 
 def _flags(method: "Integrator") -> str:
@@ -118,11 +117,15 @@ def scenes(name: str | None, wide: bool, as_json: bool) -> None:
     from symtop.model import scenes as catalogue
 
     chosen = [catalogue.scene(name)] if name is not None else list(catalogue.scenes().values())
+    if name is not None and (as_json or not wide):
+        numbers = _numbers(chosen[0])
+        click.echo(as_text([numbers]) if as_json else _scene_page(numbers, terminal_width()))
+        return
     records: list[Record] = [scene.record() for scene in chosen]
     keys = {"name": "name", "horizon": "horizon (s)", "nutation": "nutation period (s)", "purpose": "purpose"}
     short: list[Record] = [{column: record[key] for column, key in keys.items()} for record in records]
     note = "horizon: the time a run covers; nutation: one period of it. One in full: symtop scenes NAME."
-    _show(records, short, None if name is None else _numbers(chosen[0]), _scene_page, note, wide, as_json)
+    _list(records, short, note, wide, as_json)
 
 
 def _numbers(scene: "Scene") -> Record:

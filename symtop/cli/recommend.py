@@ -1,7 +1,6 @@
 """``symtop recommend``: the cheapest integrator for an accuracy, or what a physics engine makes of a scene.
 
-An engine is known here by the maps of its settings, `symtop.methods.engines.engines`. Each is run at the step of the
-user to the horizon; errors are the largest angle between the axis and the true one. The gain of another method is
+An engine is known here by the maps of its settings, `symtop.methods.engines.engines`. The gain of another method is
 counted in force evaluations, which neither the machine nor the language of the engine decides.
 """
 
@@ -9,7 +8,7 @@ import dataclasses
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -101,9 +100,10 @@ def i_use(engine: str, scene: "str | Scene", *, step_size: float = STEP, horizon
     advice = recommend(start, accuracy=error, horizon=end) if error <= WORST else None
     if advice is None or advice.integrator is None:
         return EngineAdvice(start.name, engine, h, end, off, best, math.nan, None)
-    setting = {"step_size": advice.step_size, "tolerance": advice.tolerance}
-    given: dict[str, Any] = {name: value for name, value in setting.items() if value is not None}
-    needed = simulate(start, advice.integrator, horizon=end, guard=False, observe="axis", **given)
+    needed = simulate(
+        start, advice.integrator, step_size=advice.step_size, tolerance=advice.tolerance, horizon=end, guard=False,
+        observe="axis",
+    )  # fmt: skip
     gain = forces / float(needed.attrs["force_evaluations"])
     return EngineAdvice(start.name, engine, h, end, off, best, gain, advice)
 

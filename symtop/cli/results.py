@@ -1,17 +1,12 @@
 """``symtop report``, ``archive`` and ``cite``: the page of all findings, the bundle of all data, and the sources."""
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from symtop import __version__
 from symtop.cli.common import PLUGINS, File, plugin_option, results_option, warn
 from symtop.core.errors import SymtopError
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 PACKAGE = f"""\
 @software{{symtop,
@@ -74,29 +69,22 @@ def cite(files: tuple[Path, ...]) -> None:
     from symtop.core import netcdf
     from symtop.methods.framework.registry import bibliography, citation_keys, integrator
 
+    names: list[str] = []
+    for group in (group for file in files for group in netcdf.groups(netcdf.read_any(file)).values()):
+        for name in {"variant", "integrator"} & group.variables.keys():  # files of version 0.2 have the latter
+            names += map(str, group[name].values.ravel())
+        if "integrator" in group.attrs:
+            names.append(str(group.attrs["integrator"]))
     sources: dict[str, None] = {}
-    unknown: dict[str, None] = {}
-    for file in files:
-        for name in _integrators(netcdf.read_any(file)):
-            try:
-                named = citation_keys(integrator(name))
-            except SymtopError:  # not registered here
-                named = []
-            sources.update(dict.fromkeys(named))
-            if not named:
-                unknown[name] = None
+    unknown = []
+    for name in dict.fromkeys(names):
+        try:
+            keys = citation_keys(integrator(name))
+        except SymtopError:  # not registered here
+            keys = []
+        sources |= dict.fromkeys(keys)
+        unknown += [] if keys else [name]
     for text in [PACKAGE, *(bibliography()[key] for key in sources)]:
         click.echo(text + "\n")
     if unknown:
         click.echo(f"symtop: no source is known of {', '.join(unknown)}", err=True)
-
-
-def _integrators(data: "xr.Dataset | xr.DataTree") -> Iterator[str]:
-    """Names of the integrators of a dataset or tree: a coordinate of every group, and the attribute of a run."""
-    from symtop.core import netcdf
-
-    for group in netcdf.groups(data).values():
-        for name in {"variant", "integrator"} & group.variables.keys():  # files of version 0.2 have the latter
-            yield from dict.fromkeys(map(str, group[name].values.ravel()))
-        if "integrator" in group.attrs:
-            yield str(group.attrs["integrator"])

@@ -3,10 +3,23 @@
 import math
 import sys
 from collections import Counter
+from typing import Any
 
 import click
 
-from symtop.cli.common import File, as_text, check_outputs, completing, json_option, plugin_option, say, table, warn
+from symtop.cli.common import (
+    File,
+    as_text,
+    check_outputs,
+    completing,
+    json_option,
+    plugin_option,
+    say,
+    say_written,
+    separated,
+    table,
+    warn,
+)  # fmt: skip
 from symtop.core.errors import SymtopError, whole
 from symtop.core.progress import ticking
 
@@ -36,9 +49,8 @@ EXECUTION = {
 @plugin_option
 @json_option
 def run(
-    scene: str, integrator: str, step_size: float | None, tolerance: float | None, horizon: float | None, samples: int,
-    observe: str | None, budget: float | None, guard: bool, output: str | None, figure: str | None, as_json: bool,
-) -> None:  # fmt: skip
+    scene: str, integrator: str, guard: bool, output: str | None, figure: str | None, as_json: bool, **settings: Any
+) -> None:
     """Run one INTEGRATOR on one SCENE and compare it with the exact motion.
 
     INTEGRATOR is a method, which runs in the smallest of its charts that shows what the scene observes, or a method in
@@ -58,10 +70,7 @@ def run(
         from symtop.run.reference.truth import reference
         from symtop.run.simulation import simulate
 
-        data = simulate(
-            scene, integrator, step_size=step_size, tolerance=tolerance, horizon=horizon, samples=samples,
-            observe=observe, guard=warn if guard else False, budget=budget,
-        )  # fmt: skip
+        data = simulate(scene, integrator, guard=warn if guard else False, **settings)
         if output is not None:
             netcdf.write(data, output)
         chosen = scenes.scene(scene)
@@ -73,31 +82,25 @@ def run(
 
             draw_run(chosen, data, truth, error, figure)
     series = {name: error[name].dropna("time").values for name in QUANTITIES if name in error}
-    largest = {
-        name: {"largest": float(values.max()), "last": float(values[-1])}
-        for name, values in series.items()
-        if values.size
-    }
+    largest = {name: {"largest": values.max(), "last": values[-1]} for name, values in series.items() if values.size}
+    facts = data.attrs
     if as_json:
         names = ("outcome", "outcome_message", "reached_time", "steps", "force_evaluations")
-        findings = {**{name: data.attrs[name] for name in names}, "judgement": verdict._asdict(), "errors": largest}
+        findings = {**{name: facts[name] for name in names}, "judgement": verdict._asdict(), "errors": largest}
         click.echo(as_text(findings))
     else:
-        facts, method = data.attrs, data.attrs["integrator"]
+        method, used, wanted = facts["integrator"], facts["step_size"], settings["step_size"]
         variant = method if method.endswith("]") else f"{method}[{facts['chart']}]"
         say(f"{variant} on {chosen.name}: {facts['outcome_message']}")
-        used = facts["step_size"]
-        other = step_size is not None and abs(used / step_size - 1.0) > SAME
+        other = wanted is not None and abs(used / wanted - 1.0) > SAME
         of = f" of {used:.6g}, for a whole number of them fills the horizon" if other else ""
         say(f"{facts['steps']} steps{of}, {facts['force_evaluations']} force evaluations")
-        if data.attrs["outcome"] == "ok":
+        if facts["outcome"] == "ok":
             say(f"judged against the truth: {verdict.words()}")
         for name, values in largest.items():
             click.echo(f"  {QUANTITIES[name]:<30} largest {values['largest']:.3e}   last {values['last']:.3e}")
-    for file in () if as_json else (output, figure):
-        if file is not None:
-            click.echo(f"written to {file}")
-    if data.attrs["outcome"] != "ok":
+        say_written(output, figure)
+    if facts["outcome"] != "ok":
         sys.exit(3)
 
 
@@ -137,18 +140,12 @@ def long(
         sys.exit(130)
     say(f"{data.attrs['title']}: {data.attrs['outcome_message']}")
     if data.sizes["window"]:
-        rows = [
-            [
-                name,
-                *(f"{float(value):+.3e}" for value in (
-                    data[f"{name}_least"].min(), data[f"{name}_largest"].max(), data[f"{name}_mean"][-1],
-                )),
-            ]
-            for name in ("energy", "modified_energy", "p_phi", "p_psi")
-        ]  # fmt: skip
+        rows = []
+        for name in ("energy", "modified_energy", "p_phi", "p_psi"):
+            least, most, mean = (data[f"{name}_{kind}"] for kind in ("least", "largest", "mean"))
+            rows.append([name, *(f"{float(value):+.3e}" for value in (least.min(), most.max(), mean[-1]))])
         click.echo(table(["change since the start", "least", "largest", "last window's mean"], rows))
-    if output is not None:
-        click.echo(f"written to {output}")
+    say_written(output)
     if data.attrs["outcome"] != "ok":
         sys.exit(3)
 
@@ -165,7 +162,7 @@ def long(
 @click.option("--nutations", type=float, help="In place of a horizon: nutation periods of each top.")
 @click.option("--samples", type=int, default=101, show_default=True, help="Number of samples of each top.")
 @click.option("--observe", help="nutation, axis or attitude; the axis by default.")
-@click.option("--variables", metavar="NAMES", help="What is kept over time, with commas; all by default.")
+@click.option("--variables", metavar="NAME,...", callback=separated, help="What is kept over time; all by default.")
 @click.option("--budget", type=float, help="Most steps of a top, or force evaluations of an adaptive method.")
 @click.option("--threads", type=int, help="Threads; one a core by default.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on this dask cluster.")
@@ -174,10 +171,8 @@ def long(
 @plugin_option
 @json_option
 def ensemble(
-    integrator: str, members: int, seed: int, kind: str, step_size: float | None, per_nutation: float | None,
-    tolerance: float | None, horizon: float | None, nutations: float | None, samples: int, observe: str | None,
-    variables: str | None, budget: float | None, threads: int | None, scheduler: str | None, output: str | None,
-    figure: str | None, as_json: bool,
+    integrator: str, members: int, seed: int, kind: str, variables: list[str] | None, output: str | None,
+    figure: str | None, as_json: bool, **settings: Any,
 ) -> None:  # fmt: skip
     """Run one INTEGRATOR on tops of a random population and compare each with the exact motion.
 
@@ -190,22 +185,17 @@ def ensemble(
     """
     check_outputs(output=output, figure=figure)
     whole("members", members, 1)  # which is n in Python
-    names = None if variables is None else [name.strip() for name in variables.split(",")]
     with ticking("drawing tops"):
         from symtop.measure.spread import LEVELS, QUANTITIES, largest, member_errors, spread
         from symtop.run.ensemble import ensemble as runs
         from symtop.run.ensemble.population import population
 
         tops = population(members, seed=seed, kind=kind)
-    compared = [name for name in QUANTITIES if names is None or name in names]
+    compared = [name for name in QUANTITIES if variables is None or name in variables]
     if figure is not None and not compared:
         raise SymtopError("--figure needs axis or energy among --variables, whose errors it shows")
     try:
-        data = runs.ensemble(
-            tops, integrator, step_size=step_size, per_nutation=per_nutation, tolerance=tolerance, horizon=horizon,
-            nutations=nutations, samples=samples, observe=observe, variables=names, budget=budget, path=output,
-            threads=threads, scheduler=scheduler,
-        )  # fmt: skip
+        data = runs.ensemble(tops, integrator, variables=variables, path=output, **settings)
     except KeyboardInterrupt:
         warn("interrupted" + ("" if output is None else "; the tops that were run are kept: the same command resumes"))
         sys.exit(130)
@@ -219,9 +209,7 @@ def ensemble(
         worst = {name: spread(largest(member_errors(few, shown, name))[:, None])[:, 0].tolist() for name in compared}
     data.close()
     if as_json:
-        errors = {
-            name: {f"{level:g}": error for level, error in zip(LEVELS, worst[name], strict=True)} for name in worst
-        }
+        errors = {name: dict(zip(map("{:g}".format, LEVELS), row, strict=True)) for name, row in worst.items()}
         click.echo(as_text({"outcomes": outcomes, "steps": steps, "largest_errors": errors}))
     else:
         counts = ", ".join(f"{count} {OUTCOME.get(name, name)}" for name, count in outcomes.items())
@@ -230,9 +218,7 @@ def ensemble(
         heading = [f"largest error, {few.sizes['member']} tops", *(f"{100.0 * level:g} %" for level in LEVELS)]
         if worst:
             click.echo(table(heading, [[QUANTITIES[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
-        for file in (output, figure):
-            if file is not None:
-                click.echo(f"written to {file}")
+        say_written(output, figure)
     if "ok" not in outcomes:
         sys.exit(3)
 

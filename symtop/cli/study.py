@@ -1,7 +1,6 @@
 """``symtop study``: run studies, show the state of their cases, or compute some again and compare."""
 
 import sys
-import textwrap
 import time
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
@@ -14,15 +13,16 @@ from symtop.cli.common import (
     PLUGINS,
     as_text,
     completing,
+    filled,
     json_option,
     plugin_option,
     results_option,
-    terminal_width,
+    separated,
     warn,
 )  # fmt: skip
 from symtop.core.errors import SymtopError, positive
 from symtop.core.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
-from symtop.report.sentences import counted
+from symtop.report.sentences import abridged, counted
 
 if TYPE_CHECKING:
     from symtop.runner.pool import Pool
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 MOST_NAMED = 8  # integrators and scenes in a line of the status
 MOST_SENTENCES = 3  # of the findings of a study that has run
-Row = dict[str, Any]  # of the status: one case
 
 
 @click.command(short_help="Run studies: datasets, figures and findings.")
@@ -44,7 +43,7 @@ Row = dict[str, Any]  # of the status: one case
 @click.option("--status", is_flag=True, help="Print the state of every case; compute nothing.")
 @click.option("--why", is_flag=True, help="With --status: what has changed, one line for all cases with that reason.")
 @click.option("--check", is_flag=True, help="Compute some stored cases again, in another folder, and compare.")
-@click.option("--only", metavar="METHOD,...", help="Cases of these methods alone, into the folder only of the results.")
+@click.option("--only", metavar="METHOD,...", callback=separated, help="Cases of these methods, into the folder only.")
 @click.option("--jobs", type=click.IntRange(1), help="Processes that compute cases; one a core by default.")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute cases that are not timed on this dask cluster.")
 @click.option("--limit", type=float, metavar="SECONDS", help="Longest time of one case; an hour by default.")
@@ -52,8 +51,8 @@ Row = dict[str, Any]  # of the status: one case
 @json_option
 @plugin_option
 def study(
-    names: tuple[str, ...], every: bool, quick: bool, full: bool, fresh: bool, status: bool, why: bool, check: bool,
-    only: str | None, jobs: int | None, scheduler: str | None, limit: float | None, results: str, as_json: bool,
+    names: tuple[str, ...], every: bool, fresh: bool, status: bool, why: bool, check: bool, only: list[str] | None,
+    jobs: int | None, scheduler: str | None, limit: float | None, results: str, as_json: bool, **grid: bool,
 ) -> None:  # fmt: skip
     """Run studies by NAME: datasets, figures and findings into the results folder.
 
@@ -69,24 +68,30 @@ def study(
     symtop study --all --status --why
     symtop study convergence --scheduler tcp://10.0.0.1:8786
     """
-    if why and not status:
-        raise SymtopError("--why must be given together with --status")
-    if quick and full:
-        raise SymtopError("--quick and --full must not be given together")
-    if names and every:
-        raise SymtopError(f"name studies or use --all, not both: {' '.join(names)} --all")
-    if status and (check or fresh):
-        other = "--check" if check else "--fresh"
-        raise SymtopError(f"--status and {other} must not be given together: --status computes nothing")
+    alone = "must not be given together: --status computes nothing"
+    for wrong, sentence in (
+        (why and not status, "--why must be given together with --status"),
+        (all(grid.values()), "--quick and --full must not be given together"),
+        (names and every, f"name studies or use --all, not both: {' '.join(names)} --all"),
+        (status and check, f"--status and --check {alone}"),
+        (status and fresh, f"--status and --fresh {alone}"),
+    ):
+        if wrong:
+            raise SymtopError(sentence)
     if limit is not None:
         positive("limit", limit)
-    chosen = only.split(",") if only is not None else []
-    folder = Path(results, *filter(None, ("quick" * quick, "only" * bool(chosen))))
-    grid = {"quick": quick, "full": full}
+    folder = Path(results, *filter(None, ("quick" * grid["quick"], "only" * bool(only))))
     whole = every and not (only or status or check or click.get_current_context().meta.get(PLUGINS))
-    if whole and not fresh and not scheduler and _nothing_to_do(folder, as_json, grid):
-        return
-    studies = choose(names, every=every, only=chosen, quick=quick)
+    if whole and not fresh and not scheduler:
+        from symtop.runner import manifest
+
+        began = time.monotonic()
+        up_to_date = manifest.all_findings(folder.resolve(), grid)
+        if up_to_date is not None:
+            took = {"computed": 0, "seconds": time.monotonic() - began}
+            _end([_summary(findings | took, folder, as_json) for findings in up_to_date], folder, as_json)
+            return
+    studies = choose(names, every=every, only=only or (), quick=grid["quick"])
     if status:
         sys.exit(show_status(studies, folder, why, as_json, grid))
     from symtop.runner.pool import Pool
@@ -101,19 +106,6 @@ def study(
         word, code = ("interrupted", INTERRUPTED) if isinstance(stop, KeyboardInterrupt) else ("terminated", TERMINATED)
         warn(f"{word}; what was computed is kept, and the same command goes on from there")
     sys.exit(code)
-
-
-def _nothing_to_do(results: Path, as_json: bool, grid: dict[str, bool]) -> bool:
-    """Is every study up to date? Then its findings are printed."""
-    from symtop.runner import manifest
-
-    began = time.monotonic()
-    known = manifest.all_findings(results.resolve(), grid)
-    if known is None:
-        return False
-    took = {"computed": 0, "seconds": time.monotonic() - began}
-    _end([_summary(findings | took, results, as_json) for findings in known], results, as_json)
-    return True
 
 
 def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick: bool = False) -> "list[Study]":
@@ -215,12 +207,13 @@ def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str
         drawn = counted(summary["figures"], "figure")
         click.echo("{study}: {computed} of {cases} cases computed, {drawn}".format(drawn=drawn, **summary))
         for sentence in verdict[:MOST_SENTENCES]:
-            click.echo(_indented(sentence, "  - "))
+            click.echo(filled(f"  - {sentence}"))
         left = len(verdict) - MOST_SENTENCES
-        more = f", {counted(left, 'more finding')} in {name}.json" if left > 0 else ""
-        pictures = f"figures {results / 'figures' / name}-*{more}" if findings["pictures"] else more.lstrip(", ")
-        for line in filter(None, (f"dataset {results / name}.nc", pictures)):
-            click.echo(_indented(line, "  "))
+        more = f"{counted(left, 'more finding')} in {name}.json" if left > 0 else ""
+        pictures = f"figures {results / 'figures' / name}-*" if findings["pictures"] else ""
+        click.echo(filled(f"  dataset {results / name}.nc"))
+        if pictures or more:
+            click.echo(filled(f"  {', '.join(filter(None, (pictures, more)))}"))
     for failure in findings["failures"]:
         click.echo(f"  {failure}", err=True)
     return summary
@@ -234,14 +227,6 @@ def _end(summaries: Sequence[dict[str, Any]], results: Path, as_json: bool) -> N
         click.echo(f"next: symtop report --results {results}, one page of all findings")
 
 
-def _indented(line: str, first: str) -> str:
-    """A line in as many as fit the terminal."""
-    return textwrap.fill(
-        line, terminal_width(), initial_indent=first, subsequent_indent="    ", break_on_hyphens=False,
-        break_long_words=False,
-    )  # fmt: skip
-
-
 def show_status(studies: "list[Study]", results: Path, why: bool, as_json: bool, grid: dict[str, bool]) -> int:
     """Print the state of every case, and with `why` the reason; 1 if some have failed."""
     from symtop.runner import status
@@ -252,22 +237,17 @@ def show_status(studies: "list[Study]", results: Path, why: bool, as_json: bool,
     for name, rows in {} if as_json else states.items():
         counts = Counter(row["state"] for row in rows)
         click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in status.STATES if counts[state]))
-        groups: dict[str, list[Row]] = {}  # cases that share a line
+        groups: dict[str, list[dict[str, Any]]] = {}  # cases that share a line
         for row in rows:
             if row["state"] != status.DONE:
                 reasons = filter(None, (row["state"], row["message"] or ", ".join(row.get("why", []))))
                 groups.setdefault(": ".join(reasons), []).append(row)
         for reason, group in groups.items():
             count = f"{len(group)} " if why else ""
-            where = f"{_names(group, 'integrator')} on {_names(group, 'scene')}"
-            click.echo(_indented(f"{count}{reason}: {where}", "  "))
+            methods, scenes = (list(dict.fromkeys(row[key] for row in group)) for key in ("integrator", "scene"))
+            line = f"  {count}{reason}: {abridged(methods, MOST_NAMED)} on {abridged(scenes, MOST_NAMED)}"
+            click.echo(filled(line))
     return 1 if any(row["state"] == status.FAILED for rows in states.values() for row in rows) else 0
-
-
-def _names(rows: list[Row], key: str) -> str:
-    names = list(dict.fromkeys(row[key] for row in rows))
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return ", ".join(names[:MOST_NAMED]) + more
 
 
 def check_all(

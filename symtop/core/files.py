@@ -44,8 +44,8 @@ on_cold: list[Callable[[], object]] = [_tell]  # called when a kernel is not in 
 
 def cache_root() -> Path:
     """The folder for everything symtop caches: ``$SYMTOP_CACHE`` or ``symtop`` in the user's cache folder."""
-    told = os.environ
-    return _root(*(told.get(name) for name in ("SYMTOP_CACHE", "XDG_CACHE_HOME", "HOME", "USERPROFILE")))
+    environment = os.environ
+    return _root(*(environment.get(name) for name in ("SYMTOP_CACHE", "XDG_CACHE_HOME", "HOME", "USERPROFILE")))
 
 
 @functools.lru_cache(maxsize=16)

@@ -23,10 +23,10 @@ def of_one_dataset(function: Callable[Concatenate[Any, P], Answer]) -> Callable[
         if data is not before:
             answers = {}
             _answers[function] = data, answers
-        asked = (args, tuple(sorted(kwargs.items())))
-        if asked not in answers:
-            answers[asked] = function(data, *args, **kwargs)
-        answer: Answer = answers[asked]
+        key = (args, tuple(sorted(kwargs.items())))
+        if key not in answers:
+            answers[key] = function(data, *args, **kwargs)
+        answer: Answer = answers[key]
         return answer
 
     return remembered

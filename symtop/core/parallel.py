@@ -37,13 +37,13 @@ def cores() -> int:
 
 def heed() -> None:
     """Raise `StoppedError` if the work was interrupted; for long pieces to call between their compiled calls."""
-    asked = getattr(_stop, "asked", None)
-    if asked is not None and asked.is_set():
+    stopped = getattr(_stop, "stopped", None)
+    if stopped is not None and stopped.is_set():
         raise StoppedError
 
 
-def _listen(asked: threading.Event) -> None:
-    _stop.asked = asked
+def _listen(stopped: threading.Event) -> None:
+    _stop.stopped = stopped
 
 
 def in_threads(work: Callable[[Piece], Result], pieces: Iterable[Piece], threads: int) -> Iterator[Result]:
@@ -55,12 +55,12 @@ def in_threads(work: Callable[[Piece], Result], pieces: Iterable[Piece], threads
     if threads == 1:
         yield from map(work, pieces)
         return
-    asked = threading.Event()
-    pool = ThreadPoolExecutor(threads, initializer=_listen, initargs=(asked,))
+    stopped = threading.Event()
+    pool = ThreadPoolExecutor(threads, initializer=_listen, initargs=(stopped,))
     try:
         yield from in_order(pool, work, pieces, AHEAD * threads)
     except BaseException:
-        asked.set()
+        stopped.set()
         pool.shutdown(wait=False, cancel_futures=True)
         raise
     pool.shutdown()
@@ -69,10 +69,10 @@ def in_threads(work: Callable[[Piece], Result], pieces: Iterable[Piece], threads
 def in_order(pool: Executor, work: Callable[[Piece], Result], pieces: Iterable[Piece], ahead: int) -> Iterator[Result]:
     """The results of the pieces that a pool computes, in their order; `ahead` of them are with the pool at a time."""
     rest = iter(pieces)
-    begun: list[Future[Result]] = [pool.submit(work, piece) for piece in islice(rest, ahead)]
-    while begun:
-        yield begun.pop(0).result()
-        begun += [pool.submit(work, piece) for piece in islice(rest, 1)]
+    submitted: list[Future[Result]] = [pool.submit(work, piece) for piece in islice(rest, ahead)]
+    while submitted:
+        yield submitted.pop(0).result()
+        submitted += [pool.submit(work, piece) for piece in islice(rest, 1)]
 
 
 VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")  # of NumPy's and SciPy's builds

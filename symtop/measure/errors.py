@@ -85,10 +85,10 @@ def errors(
         units = "1" if name in CONSTANTS else "rad"
         shown.variables[name].attrs.update(long_name=QUANTITIES[name], units=units)
         shown.variables[f"{name}_bound"].attrs.update(long_name=f"the least {QUANTITIES[name]} to be seen", units=units)
-    told = {"scene": chosen.name, "precision": truth.attrs["precision"]}
+    attributes = {"scene": chosen.name, "precision": truth.attrs["precision"]}
     if isinstance(run, xr.Dataset) and "integrator" in run.attrs:
-        told["integrator"] = run.attrs["integrator"]
-    shown.attrs.update(netcdf.CONVENTIONS, title=f"errors on {chosen.name}", **told)
+        attributes["integrator"] = run.attrs["integrator"]
+    shown.attrs.update(netcdf.CONVENTIONS, title=f"errors on {chosen.name}", **attributes)
     return shown
 
 
@@ -185,10 +185,10 @@ def refuse_other_scene(run: xr.Dataset | Mapping[str, Any], scene: Scene) -> Non
     attributes = getattr(run, "attrs", {})
     for name, own in (("top", scene.top), ("start", scene.start)):
         try:
-            told = type(own)(**json.loads(attributes[name]))
+            stored = type(own)(**json.loads(attributes[name]))
         except (KeyError, TypeError, ValueError):  # they do not say
             continue
-        if told != own:
+        if stored != own:
             raise SymtopError(
                 f"scene must be that of the data, {attributes.get('scene', 'of another name')}, whose {name} is "
                 f"{attributes[name]}, not {scene.name}; drop_attrs() makes them a trajectory that is compared with any"
@@ -310,21 +310,21 @@ def doubts(data: xr.Dataset, errors: Mapping[str, charts.Array], horizon: float)
 
     `horizon` is that of the scene: times far beyond it may be in another unit.
     """
-    said, time = [], data["time"].values
+    sentences, time = [], data["time"].values
     name = "attitude" if "attitude" in errors else "axis" if "axis" in errors else "theta"
     if errors[name][0] > FAR:
-        said.append(
+        sentences.append(
             f"the first sample, at t = {time[0]:.6g}, is {errors[name][0]:.2g} rad from the true {name}: is this the "
             "start of the scene, and is its time counted from there?"
         )
     if time[-1] > BEYOND * horizon:
-        said.append(
+        sentences.append(
             f"times reach to {time[-1]:.6g}, {time[-1] / horizon:.3g} times the horizon {horizon:.6g}: are they in the "
             "scene's unit of time?"
         )
     for name, values in errors.items():
         if np.isnan(values).any():
             since = time[int(np.argmax(np.isnan(values)))]
-            said.append(f"{name} is not a number from t = {since:.6g}; a largest error leaves these samples out")
+            sentences.append(f"{name} is not a number from t = {since:.6g}; a largest error leaves these samples out")
             break
-    return said
+    return sentences

@@ -33,8 +33,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symtop.measure.statistics import line, student
-
 LEAST = 5
 LARGEST_ERROR = 1e-2
 FLOOR = 1e3  # times the reference's bound: a finest error beyond it has not met rounding
@@ -65,6 +63,34 @@ class Fit(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.slope:.3f} +- {self.interval:.3f}" if math.isfinite(self.slope) else "not judged"
+
+
+class Line(NamedTuple):
+    """A straight line through points, by least squares."""
+
+    slope: float
+    error: float  # standard error of the slope
+    middle: tuple[float, float]  # the point of means, which is on the line
+    rest: Array  # what the line leaves
+
+
+def line(x: Array, y: Array) -> Line:
+    """The line through points (n,), n at least 3."""
+    middle = x.mean(), y.mean()
+    dx, dy = x - middle[0], y - middle[1]
+    spread = float(dx @ dx)
+    slope = float(dx @ dy) / spread
+    rest = dy - slope * dx
+    error = math.sqrt(float(rest @ rest) / (x.size - 2) / spread)
+    return Line(slope, error, middle, rest)
+
+
+@functools.lru_cache(maxsize=256)
+def student(freedom: int) -> float:
+    """By how much a standard error is multiplied for a 95 % interval."""
+    from scipy.special import stdtrit  # what scipy.stats asks, which takes a second to import
+
+    return float(stdtrit(freedom, 0.975))
 
 
 def power_law(x: ArrayLike, y: ArrayLike, used: ArrayLike | None = None) -> Fit:

@@ -203,8 +203,8 @@ def _of(length: int, letters: int) -> Array:
     if not spanning.size:
         return spanning
     left, sizes, _ = np.linalg.svd(spanning, full_matrices=False)
-    kept: Array = left[:, sizes > RANK]
-    return kept
+    basis: Array = left[:, sizes > RANK]
+    return basis
 
 
 def _spread(column: Array, letter: int) -> Array:

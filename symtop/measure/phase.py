@@ -36,11 +36,6 @@ FREQUENCIES: dict[str, str] = {
     "nutation_period": "relative error of nutation period",
     "precession_rate": "relative error of precession rate",
 }
-PARTS: dict[str, str] = {
-    "shape": "shape error (axis lengths)",
-    "nutation_lag": "nutation lag (rad)",
-    "precession_lag": "precession lag (rad)",
-}
 TABLE = 256  # points of the true curve from which the search for tau starts
 SWEEPS = 4  # of Gauss-Newton: the error falls from 1e-2 to rounding in three
 CLEAR = 0.25  # of the largest sin(theta): nearer to a pole, the branch of phi is taken from the neighbours

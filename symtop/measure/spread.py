@@ -45,16 +45,16 @@ def member_errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array
 def _errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array:
     numbers, values = read_members(members).numbers, data[quantity].values
     times = np.broadcast_to(data["time"].values, values.shape[:2])
-    asked = np.isfinite(times)
+    finite = np.isfinite(times)
     with np.errstate(all="ignore"):  # what a run blew up to is no error of this comparison
         if quantity == "axis":
-            truth = ClosedForms(numbers).axis(np.where(asked, times, 0.0))
+            truth = ClosedForms(numbers).axis(np.where(finite, times, 0.0))
             errors = charts.axis_distance(values, truth)
         else:
             unit = scenes.energy_scales(numbers, ClosedForms(numbers).theta_range)
             errors = np.abs(values - values[:, :1]) / unit[:, None]
     known = np.isfinite(truth).all(axis=2) if quantity == "axis" else True
-    return np.where(asked & known, np.where(np.isfinite(errors), errors, np.inf), np.nan)
+    return np.where(finite & known, np.where(np.isfinite(errors), errors, np.inf), np.nan)
 
 
 def at_places(data: xr.Dataset, errors: Array) -> tuple[Array, Array]:

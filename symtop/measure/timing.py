@@ -14,9 +14,6 @@ import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
 from symtop.methods.framework.plan import Run
 from symtop.methods.framework.registry import Integrator
 from symtop.model.exact import closed_form
@@ -27,8 +24,6 @@ BATCH = 0.02  # seconds
 CLEAR = 1e-3  # seconds: a trial that long shows how many calls make a batch
 STRIDE = 16  # the calls of a trial grow at most so much
 NOISY = 0.25  # relative spread beyond which a timing is not called reliable
-AGAIN = 0.1  # a smallest sample that no other comes so close to may be an accident
-MISSED = 0.25  # relative miss of a forecast beyond which a time is taken again
 
 
 class Timing(NamedTuple):
@@ -51,12 +46,6 @@ class Timing(NamedTuple):
     def reliable(self) -> bool:
         """Is the spread small enough for a verdict?"""
         return self.spread < NOISY
-
-
-def met_again(samples: ArrayLike) -> bool:
-    """Does another sample come to within `AGAIN` of the smallest? NaN is no sample."""
-    least = np.sort(np.asarray(samples, dtype=float), axis=None)[:2]  # NaN comes last
-    return bool(least.size == 2 and least[1] <= (1.0 + AGAIN) * least[0])
 
 
 def _batch(function: Callable[[], object], calls: int) -> float:
@@ -113,29 +102,6 @@ def timings(
             if len(taken) <= number and not tired:
                 taken.append(_batch(functions[index], calls[index]) / calls[index])
     return [Timing(tuple(taken), first) for taken, first in zip(samples, firsts, strict=True)]
-
-
-def forecasts(seconds: ArrayLike, evaluations: ArrayLike, steps: ArrayLike, *, fixed_step: bool) -> NDArray[np.float64]:
-    """The time of each run of a method as its other runs foretell it: (n,), NaN with fewer than two others.
-
-    A run costs a call, its force evaluations and its steps, and, of an adaptive method, as much for every evaluation in
-    proportion to the evaluations of a step: a Taylor derivative is the dearer the higher it is. The costs are those of
-    the least relative squares over the other runs. Nothing is shown that comes from here: a time that misses its
-    forecast is taken again. On a quiet machine 1 in 90 misses it by a quarter, and half by 1 %.
-    """
-    times, work, count = (np.asarray(values, dtype=float) for values in (seconds, evaluations, steps))
-    costs = [work, np.ones_like(work), count]
-    columns = np.stack(costs if fixed_step else [*costs, work**2 / np.maximum(count, 1.0)], axis=1)
-    expected = np.full(times.size, np.nan)
-    for k in range(times.size):
-        others = np.arange(times.size) != k
-        size = min(columns.shape[1], int(others.sum()) - 1)
-        if size > 0:
-            relative = columns[others, :size] / times[others, None]
-            unit = np.linalg.norm(relative, axis=0)
-            cost, *_ = np.linalg.lstsq(relative / unit, np.ones(len(relative)), rcond=1e-6)
-            expected[k] = columns[k, :size] @ (cost / unit)
-    return expected
 
 
 def bare_run(

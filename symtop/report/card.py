@@ -57,7 +57,8 @@ def _order(axis: Any, ledger: StepLedger) -> None:
     axis.plot(steps[valid & fitted], errors[valid & fitted], "o", color=BLUE, label="in the fit")
     axis.set(xscale="log", yscale="log")
     claimed = finding.declared.isdigit()
-    order = int(finding.declared) if claimed else _integer(finding.value)
+    slope = float(finding.declared) if claimed else finding.value
+    order = round(slope) if 0.5 < slope < 99.0 else None
     if order is not None:
         used = np.flatnonzero(valid & fitted) if (valid & fitted).any() else np.flatnonzero(valid)
         first, last = used[np.argmin(steps[used])], used[np.argmax(steps[used])]
@@ -65,10 +66,6 @@ def _order(axis: Any, ledger: StepLedger) -> None:
         label = f"h^{order}{', as claimed' if claimed else ''}"
         axis.plot(ends, errors[first] * (ends / ends[0]) ** order, color=GREY, lw=0.9, ls=(0, (5, 3)), label=label)
     axis.legend(frameon=False)
-
-
-def _integer(slope: float) -> int | None:
-    return round(slope) if 0.5 < slope < 99.0 else None
 
 
 def _energy(axis: Any, ledger: StepLedger) -> None:

@@ -56,13 +56,6 @@ def _series(name: str, points: Sequence[tuple[float | None, float | None, str]])
     }
 
 
-def _size(image: bytes) -> tuple[int, int]:
-    """Width and height of a PNG or a GIF in pixels, so that the page does not move while its figures load."""
-    if image.startswith(b"\x89PNG"):
-        return int.from_bytes(image[16:20]), int.from_bytes(image[20:24])
-    return int.from_bytes(image[6:8], "little"), int.from_bytes(image[8:10], "little")
-
-
 class Anchors:
     """Names for the things on a page that a link may lead to, each given once."""
 
@@ -113,9 +106,12 @@ def gather(results: Path, *, embed: bool = False) -> list[dict[str, Any]]:
 
 
 def _shown(file: Path, *, embed: bool) -> dict[str, Any]:
-    """Address, width and height of a picture."""
+    """Address, width and height of a PNG or a GIF, so that the page does not move while its figures load."""
     image = file.read_bytes()
-    width, height = _size(image)
+    if image.startswith(b"\x89PNG"):
+        width, height = (int.from_bytes(image[at : at + 4]) for at in (16, 20))
+    else:
+        width, height = (int.from_bytes(image[at : at + 2], "little") for at in (6, 8))
     inside = f"data:{KINDS.get(file.suffix, 'image/png')};base64,{base64.b64encode(image).decode()}" if embed else ""
     return {"source": inside or f"figures/{file.name}", "width": width, "height": height}
 

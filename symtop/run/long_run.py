@@ -37,7 +37,7 @@ from symtop.methods.framework.registry import Integrator, integrator as find_int
 from symtop.model.charts import View
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run import modified_energy as modified
-from symtop.run.guard.guard import MOST_STEPS
+from symtop.run.guard import MOST_STEPS
 
 Array = np.ndarray
 Gauge = Callable[..., dict[str, Array]]  # states and momenta of samples -> quantities

@@ -19,12 +19,11 @@ from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, boolean, one_of, positive, shown, whole
 from symtop.core.numbers import GOLDEN
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan, Run, sentence
+from symtop.methods.framework.plan import Plan, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import OBSERVABLES, Scene, horizon_of, scene as find_scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.run.guard.forecast import repeats
-from symtop.run.guard.guard import MOST_STEPS, warning
+from symtop.run.guard import MOST_STEPS, warning
 from symtop.run.trajectory import Trajectory, dataset
 
 MOST_SAMPLES = 10_000_000
@@ -61,8 +60,8 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
     if steps is not None and steps <= last:  # every step is shown
         marks: Any = np.arange(steps + 1)
         return marks * (horizon / steps), marks, False
+    place: Any = np.arange(samples, dtype=float)
     for dithered in (False, True):
-        place: Any = np.arange(samples, dtype=float)
         if dithered:
             place[1:last] += np.mod(GOLDEN * place[1:last], 1.0) - 0.5
         if steps is None:
@@ -71,9 +70,9 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
             marks = _marks(steps, place, last)
             times = marks * (horizon / steps)
         long_enough = math.isfinite(period) and horizon > 2.0 * period
-        if not long_enough or _unseen(times, period) < WIDEST_GAP:
-            return times, marks, dithered
-    return times, marks, True
+        if dithered or not long_enough or _unseen(times, period) < WIDEST_GAP:
+            break
+    return times, marks, dithered
 
 
 def chart_of(method: Integrator, watched: str, observe: str | None = None) -> str:
@@ -92,12 +91,18 @@ def likely_step(scene: Scene, method: Integrator, horizon: float, accuracy: floa
     return min(0.2 * scene.time_scale(horizon) * math.pow(accuracy, 1.0 / power), horizon)
 
 
-def check_formula(method: Integrator, words: str, step: object, tolerance: object) -> None:
-    """Refuse a step (`words` is what it is called) and a tolerance for a formula, which has nothing to tune."""
+def check_control(method: Integrator, step: object, tolerance: object, name: str = "step_size") -> None:
+    """Refuse a step, which the caller calls `name`, or a tolerance that the method does not take."""
+    if method.fixed_step and tolerance is not None:
+        words = f"has a fixed step: give step_size, not tolerance = {shown(tolerance)}"
+        raise SymtopError(f"{method.name} {words}", "step_size", "tolerance")
+    if method.adaptive and step is not None:
+        words = f"chooses its own steps: give tolerance, not {name} = {shown(step)}"
+        raise SymtopError(f"{method.name} {words}", "tolerance", name)
     if not method.fixed_step and not method.adaptive:
-        for name, value in ((words, step), ("tolerance", tolerance)):
+        for control, value in ((name, step), ("tolerance", tolerance)):
             if value is not None:
-                raise SymtopError(f"{method.name} has nothing to tune: leave out {name} = {shown(value)}", name)
+                raise SymtopError(f"{method.name} has nothing to tune: leave out {control} = {shown(value)}", control)
 
 
 def make_plan(
@@ -106,38 +111,21 @@ def make_plan(
 ) -> tuple[Plan, bool]:  # fmt: skip
     """Check the step or tolerance against the integrator and the budget, and lay out steps and samples."""
     period = scene.nutation_period
+    check_control(method, step_size, tolerance)
     if method.fixed_step:
-        if tolerance is not None:
-            raise SymtopError(
-                f"{method.name} has a fixed step: give step_size, not tolerance = {shown(tolerance)}",
-                "step_size",
-                "tolerance",
-            )
         if step_size is None:
-            proposal = likely_step(scene, method, horizon, USUAL)
-            raise SymtopError(
-                f"{method.name} has a fixed step and needs step_size, for example {proposal:.1g}", "step_size"
-            )
+            words = f"needs step_size, for example {likely_step(scene, method, horizon, USUAL):.1g}"
+            raise SymtopError(f"{method.name} has a fixed step and {words}", "step_size")
         step = positive("step_size", step_size)
         if step > horizon:
             raise SymtopError(f"step_size must be at most the horizon {horizon!r}, not {step!r}", "step_size")
         most = MOST_STEPS if budget is None else budget
         if horizon / step > most:
-            raise SymtopError(
-                f"step_size {step!r} asks for {horizon / step:.3g} steps; the limit is {most:.3g} (see budget)",
-                "step_size",
-                "budget",
-            )
+            words = f"asks for {horizon / step:.3g} steps; the limit is {most:.3g} (see budget)"
+            raise SymtopError(f"step_size {step!r} {words}", "step_size", "budget")
         steps = max(1, round(horizon / step))
         _, marks, dithered = sample_times(horizon, samples, period, steps)
         return Plan.steps(horizon / steps, marks, horizon), dithered
-    check_formula(method, "step_size", step_size, tolerance)
-    if step_size is not None:
-        raise SymtopError(
-            f"{method.name} chooses its own steps: give tolerance, not step_size = {shown(step_size)}",
-            "tolerance",
-            "step_size",
-        )
     bound = method.check_tolerance(tolerance) if method.adaptive else math.nan
     swings = horizon * max(1.0 / period, math.sqrt(abs(scene.top.mgl) / scene.top.I1) / (2.0 * math.pi))
     if method.adaptive and swings > MOST_SWINGS:
@@ -163,7 +151,7 @@ def simulate(
     ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows every step. A whole number of
     steps fills the horizon, the one nearest to horizon/step_size: the attribute ``step_size`` is the step made.
 
-    Before the run the `guard` (`symtop.run.guard.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a
+    Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a
     large error is expected; the run is the same either way. Give a function to be handed the sentence instead, or
     False for no warning. `budget` is the most steps of a fixed-step run
     (`MOST_STEPS` by default; more are refused) and the most force evaluations, or Taylor steps, of an adaptive one,
@@ -205,10 +193,6 @@ class _Run(NamedTuple):
     plan: Plan
     dithered: bool
 
-    def solve(self) -> Run:
-        """Make the run."""
-        return solve(self.method, self.chart, self.scene.top, self.scene.start, self.plan, f" on {self.scene.name}")
-
 
 def _prepared(
     scene: "str | Scene", integrator: "str | Integrator", step_size: object = None, tolerance: object = None,
@@ -225,18 +209,13 @@ def _prepared(
 
 
 def _guarded(run: _Run, guard: Callable[[str], object] | None) -> tuple[Trajectory, str]:
-    """Make a run, after the guard's sentence if there is one; "off" is the sentence of no guard.
-
-    A run that the guard's probe would repeat step by step is made first, and the probe reads it: that saves a third of
-    the guard's time.
-    """
-    states, caution = None, "off"
-    if guard is not None:
-        states = run.solve() if repeats(run.method, run.plan) else None
-        caution = warning(run.scene, run.method, run.chart, run.plan, states)
-        if caution:
-            guard(caution)
-    return Trajectory.of_run(run.scene, run.chart, run.plan, states or run.solve()), caution
+    """Make a run, after the guard's sentence if there is one; "off" is the sentence of no guard."""
+    scene, method, chart, plan, _ = run
+    caution = "off" if guard is None else warning(scene, method, chart, plan)
+    if caution and guard is not None:
+        guard(caution)
+    states = solve(method, chart, scene.top, scene.start, plan, f" on {scene.name}")
+    return Trajectory.of_run(scene, chart, plan, states), caution
 
 
 def _warn(sentence: str) -> None:

@@ -93,14 +93,14 @@ def test_a_wrong_number_is_seen(monkeypatch):
 
 
 def test_a_check_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path):
-    def trouble():
+    def trouble(results):
         raise OSError("the tools are gone")
 
-    monkeypatch.setattr(doctor, "_tools", trouble)
+    monkeypatch.setitem(doctor.CHECKS, "machine", trouble)
     monkeypatch.setattr(doctor, "_self_check", list)
     done = CliRunner().invoke(main, ["doctor", "--results", str(tmp_path)])
     assert done.exit_code == 1
-    assert "BAD  trouble" in done.output
+    assert "BAD  machine" in done.output
     assert "OSError: the tools are gone" in done.output
 
 

@@ -44,14 +44,6 @@ def test_bad_input_is_refused_in_a_sentence(engine, step, message):
         i_use(engine, "goldstein", step_size=step, horizon=10.0)
 
 
-@pytest.mark.parametrize(
-    "words", [[], ["--accuracy", "1e-6", "--i-use", "ode"], ["--accuracy", "1e-6", "--step-size", "0.1"]]
-)
-def test_the_command_asks_for_one_of_both(words):
-    done = CliRunner().invoke(main, ["recommend", "goldstein", *words])
-    assert done.exit_code == 2
-
-
 def test_the_command_says_what_an_engine_does():
     done = CliRunner().invoke(main, ["recommend", "goldstein", "--i-use", "havok", "--horizon", "10", "--json"])
     assert done.exit_code == 0, done.output

@@ -136,7 +136,7 @@ def test_an_import_inside_a_function_is_followed_at_every_level():
     space = {"__name__": "symtop.measure.made", "__package__": "symtop.measure"}
     exec(
         "def measure():\n    from . import errors\n    from ..methods.runge_kutta.gauss import farthest\n"
-        "    import symtop.run.guard.guard as other\n    return errors.error_bound, other.guard\n",
+        "    import symtop.run.guard as other\n    return errors.error_bound, other.guard\n",
         space,
     )
     labels = {part.label for part in Code().reached("measure", space["measure"])}

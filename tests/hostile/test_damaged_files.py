@@ -11,8 +11,8 @@ import symtop
 from symtop.core import netcdf
 from symtop.core.jit import compile_kernel, is_cached
 from symtop.run import long_run as longrun
-from symtop.run.disk_cache import cached
 from symtop.run.reference import truth as references
+from symtop.run.reference.truth import cached
 
 FLIPS = [pytest.param(12, id="few"), pytest.param(200, id="many", marks=pytest.mark.slow)]
 

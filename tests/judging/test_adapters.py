@@ -16,6 +16,7 @@ from scipy.integrate import RK23
 import symtop
 from symtop.cli.judge import FORMS as OFFERED
 from symtop.cli.main import main
+from symtop.judging import sandbox
 from symtop.judging.adapters.adapter import integrator, label_of
 from symtop.judging.adapters.choice import FORMS, open_target
 from symtop.judging.adapters.python_step import PythonStep
@@ -312,6 +313,27 @@ def impatient(monkeypatch):
 def test_a_step_that_never_works_cannot_be_judged(step, words, impatient):
     with pytest.raises(symtop.SymtopError, match=words):
         symtop.judge(step, quick=True)
+
+
+@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not count what waits")
+def test_waiting_for_a_processor_takes_none_of_the_time_that_judging_has():
+    """Two processes on one core; sleep is no such waiting (the control)."""
+    busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+    allowed = os.sched_getaffinity(0)
+    try:
+        for process in (0, busy.pid):
+            os.sched_setaffinity(process, {min(allowed)})
+        wall, counted, worked = time.monotonic(), sandbox._clock(os.getpid()), time.process_time()
+        while time.process_time() < worked + 0.3:
+            pass
+        assert sandbox._clock(os.getpid()) - counted < 0.8 * (time.monotonic() - wall)
+        counted = sandbox._clock(os.getpid())
+        time.sleep(0.2)
+        assert sandbox._clock(os.getpid()) - counted > 0.19
+    finally:
+        os.sched_setaffinity(0, allowed)
+        busy.kill()
+        busy.wait()
 
 
 def test_a_step_that_hangs_backwards_is_judged_forwards(impatient):

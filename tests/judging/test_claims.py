@@ -17,7 +17,7 @@ from symtop.judging.battery import CLAIMS, judge
 from symtop.judging.claims import constants, long_run as long, order, pole
 from symtop.judging.claims.subject import Subject
 from symtop.judging.findings import NOTHING, VERDICTS, Finding, read
-from symtop.measure.growth import behaviour
+from symtop.measure.conservation import behaviour
 from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
 from symtop.methods.framework.plan import Run
 from symtop.methods.framework.registry import Integrator

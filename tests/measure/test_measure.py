@@ -1,4 +1,4 @@
-"""The measures themselves, on data whose answer is known: orders, trends, scales, verdicts, counts, ladders."""
+"""The measures themselves, on data whose answer is known: orders, trends, scales, counts, ladders."""
 
 import math
 import time
@@ -8,11 +8,9 @@ import pytest
 import xarray as xr
 
 import symtop
-from symtop.measure import verdicts
 from symtop.measure.accuracy import error_table
-from symtop.measure.conservation import trend
+from symtop.measure.conservation import growth, trend
 from symtop.measure.errors import errors_against
-from symtop.measure.growth import growth
 from symtop.measure.order import order, power_law
 from symtop.measure.settings import ladder
 from symtop.measure.timing import Timing, timings
@@ -115,27 +113,6 @@ def test_samples_at_fractions_of_a_period_are_dithered(fraction):
     assert dithered
     assert times[0] == 0.0
     assert times[-1] == 100.0 * fraction
-
-
-def test_each_kind_of_run_gets_its_own_verdict():
-    where = symtop.scene("spheroid")
-    good = symtop.simulate(where, "exact", samples=101)
-    nothing = np.zeros(101)
-    assert verdicts.verdict(where, good, nothing) == "accurate"
-    assert verdicts.verdict(where, good, nothing + 0.5) == "bounded_but_wrong"
-    tilted = good.assign(theta=good["theta"] + 1.0)
-    assert verdicts.verdict(where, tilted, nothing + 0.5) == "wrong_regime"
-    losing = good.assign(energy=good["energy"] * (1.0 - 0.1 * good["time"] / 8.0))
-    assert verdicts.verdict(where, losing, nothing + 0.5) == "drifting"
-    assert verdicts.verdict(where, good.assign_attrs(outcome="left_chart"), nothing) == "left_chart"
-
-
-def test_accurate_is_measured_against_the_width_of_the_nutation():
-    """`fast` nutates over 4e-4 rad: half a thousandth of a radian is not accurate there."""
-    where = symtop.scene("fast")
-    run = symtop.simulate(where, "exact", samples=101)
-    assert verdicts.verdict(where, run, np.full(101, 1e-5)) == "accurate"
-    assert verdicts.verdict(where, run, np.full(101, 5e-4)) != "accurate"
 
 
 def test_a_table_stops_for_good_once_a_run_took_too_much_work():

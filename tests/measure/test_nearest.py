@@ -8,8 +8,8 @@ import xarray as xr
 from symtop_studies.population.tops import Tops
 
 import symtop
-from symtop.measure import nearest as module
-from symtop.measure.nearest import distances, nearest, regime
+from symtop.measure import ranking as module
+from symtop.measure.ranking import distances, nearest, regime
 
 INF, NAN = math.inf, math.nan
 

@@ -96,6 +96,11 @@ def test_no_entry_is_cited_by_nobody():
     assert set(bibliography()) == {key for name in NAMES for key in symtop.integrator(name).reference.split()}
 
 
+def test_an_integrator_of_ones_own_cites_nobody_that_is_known_here():
+    with pytest.raises(symtop.SymtopError, match="names no source that is known here"):
+        symtop.citation(symtop.composition("mine", (1.0,), (0.5, 0.5)))
+
+
 def test_an_integrator_of_ones_own_says_what_its_author_says():
     mine = symtop.runge_kutta("euler", ((),), (1.0,), order=1)
     assert mine.about == ""

@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from symtop_studies.stability.linear_limits import linear_limits
 
 import symtop
-from symtop.measure.conservation import residuals, trend
-from symtop.measure.growth import growth
+from symtop.measure.conservation import growth, residuals, trend
 from symtop.measure.step_map import one_step as map_of, symplectic_defect
 from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.registry import integrator
@@ -16,7 +16,7 @@ from symtop.methods.framework.space import SpaceTop, field_axis, frame_to_attitu
 from symtop.methods.runge_kutta.gauss import STAGES, gauss_rule, march_axis, march_frame
 from symtop.model import charts
 from symtop.model.scenes import steady
-from symtop.run.linear_stability import linear_limits, trace
+from symtop.run.linear_stability import trace
 from symtop.run.simulation import integrate
 from tests.slopes import assert_order
 
@@ -52,6 +52,7 @@ WINDOWS = {2: (60, 2000), 4: (40, 400), 6: (25, 130), 8: (18, 50), 10: (8, 26), 
 @pytest.mark.parametrize("scene", ["spheroid", "goldstein"])
 @pytest.mark.parametrize("order", WINDOWS)
 def test_order(scene, order):
+    assert integrator(f"gauss-{order}").order == order
     assert_order(scene, integrator(f"gauss-{order}"), order, 0.05 if order <= 6 else 0.3, WINDOWS[order])
 
 

@@ -216,3 +216,24 @@ def test_a_long_table_is_scaled_as_numbers_are():
     assert [a == b for a, b in zip(drift, plain, strict=True)].count(False) <= 1 + (len(drift) + 1) % 2
     assert drift[middle] == pytest.approx(plain[middle], rel=1e-13)
     assert math.fsum(drift) == pytest.approx(whole, rel=1e-15)
+
+
+def test_a_composition_travels_as_an_array_and_arrives_whole():
+    """Numbers of every kind, a rule that hangs on the start included, to the bits of the rule that Python makes."""
+    scene = symtop.scene("spheroid")
+    drift, kick = [0.1, 0.2, 0.4, 0.2, 0.1], [0.05, 0.15, 0.3, 0.3, 0.15, 0.05]
+    for more in ({"rotation": "cayley-tuned"}, {"gradient": [0.0, 1e-3, 0.0, 0.0, 1e-3, 0.0], "processor": 0.01}):
+        for solver in symtop.composition("long", drift, kick, chart="space", **more).solvers.values():
+            assert solver._whole.rule.tolist()[:11] == [*solver.rule.rule.drift, *solver.rule.rule.kick]
+            assert_the_same_run(solver, scene.top, scene.start, Plan.steps(0.02, [0, 1, 300]))
+
+
+@pytest.mark.parametrize("name", ["gauss-2", "gauss-12", "collective-gauss-6"])
+def test_the_table_of_a_gauss_method_travels_as_one_array(name):
+    """To the bits of the table that Python reads, which a march in stretches takes."""
+    scene = symtop.scene("spheroid")
+    for solver in symtop.integrator(name).solvers.values():
+        table = solver.rule(scene.top, scene.start, 0.02)
+        assert solver._whole.rule[: len(table.b)].tolist() == table.mu.tolist()
+        assert solver._whole.rule[len(table.b)].tolist() == table.b.tolist()
+        assert_the_same_run(solver, scene.top, scene.start, Plan.steps(0.02, [0, 1, 300]))

@@ -19,7 +19,7 @@ from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.exact.digits import PreciseForm, precise_constants
 from symtop.model.scenes import grazing, scene, sleeping
 from symtop.model.top import Angles, SymmetricTop, flat
-from symtop.run.reference.bounds import ROUNDING
+from symtop.run.reference.truth import ROUNDING
 
 EPS = float(np.finfo(float).eps)
 SEPARATRIX = SymmetricTop(1.0, 0.5, -1.0), Angles(0.0, theta_dot=2.0)

@@ -183,14 +183,3 @@ def test_a_published_figure_has_a_vector_beside_it_and_the_same_bytes_again(tmp_
     assert written[0][1].startswith(b"%PDF")
     with_pixels = np.frombuffer(written[0][0][16:24], ">u4")
     assert with_pixels[0] == round(style.WIDTH * style.DPI)
-
-
-def test_a_sketch_has_half_the_dots_of_a_saved_figure(tmp_path):
-    widths = []
-    for write in (style.sketch, style.save):
-        figure, axes = style.panels(1, 1)
-        axes[0, 0].plot([1.0, 2.0])
-        write(figure, tmp_path / "a.png")
-        widths.append(int(np.frombuffer((tmp_path / "a.png").read_bytes()[16:20], ">u4")[0]))
-    assert 2 * widths[0] == widths[1]
-    assert not list(tmp_path.glob("*.pdf"))

@@ -15,9 +15,8 @@ from symtop.methods.framework.registry import methods
 from symtop.model import charts
 from symtop.model.charts import axes
 from symtop.model.scenes import closed_form, grazing, steady
-from symtop.run.guard import forecast, guard
-from symtop.run.guard.forecast import Probe, grown, landmarks
-from symtop.run.guard.guard import EXPECTED
+from symtop.run import guard
+from symtop.run.guard import EXPECTED, Probe, grown, landmarks
 from symtop.run.linear_stability import trace
 from symtop.run.simulation import make_plan
 
@@ -268,7 +267,7 @@ def test_every_method_can_be_probed_and_is_told_what_it_can_do():
         if method.control == "tolerance" and method.default_tolerance is None:
             control = {"tolerance": 1e-6 if method.implementation == "compiled" else 1e-5}
         plan, _ = make_plan(where, method, **control, horizon=3.0, samples=11)
-        found = forecast.forecast(where, method, method.charts()[0], plan)
+        found = guard.forecast(where, method, method.charts()[0], plan)
         assert found.outcome == "ok"
         assert found.axis_error < 1e-2
 

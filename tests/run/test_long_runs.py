@@ -200,7 +200,7 @@ def test_an_interrupt_keeps_every_finished_window(tmp_path, monkeypatch):
 
 def test_a_result_that_cannot_be_written_leaves_the_checkpoint(tmp_path, monkeypatch):
     """The disk is full when the run is done: the same call writes what was computed, without a step."""
-    output, file, write = tmp_path / "windows.nc", tmp_path / "run.nc", longrun.datasets.write
+    output, file, write = tmp_path / "windows.nc", tmp_path / "run.nc", longrun.netcdf.write
     asked = {"steps": 50_000, "step_size": H, "checkpoint": file, "output": output, "quiet": True}
 
     def full(data, path):
@@ -208,7 +208,7 @@ def test_a_result_that_cannot_be_written_leaves_the_checkpoint(tmp_path, monkeyp
             raise SymtopError(f"cannot write {path}: No space left on device")
         return write(data, path)
 
-    monkeypatch.setattr(longrun.datasets, "write", full)
+    monkeypatch.setattr(longrun.netcdf, "write", full)
     with pytest.raises(SymtopError, match=r"No space left on device; the steps are kept in .*run.nc"):
         long_run(WHERE, "rk4", **asked)
     assert file.is_file()
@@ -216,7 +216,7 @@ def test_a_result_that_cannot_be_written_leaves_the_checkpoint(tmp_path, monkeyp
     monkeypatch.setattr(longrun._Book, "note", lambda *_: pytest.fail("it steps"))
     data = long_run(WHERE, "rk4", **asked)
     assert not file.exists()
-    assert longrun.datasets.read(output).identical(data)
+    assert longrun.netcdf.read(output).identical(data)
     monkeypatch.undo()
     assert data.identical(long_run(WHERE, "rk4", steps=50_000, step_size=H, quiet=True))
 

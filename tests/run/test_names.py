@@ -4,14 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
+from symtop_studies.stability.linear_limits import linear_limits, sleeping_threshold
 
 import symtop
 from symtop.judging.battery import judge
 from symtop.methods.framework import registry
 from symtop.methods.lagrangian.discrete_lagrangian import is_midpoint
 from symtop.methods.lagrangian.galerkin import is_galerkin
-from symtop.run.guard.forecast import forecast
-from symtop.run.linear_stability import linear_limits, sleeping_threshold
+from symtop.run.guard import forecast
 from symtop.run.long_run import long_run
 from symtop.run.modified_energy import modified_energy
 from symtop.run.simulation import make_plan

@@ -14,12 +14,19 @@ import pytest
 from mpmath import mp, mpf, workdps
 
 import symtop
-from symtop.model import charts
+from symtop.model import charts, scenes
 from symtop.model.exact import closed_form
+from symtop.model.exact.constants import RATE
 from symtop.model.exact.digits import PreciseForm
-from symtop.run.reference.certificate import Certificate
 from symtop.run.reference.independent_checks import check_times, flown, integrate, precise_attitude
-from symtop.run.reference.truth import UNCERTIFIED, _cache_path, reference as reference_function
+from symtop.run.reference.truth import (
+    UNCERTIFIED,
+    Certificate,
+    _cache_path,
+    closed_bounds,
+    closed_values,
+    reference as reference_function,
+)
 
 
 @pytest.fixture
@@ -110,6 +117,21 @@ def test_bounds_hold_on_random_tops_and_are_tight(precision):
 @pytest.mark.parametrize("precision", ["longdouble", "closed-form"])
 def test_bounds_hold_on_500_random_tops(precision):
     assert check_bounds(500, precision, seed=2026) < 100.0
+
+
+@pytest.mark.parametrize("name", ["spheroid", "goldstein", "fast", "cusp"])
+def test_the_bound_of_the_closed_form_holds_the_rounding_and_the_rates(name):
+    """Twice what `benchmarks/accuracy.py` finds; the error of a rate times the time and the angular velocity."""
+    where, times = symtop.scene(name), np.array([0.0, 1e14])
+    motion = scenes.closed_form(where)(np.linspace(0.0, where.nutation_period, 400))
+    across = motion.phi_dot * np.sin(motion.theta)
+    along = motion.psi_dot + motion.phi_dot * np.cos(motion.theta)
+    fastest = np.sqrt(motion.theta_dot**2 + across**2 + along**2).max()
+    bounds = closed_bounds(where, times, closed_values(where, times))
+    for quantity, rounding in {"theta": 7.1e-16, "axis": 8.8e-16, "attitude": 8.8e-16}.items():
+        assert bounds[quantity][0] >= 2.0 * rounding
+        assert np.diff(bounds[quantity]) >= RATE * times[1] * fastest
+    assert min(bounds["phi"][0], bounds["psi"][0]) >= 2.0 * 4.8e-16
 
 
 def test_a_bound_that_is_too_small_would_be_seen():

@@ -7,7 +7,7 @@ import symtop
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.plan import Plan
 from symtop.model.scenes import closed_form
-from symtop.run.guard.forecast import forecast
+from symtop.run.guard import forecast
 from symtop.run.simulation import make_plan
 
 STEPS = 20_000

@@ -6,14 +6,15 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.stability import atlas, atlas_words, outcome_maps
+from symtop_studies.stability import atlas, atlas_words, messages, outcome_maps, words
+from symtop_studies.stability.many_verdicts import JUDGED, VERDICTS
 from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, row_plan, spin_unit, with_spin
 from symtop_studies.stability.tables import Column, family_limits, map_table, sampling_table
 
 import symtop
 from symtop.core import netcdf
 from symtop.measure.errors import errors_against
-from symtop.measure.verdicts import JUDGED, VERDICTS, verdict
+from symtop.measure.verdicts import judgement
 from symtop.methods.framework.registry import integrator, methods
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
@@ -26,7 +27,7 @@ STEPS = [0.011, 0.053, 0.17, 0.31, 0.83]
 
 @pytest.mark.parametrize("name", ["midpoint", "stormer-verlet", "strang", "gauss-4", "rk4"])
 def test_a_map_says_what_single_runs_say(name):
-    """The same runs through `simulate`, the reference and `verdict`, sampled more densely."""
+    """The same runs through `simulate`, the reference and `judgement`, sampled more densely."""
     runs = outcome_map("cusp", [0.3, 1.0, 8.0], integrator(name), STEPS, 12.0)
     for place, ratio in enumerate((0.3, 1.0, 8.0)):
         spun = with_spin(scene("cusp"), ratio)
@@ -38,7 +39,7 @@ def test_a_map_says_what_single_runs_say(name):
             )  # fmt: skip
             error = errors_against(spun, run, reference(spun, run["time"].values, "closed-form"))["axis"].values
             mapped = VERDICTS[runs.verdict[place, column]]
-            single = verdict(spun, run, error)
+            single = judgement(spun, run, error).verdict
             assert (mapped == "accurate") == (single == "accurate"), (ratio, value, mapped, single)
             if run.attrs["outcome"] != "ok":
                 assert mapped == run.attrs["outcome"]
@@ -278,6 +279,79 @@ def tolerances(*ladders):
         cell = hand_made([[A if value < 2e-4 else B for value in ladder]] * 4, ladder, knob_name="tolerance")
         cells.append((Case("cusp", name), cell.sel(scene="cusp", variant="midpoint", drop=True)))
     return store.combine(cells)
+
+
+def test_shares_of_a_page_are_of_what_all_its_maps_have():
+    data = tolerances([1e-10, 1e-8, 1e-6, 1e-4, 1e-2], [1e-6, 1e-4, 1e-2])
+    shares = {name: one.shares[0] for name, one in atlas.common(atlas.maps(data, "cusp")).items()}
+    assert shares == pytest.approx({"rk45[axis]": 2 / 3, "radau[axis]": 2 / 3})
+    assert atlas.maps(data, "cusp")["rk45[axis]"].shares[0] == pytest.approx(4 / 5)
+
+
+def test_a_tie_has_no_single_winner():
+    ladder = [1e-6, 1e-4, 1e-2]
+    best, worst = atlas_words.ends(atlas.maps(tolerances(ladder, ladder, ladder), "cusp"))
+    assert best == worst == "3 methods (67%)"
+
+
+def test_a_variant_without_an_inaccurate_run_has_no_share_of_them():
+    cells = [(Case("cusp", name), hand_made(lines).sel(scene="cusp", variant="midpoint", drop=True))
+             for name, lines in (("rk4[axis]", [[A, B, L]] * 4), ("strang[axis]", [[A, A, A]] * 4))]  # fmt: skip
+    silent = {name: one.silent for name, one in atlas.maps(store.combine(cells), "cusp").items()}
+    assert silent["rk4[axis]"] == 0.5
+    assert math.isnan(silent["strang[axis]"])
+
+
+def test_a_pole_that_halves_the_reach_is_told_from_one_that_does_not():
+    gaps = (1e-6, 1e-5, 1e-2, 0.2)
+    near = hand_made([[L, L, L], [L, L, L], [A, L, L], [A, A, L]], parameter=gaps, scene_name="grazing")
+    effect = atlas.pole_effect(atlas.maps(near, "grazing")["midpoint"])
+    assert effect.halves
+    assert effect.width == pytest.approx(0.011)
+    unspoiled = hand_made([[A, A, L]] * 4, parameter=gaps, scene_name="grazing")
+    assert not atlas.pole_effect(atlas.maps(unspoiled, "grazing")["midpoint"]).halves
+
+
+def test_a_method_without_a_linear_limit_is_said_to_have_none():
+    for limit, shown in ((math.nan, "none of 300 steps up to 10"), (1.9999, "1.9999")):
+        given = {Column.LIMIT_PHASE: limit, Column.THIRD_TURN_PHASE: 1.7321, Column.SOUGHT_PHASE: 10.0}
+        data = store.combine([(Case("steady-fast", "midpoint"), xr.Dataset(given))])
+        assert words.tables(data)[-1].rows[0][1] == shown
+    window = data.assign({Column.WINDOW_START: data[Column.LIMIT_PHASE] * 0.0 + 6.28,
+                          Column.WINDOW_END: data[Column.LIMIT_PHASE] * 0.0 + 6.287})  # fmt: skip
+    assert words.tables(window)[-1].rows[0][2] == "6.280"
+
+
+def test_runs_that_outlast_the_law_of_the_separatrix_or_never_get_there_are_not_counted():
+    columns = {
+        Column.EARLY_ERROR: (("variant", "setting"), [[1e-6, 1e-8], [1e-6, 1e-8]]),
+        Column.PREDICTED_HORIZON: (("variant", "setting"), [[29.0, 38.2], [29.0, 38.2]]),
+        Column.HORIZON: (("variant", "setting"), [[29.5, 38.4], [72.0, 71.0]]),
+    }
+    part = xr.Dataset(columns, coords={"variant": ["rk4[axis]", "gauss-4[axis]"]})
+    assert words.outlasting(part) == ["gauss-4[axis]"]
+    assert words.misses(part) == pytest.approx([0.5, 0.2])
+    assert words.unreached(part) == {}
+    part[Column.HORIZON][0, 1] = math.nan
+    assert words.misses(part) == pytest.approx([0.5])
+    assert words.unreached(part) == {"rk4[axis]": 1}
+
+
+def test_an_energy_error_that_no_sample_sees_is_no_ratio_of_a_floor():
+    columns = {Column.ENERGY_ONCE: ("variant", [0.0, 5e-9, 2e-5, 1e-16]),
+               Column.ENERGY_EVERY: ("variant", [4.2e-8, 2.5e-4, 3e-5, 1e-15])}  # fmt: skip
+    part = xr.Dataset(columns, coords={"variant": ["yoshida-4", "stormer-verlet", "rkmk-se3-2", "gauss-4"]})
+    assert messages.hidden_sampled(part) == ["yoshida-4"]
+    assert messages.worst_sampled(part) == "stormer-verlet"
+
+
+def test_cells_that_were_not_run_are_marked_and_counted():
+    settings = {"parameters": [0.3, 3.0, 8.0, 20.0], "ladder": np.geomspace(0.01, 0.5, 30).tolist(), "periods": 10.0}
+    data = store.combine([(Case("cusp", "strang[axis]"), map_table("cusp", integrator("strang[axis]"), settings))])
+    one = atlas.maps(data, "cusp")["strang[axis]"]
+    assert 0.1 < one.made.mean() < 0.8
+    assert (one.outcome[~one.made] == 0).all()
+    assert np.sum(data["outcome"].values == outcome_maps.SETTLED) == np.sum(~one.made)
 
 
 def test_the_full_grid_is_as_large_as_promised():

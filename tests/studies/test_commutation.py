@@ -138,3 +138,16 @@ def test_the_distance_of_a_kernel_from_its_unreduced_form_is_held_against_roundi
     said = words.same_map(data)
     assert f"differ by up to {gap:.1e} rad in 10000 steps, {judged} the 1e-11 rad that rounding may reach." in said
     assert said.endswith("change by up to 1.0e-15, relative.")
+
+
+def test_what_a_reduced_kernel_saves_is_split_into_iterations_and_the_time_of_one():
+    dims = ("scene", "variant", "kernel", "twin_step")
+    data = xr.Dataset(
+        {Column.SECONDS_A_STEP: (dims, [[[[1e-7, 1e-7], [2e-7, 3e-7]]]]),
+         Column.ITERATIONS_A_STEP: (dims, [[[[2.0, 1.5], [3.0, 4.5]]]]),
+         Column.COMPARED_STEP: (("scene", "variant", "twin_step"), [[[0.1, 0.01]]])},
+        coords={"scene": ["spheroid"], "variant": ["midpoint"], "kernel": ["reduced", "unreduced"]},
+    )  # fmt: skip
+    first, second = words.savings(data)
+    assert (first.time, first.more, first.each) == pytest.approx((2.0, 1.5, 4.0 / 3.0))
+    assert (second.time, second.more, second.each) == pytest.approx((3.0, 3.0, 1.0))

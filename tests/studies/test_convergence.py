@@ -122,3 +122,10 @@ def test_tables_hold_a_row_for_every_pair_and_say_what_a_chart_does_not_show(dat
     assert "not shown" not in by_name["strang[attitude]"]
     assert {row[1] for row in tolerances.rows} == {name for name in ROWS if integrator(name).adaptive}
     assert isinstance(data, xr.Dataset)
+
+
+def test_errors_of_adaptive_methods_follow_their_tolerance(data):
+    fitted = tables.tolerance_fits(data)
+    assert {name for _, name in fitted} == {name for name in ROWS if integrator(name).adaptive}
+    assert fitted["goldstein", "rk45[angles]"].slope == pytest.approx(1.0, abs=0.15)
+    assert words.by_tolerance(tables.stepping(data)) == {}

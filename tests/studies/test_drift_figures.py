@@ -48,3 +48,15 @@ def test_rows_are_grouped_by_the_constants_that_they_lose(histories):
     assert messages.sizes(histories.sel(variant=NAMES[:2])).endswith("with a bounded error")
     ended = histories.assign(outcome=histories["outcome"].where(histories["variant"] != "strang[axis]", "left_chart"))
     assert messages.lost(ended)[CONSTANTS] == ["strang[axis]"]
+
+
+def test_growth_as_time_is_told_from_faster_growth():
+    slopes = np.array([0.91, 1.0, 1.09, 0.88, 1.12, 2.0])
+    assert messages.as_time(slopes).tolist() == [True, True, True, False, False, False]
+    assert messages.faster(slopes).tolist() == [False, False, False, False, True, True]
+
+
+def test_phases_are_grouped_by_what_the_energy_does(histories):
+    groups = messages.by_energy(histories)
+    assert sorted(groups["bounded"]) == [1.0, 1.0, 1.04, 2.0]
+    assert sorted(groups["lost"]) == [1.9, 2.0, 2.0, 2.2]

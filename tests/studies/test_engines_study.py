@@ -118,6 +118,10 @@ def test_every_table_has_a_cell_below_each_heading_and_every_engine_a_source(mea
     assert len({one.engine for one in listed.STATEMENTS}) == len(listed.STATEMENTS)
 
 
+def test_maps_are_ordered_in_double_precision_and_none_without_the_gyroscopic_term(measured):
+    assert words.by_order(measured) == {0: ["no-gyro[axis]"], 1: ["mujoco-euler[axis]"]}
+
+
 def test_shares_count_tops_within_five_degrees(measured):
     off = measured["population"]["off"].sel(scene="population", variant="strang[axis]").values
     assert words.share(measured, "strang[axis]") == np.mean(np.degrees(off) <= 5.0)

@@ -238,3 +238,15 @@ def test_a_tie_goes_to_the_smaller_chart_and_a_lead_does_not(attitude, chart):
         for where, seconds in (("axis", 1.0), ("attitude", attitude))
     ]
     assert fastest(pair).chart == chart
+
+
+@pytest.mark.parametrize(("ratio", "verdict"), [(1.94, "more"), (1.09, "the same"), (0.97, "the same"), (0.87, "less")])
+def test_what_differs_by_less_than_a_tie_is_level(ratio, verdict):
+    assert words.more(ratio) == verdict
+
+
+def test_loud_times_are_counted(measured):
+    known = np.isfinite(measured[Column.SPREAD])
+    quiet, loud = (measured.assign({Column.SPREAD: measured[Column.SPREAD].where(~known, one)}) for one in (0.01, 0.9))
+    assert f"{int(known.sum())} of {int(known.sum())} are above" in words.noise_sentence(loud)
+    assert "above 10%" not in words.noise_sentence(quiet)

@@ -15,10 +15,12 @@ from symtop_studies.stability.failures import (
     survives,
     surviving_displacements,
 )
+from symtop_studies.stability.linear_limits import linear_limits, sleep_margin, sleeping_threshold
 from symtop_studies.stability.solver_tolerance import solver_sweep, textbook_midpoint
 from symtop_studies.stability.tables import narrow_window
 
 import symtop
+from symtop.core.numbers import sign_changes
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator, methods
@@ -27,15 +29,7 @@ from symtop.model import charts, scenes
 from symtop.model.charts import View, axis_of
 from symtop.model.scenes import Scene, closed_form, grazing, sleeping
 from symtop.model.top import Angles, SymmetricTop, effective_force
-from symtop.run.linear_stability import (
-    few_steps,
-    linear_limits,
-    sign_changes,
-    sleep_margin,
-    sleeping_threshold,
-    trace,
-    with_momenta,
-)
+from symtop.run.linear_stability import few_steps, trace, with_momenta
 from symtop.runner.grid import grid_variants
 
 STEADY = scenes.scene("steady-fast")  # I1, I3, mgl, theta, w3 = 2, 1, 2, 60 degrees, 20

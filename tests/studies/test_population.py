@@ -7,23 +7,33 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.population import costs, ladder, messages, prices as pricing, study, tops as tops_module, verdicts
+from symtop_studies.population import (
+    costs,
+    ladder,
+    messages,
+    prices as pricing,
+    study,
+    tops as tops_module,
+    verdicts,
+    words,
+)
 from symtop_studies.population.costs import Share, cost_to_reach, detection, quantiles, run_lengths, slowdowns, winner
-from symtop_studies.population.prices import prices
+from symtop_studies.population.prices import Pair, prices
 from symtop_studies.population.tops import ASKED, FIRST, MOMENTA, Tops, numbers_of, strata_of
 from symtop_studies.population.verdicts import Cell
+from symtop_studies.work_precision.walk import nutation_width
 
 import symtop
 from symtop import advise
 from symtop.core import netcdf
 from symtop.measure.accuracy import error_row
-from symtop.measure.nearest import nearest
-from symtop.measure.settings import TARGETS, nutation_width
+from symtop.measure.ranking import nearest
+from symtop.measure.settings import TARGETS
 from symtop.measure.timing import Timing
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
-from symtop.run.guard.guard import EXPECTED
+from symtop.run.guard import EXPECTED
 from symtop.runner.check import differences
 
 INF, NAN = math.inf, math.nan
@@ -431,6 +441,13 @@ def test_standings_of_known_costs():
     assert third.solved == Share(1, 4)
 
 
+def test_the_widest_solves_the_most_tops_and_is_the_first_of_equals():
+    for fails_too, row in ((0, "b"), (4, "a")):
+        data = tree({"a": [1.0] * 6 + [INF] * 4, "b": [3.0] * (10 - fails_too) + [INF] * fails_too})
+        taken = verdicts.costs(data, Cell("short", "axis", 1e-3), "alone")
+        assert verdicts.widest(verdicts.standings(taken)).name == row
+
+
 def test_a_method_made_worse_loses():
     """The same costs with a hundredth of noise: level; one of them twice as dear: it wins nowhere."""
     draw = np.random.default_rng(1)
@@ -521,3 +538,22 @@ def test_advice_counts_the_nearest_tops_of_the_quick_results(quick_results, quan
     advice = symtop.recommend(scene, accuracy=1e-6, quantity=quantity, horizon=20.0, results=quick_results)
     assert "of the 50 nearest random tops" in advice.nearest
     assert advice.nearest in str(advice)
+
+
+def test_silent_runs_at_small_steps_are_counted_by_kind_of_top(quick_results):
+    data = netcdf.read_any(quick_results / "population.nc")
+    share, each = words.hidden(data), words.hidden_by_steps(data)
+    assert share.kind in verdicts.strata(data)
+    assert share.of_kind <= share.silent_fine == pytest.approx(share.fine * share.wrong_fine)
+    assert [step for step, _, _ in each] == sorted(step for step, _, _ in each)
+    assert sum(wrong for step, wrong, _ in each if step >= words.FINE) == share.wrong_fine < share.wrong
+    assert sum(silent for step, _, silent in each if step >= words.FINE) == pytest.approx(share.silent_fine)
+
+
+def test_a_price_lost_in_noise_is_the_long_runs_whole_time():
+    """A short run that was timed longer than the long one gives no slope; a price is positive all the same."""
+    pair = Pair((lambda: None, 100.0), (lambda: None, 300.0))
+    assert pair.slopes(Timing((1.0, 2.0), 0.0), Timing((5.0, 4.0), 0.0), 2) == pytest.approx(
+        [3 / 200, 4 / 200, 2 / 200]
+    )
+    assert pair.slopes(Timing((6.0, 6.0), 0.0), Timing((3.0, 3.0), 0.0), 2) == pytest.approx([0.01] * 3)

@@ -5,14 +5,16 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.drift import messages, tables, words
+from symtop_studies.drift import behaviours, growth, messages, tables, words
 from symtop_studies.drift.runs import run_history
 from symtop_studies.drift.study import TOLERANCE, cases
+from symtop_studies.drift.variants import charts_table
 from symtop_studies.truth import tables as truth_tables, words as truth_words
 
 import symtop
 from symtop.judging.claims.long_run import KEPT, Constant
-from symtop.measure import conservation
+from symtop.measure.conservation import Changed
+from symtop.run.trajectory import Trajectory
 
 
 @pytest.mark.parametrize(
@@ -96,7 +98,7 @@ def test_the_same_run_has_one_behaviour_in_every_study():
         columns = {"outcome": ("scene", ["ok"]), **{name: ("scene", [value]) for name, value in measured.items()}}
         cell = xr.Dataset(columns, coords={"scene": ["spheroid"]})
         grain = symtop.scene("spheroid").energy_grain
-        changed = conservation.Changed(size, 0.0, 1.0, 0.0, exponent, interval, "")
+        changed = Changed(size, 0.0, 1.0, 0.0, exponent, interval, "")
         ledger = Constant(changed, 0.0, KEPT * grain, grain)
         assert tables.worst_behaviour(cell, "energy") == ledger.kind
 
@@ -132,14 +134,10 @@ def test_a_change_of_law_is_found_in_a_run_and_an_oscillation_that_switches_on_i
     where = symtop.scene("spheroid")
     time = np.linspace(0.0, 5000.0 * where.nutation_period, 4001)
     planted = {"energy": 1e-9 + 1e-9 * (time / time[-1] / 0.1) ** 2, "p_phi": np.tanh(time), "p_psi": 1e-9 * time}
-    run = xr.Dataset(
-        {name: ("time", values) for name, values in {**planted, "theta": time, "p_theta": time}.items()},
-        coords={"time": time},
-        attrs={"outcome": "ok", "steps": 1},
-    )
-    monkeypatch.setattr(conservation, "simulate", lambda *_, **__: run)
-    monkeypatch.setattr(conservation, "residuals", lambda *_: planted)
-    found = conservation.history(where, symtop.integrator("rk4"))
+    run = Trajectory(time, theta=time, p_theta=time, steps=1)
+    monkeypatch.setattr(growth, "integrate", lambda *_, **__: run)
+    monkeypatch.setattr(growth, "residuals", lambda *_: planted)
+    found = growth.history(where, symtop.integrator("rk4"))
     assert float(found["energy_change"]) == pytest.approx(0.1 * time[-1], rel=0.5)
     assert float(found["energy_after"]) == pytest.approx(2.0, abs=0.3)
     assert str(found["p_psi_law"].item()) == "linear"
@@ -155,3 +153,50 @@ def test_the_truth_study_counts_the_bounds_that_an_error_exceeds(bound, holding)
         truth_tables.BOUND: ("horizon", [4e-9, bound, 1e-9, np.nan]),
     })  # fmt: skip
     assert f"Of 2 claimed bounds {holding} hold" in truth_words.bounds(data)
+
+
+def test_a_phase_is_steady_only_if_its_intervals_allow_it_and_faster_only_on_every_scene():
+    powers = {
+        "strang": (1.0, 1.0),
+        "rk4": (2.09, 1.90),
+        "taylor": (1.94, 2.03),
+        "mixed": (1.0, 1.6),
+        "exact": (0.2, 0.1),
+    }
+    sizes = {"strang": 1.0, "rk4": 1.0, "taylor": 7e-10, "mixed": 1e-3, "exact": 1e-15}
+    data = xr.Dataset(
+        {
+            "phase_exponent": (("variant", "scene"), list(powers.values())),
+            "phase_exponent_interval": (("variant", "scene"), np.full((5, 2), 0.15)),
+            "phase_largest": (("variant", "scene"), [[size] * 2 for size in sizes.values()]),
+        },
+        coords={"variant": list(powers), "scene": ["spheroid", "goldstein"]},
+    )
+    assert {word: [one.row for one in group] for word, group in behaviours.phases(data).items()} == {
+        behaviours.STEADY: ["strang"], behaviours.FASTER: ["rk4", "taylor"], behaviours.UNCLEAR: ["mixed"],
+    }  # fmt: skip
+
+
+def test_a_chart_matters_only_where_the_change_is_above_rounding_and_twice_as_large():
+    names = ["rk4[angles]", "rk4[axis]", "strang[axis]", "strang[attitude]"]
+
+    def compared(*changes):
+        columns = {"p_phi_largest": [*changes, 1e-15, 1e-15], "energy_largest": [1e-15] * 4, "p_psi_largest": [0.0] * 4}
+        columns = {key: (("scene", "variant"), [values]) for key, values in (columns | {"outcome": ["ok"] * 4}).items()}
+        return charts_table(xr.Dataset(columns, coords={"scene": ["spheroid"], "variant": names}))
+
+    (table,) = compared(1.5e-4, 0.0)
+    assert list(table.rows) == [["p_phi", "rk4", "1.5e-04", "exactly 0", ""]]
+    assert compared(1.5e-4, 1.2e-4) == compared(1e-14, 0.0) == []
+
+
+def test_a_loss_that_is_off_by_a_fifth_was_not_predicted():
+    def message(*ratios):
+        return words.predictions({
+            f"method-{k}": xr.Dataset({"short": 100.0, "measured": 250.0, "ratio": ratio})
+            for k, ratio in enumerate(ratios)
+        })  # fmt: skip
+
+    assert "3% for 2 of 2" in message(1.01, 0.97)
+    assert "method-1 (20% off)" in message(1.01, 1.2)
+    assert "1% for 1 of 2" in message(1.01, math.nan)

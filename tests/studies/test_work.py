@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.work_precision import energy, timing_rounds as rounds_module, trust
+from symtop_studies.work_precision import energy, figures, leads, timing_rounds as rounds_module, trust
 from symtop_studies.work_precision.timing_rounds import (
     PATIENCE,
     Effort,
@@ -17,10 +17,10 @@ from symtop_studies.work_precision.timing_rounds import (
     timed_runs,
     timing_rounds,
 )  # fmt: skip
+from symtop_studies.work_precision.walk import least_work, work_table
 
 import symtop
-from symtop.measure import ranking
-from symtop.measure.settings import TARGETS, least_work, work_table
+from symtop.measure.settings import TARGETS
 from symtop.measure.timing import Timing
 from symtop.runner import store
 from symtop.runner.study import Case
@@ -202,7 +202,7 @@ def test_times_that_no_other_predicts_are_told_apart(timed_study):
 def called(seconds, table):
     """The winners that are called beyond the noise, by horizon and target, with all winners."""
     data = store.combine([*table, (Case("goldstein", "together"), seconds)])
-    wins = ranking.winners(data)
+    wins = leads.winners(data)
     return {key: won.best.integrator for key, won in wins.items() if won and not won.level}, {
         key: won.best.integrator for key, won in wins.items() if won
     }
@@ -242,3 +242,22 @@ def test_the_parts_are_compared_at_equal_settings_and_above_rounding():
                        "shape": (("horizon", "setting"), [[1e-3, 1e-4, 1e-14], [2e-4, 3e-3, np.nan]])})  # fmt: skip
     assert energy.ratios_at_equal_settings(runs, "shape") == pytest.approx([3.0, 2.0])
     assert energy.growth_at_equal_settings(runs, "shape") == pytest.approx(2.5)
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(0.0, "0%"), (1 / 163, "0.6%"), (0.47, "47%"), (0.998, "99.8%"), (1.0, "100%")]
+)
+def test_a_share_that_is_neither_none_nor_all_does_not_read_as_such(share, text):
+    assert energy.percent(share) == text
+
+
+def test_the_middle_slowdown_counts_targets_that_are_not_met_as_endless():
+    table = xr.DataArray([[1.0, 1.0, np.nan, np.nan], [50.0, 60.0, 70.0, np.nan]], dims=("variant", "problem"),
+                         coords={"variant": ["quick", "sure"]})  # fmt: skip
+    assert figures.middles(table) == (3, [("quick", 2, 1.0), ("sure", 3, 60.0)])
+
+
+def test_what_stays_is_told_from_what_grows():
+    message = figures.growth_message(("10", "1000"), [1.0, 1.02, 99.0], [100.0, 101.0, 9e3])
+    assert "2 of the 3" in message
+    assert "101 times" in message

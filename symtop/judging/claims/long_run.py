@@ -1,7 +1,7 @@
 """What a million steps do to the constants of the motion, and what a step costs.
 
 A constant is kept, bounded, a random walk, a drift or just growing by the rule of every study,
-`symtop.measure.growth.behaviour`: by its size, and by the exponent of its growth (0, 1/2, 1) if the 95 % interval
+`symtop.measure.conservation.behaviour`: by its size, and by the exponent of its growth (0, 1/2, 1) if the 95 % interval
 excludes the others. Somebody else's sums may be plain. So a change that grows is rounding, too, while it is no more
 than `KEPT`, relative, or than the random walk that the rounding seen in one step makes, n^1/2 times as much: a bias
 beyond a thousandth of that rounding is visible in a million steps. A drift that hides below a bounded oscillation shows
@@ -23,8 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symtop.measure.conservation import Changed, Difference, constant_of, from_increments, residuals
-from symtop.measure.growth import behaviour, tops
+from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, residuals, tops
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Array, Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator

@@ -48,14 +48,14 @@ def _entry(
 
 def _engine(
     name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, keeps: str = "", *,
-    carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = nothing, **said: Any,
+    carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = nothing, **more: Any,
 ) -> Integrator:  # fmt: skip
     """A map in double, on the axis and on the attitude."""
     loops = {
         "axis": axis_loop(step, carried["axis"], reused),
         "attitude": attitude_loop(step, carried["attitude"], reused),
     }
-    return _entry(name, loops, order, summary, reference, keeps, carried=carried, **said)
+    return _entry(name, loops, order, summary, reference, keeps, carried=carried, **more)
 
 
 def _both(
@@ -64,10 +64,10 @@ def _both(
 ) -> list[Integrator]:  # fmt: skip
     """A map in double and in the single precision of the engine, there on the attitude as the engine steps it."""
     rounded = {"attitude": attitude_loop(step, VELOCITY["attitude"], number=single)}
-    said = f"{summary}, in single precision"
+    in_single = f"{summary}, in single precision"
     return [
         _engine(name, step, order, summary, reference, keeps, rule=rule, energy_error=energy_error),
-        _entry(f"{name}-float32", rounded, None, said, reference, rule=rule, precision="single"),
+        _entry(f"{name}-float32", rounded, None, in_single, reference, rule=rule, precision="single"),
     ]
 
 

@@ -164,8 +164,8 @@ class Integrator:
         if self.conserves is not None:
             if isinstance(self.conserves, str) or not isinstance(self.conserves, Collection):
                 raise SymtopError(f"conserves must be a set of names, not {self.conserves!r}")
-            kept = frozenset(one_of("an entry of conserves", name, CONSERVED) for name in self.conserves)
-            object.__setattr__(self, "conserves", kept)
+            names = frozenset(one_of("an entry of conserves", name, CONSERVED) for name in self.conserves)
+            object.__setattr__(self, "conserves", names)
 
     def _check_kinds(self) -> None:
         for name, allowed in ALLOWED.items():
@@ -274,8 +274,7 @@ def _load() -> None:
             _loaded.append(module.__name__)
             for entry in module.built_in():
                 about, inner = entry.about or paragraphs().get(entry.name, ""), entry.inner_loop or "scalar"
-                told = replace(entry, about=about, inner_loop=inner)
-                _registry.setdefault(entry.name, told)
+                _registry.setdefault(entry.name, replace(entry, about=about, inner_loop=inner))
                 _shipped.add(entry.name)
             if hasattr(module, "missing"):
                 _missing.update(module.missing())

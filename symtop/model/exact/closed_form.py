@@ -212,16 +212,16 @@ class ClosedForm(_Form[float]):
 
     def run(self, times: Array) -> tuple[Array, Array, Array]:
         """States (n, 7) at a row of times, with p_phi = L_z and p_psi = L.e read off them."""
-        seen = fill(self._all, _in_a_row(times)[0], RUN)[0]
-        return seen[:, :7], seen[:, 7], seen[:, 8]
+        values = fill(self._all, _in_a_row(times)[0], RUN)[0]
+        return values[:, :7], values[:, 7], values[:, 8]
 
     def _constant(self, place: int) -> float:
         return float(self._constants[place])
 
     def _view(self, times: ArrayLike, view: int) -> Array:
         flat_times, shape = _in_a_row(times)
-        seen = fill(self._all, flat_times, view)
-        return seen[0] if len(shape) == 1 else seen.reshape(*shape, WIDTHS[view])
+        values = fill(self._all, flat_times, view)
+        return values[0] if len(shape) == 1 else values.reshape(*shape, WIDTHS[view])
 
 
 def compile_now() -> None:
@@ -334,8 +334,8 @@ class ClosedForms(_Form[Array]):
 
     def run(self, times: ArrayLike) -> tuple[Array, Array]:
         """States (n, samples, 7), and p_phi = L_z and p_psi = L.e read off them, (n, samples, 2)."""
-        seen = self._view(times, RUN)
-        return seen[..., :7], seen[..., 7:]
+        values = self._view(times, RUN)
+        return values[..., :7], values[..., 7:]
 
     def _constant(self, place: int) -> Array:
         return self.constants[:, place]

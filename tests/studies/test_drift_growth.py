@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from symtop_studies.drift.growth import change_point, ensemble_growth, history, horizon, lost_at
 from symtop_studies.drift.phase_loss import phase_loss
 from symtop_studies.drift.runs import elapsed_steps, members
 
 import symtop
-from symtop.measure.conservation import history
-from symtop.measure.growth import change_point, ensemble_growth, growth, horizon, law, lost_at
+from symtop.measure.conservation import growth, law
 from symtop.measure.phase import nutation_phase
 from symtop.run import modified_energy as shadow
 from symtop.run.long_run import chart_of, scattered, watch

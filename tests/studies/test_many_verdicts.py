@@ -1,12 +1,13 @@
-"""Verdicts in one compiled pass against `verdict`, run by run."""
+"""Verdicts in one compiled pass against `judgement`, run by run."""
 
 import math
 
 import numpy as np
 import pytest
 import xarray as xr
+from symtop_studies.stability.many_verdicts import VERDICTS, judge_runs, truths
 
-from symtop.measure.verdicts import VERDICTS, judge_runs, truths, verdict
+from symtop.measure.verdicts import judgement
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
@@ -17,13 +18,13 @@ SAMPLES = 41
 
 
 def run_of(scene_, name, chart, step, count):
-    """A run with its times, and the dataset that `verdict` reads."""
+    """A run with its times, and the dataset that `judgement` reads."""
     h = step * scene_.nutation_period
     plan = Plan.steps(h, np.unique(np.rint(np.linspace(0, count, SAMPLES)).astype(np.int64)))
     run = solve(integrator(name), chart, scene_.top, scene_.start, plan)
     seen = View(chart, scene_.top, run.states, run.p_phi, run.p_psi)
     shown = {name: ("time", getattr(seen, name)) for name in ("theta", "energy", "p_phi", "p_psi")}
-    return plan.times, run, seen, xr.Dataset(shown, attrs={"outcome": run.outcome})
+    return plan.times, run, seen, xr.Dataset(shown, {"time": plan.times}, {"outcome": run.outcome})
 
 
 def one_pass(scene_, times, states, momenta, followed=True):
@@ -54,13 +55,13 @@ def padded(values):
         ("rk4", "angles", 0.15, "drifting"),
     ],
 )
-def test_one_pass_says_what_verdict_says(name, chart, step, word):
+def test_one_pass_says_what_judgement_says(name, chart, step, word):
     cusp = scene("cusp")
     times, run, seen, shown = run_of(cusp, name, chart, step, 400)
     error = axis_distance(seen.axis, closed_form(cusp).axis(times))
     momenta = np.stack([run.p_phi, run.p_psi], axis=-1)
     mapped, largest = one_pass(cusp, times, run.states, momenta)
-    assert mapped == verdict(cusp, shown, error) == word
+    assert mapped == judgement(cusp, shown, error).verdict == word
     assert largest == pytest.approx(error.max(), rel=1e-9)
     early, some = one_pass(cusp, times, run.states, momenta, followed=False)
     assert early == word
@@ -69,7 +70,7 @@ def test_one_pass_says_what_verdict_says(name, chart, step, word):
 
 
 @pytest.mark.parametrize("name", ["rk4", "commutator-free-4", "rkmk-se3-4"])
-def test_one_pass_says_what_verdict_says_of_runs_of_few_steps(name):
+def test_one_pass_says_what_judgement_says_of_runs_of_few_steps(name):
     """Fewer steps than a run has samples: each run has halves of its own, and fewer than 16 samples never drift."""
     cusp, words = scene("cusp"), set()
     for count in range(6, 41):
@@ -79,7 +80,7 @@ def test_one_pass_says_what_verdict_says_of_runs_of_few_steps(name):
                 error = axis_distance(seen.axis, closed_form(cusp).axis(times))
                 seen_by_map = times, run.states, np.stack([run.p_phi, run.p_psi], axis=-1)
                 word = one_pass(cusp, *(padded(values) for values in seen_by_map))[0]
-                assert word == verdict(cusp, shown, error), (count, step)
+                assert word == judgement(cusp, shown, error).verdict, (count, step)
                 words.add((word, times.size < 16))
     assert ("bounded_but_wrong", True) in words
     assert (("drifting", False) in words) == (name != "rkmk-se3-4")

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from symtop_studies.work_precision.walk import CAPPED, TOO_WIDE, Walk, nutation_width, spans, work_table
 
 import symtop
 from symtop.measure.accuracy import error_row
-from symtop.measure.settings import CAPPED, TARGETS, TOO_WIDE, Walk, compared, limits, nutation_width, spans, work_table
+from symtop.measure.settings import TARGETS, compared, limits
 from symtop.methods.framework.registry import methods
 from symtop.model import charts
 from symtop.run.reference.truth import reference

@@ -1,98 +1,66 @@
-"""How an error grows: the exponent of error ~ t^alpha with its interval, where it changes, when a tolerance is lost.
+"""What a long run does to the constants of the motion and to its phase: histories, and laws of growth.
 
-    alpha   0         1/2                       1                        3/2                        2
-    means   bounded   random walk (rounding     steady drift (phase of   phase under a random       phase under a steady
-                      at its best)              a symplectic method)     walk of the energy         drift of the energy
-
-A single exponent is the least-squares slope of the logarithm of the largest error in logarithmic windows. That of a
-random walk needs an ensemble: one walk may return to zero and its largest value says little, but the root mean square
-over members grows as n^1/2, and drawing members with replacement (bootstrap) gives the interval. Source of the laws of
-rounding: Brouwer, Astron. J. 46 (1937) 149; of the interval: Efron, Ann. Statist. 7 (1979) 1.
+The root mean square over the members of an ensemble grows as n^1/2 where each is a random walk. One walk may return to
+zero and its largest value says little; drawing members with replacement (bootstrap) gives the interval. Source of the
+laws of rounding: Brouwer, Astron. J. 46 (1937) 149; of the interval: Efron, Ann. Statist. 7 (1979) 1.
 
 When a tolerance is lost is foretold by the parabola error = a + b t + c t^2 through a short run: b is a wrong frequency
-and c the drift of the frequency that comes with a drift of energy. A c or an a that is not significant is left out.
+and c the drift of the frequency that comes with a drift of energy. A c or an a that is not significant is left out: one
+of less than four standard errors, which are error_k^2 = rest.rest/(n - m) (A^T A)^-1_kk of the columns A (n, m).
 """
 
 import math
-from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike
 
 from symtop.core.numbers import TINY
+from symtop.measure.conservation import Trend, constant_of, residuals, tops
 from symtop.measure.order import Fit, power_law
-from symtop.measure.statistics import columns_fitted
+from symtop.measure.phase import nutation_phase
+from symtop.methods.framework.registry import Integrator
+from symtop.model.charts import Array
+from symtop.model.scenes import Scene
+from symtop.run.simulation import integrate
 
-LAWS = {0.0: "bounded", 0.5: "random walk", 1.0: "linear", 1.5: "t^3/2", 2.0: "quadratic"}
+WINDOWS = 24  # for a change of law: each side of it needs at least five
+SETTLED = 30.0  # nutations: before, an oscillation switches on, which is no change of law
 DRAWS, SEED = 2000, 1937  # of the bootstrap
 BLOCKS = 50
-RUN_ROUNDING = 3e-13  # relative: the largest change that a million steps of rounding explain where sums are compensated
-WALK = 100.0  # times what rounding explains: a larger growth as t^1/2 is no walk of rounding
 
 
-def growth(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Fit:
-    """The exponent of |residual| ~ t^exponent, from the largest values in logarithmic windows of the last `decades`.
+def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:
+    """One run and what became of the constants of the motion and of its phase.
 
-    What happens within the first nutations is an oscillation that switches on, not growth.
+    Dimension ``sample``: ``sample_time`` and, for energy, p_phi and p_psi, ``NAME_residual``. For each of them the
+    ``largest``, the linear ``slope`` with its ``interval`` and ``rise``, and the ``exponent`` of growth over the last
+    two decades; for the phase of the nutation (rad; NaN where there is none) ``largest`` and ``exponent``, over the
+    last decade, because a wrong frequency gives way to a drifting one only late. ``exponent_interval`` goes with each,
+    and ``law``, its name; where one law gives way to another, ``change`` is the time, ``before`` and ``after`` are the
+    exponents (NaN where none does).
     """
-    return power_law(*tops(time, residual, decades))
+    run = integrate(scene, method, observe="nutation", **settings)
+    time = run.time
+    columns: dict[str, Any] = {"sample_time": ("sample", time), "outcome": run.outcome, "steps": run.steps}
+    period = scene.nutation_period
+    late = time > (SETTLED * period if math.isfinite(period) else 0.0)
+    for name, values in residuals(scene, run).items():
+        columns[f"{name}_residual"] = ("sample", values)
+        columns |= _columns(name, constant_of(time, values)._asdict(), time[late], values[late])
+    phase = nutation_phase(scene, time, run.theta, run.p_theta / scene.top.I1)
+    changed = constant_of(time, phase, 1.0)._asdict()
+    without_trend = {part: value for part, value in changed.items() if part not in Trend._fields}
+    return xr.Dataset(columns | _columns("phase", without_trend, time[late], phase[late]))
 
 
-def tops(
-    time: ArrayLike, residual: ArrayLike, decades: float = 2.0, count: int = 12
-) -> tuple[list[float], list[float]]:
-    """Middles of `count` logarithmic windows that fill the last `decades`, and the largest |residual| in each."""
-    t, r = np.asarray(time, float), np.abs(np.asarray(residual, float))
-    edges = np.geomspace(t[-1] / 10.0**decades, t[-1], count + 1)
-    middles, largest = [], []
-    for low, high in pairwise(edges):
-        inside = (t > low) & (t <= high) & np.isfinite(r)
-        if inside.any():
-            middles.append(math.sqrt(low * high))
-            largest.append(float(r[inside].max()))
-    return middles, largest
-
-
-def law(fit: Fit, slack: float = 0.1) -> str:
-    """The name of the exponent that a fit agrees with, within its interval or `slack`; otherwise the exponent.
-
-    "undecided" if another law lies within the interval as well.
-    """
-    if not math.isfinite(fit.slope):
-        return "not judged"
-    nearest = min(LAWS, key=lambda exponent: abs(exponent - fit.slope))
-    if any(abs(exponent - fit.slope) <= fit.interval for exponent in LAWS if exponent != nearest):
-        return "undecided"
-    agrees = abs(nearest - fit.slope) <= max(fit.interval, slack)
-    return LAWS[nearest] if agrees else f"t^{fit.slope:.2f}"
-
-
-def behaviour(size: float, slope: float, interval: float, grain: float = 1.0, rounding: float = 0.0) -> str:
-    """What became of a constant whose largest change is `size` and grows as t^slope (95 %: +- interval).
-
-    The one rule of every study. `grain` is the rounding of the constant in units of the machine's, 1 or more (see
-    `Scene.energy_grain`); `rounding` is what rounding explains beyond ``RUN_ROUNDING * grain``, where sums are plain.
-
-        kept          size <= RUN_ROUNDING grain, whatever the exponent; or size <= rounding, and not bounded
-        bounded       the exponent is nearest to 0, and its interval excludes 1/2: an error of the step, however small
-        random walk   nearest to 1/2, the interval excludes 0 and 1, and size <= `WALK` times rounding
-        drift         nearest to 1 or larger, and the interval excludes 1/2
-        growing       anything else: the interval does not tell two laws apart, a growth as t^1/2 that is too large for
-                      rounding, or no exponent (NaN)
-    """
-    if size <= RUN_ROUNDING * grain:
-        return "kept"
-    low, high = slope - interval, slope + interval
-    if slope < 0.25 and high < 0.5:
-        return "bounded"
-    rounding = max(rounding, RUN_ROUNDING * grain)
-    if size <= rounding:
-        return "kept"
-    if slope >= 0.75 and low > 0.5:
-        return "drift"
-    walks = 0.25 <= slope < 0.75 and low > 0.0 and high < 1.0
-    return "random walk" if walks and size <= WALK * rounding else "growing"
+def _columns(name: str, changed: dict[str, Any], time: np.ndarray, values: np.ndarray) -> dict[str, Any]:
+    """What became of a quantity, and where within the last two decades another law than that of the end ended."""
+    change = change_point(*tops(time, values, count=WINDOWS)) if time.size else None
+    when, before, after = (math.nan,) * 3 if change is None else change
+    parts = changed | {"change": when, "before": before, "after": after}
+    return {f"{name}_{part}": value for part, value in parts.items()}
 
 
 class Ensemble(NamedTuple):
@@ -200,3 +168,12 @@ def _means(time: ArrayLike, error: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     good = np.isfinite(e)
     parts = np.array_split(np.flatnonzero(good), BLOCKS)
     return tuple(np.array([values[part].mean() for part in parts]) for values in (t, e))  # type: ignore[return-value]
+
+
+def columns_fitted(columns: Array, values: Array) -> tuple[Array, Array]:
+    """Coefficients (m,) of columns (n, m) in values (n,), and their standard errors."""
+    coefficients = np.linalg.lstsq(columns, values, rcond=None)[0]
+    rest = values - columns @ coefficients
+    freedom = values.size - columns.shape[1]
+    variances = float(rest @ rest) / freedom * np.linalg.inv(columns.T @ columns).diagonal()
+    return np.asarray(coefficients), np.asarray(np.sqrt(variances))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.run.reference import scene_states
-from symtop.run.reference.scene_states import ANGLES, COLUMNS, DIGITS, TIMES
+from symtop.report import archive
+from symtop.report.archive import ANGLES, COLUMNS, DIGITS, TIMES
 
 THEIRS = dict(zip(ANGLES, ("theta", "phi", "psi", "thetadot", "phidot", "psidot"), strict=True))
 
@@ -35,23 +35,23 @@ def apart(printed, stored):
 @pytest.mark.parametrize("name", ["spheroid_ieee", "goldstein_at_rest_ieee"])
 def test_thirty_digits_agree_with_four_independent_evaluations(truth, name):
     entry = truth[name]
-    row = read(scene_states.states_csv([like(entry)]))[-1]
+    row = read(archive.states_csv([like(entry)]))[-1]
     assert float(row["time"]) == float(entry["t"])
     stored = {ours: entry["state"][theirs] for ours, theirs in THEIRS.items()}
     stored |= dict(zip(COLUMNS[6:], [*entry["axis_xyz"], *entry["quaternion_wxyz"]], strict=True))
     assert all(apart(row[column], value) <= 1 for column, value in stored.items())
-    other = read(scene_states.states_csv([like(entry | {"mgl": str(float(entry["mgl"]) * (1.0 + 2.3e-16))})]))[-1]
+    other = read(archive.states_csv([like(entry | {"mgl": str(float(entry["mgl"]) * (1.0 + 2.3e-16))})]))[-1]
     assert apart(other["theta"], stored["theta"]) > 1e10  # another last bit of mgl is another motion
 
 
 def test_every_scene_has_ten_times_up_to_its_horizon():
-    rows = read(scene_states.states_csv(symtop.scenes().values()))
+    rows = read(archive.states_csv(symtop.scenes().values()))
     assert [row["scene"] for row in rows] == [name for name in symtop.scenes() for _ in range(TIMES)]
     for name, scene in symtop.scenes().items():
         times = [float(row["time"]) for row in rows if row["scene"] == name]
         assert times == sorted(times)
         assert times[-1] == pytest.approx(scene.horizon, rel=1e-5)
-    problems = read(scene_states.scenes_csv(symtop.scenes().values()))
+    problems = read(archive.scenes_csv(symtop.scenes().values()))
     for row, scene in zip(problems, symtop.scenes().values(), strict=True):
         assert symtop.SymmetricTop(*(float(row[key]) for key in ("I1", "I3", "mgl"))) == scene.top
         assert symtop.Angles(*(float(row[key]) for key in ANGLES)) == scene.start
@@ -70,7 +70,7 @@ def distances(data, true, name):
 
 
 def test_the_reference_agrees_with_the_test_set_to_its_bounds():
-    data = scene_states.states(list(symtop.scenes().values()))
+    data = archive.states(list(symtop.scenes().values()))
     for name in symtop.scenes():
         true = symtop.reference(name, data["time"].sel(scene=name).values)
         axis, theta = distances(data, true, name)
@@ -83,7 +83,7 @@ def test_the_reference_agrees_with_the_test_set_to_its_bounds():
 def test_an_integration_in_quadruple_precision_agrees_to_its_bound():
     pytest.importorskip("heyoka")
     names = ["goldstein", "bruls-cardona-arnold"]  # the latter next to a pole
-    data = scene_states.states([symtop.scene(name) for name in names])
+    data = archive.states([symtop.scene(name) for name in names])
     for name in names:
         true = symtop.reference(name, data["time"].sel(scene=name).values, "quad")
         axis, theta = distances(data, true, name)
@@ -94,7 +94,7 @@ def test_an_integration_in_quadruple_precision_agrees_to_its_bound():
 
 def test_the_dataset_and_the_text_hold_the_same_numbers():
     chosen = [symtop.scene("spheroid"), symtop.scene("fast")]
-    data, rows = scene_states.states(chosen), read(scene_states.states_csv(chosen))
+    data, rows = archive.states(chosen), read(archive.states_csv(chosen))
     with localcontext(prec=80):
         for k, row in enumerate(rows):
             cell = data.isel(scene=k // TIMES, sample=k % TIMES)
