@@ -13,7 +13,6 @@ from symtop import advise
 from symtop.advise import regime
 from symtop.cli.main import main
 from symtop.measure import settings
-from symtop.measure.errors import errors_against
 from symtop.measure.ranking import Near
 from symtop.methods.framework.registry import methods
 
@@ -24,8 +23,7 @@ def measured(scene, advice, quantity="axis"):
         scene, advice.integrator, step_size=advice.step_size, tolerance=advice.tolerance, horizon=advice.horizon,
         samples=1009, observe="attitude" if quantity == "attitude" else "axis", guard=False,
     )  # fmt: skip
-    truth = symtop.reference(scene, run["time"].values, precision="closed-form")
-    return float(errors_against(scene, run, truth)[quantity].max())
+    return float(symtop.errors(run)[quantity].max())
 
 
 @pytest.mark.parametrize(("quantity", "accuracy"), [("axis", 1e-6), ("energy", 1e-4)])

@@ -25,7 +25,8 @@ import symtop
 from benchmarks.measured import circumstances
 from benchmarks.peers import Peer, own
 from benchmarks.peers.common import Inner, Library, axes_of
-from symtop.measure.accuracy import SAMPLES, judge_limit
+from symtop.core.numbers import EPSILON
+from symtop.measure.accuracy import SAMPLES
 from symtop.measure.settings import seek, step_ladder
 from symtop.measure.timing import timings
 from symtop.methods.framework.registry import Integrator, methods
@@ -78,7 +79,8 @@ def accuracy(scene: Scene, method: Integrator, setting: float) -> Point:
     error = float(np.max(charts.axis_distance(axis, truth["axis"].values)))
     failed = not math.isfinite(error) or (run is not None and run.outcome != "ok")
     steps, work = (run.steps, run.force_evaluations) if run is not None else (len(times) - 1, 0)
-    return Point(setting, math.nan if failed else error, judge_limit(scene, truth, truth, "axis"), steps, work, elapsed)
+    bound = float(truth["axis_error_bound"].max()) + EPSILON
+    return Point(setting, math.nan if failed else error, bound, steps, work, elapsed)
 
 
 def ladder(scene: Scene, method: Integrator) -> list[float]:

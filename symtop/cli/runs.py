@@ -64,7 +64,7 @@ def run(
     check_outputs(output=output, figure=figure)
     with ticking("running"):  # the packages are loaded under the clock, too
         from symtop.core import netcdf
-        from symtop.measure.errors import QUANTITIES, errors_against
+        from symtop.measure.errors import QUANTITIES, errors
         from symtop.measure.verdicts import judgement
         from symtop.model import scenes
         from symtop.run.reference.truth import reference
@@ -75,7 +75,7 @@ def run(
             netcdf.write(data, output)
         chosen = scenes.scene(scene)
         truth = reference(chosen, data["time"].values, precision="closed-form")
-        error = errors_against(chosen, data, truth)
+        error = errors(data)
         verdict = judgement(chosen, data, error["axis"].values)
         if figure is not None:
             from symtop.report.plot import draw_run

@@ -31,6 +31,7 @@ from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import completed, errors, refuse_other_scene, sampled
 from symtop.model.charts import space_energy
 from symtop.model.scenes import Scene
+from symtop.run.trajectory import Trajectory
 
 FILES = (".csv", ".txt", ".dat", ".nc")
 VECTORS = {"axis": ("ex", "ey", "ez"), "quaternion": ("qw", "qx", "qy", "qz"), "momentum": ("Lx", "Ly", "Lz")}
@@ -111,11 +112,9 @@ def _from_states(scene: Scene, given: Mapping[str, Any], momentum: Any) -> dict[
     """Energy and momenta by the angular momentum and the axis; nothing where one of them is not there."""
     if momentum is None:
         return {}
-    dims = {"axis": ("time", "component"), "quaternion": ("time", "part")}
-    whole = completed(xr.Dataset({name: (dims.get(name, "time"), given[name]) for name in given if name != "time"}))
-    if "axis" not in whole:
+    axis = completed(Trajectory.of_data(given)).axis
+    if axis is None:
         return {}
-    axis = whole["axis"].values
     L = np.asarray(momentum, dtype=float)
     if L.shape != axis.shape:
         raise SymtopError(f"momentum must have the shape {axis.shape}, one row for each time, not {L.shape}")

@@ -31,6 +31,7 @@ from symtop.core.numbers import EPSILON
 from symtop.measure.verdicts import STEADY
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
+from symtop.run.trajectory import Trajectory
 
 FREQUENCIES: dict[str, str] = {
     "nutation_period": "relative error of nutation period",
@@ -103,11 +104,9 @@ def nutation_phase(scene: Scene, time: Array, theta: Array, theta_dot: Array) ->
     return phase
 
 
-def split(scene: Scene, run: xr.Dataset) -> Split:
+def split(scene: Scene, run: Trajectory) -> Split:
     """Shape error and lags at every sample (n,) of a run without failures."""
-    u = np.cos(run["theta"].values)
-    du = -np.sin(run["theta"].values) * run["p_theta"].values / scene.top.I1
-    return _split(scene, run["time"].values, u, du, run["phi"].values)
+    return _split(scene, run.time, np.cos(run.theta), -np.sin(run.theta) * run.p_theta / scene.top.I1, run.phi)
 
 
 def _split(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Split:
@@ -154,12 +153,12 @@ def _doubt(t: Array, bound: Array, weights: Array) -> float:
     return float(np.sum(weights * middle * bound) / np.sum(weights * middle * middle))
 
 
-def phase(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> Phase:
+def phase(scene: Scene, run: Trajectory, truth: xr.Dataset) -> Phase:
     """Shape, lags and frequencies of a run; all NaN if it failed or has fewer than three samples."""
-    if run.attrs["outcome"] != "ok" or run.sizes["time"] < 3:
+    if run.outcome != "ok" or run.time.size < 3:
         return Phase(*[math.nan] * 7)
-    form, t = closed_form(scene), run["time"].values
-    sine = np.maximum(np.sin(run["theta"].values), EPSILON)
+    form, t = closed_form(scene), run.time
+    sine = np.maximum(np.sin(run.theta), EPSILON)
     with np.errstate(over="ignore", invalid="ignore"):  # a run may be far from anything
         parts = split(scene, run)
     # on a separatrix the whole run is the time scale, not `Scene.time_scale`: a rate is judged over what was seen

@@ -97,7 +97,7 @@ def test_an_edited_kernel_makes_the_cases_that_use_it_stale_and_no_others(place,
     "place",
     [
         "symtop.model.top:SymmetricTop.potential", "symtop.run.simulation:simulate",
-        "symtop.model.exact.motion_constants:all_constants",
+        "symtop.model.exact.constants:all_constants",
         "symtop.methods.framework.calling:solve",
     ],
 )  # fmt: skip
@@ -117,7 +117,7 @@ def test_measure_code_and_the_reference_make_the_cases_of_their_study_stale():
 @pytest.mark.parametrize(
     ("place", "again"),
     [
-        ("symtop.measure.ranking:winners", True), ("symtop_studies.work_precision.words:sentences", True),
+        ("symtop_studies.work_precision.leads:winners", True), ("symtop_studies.work_precision.words:sentences", True),
         ("symtop.runner.store:_dense", True), ("symtop.cli.common:as_text", False),
         ("symtop_studies.drift.words:verdict", False),
     ],

@@ -13,12 +13,10 @@ from symtop_studies.stability.tables import Column, family_limits, map_table, sa
 
 import symtop
 from symtop.core import netcdf
-from symtop.measure.errors import errors_against
 from symtop.measure.verdicts import judgement
 from symtop.methods.framework.registry import integrator, methods
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
-from symtop.run.reference.truth import reference
 from symtop.runner import run as runner, store
 from symtop.runner.study import Case
 
@@ -37,7 +35,7 @@ def test_a_map_says_what_single_runs_say(name):
                 spun, name, step_size=value * spun.nutation_period, horizon=horizon, samples=241, observe="axis",
                 guard=False,
             )  # fmt: skip
-            error = errors_against(spun, run, reference(spun, run["time"].values, "closed-form"))["axis"].values
+            error = symtop.errors(run)["axis"].values
             mapped = VERDICTS[runs.verdict[place, column]]
             single = judgement(spun, run, error).verdict
             assert (mapped == "accurate") == (single == "accurate"), (ratio, value, mapped, single)

@@ -10,6 +10,7 @@ import symtop
 from symtop.measure.phase import split
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
+from symtop.run.trajectory import Trajectory
 
 FAR = runs.horizons()
 SHORT = FAR <= 1.0001e3
@@ -90,7 +91,7 @@ def test_the_shape_is_the_distance_from_the_true_orbit_whatever_the_delay():
     u = np.cos(run["theta"].values)
     rate = -np.sin(run["theta"].values) * run["p_theta"].values / on.top.I1
     mine = runs.shape(tops, u[np.newaxis], rate[np.newaxis])[0]
-    theirs = split(on, run).shape
+    theirs = split(on, Trajectory.of_data(run)).shape
     big = theirs > 0.2 * theirs.max()
     np.testing.assert_allclose(mine[big], theirs[big], rtol=0.05)
     late = closed_form(on)(run["time"].values + 0.3)  # the truth, early: no error of shape, but one of phase
