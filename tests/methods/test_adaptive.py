@@ -30,9 +30,10 @@ def members(count=60):
 
 def test_the_adaptive_solvers_are_own_ones():
     assert {name.split("[")[0] for name in SOLVERS} == {
-        "rk45-compiled", "tsit5", "dop853-compiled", "vern9", "extrapolation", "series-adaptive",
+        "rk45-compiled", "tsit5", "dop853-compiled", "vern9", "extrapolation", "adams", "dprkn8", "series-adaptive",
+        "series-general-adaptive",
     }  # fmt: skip
-    assert len(SOLVERS) == 17
+    assert len(SOLVERS) == 23
 
 
 @pytest.mark.parametrize("budget", [None, BUDGET])
