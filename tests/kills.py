@@ -19,7 +19,7 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.runner import store
-from symtop.runner.check import differences
+from symtop.runner.cases import differences
 from tests.commands import ended, leftovers, symtop
 
 PATIENCE = 2400.0  # seconds for an undisturbed run

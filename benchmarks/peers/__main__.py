@@ -13,7 +13,7 @@ from benchmarks.peers.study import STUDY, measured
 from benchmarks.peers.summary import lines
 from symtop.core import netcdf
 from symtop.report import style
-from symtop.runner import analyse, store
+from symtop.runner import run as runner, store
 
 
 def main() -> None:
@@ -36,7 +36,7 @@ def main() -> None:
         data = netcdf.describe(measure(peers, options.scenes), STUDY.title, question=STUDY.question)
         netcdf.write(data, file)
         many = together.measure(SOLVERS if any(peer.package == DIFFRAX for peer in peers) else ())
-    findings = analyse.findings_of(
+    findings = runner.findings_of(
         STUDY, data, options.results, style.publish, failures=missing, cases=data["seconds"].count().item()
     )
     if many:

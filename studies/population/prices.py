@@ -26,7 +26,7 @@ import xarray as xr
 
 from symtop.measure.timing import Timing, timings
 from symtop.methods.framework.adaptive import Adaptive
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.charts import Array

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.core.numbers import EPSILON, GOLDEN, TINY
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import members_of
 from symtop.model import charts, scenes
 from symtop.model.charts import Array, axis_of, space_energy
 from symtop.model.exact.closed_form import ClosedForms
@@ -47,7 +47,7 @@ class Body(NamedTuple):
 
 
 class Shown(Protocol):
-    """What n runs have shown, such as `symtop.methods.framework.many.Many`."""
+    """What n runs have shown, such as `symtop.methods.framework.lanes.Many`."""
 
     @property
     def states(self) -> Array:

@@ -10,10 +10,10 @@ Two rounds. First every variant walks down to each target on every scene and ove
 """
 
 import xarray as xr
+from symtop_studies.grid import grid_scenes
 
 from symtop.measure.settings import compared
 from symtop.model.scenes import TAGS
-from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
 from . import energy, words

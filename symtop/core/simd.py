@@ -3,7 +3,7 @@
 A recurrence whose every term needs all terms before it, a Taylor series, is unrolled completely and has no loop that
 could be vectorised. Written as arithmetic of `Vectors` it is, and an order of 20 takes a fifth of the time.
 Every operation rounds as IEEE 754 says, and products are fused with sums where `fma` stands and nowhere else, so that
-the result does not hang on the processor. One without AVX does the same on two or four registers.
+the result does not hang on the processor.
 
 `Components` writes the same operations on four scalars each, to the same bits: inside a loop over many members LLVM
 makes vectors of the members, and a component that nobody reads is not computed.

@@ -21,10 +21,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from symtop.core.errors import SymtopError, words_of
+from symtop.judging.adapters.adapter import heartbeat
 from symtop.judging.battery import Stage, measure, stages, unmeasured
 from symtop.judging.claims.subject import Request
-from symtop.judging.findings import Finding
-from symtop.judging.heartbeat import heartbeat
+from symtop.judging.findings import About, Finding
 
 THREADED = "jax"  # hangs in a process that was forked after its import
 LOOK = 0.05  # seconds between two looks
@@ -34,15 +34,6 @@ VERDICT, QUICK_VERDICT = (45.0, 120.0, 15.0), (12.0, 40.0, 6.0)
 WORDS = 160  # characters of what a process says before it ends
 
 
-class About(NamedTuple):
-    """What is judged, once it is open."""
-
-    name: str
-    chart: str
-    implementation: str
-    seconds_a_step: float
-
-
 class Results(NamedTuple):
     """The findings of one stage, and what a figure shows of all stages so far."""
 
@@ -50,11 +41,8 @@ class Results(NamedTuple):
     traces: dict[str, Any]
 
 
-class _Failure(NamedTuple):
-    """Why a process was ended, or ended by itself."""
-
-    why: str
-    backwards: bool = False  # it was in a step of -h
+class _LostError(Exception):
+    """A process was ended, or ended by itself: why, and whether it was in a step of -h."""
 
 
 def run(request: Request) -> Iterator[About | Results]:
@@ -66,31 +54,29 @@ def run(request: Request) -> Iterator[About | Results]:
     heartbeat.reset(quick=request.quick)
     opened, began = False, time.monotonic()
     while todo:
-        failure = None
-        for event in _isolated(request, todo, began):
-            if isinstance(event, _Failure):
-                failure = event
-            elif isinstance(event, Results):
-                todo.pop(0)
-                yield event
-            elif not opened:
+        try:
+            for event in _isolated(request, todo, began):
+                if isinstance(event, Results):
+                    todo.pop(0)
+                if isinstance(event, Results) or not opened:
+                    yield event
                 opened = True
-                yield event
-        if failure is None:
+        except _LostError as failure:
+            if not opened:
+                raise SymtopError(f"it cannot be judged: {failure.args[0]}") from None
+            yield from _left_open(request, todo, *failure.args)
+        else:
             return
-        if not opened:
-            raise SymtopError(f"it cannot be judged: {failure.why}")
-        yield from _lost(request, failure, todo)
 
 
-def _lost(request: Request, failure: _Failure, todo: list[Stage]) -> Iterator[Results]:
+def _left_open(request: Request, todo: list[Stage], why: str, backwards: bool) -> Iterator[Results]:
     """What a failure leaves undecided: one stage; all without a call; none if it was a step of -h, then refused."""
-    if failure.backwards and not heartbeat.forward_only:
+    if backwards and not heartbeat.forward_only:
         heartbeat.forward_only = True
         return
     for stage in todo[:] if todo[0][0].name == "calls" else todo[:1]:
         todo.remove(stage)
-        yield Results(unmeasured(stage, request.claimed(), failure.why), {})
+        yield Results(unmeasured(stage, request.claimed(), why), {})
 
 
 def _work(request: Request, todo: list[Stage]) -> Iterator[About | Results]:
@@ -102,15 +88,15 @@ def _work(request: Request, todo: list[Stage]) -> Iterator[About | Results]:
         yield Results(measure(stage, subject), subject.traces)
 
 
-def _isolated(request: Request, todo: list[Stage], first: float) -> Iterator[About | Results | _Failure]:
-    """The stages in a forked process, and at last why it ended if not well; `first` is when the judging began."""
+def _isolated(request: Request, todo: list[Stage], first: float) -> Iterator[About | Results]:
+    """The stages in a forked process; `first` is when the judging began."""
     context: Any = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe()
     with tempfile.TemporaryFile() as output, ours:
         process = context.Process(target=_child, args=(request, list(todo), theirs, output), daemon=True)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # newer versions of Python warn of threads; the child uses none of theirs
-            heartbeat.end()
+            heartbeat.inside = False
             process.start()
         theirs.close()
         try:
@@ -132,43 +118,38 @@ def _child(request: Request, todo: list[Stage], pipe: Any, output: Any) -> None:
     try:
         for event in _work(request, todo):
             pipe.send(event)
-    except SymtopError as error:
-        pipe.send(error)
     except BaseException as error:  # noqa: BLE001  (somebody else's code)
-        pipe.send(_Failure(words_of(error)))
+        pipe.send(error if isinstance(error, SymtopError) else _LostError(words_of(error), False))
     pipe.send(None)
 
 
-def _events(process: Any, pipe: Any, output: Any, first: float, *, quick: bool) -> Iterator[About | Results | _Failure]:
-    """What the process sends, until it ends, hangs in a call or takes too long for a stage."""
+def _events(process: Any, pipe: Any, output: Any, first: float, *, quick: bool) -> Iterator[About | Results]:
+    """What the process sends; _LostError if it ends otherwise, hangs in a call or takes too long for a stage."""
     limit, began = OPENING, _clock(process.pid)
-    calls, since = heartbeat.look().calls, began
+    calls, since = heartbeat.calls, began
     while True:
         if pipe.poll(LOOK):
             try:
                 event = pipe.recv()
             except EOFError:
-                event = _Failure(_death(process, output))
-            if isinstance(event, SymtopError):
+                event = _LostError(_death(process, output), False)
+            if isinstance(event, Exception):
                 raise event
-            if event is not None:
-                yield event
-            if event is None or isinstance(event, _Failure):
+            if event is None:
                 return
+            yield event
             began = _clock(process.pid)
             most, together, least = QUICK_VERDICT if quick else VERDICT
             limit = max(least, min(most, together - (began - first)))
             continue
-        beat, now = heartbeat.look(), _clock(process.pid)
-        if beat.calls != calls or not beat.inside:
-            calls, since = beat.calls, now
-        if now - since > beat.allowed:
-            why = f"a step of h = {beat.step:.3g} had not returned after {now - since:.0f} s"
-            yield _Failure(why, beat.step < 0)
-            return
+        now = _clock(process.pid)
+        if heartbeat.calls != calls or not heartbeat.inside:
+            calls, since = heartbeat.calls, now
+        if now - since > heartbeat.allowed:
+            why = f"a step of h = {heartbeat.step:.3g} had not returned after {now - since:.0f} s"
+            raise _LostError(why, heartbeat.step < 0)
         if now - began > limit:
-            yield _Failure(f"it was not judged within {limit:.0f} s")
-            return
+            raise _LostError(f"it was not judged within {limit:.0f} s", False)
 
 
 def _clock(pid: int) -> float:
@@ -185,9 +166,9 @@ def _clock(pid: int) -> float:
 
 def _death(process: Any, output: Any) -> str:
     process.join(2.0)
-    code, beat = process.exitcode, heartbeat.look()
+    code = process.exitcode
     if code is not None and code < 0:
-        during = f" in a step of h = {beat.step:.3g}" if beat.inside else ""
+        during = f" in a step of h = {heartbeat.step:.3g}" if heartbeat.inside else ""
         return f"its process was ended by {signal.Signals(-code).name}{during}"
     output.seek(0)
     words = " ".join(output.read()[-4 * WORDS :].decode(errors="replace").split())[-WORDS:]

@@ -77,16 +77,16 @@ def step_series(step: StepMap, start: Angles, period: float) -> Series:
 
     Raises SymtopError if no step succeeds.
     """
-    exact, z, before = motion_from(step, start), step.point(start), step.at(start)
+    exact, z, before = closed_form(Scene("start", step.top, start, 1.0)), step.point(start), step.at(start)
+
+    def motion(h: float) -> Array:
+        return step.at(Angles(*(float(value[0]) for value in exact(np.array([h])))))
+
     return compared(
-        lambda h: aligned(step.chart, step.image(z, h), before), lambda h: aligned(step.chart, exact(h), before), period
+        lambda h: aligned(step.chart, step.image(z, h), before),
+        lambda h: aligned(step.chart, motion(h), before),
+        period,
     )
-
-
-def motion_from(step: StepMap, start: Angles) -> Callable[[float], Array]:
-    """Y of the true motion from a start, as a function of time."""
-    exact = closed_form(Scene("start", step.top, start, 1.0))
-    return lambda h: step.at(Angles(*(float(value[0]) for value in exact(np.array([h])))))
 
 
 def compared(image: Callable[[float], Array], motion: Callable[[float], Array], period: float) -> Series:

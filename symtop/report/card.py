@@ -17,9 +17,7 @@ import numpy as np
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home
-from symtop.judging.findings import Finding, claim_name
-from symtop.judging.judge_step import StepLedger
-from symtop.judging.text_report import description
+from symtop.judging.findings import Finding, StepLedger, claim_name, description
 from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels
 
 LEAST = 1e-17  # what is smaller is drawn here

@@ -116,7 +116,7 @@ def test_a_damaged_checkpoint_is_not_gone_on_from(tmp_path, monkeypatch, flips):
     par, rule, state = solver.setup(scene.top, scene.start, H)
     start = solver.loop.begun(par, rule, state, H)
     for file in (True, tmp_path / "own.nc"):
-        book = longrun._Book(file, "an identity")
+        book = longrun._Checkpoint(file, "an identity")
         book.latest = start._replace(k=7), [[0.5] * 15] * 3
         book.save()
         good = book.resumed(start)

@@ -7,7 +7,7 @@ import pytest
 
 import symtop
 from symtop.methods.framework.adaptive import Adaptive
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
 from symtop.run.ensemble.chunks import nutation_periods

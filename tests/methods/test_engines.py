@@ -6,17 +6,17 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from symtop_studies.grid import grid_variants
 
 import symtop
 from symtop.judging.battery import judge
 from symtop.measure.settings import compared
 from symtop.methods.framework import registry
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import Plan
 from symtop.model import charts
 from symtop.model.top import flat
-from symtop.runner.grid import grid_variants
 from tests.conftest import random_scenes
 from tests.methods import engine_formulas
 

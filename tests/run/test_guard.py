@@ -270,19 +270,3 @@ def test_every_method_can_be_probed_and_is_told_what_it_can_do():
         found = guard.forecast(where, method, method.charts()[0], plan)
         assert found.outcome == "ok"
         assert found.axis_error < 1e-2
-
-
-def test_the_command_line_prints_it_before_the_run_and_can_be_told_not_to():
-    from click.testing import CliRunner
-
-    from symtop.cli.main import main
-
-    words = ["run", "goldstein", "midpoint", "--step-size", "0.1", "--horizon", "200"]
-    told, quiet = (CliRunner().invoke(main, [*words, *more]) for more in ([], ["--no-guard"]))
-    assert told.exit_code == quiet.exit_code == 0
-    assert told.output.splitlines()[0].startswith("symtop: midpoint on goldstein: expect an axis error of")
-    assert "expect" not in quiet.output
-    assert told.stdout == quiet.stdout  # the warning goes to stderr, the run is the same
-    short = CliRunner().invoke(main, ["run", "goldstein", "taylor", "--budget", "3"])
-    assert short.exit_code == 3
-    assert "the limit on the work of one run was reached" in short.output

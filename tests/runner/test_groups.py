@@ -6,7 +6,8 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError
-from symtop.runner import check, store
+from symtop.runner import store
+from symtop.runner.cases import differences
 from symtop.runner.study import Case
 
 LONG = xr.Dataset({"energy": ("window", [1.0, 2.0, 3.0]), "outcome": "ok", "steps": 3})
@@ -36,25 +37,20 @@ def test_a_tree_is_read_as_it_was_written(tmp_path):
     data = netcdf.describe(tree(), "Groups", question="Does it come back?")
     path = netcdf.write(data, tmp_path / "groups.nc")
     again = netcdf.read_any(path)
-    assert check.differences(data, again) == []
+    assert differences(data, again) == []
     assert again["phases/energy"].dtype == np.uint8
     assert again.attrs["question"] == "Does it come back?"
     assert again["windows/energy"].attrs["long_name"] == "total energy"
-    flat = netcdf.write(LONG, tmp_path / "flat.nc")
-    assert isinstance(netcdf.read_any(flat), xr.Dataset)
-    path.write_bytes(path.read_bytes()[:2000])
-    with pytest.raises(SymtopError, match="cannot read"):
-        netcdf.read_any(path)
 
 
 def test_a_check_names_the_group_that_differs():
-    assert check.differences(tree(), tree()) == []
-    (difference,) = check.differences(tree(), tree(PHASE + np.uint8(1)))
+    assert differences(tree(), tree()) == []
+    (difference,) = differences(tree(), tree(PHASE + np.uint8(1)))
     assert difference.startswith("phases: energy differs")
     lost = tree()
     del lost["phases"]
-    assert check.differences(tree(), lost) == ["group phases is in one of them only"]
-    assert check.differences(LONG, LONG) == []
+    assert differences(tree(), lost) == ["group phases is in one of them only"]
+    assert differences(LONG, LONG) == []
 
 
 def test_cases_that_would_replace_each_other_are_refused():

@@ -29,8 +29,7 @@ import numpy as np
 from symtop.core.jit import fused, register_jitable, set_item
 from symtop.core.numbers import EPSILON
 from symtop.methods.framework.equations import FORMULATIONS
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import Loop, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import plus, row_of, store
