@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
+from symtop_studies.memoize import of_one_dataset
 
-from symtop.core.memoize import of_one_dataset
 from symtop.measure.ranking import NEEDS, Place, cheapest, ranked
 from symtop.measure.settings import TARGETS
 

@@ -78,10 +78,7 @@ results_option = click.option(
 
 
 class Group(click.Group):
-    """Prints a SymtopError, or a file that cannot be used, as one sentence and exits with code 2; 130 after Ctrl-C.
-
-    A sentence names options in the place of arguments. A SymtopWarning is a line like those of the commands.
-    """
+    """Prints an error as one sentence that names options, and exits with code 2; 130 after Ctrl-C."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
@@ -177,10 +174,7 @@ def say_written(*files: str | None, err: bool = False) -> None:
 
 
 def check_outputs(**files: str | None) -> None:
-    """Refuse, before a run, what cannot be written; `files` by the names of their options.
-
-    An ending says what a file is, its folder is there, what it replaces is an earlier result, and no two are the same.
-    """
+    """Refuse, before a run, endings, folders and files that cannot be written; `files` by the names of options."""
     options = dict[Path, str]()
     for name, file in files.items():
         if file is None:

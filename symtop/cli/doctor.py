@@ -69,10 +69,7 @@ def _machine(_: Path) -> list[Finding]:
 
 
 def _packages(_: Path) -> list[Finding]:
-    """Every requirement of symtop's metadata that applies to this machine, and whether its version is in range.
-
-    A requirement of an extra may be absent; one that is installed must be in range too.
-    """
+    """Every requirement that applies to this machine, and whether its version is in range; one of an extra may lack."""
     from packaging.requirements import Requirement
 
     extras = importlib.metadata.metadata("symtop").get_all("Provides-Extra") or []

@@ -87,10 +87,7 @@ def study(
 
 
 def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick: bool = False) -> "list[Study]":
-    """The studies of those names, each once, or all of them; of some integrators alone if `only` names them.
-
-    Of several studies those that have no case of these integrators are left out, with a warning.
-    """
+    """The studies of those names, each once, or all; of the integrators in `only` alone, where they have such cases."""
     from symtop.methods.framework.registry import integrator
     from symtop.runner import scripts
 

@@ -97,10 +97,8 @@ def packages(*names: str) -> Reasons:
 
 
 PACKAGE = Path(__file__).resolve().parent.parent
-PLUMBING = frozenset(
-    Path(__file__).with_name(f"{name}.py").resolve()
-    for name in ("cluster", "code_hash", "errors", "files", "memoize", "netcdf", "parallel", "progress", "signals")
-)
+_PLUMBING = ("code_hash", "errors", "files", "netcdf", "parallel", "progress", "signals")
+PLUMBING = frozenset([PACKAGE / "run" / "cluster.py", *(PACKAGE / "core" / f"{name}.py" for name in _PLUMBING)])
 roots: dict[str, Path] = {PACKAGE.name: PACKAGE}  # name of a known package: its folder
 
 

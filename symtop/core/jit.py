@@ -6,13 +6,9 @@ of a kernel is named after a hash of everything it is compiled from (`symtop.cor
 and values of its functions, wherever they stand, and the versions of Python and numba. The first time a process saves a
 kernel it removes those that nobody used for 30 days, and the oldest ones beyond `MOST_BYTES`.
 
-Beside it stand the operations that numba lacks.
-
-    fused     a b + c with one rounding. A number on the grid of its last place plus a correction that hardly changes
-              from step to step is rounded the same way every time, a bias of up to half a unit in the last place; the
-              exact product has random digits below that grid, and added before the rounding they remove the bias.
-    times     a row of numbers, each multiplied by one instruction: LLVM unrolls a loop over a tuple up to about 16
-              elements and copies the tuple in each pass beyond.
+Beside it stands `fused`, a b + c with one rounding, which numba lacks. A number on the grid of its last place plus a
+correction that hardly changes from step to step is rounded the same way every time, a bias of up to half a unit in the
+last place; the exact product has random digits below that grid, and added before the rounding they remove the bias.
 """
 
 import contextlib
@@ -273,17 +269,6 @@ def _two_product(a, b):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def _times(typing, values, by):  # type: ignore[no-untyped-def]
-    def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        result, factor = arguments
-        for i in range(len(values)):
-            result = builder.insert_value(result, builder.fmul(builder.extract_value(result, i), factor), i)
-        return result
-
-    return values(values, types.float64), emit
-
-
-@intrinsic
 def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
     """place + h w_0 terms_0 + h w_1 terms_1 + ... of tuples, in this order and without the terms whose weight is None.
 
@@ -302,34 +287,3 @@ def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
         return result
 
     return place(place, terms, weights, h), emit
-
-
-def _scaled(values: Any, by: float) -> Any:
-    for i in range(len(values)):
-        values[i] = values[i] * by
-    return values
-
-
-def _put(values: Any, i: int, value: float) -> Any:
-    values[i] = value
-    return values
-
-
-def times(values: Any, by: float) -> Any:
-    """A row of doubles, each multiplied by the number `by`: a new tuple, or the same array."""
-    return tuple(value * by for value in values) if isinstance(values, tuple) else _scaled(values, by)
-
-
-def with_item(values: Any, i: int, value: float) -> Any:
-    """A row with number i replaced: a new tuple, or the same array."""
-    return (*values[:i], value, *values[i + 1 :]) if isinstance(values, tuple) else _put(values, i, value)
-
-
-@overload(times, jit_options=INLINED, strict=False)
-def _compiled_times(values: Any, by: float) -> Callable[..., Any]:
-    return _scaled if isinstance(values, types.Array) else lambda values, by: _times(values, by)  # noqa: PLW0108
-
-
-@overload(with_item, jit_options=INLINED, strict=False)
-def _compiled_with_item(values: Any, i: int, value: float) -> Callable[..., Any]:
-    return _put if isinstance(values, types.Array) else lambda values, i, value: set_item(values, i, value)  # noqa: PLW0108

@@ -30,12 +30,13 @@ import xarray as xr
 from pebble import ProcessExpired, ProcessPool
 from tqdm import tqdm
 
-from symtop.core import cluster, files, netcdf, parallel
+from symtop.core import files, netcdf, parallel
 from symtop.core.errors import SymtopError, words_of
 from symtop.core.signals import at_most, is_of_user
 from symtop.measure.timing import bare_run
 from symtop.methods.framework.registry import integrator, integrators, split_name
 from symtop.model.scenes import scene
+from symtop.run import cluster
 from symtop.runner import fingerprint, plugins, scripts, store
 from symtop.runner.study import Case, Study
 

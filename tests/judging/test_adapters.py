@@ -16,7 +16,7 @@ from scipy.integrate import RK23
 import symtop
 from symtop.cli.judge import FORMS as OFFERED
 from symtop.cli.main import main
-from symtop.judging import sandbox
+from symtop.judging import judge_step
 from symtop.judging.adapters.adapter import heartbeat, integrator, label_of
 from symtop.judging.adapters.python_step import PythonStep, RotationStep, SeparableStep, to_body, to_space
 from symtop.judging.battery import CLAIMS, TABLE
@@ -319,13 +319,13 @@ def test_waiting_for_a_processor_takes_none_of_the_time_that_judging_has():
     try:
         for process in (0, busy.pid):
             os.sched_setaffinity(process, {min(allowed)})
-        wall, counted, worked = time.monotonic(), sandbox._clock(os.getpid()), time.process_time()
+        wall, counted, worked = time.monotonic(), judge_step._clock(os.getpid()), time.process_time()
         while time.process_time() < worked + 0.3:
             pass
-        assert sandbox._clock(os.getpid()) - counted < 0.8 * (time.monotonic() - wall)
-        counted = sandbox._clock(os.getpid())
+        assert judge_step._clock(os.getpid()) - counted < 0.8 * (time.monotonic() - wall)
+        counted = judge_step._clock(os.getpid())
         time.sleep(0.2)
-        assert sandbox._clock(os.getpid()) - counted > 0.19
+        assert judge_step._clock(os.getpid()) - counted > 0.19
     finally:
         os.sched_setaffinity(0, allowed)
         busy.kill()

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.judging.adapters.array_step import field_of
+from symtop.judging.adapters.external import field_of
 from symtop.judging.claims.subject import open_target
 from symtop.methods.framework.equations import FORMULATIONS
 

@@ -122,9 +122,8 @@ def integrator(stepper: Stepper, **claims: Any) -> Integrator:
 class Heartbeat(ctypes.Structure):
     """Counts calls of a step, in memory that a forked process shares: ``with heartbeat.call(h): step(...)``.
 
-    `calls` have begun so far; `step` is the h of the last one, which is under way if `inside` and may take `allowed`
-    seconds. What it raises becomes a SymtopError. `forward_only` is set after a step backwards has not returned: such
-    steps are refused from then on.
+    `calls` have begun; `step` is the h of the last one, which is under way if `inside` and may take `allowed` seconds.
+    What it raises becomes a SymtopError. Once a step backwards has not returned, `forward_only` refuses such steps.
     """
 
     _fields_ = (("calls", c_long), ("step", c_double), ("inside", c_bool), ("allowed", c_double))

@@ -306,10 +306,7 @@ class Limit(NamedTuple):
 
 
 def limit(method: Integrator, scene: Scene, power: int, finest: float | None = None) -> Limit:
-    """How far from the true motion a run ends in the limit of small steps, for a method whose order is `power`.
-
-    The finest of the three runs has at most `finest` steps.
-    """
+    """How far from the true motion runs of a method of order `power`, of `finest` steps at most, end as h -> 0."""
     fewest = STEPS.get(power, 200) // (1 if method.implementation == "compiled" else 20)
     if finest is not None:
         fewest = min(fewest, int(finest) // 4)
@@ -359,16 +356,13 @@ def _exactness(subject: Subject) -> Finding:
 
 
 def table_of(method: Integrator) -> Conditions | None:
-    """The conditions of an explicit Runge-Kutta method of fixed step or a splitting into two flows, None for any other.
-
-    A splitting whose drift is a Cayley map has no table of this kind: its drift is no flow.
-    """
+    """The conditions of an explicit Runge-Kutta method of fixed step or of a splitting into two flows; else None."""
     for solver in method.solvers.values():
         rule: Any = solver.rule if isinstance(solver, FixedStep) else None
         rule = rule.rule if isinstance(rule, Scaled) else rule
         if isinstance(rule, Tableau):
             return conditions(triangle(rule.a, len(rule.b)), rule.b)
-        if isinstance(rule, Composition) and rule.turn == EXACT:
+        if isinstance(rule, Composition) and rule.turn == EXACT:  # a Cayley map is no flow
             return splitting_conditions(rule.drift, rule.kick, rule.gradient, rule.processor)
     return None
 

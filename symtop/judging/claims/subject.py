@@ -19,8 +19,7 @@ import numpy as np
 from symtop.core.errors import SymtopError, foreign_code, one_of
 from symtop.core.files import execute, python_file
 from symtop.judging.adapters.adapter import Stepper, integrator
-from symtop.judging.adapters.array_step import BatchStep, DiffraxSolver, is_solver
-from symtop.judging.adapters.external import Program, SharedObject
+from symtop.judging.adapters.external import BatchStep, DiffraxSolver, Program, SharedObject, is_solver
 from symtop.judging.adapters.python_step import PythonStep, RotationStep, ScipySolver, SeparableStep
 from symtop.judging.findings import yes_no
 from symtop.measure.conservation import CONSTANTS as MOTION
@@ -157,10 +156,7 @@ def form_of(target: Any) -> str:
 
 
 def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = False) -> Stepper:
-    """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command.
-
-    Raises SymtopError for anything that is none of these, or that cannot be loaded.
-    """
+    """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else."""
     kind = one_of("form", form or form_of(target), FORMS)
     one_of("chart", chart, CHARTS)
     if kind == "program":

@@ -49,10 +49,10 @@ from numpy.typing import NDArray
 
 from symtop.core.jit import compile_kernel, register_jitable, set_item
 from symtop.core.parallel import heed
-from symtop.core.simd import wide_vectors
 from symtop.methods.framework.angles import in_chart
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.preparation import Body, Pack, Start, as_fields, conserved
+from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 from symtop.model.top import Angles, SymmetricTop
 

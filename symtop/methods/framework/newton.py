@@ -24,9 +24,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.core.simd import wide_vectors
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
 from symtop.methods.framework.plan import OK
+from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 
 NEGLIGIBLE_ANGLE = 1e-18  # radians: no correction below this can matter to an angle

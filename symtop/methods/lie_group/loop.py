@@ -26,12 +26,12 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.core.simd import wide_vectors
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Body, Preparation, Shown, as_it_steps
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, observe_attitude, on_attitude, with_spin
+from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate, cross, dot, plus, scaled
 
 _attitude_numbers = on_attitude.numbers

@@ -37,11 +37,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.core.simd import wide_vectors
 from symtop.methods.framework.lanes import Lanes, W, column
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group.loop import UNSPUN, entered, give_up, in_both_charts, left, lie_loop, moved, stepped
+from symtop.methods.simd import wide_vectors
 from symtop.methods.splitting.rotor import COSINE, SINE, series
 from symtop.methods.vectors import cross, dot, plus, scaled
 

@@ -51,7 +51,6 @@ import numpy as np
 
 from symtop.core.jit import register_jitable, set_item
 from symtop.core.multiprecision import context
-from symtop.core.simd import wide_vectors
 from symtop.methods.framework import space
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
@@ -59,6 +58,7 @@ from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Later
 from symtop.methods.framework.registry import Array, Integrator
 from symtop.methods.framework.space import SpaceTop, field_axis, field_frame, observe_axis
+from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 
 ENOUGH = 1e-9  # a correction in units of |e| = 1, whose square is below rounding

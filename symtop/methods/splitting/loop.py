@@ -24,11 +24,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.core.jit import register_jitable, set_item, times, to_fixed_tuple, with_item
-from symtop.core.simd import wide_vectors
+from symtop.core.jit import register_jitable, set_item, to_fixed_tuple
 from symtop.methods.framework.lanes import Lanes, W, column, put
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.preparation import as_fields
+from symtop.methods.simd import times, wide_vectors, with_item
 from symtop.methods.vectors import accumulate
 
 SHORT = 2  # drifts

@@ -8,7 +8,7 @@
 
 c1 and c0 are constants of the motion, so that the equation of w is linear with the coefficient u, and that of u knows u
 alone. With y = w/(h mgl), a = h/I1, m = h mgl, P = a p_phi and S_n = [Re y_n, Im y_n, u_n] the coefficients of
-(t/h)^n, an order is one product of u with all three, in one register (`symtop.core.simd`):
+(t/h)^n, an order is one product of u with all three, in one register (`symtop.methods.simd`):
 
     S_{n+2} = [1, 1, 3] (kappa (sum_{0<j<n} u_j S_{n-j} + u_0 S_n) + u_n G)/((n+1)(n+2)) + [-P, P] swap(S_{n+1})/(n+2)
     G = [a Re w, a Im w, 2 kappa u_0 - c1/3]        (u_0 S_n only of y),        S_1 = [-Im z, Re z, a Im(conj(w) z)]
@@ -61,7 +61,6 @@ from numba.extending import intrinsic
 from symtop.core.errors import SymtopError, whole
 from symtop.core.jit import compile_kernel, register_jitable, set_item
 from symtop.core.numbers import EPSILON
-from symtop.core.simd import Components, Vectors
 from symtop.methods.framework import space
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.lanes import Lanes, one_loop
@@ -70,6 +69,7 @@ from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import Body, Scaled, Start
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, with_spin
+from symtop.methods.simd import Components, Vectors
 from symtop.methods.vectors import accumulate
 
 

@@ -25,7 +25,6 @@ from symtop.core.errors import SymtopError
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.numbers import GOLDEN
 from symtop.core.parallel import heed
-from symtop.core.simd import wide_vectors
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.lanes import Many, W, column, members_of, put
@@ -34,6 +33,7 @@ from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, OUTCOMES, 
 from symtop.methods.framework.preparation import Body, Start
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
+from symtop.methods.simd import wide_vectors
 from symtop.model import charts, top as model
 from symtop.model.charts import View
 from symtop.model.exact.closed_form import ClosedForms

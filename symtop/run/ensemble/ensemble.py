@@ -17,7 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from symtop.core import cluster, netcdf
+from symtop.core import netcdf
 from symtop.core.code_hash import digest, hashed, packages
 from symtop.core.errors import SymtopError, SymtopWarning, boolean, check_replaceable, file_path, positive, whole
 from symtop.core.files import locked
@@ -29,6 +29,7 @@ from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
+from symtop.run import cluster
 from symtop.run.ensemble.chunks import CHUNK, CHUNK_STEPS, RAISED, SHOWN, Job, as_dataset, nutation_periods, same_times
 from symtop.run.ensemble.inputs import Members, called, for_each, read_members
 from symtop.run.guard import MOST_STEPS
