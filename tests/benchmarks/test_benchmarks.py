@@ -67,6 +67,7 @@ def test_a_twin_that_leaves_the_chart_says_so():
         ("strang", "axis"),
         ("midpoint", "angles"),
         ("rk4", "axis"),
+        ("dop853-compiled-fixed", "axis"),
         ("gauss-6", "axis"),
         ("gauss-2", "attitude"),  # nine components: the widest state that the loop adds up
     ],
