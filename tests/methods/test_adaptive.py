@@ -17,7 +17,7 @@ SOLVERS = {
     row.name: row.solvers[row.charts()[0]] for row in variants() if isinstance(row.solvers[row.charts()[0]], Adaptive)
 }
 COUNTS = 7
-BUDGET = 900.0
+BUDGET = 400.0
 
 
 def members(count=60):
