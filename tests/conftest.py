@@ -32,7 +32,8 @@ from symtop.methods.framework import registry
 from symtop.model import scenes
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.runner import plugins, scripts
+from symtop.run import plugins
+from symtop.runner import scripts
 
 scripts.install()  # tests import `symtop_studies`
 

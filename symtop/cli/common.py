@@ -33,7 +33,7 @@ PLUGINS = "symtop.plugins"  # in the context of a command: plug-ins were given
 
 def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]) -> None:
     if files and not ctx.resilient_parsing:  # as shell completion parses
-        from symtop.runner import plugins
+        from symtop.run import plugins
 
         ctx.meta[PLUGINS] = True
         for file in files:

@@ -175,7 +175,7 @@ def ensemble(
     check_outputs(output=output, figure=figure)
     whole("members", members, 1)  # which is n in Python
     with ticking("drawing tops"):
-        from symtop.measure.spread import LEVELS, QUANTITIES, largest, member_errors, spread
+        from symtop.report.spread import LEVELS, QUANTITIES, largest, member_errors, spread
         from symtop.run.ensemble import ensemble as runs
         from symtop.run.ensemble.population import population
 

@@ -240,13 +240,14 @@ def report(results: str, embed: bool) -> None:
     If the folder holds no findings and its folder ``quick`` does, the page is made of those of ``quick``. A page that
     is up to date is not written again.
     """
+    from symtop.report.sources import report_hash
     from symtop.runner import manifest
 
     folder = Path(results)
     if not any(folder.glob("*.json")) and any((folder / "quick").glob("*.json")):
         common.warn(f"{folder} holds no findings; the report is made of those in {folder / 'quick'}")
         folder /= "quick"
-    made_of = manifest.report_hash(folder, embed=embed)
+    made_of = report_hash(folder, embed=embed)
     if not click.get_current_context().meta.get(common.PLUGINS) and manifest.is_current(folder, manifest.PAGE, made_of):
         click.echo(f"report: {folder / manifest.PAGE} (up to date)")
         return

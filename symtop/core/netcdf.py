@@ -189,6 +189,25 @@ def sweep(path: Path) -> None:
         left.unlink(missing_ok=True)
 
 
+def write_text(path: Path, text: str) -> None:
+    """Replace a small text file in one move."""
+    with replacing(path) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Replace a JSON file in one move."""
+    write_text(path, json.dumps(content, indent=1, ensure_ascii=False, default=str) + "\n")
+
+
+def read_json(path: Path) -> Any:
+    """The content of a JSON file, or None if there is none or it is damaged."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
 def _encoding(data: xr.Dataset) -> dict[Any, dict[str, Any]]:
     """No fill value in coordinates; bytes compressed."""
     bare = {name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"}

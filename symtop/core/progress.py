@@ -61,3 +61,11 @@ def ticking(words: str) -> Iterator[None]:
             assert clock.stdin is not None  # noqa: S101
             clock.stdin.close()
             clock.wait()
+
+
+def progress_bar(words: str, *, quiet: bool, **options: Any) -> Any:
+    """A progress bar, or without a total the words alone, where somebody is watching."""
+    from tqdm import tqdm
+
+    options = options or {"total": 1, "bar_format": "{desc}"}
+    return tqdm(desc=words, disable=quiet or not is_terminal(sys.stderr), leave=False, **options)

@@ -106,7 +106,9 @@ def judge(
     request = Request(target, form, chart, adaptive, find_scene(scene), quick, claims | claims_of_energy)
     made = request.claimed()  # claims that make no sense are refused before anything is loaded
     implied = {"time"} | ({"energy"} if energy is None and "energy" not in (conserves or ()) else set())
-    if form is None and is_trajectory(target):
+    table = isinstance(target, (xr.Dataset, Mapping))
+    file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES) and " " not in str(target)
+    if form is None and (table or file):
         if {order, symplectic, symmetric, explicit} != {None}:
             raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
         implied, about = (
@@ -132,13 +134,6 @@ def judge(
     if not findings:
         raise SymtopError("it cannot be judged: its process ended before it was open")
     return StepLedger(about.name, request.scene.name, tuple(findings), traces, about, frozenset(implied))
-
-
-def is_trajectory(target: Any) -> bool:
-    """Is it a file or a table of states, and nothing that steps?"""
-    if isinstance(target, (str, Path)):
-        return str(target).lower().endswith(FILES) and " " not in str(target)
-    return isinstance(target, (xr.Dataset, Mapping))
 
 
 def read(target: Any) -> dict[str, Any]:

@@ -63,19 +63,15 @@ def published_values() -> list[Published]:
     energy, vertical = scene.top.energy(scene.start), scene.top.momenta(scene.start).p_phi
     values.append(Published(source, "energy", 1.72, energy, 1e-12, "consistency", tests=START))
     values.append(Published(source, "vertical angular momentum", 1.04, vertical, 1e-12, "consistency", tests=START))
-    return values + _detest()
 
-
-def _detest() -> list[Published]:
-    """Euler's equations of DETEST B5, integrated by SciPy's DOP853 at its tightest tolerance."""
     from scipy.integrate import solve_ivp
 
-    done = solve_ivp(
+    done = solve_ivp(  # Euler's equations of DETEST B5, by SciPy's DOP853 at its tightest tolerance
         lambda _, y: (y[1] * y[2], -y[0] * y[2], -0.51 * y[0] * y[1]), (0.0, 20.0), (0.0, 1.0, 1.0),
         method="DOP853", rtol=3e-14, atol=1e-15,
     )  # fmt: skip
     source, printed = "Enright & Pryce 1987, DETEST B5", (-0.93965707987, -0.34211777540, 0.74141265962)
-    return [
+    return values + [
         Published(source, f"y{k + 1}(20)", value, float(done.y[k, -1]), 1e-11, "printed", REMARK, OTHER_BODY)
         for k, value in enumerate(printed)
     ]

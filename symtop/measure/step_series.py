@@ -145,7 +145,10 @@ def _fitted(
     size = np.maximum(np.max(np.abs(true), axis=1), np.finfo(float).tiny)
     size[0] = 1.0
     moved = np.max(np.abs(finer[: power + 1] - terms), axis=1)
-    doubt = np.maximum(scatter * _amplification(power, backward=backward), moved)
+    weights = np.full(power + 1, 2.0 / NODES)
+    weights[0] = 1.0 / NODES
+    grown = np.sqrt((_to_powers(power, backward=backward) ** 2) @ weights)  # what a scatter of one makes of each power
+    doubt = np.maximum(scatter * grown, moved)
     return scatter, Series(width, np.max(np.abs(terms), axis=1) / size, doubt / size, backward)
 
 
@@ -178,11 +181,3 @@ def _to_powers(degree: int, *, backward: bool) -> Array:
     matrix = np.stack(columns, axis=1)
     matrix.flags.writeable = False
     return matrix
-
-
-def _amplification(degree: int, *, backward: bool) -> Array:
-    """What a scatter of one in the samples makes of each power."""
-    weights = np.full(degree + 1, 2.0 / NODES)
-    weights[0] = 1.0 / NODES
-    grown: Array = np.sqrt((_to_powers(degree, backward=backward) ** 2) @ weights)
-    return grown

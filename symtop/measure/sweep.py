@@ -89,10 +89,9 @@ def sweep(
     file = None if path is None else file_path("path", path)
     stored, done = _stored(file)
     if others := [f"{name} on {of}" for of, name in stored if (of, name) not in pairs]:
-        raise SymtopError(
-            f"path {str(file)!r} holds what was not asked for, {_few(others)}: ask for these as well, or name another "
-            "path"
-        )
+        few = ", ".join(others[:MOST_NAMED]) + (f" and {len(others) - MOST_NAMED} more" if others[MOST_NAMED:] else "")
+        must = "ask for these as well, or name another path"
+        raise SymtopError(f"path {str(file)!r} holds what was not asked for, {few}: {must}")
     # what raised is tried again: the cause may have been of the moment
     rest = [cell for cell in asked if cell.made_of not in done or RAISED in done[cell.made_of]["outcome"].values]
 
@@ -173,13 +172,9 @@ def _cell(
         settings = [math.nan]
     for value in settings:
         make_plan(scene, method, **method.setting(value).kwargs(), horizon=until, samples=enough_samples(scene, until))
-    return _Cell(scene, method, tuple(settings), until, observe, _made_of(scene, method, (settings, until, observe)))
-
-
-def _made_of(scene: Scene, method: Integrator, settings: object) -> str:
-    """The digest of all that the numbers of a cell depend on."""
-    code = _code().reasons("sweep", error_row, scene, method)
-    return code_hash.digest(code | code_hash.packages() | {"settings": repr(settings)})
+    made_of = _code().reasons("sweep", error_row, scene, method) | code_hash.packages()
+    digest = code_hash.digest(made_of | {"settings": repr((settings, until, observe))})
+    return _Cell(scene, method, tuple(settings), until, observe, digest)
 
 
 @functools.cache
@@ -235,12 +230,6 @@ def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Data
                 pairs.append((scene, name))
                 tables[digest] = own.isel(setting=np.flatnonzero(run))
     return pairs, tables
-
-
-def _few(names: list[str]) -> str:
-    """The first of some names, and how many more there are."""
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return ", ".join(names[:MOST_NAMED]) + more
 
 
 def _described(data: xr.Dataset) -> xr.Dataset:

@@ -89,18 +89,13 @@ def _parts(quaternions: Array) -> tuple[Array, Array, Array, Array]:
     return quaternions[..., 0], quaternions[..., 1], quaternions[..., 2], quaternions[..., 3]
 
 
-def _vectors(x: Array, y: Array, z: Array) -> Array:
-    """Vectors (..., 3) of their components, faster than by `np.stack`."""
-    vectors = np.empty((*np.shape(x), 3), np.result_type(x))
-    vectors[..., 0], vectors[..., 1], vectors[..., 2] = x, y, z
-    return vectors
-
-
 def axis_from_quaternion(quaternion: Array) -> Array:
     """The third column of the rotation matrix, shape (..., 3)."""
     w, x, y, z = _parts(quaternion)
     right, back = x * z + w * y, y * z - w * x  # doubled by addition: quadruple precision has no 2.0
-    return _vectors(right + right, back + back, w * w - x * x - y * y + z * z)
+    axis = np.empty((*np.shape(x), 3), np.result_type(x))  # faster than np.stack
+    axis[..., 0], axis[..., 1], axis[..., 2] = right + right, back + back, w * w - x * x - y * y + z * z
+    return axis
 
 
 def theta_from_axis(axis: Array) -> Array:

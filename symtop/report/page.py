@@ -16,11 +16,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from symtop.core import netcdf
 from symtop.core.errors import SymtopError
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.report import markdown, method, tables
+from symtop.report.sources import report_files, report_hash
 from symtop.report.style import look
-from symtop.runner import manifest, plugins, run as runner, store
+from symtop.run import plugins
+from symtop.runner import manifest, run as runner
 
 WORDS = "report.md"
 TITLE = "Integrators on the heavy symmetric top"
@@ -82,7 +85,7 @@ def gather(results: Path, *, embed: bool = False) -> list[dict[str, Any]]:
     studies, gathered = list(runner.names()), []
     others = sorted({file.stem for file in results.glob("*.json")} - set(studies))
     for name in [*studies, *others]:
-        findings = store.read_json(results / f"{name}.json")
+        findings = netcdf.read_json(results / f"{name}.json")
         if findings is None or (name in others and not (isinstance(findings, dict) and "pictures" in findings)):
             continue
         try:
@@ -137,7 +140,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
         loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    made_of, sources = manifest.report_hash(results, embed=embed), manifest.report_files(results)
+    made_of, sources = report_hash(results, embed=embed), report_files(results)
     studies = gather(results, embed=embed)
     _named(studies)
     titles = {study["study"]: study["title"] for study in studies}
@@ -166,9 +169,9 @@ def write(results: Path, *, embed: bool = False) -> Path:
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
     )
     target = results / manifest.PAGE
-    store.write_text(target, text)
+    netcdf.write_text(target, text)
     opening = ["# " + TITLE, INTRODUCTION, *(markdown.opening(study, titles) for study in studies), ROWS]
     opening.append(markdown.measured(measured))
-    store.write_text(results / WORDS, markdown.page(studies, opening, facts))
+    netcdf.write_text(results / WORDS, markdown.page(studies, opening, facts))
     manifest.note(results, manifest.PAGE, "" if plugins.loaded() else made_of, [target, results / WORDS, *sources])
     return target

@@ -11,35 +11,25 @@ and no file holds a date.
 """
 
 import json
-import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
 import xarray as xr
-from tqdm import tqdm
 
 from symtop.core import code_hash, netcdf
-from symtop.core.files import is_terminal
-from symtop.core.progress import beating
-from symtop.runner import fingerprint, plugins, store
+from symtop.core.progress import beating, progress_bar
+from symtop.measure.datasets import Combined, combine, differences
+from symtop.run import plugins
+from symtop.runner import fingerprint, store
 from symtop.runner.pool import Pool, Result, Task
 from symtop.runner.scripts import file_of
-from symtop.runner.study import Case, Combined, Study, StudyError, failing
+from symtop.runner.study import Case, Study, StudyError, failing
 
 DONE, FAILED, STALE, MISSING = STATES = ("done", "failed", "stale", "missing")
 SAMPLE = 5  # cases of each study that are checked
-# in the names of variables of measured times, or of such a time over a count
-CLOCKED = ("seconds", "reliable", "spread", "first_call", "alone", "together")
-
-
-def progress_bar(words: str, *, quiet: bool, **options: Any) -> Any:
-    """A progress bar, or without a total the words alone, where somebody is watching."""
-    options = options or {"total": 1, "bar_format": "{desc}"}
-    return tqdm(desc=words, disable=quiet or not is_terminal(sys.stderr), leave=False, **options)
 
 
 @dataclass
@@ -118,7 +108,7 @@ class StudyCases:
             why = self.failures[0] if self.failures else "the grid is empty"
             raise StudyError(f"study {self.study.name}: no case could be measured; {why}")
         with failing(self.study.name, "combining what measure returned"):
-            return store.combine([(case, self.data[path]) for path, case in self.cases.items() if path in self.data])
+            return combine([(case, self.data[path]) for path, case in self.cases.items() if path in self.data])
 
 
 def status(
@@ -133,7 +123,7 @@ def status(
     older = store.superseded(stored, cases.cases)
     rows = []
     for path, case in cases.cases.items():
-        record = store.read_json(store.failure_path(path))
+        record = netcdf.read_json(store.failure_path(path))
         earlier = [old for old in older if store.identity_of(old) == store.identity_of(path)]
         state, message, causes = DONE, "", list[str]()
         if path not in cases.data:
@@ -141,20 +131,13 @@ def status(
         if state == FAILED:
             message = str(record.get("message", ""))
         elif why and state == STALE:
-            causes = changed(study, case, max(earlier, key=lambda old: old.stat().st_mtime))
+            before = _attribute(max(earlier, key=lambda old: old.stat().st_mtime), "made_of")
+            causes = code_hash.changes(before, fingerprint.reasons(study, case))
         elif why and state == MISSING:
             causes = other_settings(case, stored)
         row = {"scene": case.scene, "integrator": case.integrator, "state": state, "message": message}
         rows.append(row | ({"why": causes} if why else {}))
     return rows
-
-
-def changed(study: Study, case: Case, path: Path) -> list[str]:
-    """What a case depends on that is not what it was when a file was computed: labels of a fingerprint."""
-    before = _attribute(path, "made_of")
-    if not before:
-        return ["its file does not say what it was made of"]
-    return code_hash.changes(before, fingerprint.reasons(study, case))
 
 
 def other_settings(case: Case, stored: list[Path]) -> list[str]:
@@ -200,44 +183,3 @@ def check(
         pair = differences(netcdf.read_any(whole), cases.combined(), attributes=False)
         differing += [f"{whole.name}: {text}" for text in pair]
     return {"study": study.name, "stored": len(stored), "compared": len(chosen), "differences": differing}
-
-
-def differences(stored: Combined, again: Combined, *, attributes: bool = True) -> list[str]:
-    """In what two datasets, or trees of them, differ besides measured times and where they were made."""
-    ours, theirs = netcdf.groups(stored), netcdf.groups(again)
-    return [f"group {name} is in one of them only" for name in sorted(ours.keys() ^ theirs.keys())] + [
-        f"{name}: {difference}" if name else difference
-        for name in sorted(ours.keys() & theirs.keys())
-        for difference in _differences(ours[name], theirs[name], attributes)
-    ]
-
-
-def _differences(stored: xr.Dataset, again: xr.Dataset, attributes: bool) -> list[str]:
-    ours, theirs = set(map(str, stored.variables)), set(map(str, again.variables))
-    differing = [f"{name} is in one of them only" for name in sorted(ours ^ theirs)]
-    for name in sorted(ours & theirs):
-        one, other = stored[name], again[name]
-        if one.dims != other.dims or one.shape != other.shape:
-            differing.append(f"{name} has another shape: {dict(one.sizes)} and {dict(other.sizes)}")
-        elif not any(word in name for word in CLOCKED) and not _same(one, other):
-            differing.append(f"{name} differs{_how_much(one, other)}")
-    for key in sorted({*stored.attrs, *again.attrs} - {*netcdf.provenance(), "content"}) if attributes else []:
-        before, now = stored.attrs.get(key), again.attrs.get(key)
-        if before != now and not key.startswith("timed_"):
-            differing.append(f"attribute {key} differs: {before!r} and {now!r}")
-    return differing
-
-
-def _same(one: xr.DataArray, other: xr.DataArray) -> bool:
-    """To the last bit, for numbers."""
-    if one.dtype.kind == "f" and one.dtype == other.dtype:
-        return one.values.tobytes() == other.values.tobytes()
-    return one.equals(other)
-
-
-def _how_much(one: xr.DataArray, other: xr.DataArray) -> str:
-    if one.dtype.kind != "f" or other.dtype.kind != "f":
-        return ""
-    with np.errstate(all="ignore"):
-        gap = np.abs(one.values - other.values)
-    return f" by up to {np.nanmax(gap):.3g}" if np.isfinite(gap).any() else " in which values are NaN"

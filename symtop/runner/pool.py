@@ -1,12 +1,10 @@
 """Computes cases: in this process, in worker processes, or on a dask cluster, and in which order.
 
-The workers are Pebble's: a limit ends a case in compiled code as well, and a worker that dies fails its own case and no
-other. They stay for the next study, because a start takes two seconds. Few cases, and those of integrators that only
-this process knows, are computed here. On a dask cluster, for cases that are not timed, workers need this version of
-symtop, the scripts of the studies, and the results folder under the same path.
+The workers are Pebble's: a limit ends compiled code, too, and a worker that dies fails its own case alone. They stay
+for the next study. Few cases, and those of integrators that only this process knows, are computed here. On a dask
+cluster, for untimed cases, workers need this version of symtop, the studies, and the results folder at the same path.
 
-A failure that a case causes (its method, its measure, its time) is recorded and returned, and the others go on. A
-failure that the machine causes (a full disk, other sources than the command's) is raised: it would stop the others too.
+A failure that a case causes is recorded and the others go on; one of the machine's (a full disk) is raised.
 """
 
 import contextlib
@@ -15,7 +13,6 @@ import gc
 import math
 import os
 import signal
-import statistics
 import threading
 import time
 import traceback
@@ -33,11 +30,10 @@ from tqdm import tqdm
 from symtop.core import files, netcdf, parallel
 from symtop.core.errors import SymtopError, words_of
 from symtop.core.signals import at_most, is_of_user
-from symtop.measure.timing import bare_run
-from symtop.methods.framework.registry import integrator, integrators, split_name
-from symtop.model.scenes import scene
-from symtop.run import cluster
-from symtop.runner import fingerprint, plugins, scripts, store
+from symtop.measure.timing import DISTURBED, slowdown
+from symtop.methods.framework.registry import integrators, split_name
+from symtop.run import cluster, plugins
+from symtop.runner import fingerprint, scripts, store
 from symtop.runner.study import Case, Study
 
 WORTH_WORKERS = 8  # cases; starting a worker takes two seconds
@@ -81,10 +77,9 @@ def prepare(script: str, files_of_plugins: tuple[str, ...]) -> Study:
 
 
 def execute_case(task: Task, study: Study | None = None) -> Result:
-    """Compute a case and store it, or record how it failed.
+    """Compute a case and store it, or record how it failed; SymtopError where the machine is the cause.
 
-    A worker is given no `study` and loads it by name. Python code hears the limit; compiled code does not, and its
-    process is ended by the pool `GRACE` seconds later. Raises SymtopError where the machine is the cause.
+    A worker loads the study by name. Compiled code hears no limit: the pool ends its process `GRACE` seconds later.
     """
     study = study or prepare(task.study, task.plugins)
     path, case = task.path, task.case
@@ -133,9 +128,12 @@ def _traced(task: Task) -> Iterator[None]:
 
 
 def failed(task: Task, why: object, trace: str = "") -> Result:
-    """Record how a case failed."""
+    """Record how a case failed; a file that an earlier run may have left is no longer its result."""
     message = f"{task.case.integrator} on {task.case.scene} failed: {' '.join(str(why).split())}"
-    store.save_failure(task.path, task.case, message, trace)
+    question = {"scene": task.case.scene, "integrator": task.case.integrator, "settings": dict(task.case.settings)}
+    record = question | {"message": message, "traceback": trace.splitlines()}
+    netcdf.write_json(store.failure_path(task.path), record)
+    task.path.unlink(missing_ok=True)
     return Result("failed", message)
 
 
@@ -174,10 +172,9 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         return self._analyses[-1]
 
     def run(self, study: Study, tasks: Sequence[Task], on_result: OnResult) -> None:
-        """Compute all tasks and call `on_result` with each as it ends, in any order; timed ones last.
+        """Compute all tasks, timed ones last, and call `on_result` with each as it ends.
 
         Timed cases run one at a time, or one on each core where a trial shows that they do not disturb each other.
-        Raises SymtopError if the results cannot be written or the workers cannot work.
         """
         for timed in (False, True):
             chosen = in_order([task for task in tasks if study.is_timed(task.case) == timed])
@@ -332,41 +329,3 @@ def _result(future: "Future[Result]", task: Task) -> Result:
         if type(error).__module__.partition(".")[0] != "distributed":
             raise
         return failed(task, f"the cluster gave it up: {type(error).__name__}: {error}")
-
-
-SPAN = 0.03  # seconds of a worker in one turn
-TURNS = 7
-TRIES = 20  # to have all workers at once, the first time when they have to start
-DISTURBED = 1.05  # times as long as alone: beyond it timed cases run one after another
-
-
-def timed_turn() -> tuple[int, float, float, float]:
-    """Process, begin, end and mean seconds of short runs of a compiled method for `SPAN` seconds."""
-    run = bare_run(scene("spheroid"), integrator("strang"), "axis", 1e-3, 4.0)
-    run()  # its kernel may have to be compiled
-    begin, count = time.monotonic(), 0  # of the clock that all processes share
-    while (end := time.monotonic()) < begin + SPAN:
-        run()
-        count += 1
-    return os.getpid(), begin, end, (end - begin) / count
-
-
-def slowdown(submit: Callable[..., "Future[Any]"], size: int) -> float:
-    """How many times longer a run takes while `size` workers run; infinite if they never did at once.
-
-    Workers time the same run, one of them alone and all at once, in turns. Beside others it takes as long as alone
-    where cores share nothing that a run needs, and up to twice as long where two of them are threads of one core.
-    """
-
-    def at_once() -> list[tuple[int, float, float, float]]:
-        return [future.result() for future in [submit(timed_turn) for _ in range(size)]]
-
-    for _ in range(TRIES):
-        if len({process for process, *_ in at_once()}) == size:
-            break
-    ratios = []
-    for _ in range(TURNS):
-        alone, together = submit(timed_turn).result(), at_once()
-        if min(end for _, _, end, _ in together) - max(begin for _, begin, _, _ in together) > 0.5 * SPAN:
-            ratios.append(max(seconds for *_, seconds in together) / alone[-1])
-    return statistics.median(ratios) if ratios else math.inf

@@ -1,9 +1,7 @@
 """Runs a study: computes the cases that are missing, combines them, draws, and writes the findings.
 
-A case is computed only if no file holds its digest, so that an interrupted study resumes and an unchanged one ends in
-seconds. A study may have a second round of cases, made from what the first one found. Two commands may share one
-folder: each case is computed by one of them. How a picture is written to a file is the caller's choice (`Save`): this
-room knows no style.
+A case is computed only if no file holds its digest: an interrupted study resumes, an unchanged one ends in seconds. Two
+commands may share one folder: each case is computed by one of them. How a picture is written is the caller's choice.
 """
 
 import contextlib
@@ -19,10 +17,12 @@ from pebble import ProcessExpired
 from symtop.core import files, netcdf
 from symtop.core.code_hash import hashed
 from symtop.core.errors import positive
-from symtop.core.progress import beating
+from symtop.core.progress import beating, progress_bar
+from symtop.measure.datasets import combine
 from symtop.model.scenes import scenes
-from symtop.runner import fingerprint, manifest, plugins, store
-from symtop.runner.cases import StudyCases, progress_bar
+from symtop.run import plugins
+from symtop.runner import fingerprint, manifest, store
+from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool, prepare
 from symtop.runner.scripts import file_of, folder, load, names
 from symtop.runner.study import Case, Save, Study, findings_of
@@ -68,7 +68,7 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
     drawing = drawing_digest(study, save)
     made_of = hashed(*sorted(path.name for path in first), drawing)
     if not fresh and manifest.is_current(results, study.name, made_of):
-        known = store.read_json(results / f"{study.name}.json")
+        known = netcdf.read_json(results / f"{study.name}.json")
         if isinstance(known, dict):
             return Started(lambda: known | {"computed": 0, "seconds": time.monotonic() - began})
     try:
@@ -115,7 +115,7 @@ def analyse_stored(
 
 def drawing_digest(study: Study, save: Save | None) -> str:
     """Hash of what combines, draws and judges."""
-    return fingerprint.drawing_digest(study, file_of(study.name), store.combine, save)
+    return fingerprint.drawing_digest(study, file_of(study.name), combine, save)
 
 
 def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> Findings:
@@ -133,7 +133,7 @@ def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> 
         store.forget(results, study, cases.cases)
         findings = findings_of(study, combined, results, save, failures=cases.failures, cases=len(cases.cases))
         findings["quick"] = quick
-        store.write_json(words, findings)
+        netcdf.write_json(words, findings)
         if not cases.failures and made_of:
             pictures = [results / "figures" / picture["file"] for picture in findings["pictures"]]
             manifest.note(results, study.name, made_of, [dataset, words, *pictures, *cases.cases])

@@ -14,6 +14,7 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, foreign_code, label, shown
+from symtop.measure.datasets import Combined
 from symtop.methods.framework.registry import split_name
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 REFERENCE = "exact"  # the integrator that is the closed form
 Save = Callable[["Figure", Path], object]  # writes a picture's figure to a file
-Combined = xr.Dataset | xr.DataTree  # what a study measured: a tree if its cases are in groups
 LONGEST = 120  # characters of a value that are shown
 
 
@@ -34,19 +34,14 @@ def failing(study: str, function: str) -> AbstractContextManager[None]:
     return foreign_code(f"study {study}: {function}", StudyError)
 
 
-def refusal(study: str, function: str, wanted: str, given: object) -> StudyError:
-    """The sentence on what a function of a study returned."""
-    text = " ".join(shown(given).split())
-    text = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
-    return StudyError(f"study {study}: {function} must return {wanted}, not {text}")
-
-
 def each(study: str, function: str, make: Callable[[], Any], kind: type, wanted: str) -> Iterator[Any]:
     """What a function of a study returns or yields, one by one, each of which must be of that kind."""
     with failing(study, function):
         made = make()
     if isinstance(made, (str, bytes, Mapping, kind)) or not isinstance(made, Iterable):
-        raise refusal(study, function, wanted, made)
+        text = " ".join(shown(made).split())
+        text = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
+        raise StudyError(f"study {study}: {function} must return {wanted}, not {text}")
     entries, end = iter(made), object()
     while True:
         with failing(study, function):
@@ -113,9 +108,8 @@ class Case:
     """One cell of a study's grid: an integrator on a scene, with settings that JSON can hold, or SymtopError.
 
     A case may measure several integrators against each other: then its dataset has a dimension ``variant``,
-    `integrator` names them together and ``settings["integrators"]`` lists them.
-    A study that measures several different things puts each into a `group` of its own: the study's dataset is then an
-    `xarray.DataTree` with one dataset a group (see `store.combine`), each over the scenes and integrators that it has.
+    `integrator` names them together and ``settings["integrators"]`` lists them. Cases of several kinds have a `group`
+    each: the study's dataset is then an `xarray.DataTree` with one dataset a group (`symtop.measure.datasets.combine`).
     """
 
     scene: str
@@ -160,9 +154,8 @@ class Case:
 class Study:
     """A question and how it is answered.
 
-    `pictures`, `verdict`, `tables`, `charts`, `opening` and `follow_up` get everything that was measured: an
-    `xarray.Dataset`, or an `xarray.DataTree` if the cases are in groups. Each picture is saved and closed before the
-    next one is drawn, if `pictures` draws them one by one.
+    `pictures`, `verdict`, `tables`, `charts`, `opening` and `follow_up` get everything that was measured. Each picture
+    is saved and closed before the next one is drawn, if `pictures` draws them one by one.
     """
 
     name: str
@@ -197,6 +190,10 @@ class Study:
     def _listed(self, function: str, make: Callable[[], Any]) -> list[Case]:
         return list(each(self.name, function, make, Case, "a list of Case"))
 
+    def is_timed(self, case: Case) -> bool:
+        """Are times measured in the case, so that nothing may run beside it that disturbs them?"""
+        return self.timed or case.timed
+
     def only(self, names: Collection[str]) -> "Study":
         """The same study with the cases of some methods, or variants, alone; SymtopError if it has none of them.
 
@@ -206,8 +203,11 @@ class Study:
         wanted = {*names, REFERENCE}
 
         def chosen(cases: list[Case]) -> list[Case]:
-            whole = self._listed("cases", lambda: cases)
-            return [case for case in whole if any({name, split_name(name)[0]} & wanted for name in case.integrators)]
+            return [
+                case
+                for case in self._listed("cases", lambda: cases)
+                if any({name, split_name(name)[0]} & wanted for name in case.integrators)
+            ]
 
         def first(quick: bool) -> list[Case]:
             cases = chosen(self.cases(quick))
@@ -235,10 +235,6 @@ class Study:
             follow_up=later and (lambda data: chosen(later(data))), **answers,
         )  # fmt: skip
 
-    def is_timed(self, case: Case) -> bool:
-        """Are times measured in the case, so that nothing may run beside it that disturbs them?"""
-        return self.timed or case.timed
-
 
 def findings_of(
     study: Study, data: Combined, results: Path, save: Save | None, *, failures: list[str], cases: int
@@ -251,9 +247,9 @@ def findings_of(
     if study.opening is not None:
         with failing(study.name, "opening"):
             first = study.opening(data)
-            if not isinstance(first, Opening):
-                raise refusal(study.name, "opening", "an Opening", first)
-            opening = first._asdict() | {"table": first.table._asdict(), "explained": dict(first.explained)}
+        if not isinstance(first, Opening):
+            raise StudyError(f"study {study.name}: opening must return an Opening, not {shown(first)[:LONGEST]}")
+        opening = first._asdict() | {"table": first.table._asdict(), "explained": dict(first.explained)}
     return {
         "study": study.name,
         **{name: getattr(study, name) for name in ("title", "question", "how_to_read")},
@@ -273,9 +269,8 @@ def _saved(study: Study, data: Combined, results: Path, save: Save) -> Iterator[
     """Save the pictures one by one; StudyError for what is none."""
     for picture in each(study.name, "pictures", lambda: study.pictures(data), Picture, "or yield Pictures"):
         words = {key: getattr(picture, key) for key in ("name", "caption", "alt", "lead")}
-        for key, text in words.items():
-            if not isinstance(text, str):
-                raise StudyError(f"study {study.name}: a Picture must have a {key} that is text, not {shown(text)}")
+        for key in (key for key, text in words.items() if not isinstance(text, str)):
+            raise StudyError(f"study {study.name}: a Picture must have a {key} that is text, not {shown(words[key])}")
         if not hasattr(picture.figure, "savefig"):
             kind = type(picture.figure).__name__
             raise StudyError(f"study {study.name}: the figure of a Picture must be one of matplotlib, not a {kind}")

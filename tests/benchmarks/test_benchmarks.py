@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import adaptive, bench, ensemble, kernels, lanes, measured, targets, truth, twin, whole_run
+from symtop.core import netcdf
 from symtop.measure.timing import Timing, timings
 from symtop.methods.framework import loop as loops
 from symtop.methods.framework.lanes import Many
@@ -14,7 +15,6 @@ from symtop.methods.framework.registry import methods
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.report import page
-from symtop.runner import store
 
 KEYS = kernels.keys()
 STEPS = 500
@@ -103,7 +103,7 @@ def test_what_the_benchmark_leaves_is_what_the_report_shows(tmp_path):
     batch = lanes.Batch(1e-6, 1.2e-6, 45, 7e-6, 16e-6, 2.6e-6)
     together = lanes.Measured(lane_rows, [lanes.Threads("strang", "axis", 1.9, 1.8, 2.0)], [batch])
     content = bench.findings(rows, {}, forms, reached, items, one_step, many, together, 1e-9, facts)
-    store.write_json(tmp_path / "bench.json", content)
+    netcdf.write_json(tmp_path / "bench.json", content)
     text = page.write(tmp_path).read_text()
     markdown = (tmp_path / "report.md").read_text()
     counted = ("1 of 2 kernels", "3.0 us at most", "123 times faster", "explicit: 1 of 2 methods")

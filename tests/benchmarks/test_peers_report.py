@@ -14,7 +14,7 @@ from benchmarks import measured
 from benchmarks.peers import measure, study, summary, together
 from symtop.core import netcdf
 from symtop.report import page, style
-from symtop.runner import run as runner, store
+from symtop.runner import run as runner
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -80,7 +80,7 @@ def _peers_into(folder):
     data = _stored({"symtop": (1e-3, 2e-5), "scipy[axis] C": (6e-3, 4e-3)})
     found = runner.findings_of(study.STUDY, data, folder, style.save, failures=["drake was skipped."], cases=2)
     found["provenance"] = {**found["provenance"], "processor": "an abacus"}
-    store.write_json(folder / "peers.json", found | {"measured": study.measured(data)})
+    netcdf.write_json(folder / "peers.json", found | {"measured": study.measured(data)})
 
 
 def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_path, quick_results):

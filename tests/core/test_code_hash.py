@@ -33,7 +33,7 @@ def loaded(path: Path, name: str):
 SCRIPT = """
 import math
 from symtop.methods.runge_kutta import gauss
-from symtop.runner.cases import differences
+from symtop.measure.datasets import differences
 
 STEPS = (5,)
 CAPTION = "unused"

@@ -23,8 +23,9 @@ from symtop.methods.framework.plan import Run
 from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
 from symtop.report import style
+from symtop.run import plugins
 from symtop.run.simulation import integrate
-from symtop.runner import plugins, run as runner
+from symtop.runner import run as runner
 from tests.conftest import random_scenes
 
 registry = importlib.import_module("symtop.methods.framework.registry")

@@ -8,12 +8,12 @@ import pytest
 import xarray as xr
 
 import symtop
+from symtop.measure import datasets
 from symtop.measure.accuracy import error_table
 from symtop.measure.conservation import trend
 from symtop.measure.order import order, power_law
 from symtop.measure.settings import ladder
 from symtop.measure.timing import Timing, timings
-from symtop.runner import store
 from symtop.runner.study import Case
 
 STEPS = 0.1 / 1.5 ** np.arange(16)
@@ -119,10 +119,10 @@ def test_combining_refuses_cases_with_different_coordinates():
         data = xr.Dataset({"error": ("horizon", np.zeros(len(horizons)))}, coords={"horizon": horizons})
         return Case("spheroid", name), data
 
-    joined = store.combine([case("a", [8.0, 100.0]), case("b", [8.0, 100.0, 1000.0])])
+    joined = datasets.combine([case("a", [8.0, 100.0]), case("b", [8.0, 100.0, 1000.0])])
     assert np.isnan(joined["error"].sel(variant="a", horizon=1000.0))
     with pytest.raises(symtop.SymtopError, match="coordinate horizon of b on spheroid differs"):
-        store.combine([case("a", [8.0, 100.0]), case("b", [8.0, 1000.0])])
+        datasets.combine([case("a", [8.0, 100.0]), case("b", [8.0, 1000.0])])
 
 
 def test_a_function_that_has_taken_long_is_asked_no_more_but_twice_at_least():

@@ -74,9 +74,9 @@ def test_a_budget_is_passed_by_less_than_a_step(name):
     done, reached = SOLVERS[name].many(numbers, tolerance, times, np.full(20, COUNTS), BUDGET)
     ended = done.outcome == OUTCOMES.index("out_of_budget")
     assert ended.any()
-    most = (
-        20.0 * (1 + COUNTS) if name.startswith("series") else 6.0 * 8
-    )  # a step and the samples in it; some rejections
+    most = 20.0 * (1 + COUNTS) if name.startswith("series") else 6.0 * 8  # a step and its samples; some rejections
+    if name.startswith("extrapolation"):
+        most = 2.0 * 101  # ten lines, tried twice
     assert (done.work[ended] < BUDGET + most).all()
     assert (reached[ended] < times[ended, -1]).all()
 

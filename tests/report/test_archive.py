@@ -10,8 +10,9 @@ import xarray as xr
 import symtop
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError
+from symtop.measure import datasets
 from symtop.report import archive, style
-from symtop.runner import run as runner, store
+from symtop.runner import run as runner
 from symtop.runner.study import Case, Picture, Study, Table
 
 
@@ -41,10 +42,10 @@ def results(tmp_path_factory):
     """A results folder with one small study, a case, a figure that nothing shows and a file of somebody else's."""
     folder = tmp_path_factory.mktemp("bundled") / "results"
     (case,) = STUDY.cases(True)
-    data = netcdf.describe(store.combine([(case, STUDY.measure(case))]), "Small", question=STUDY.question)
+    data = netcdf.describe(datasets.combine([(case, STUDY.measure(case))]), "Small", question=STUDY.question)
     netcdf.write(data, folder / "small.nc")
     found = runner.findings_of(STUDY, data, folder, style.save, failures=[], cases=1)
-    store.write_json(folder / "peers.json", found | {"study": "peers", "measured": "once"})
+    netcdf.write_json(folder / "peers.json", found | {"study": "peers", "measured": "once"})
     (folder / "cases" / "small").mkdir(parents=True)
     (folder / "cases" / "small" / "one.nc").write_bytes(b"a case")
     (folder / "figures" / "old.png").write_bytes(b"not shown")

@@ -8,6 +8,7 @@ from click.testing import CliRunner
 
 from symtop.cli.main import main
 from symtop.core import netcdf
+from symtop.report import sources
 from symtop.runner import manifest, run as runner, scripts, store
 from tests.commands import PROBE
 from tests.runner.test_rounds import ROUNDS
@@ -110,17 +111,17 @@ def every(tmp_path, monkeypatch):
 
 
 def test_the_hash_of_the_report_follows_sources_processor_and_files(tmp_path, monkeypatch):
-    before = manifest.report_hash(tmp_path, embed=False)
-    assert manifest.report_hash(tmp_path, embed=False) == before != manifest.report_hash(tmp_path, embed=True)
+    before = sources.report_hash(tmp_path, embed=False)
+    assert sources.report_hash(tmp_path, embed=False) == before != sources.report_hash(tmp_path, embed=True)
     (tmp_path / "one.json").touch()
-    assert manifest.report_hash(tmp_path, embed=False) != before
+    assert sources.report_hash(tmp_path, embed=False) != before
     (tmp_path / "one.json").unlink()
-    monkeypatch.setattr(manifest, "processor", lambda: "another")
-    assert manifest.report_hash(tmp_path, embed=False) != before
+    monkeypatch.setattr(sources, "processor", lambda: "another")
+    assert sources.report_hash(tmp_path, embed=False) != before
     monkeypatch.undo()
-    real = manifest.file_hash
-    monkeypatch.setattr(manifest, "file_hash", lambda path: real(path) + "x" * (path.name == "page.js"))
-    assert manifest.report_hash(tmp_path, embed=False) != before
+    real = sources.file_hash
+    monkeypatch.setattr(sources, "file_hash", lambda path: real(path) + "x" * (path.name == "page.js"))
+    assert sources.report_hash(tmp_path, embed=False) != before
 
 
 def test_the_report_is_written_again_only_if_something_has_changed(every):

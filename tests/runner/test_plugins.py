@@ -14,7 +14,8 @@ from symtop.methods.framework.registry import split_name
 CODE = """\
 import sys
 import symtop
-from symtop.runner import fingerprint, plugins
+from symtop.run import plugins
+from symtop.runner import fingerprint
 (name,) = plugins.load(sys.argv[1])
 for label, value in fingerprint.made_of("method", symtop.integrator(name)).items():
     print(label, value, sep="\\t")

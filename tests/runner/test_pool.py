@@ -8,6 +8,7 @@ import time
 import pytest
 
 from symtop.core.parallel import cores
+from symtop.measure import timing
 from symtop.runner import pool as pools, run as runner, store
 from symtop.runner.pool import Pool, Task, in_order
 from symtop.runner.study import Case
@@ -102,7 +103,7 @@ def test_few_cases_are_computed_here_and_timed_ones_need_no_trial(study, tmp_pat
 def test_the_trial_sees_workers_that_share_a_core(monkeypatch):
     """With twice as many workers as cores a run takes twice as long."""
     crowd = 2 * cores()
-    monkeypatch.setattr(pools, "TURNS", 3)
+    monkeypatch.setattr(timing, "TURNS", 3)
     with Pool(crowd) as pool:
         pool.open(crowd)
-        assert 1.3 < pools.slowdown(pool.submit, crowd) < math.inf
+        assert 1.3 < timing.slowdown(pool.submit, crowd) < math.inf

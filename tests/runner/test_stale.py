@@ -118,7 +118,7 @@ def test_measure_code_and_the_reference_make_the_cases_of_their_study_stale():
     ("place", "again"),
     [
         ("symtop_studies.work_precision.leads:winners", True), ("symtop_studies.work_precision.words:sentences", True),
-        ("symtop.runner.store:_dense", True), ("symtop.cli.common:as_text", False),
+        ("symtop.measure.datasets:_dense", True), ("symtop.cli.common:as_text", False),
         ("symtop_studies.drift.words:verdict", False),
     ],
 )  # fmt: skip

@@ -17,11 +17,11 @@ from click.testing import CliRunner
 import symtop
 from symtop.cli.main import main
 from symtop.core import netcdf
+from symtop.measure.datasets import differences
 from symtop.methods.framework import registry
 from symtop.methods.framework.registry import Integrator
 from symtop.report import style
 from symtop.runner import run as runner, store
-from symtop.runner.cases import differences
 from tests.commands import PROBE, contents
 
 

@@ -14,11 +14,11 @@ from symtop_studies.stability.tables import Column, family_limits, map_table, sa
 
 import symtop
 from symtop.core import netcdf
+from symtop.measure import datasets
 from symtop.measure.verdicts import judgement
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
-from symtop.runner import store
 from symtop.runner.study import Case
 
 STEPS = [0.011, 0.053, 0.17, 0.31, 0.83]
@@ -198,7 +198,7 @@ def hand_made(
             "knob_name": knob_name,
         }
     )
-    return store.combine([(Case(scene_name, "midpoint"), data)])
+    return datasets.combine([(Case(scene_name, "midpoint"), data)])
 
 
 A, B, L = "accurate", "bounded_but_wrong", "left_chart"
@@ -234,7 +234,7 @@ def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
                                                         "periods": 1.0, "shown": 0.01})  # fmt: skip
     large = map_table("grazing", integrator("midpoint"), {"parameters": [1e-3, 0.1, 0.2], "ladder": [0.01, 0.05, 0.1],
                                                           "periods": 1.0, "shown": 0.01})  # fmt: skip
-    data = store.combine([(Case("grazing", "strang"), small), (Case("grazing", "midpoint"), large)])
+    data = datasets.combine([(Case("grazing", "strang"), small), (Case("grazing", "midpoint"), large)])
     symtop_file = tmp_path / "maps.nc"
     netcdf.write(data, symtop_file)
     again = netcdf.read(symtop_file)
@@ -251,7 +251,7 @@ def tolerances(*ladders):
     for name, ladder in zip(names, ladders, strict=False):
         cell = hand_made([[A if value < 2e-4 else B for value in ladder]] * 4, ladder, knob_name="tolerance")
         cells.append((Case("cusp", name), cell.sel(scene="cusp", variant="midpoint", drop=True)))
-    return store.combine(cells)
+    return datasets.combine(cells)
 
 
 def test_shares_of_a_page_are_of_what_all_its_maps_have():
@@ -264,7 +264,7 @@ def test_shares_of_a_page_are_of_what_all_its_maps_have():
 def test_a_variant_without_an_inaccurate_run_has_no_share_of_them():
     cells = [(Case("cusp", name), hand_made(lines).sel(scene="cusp", variant="midpoint", drop=True))
              for name, lines in (("rk4[axis]", [[A, B, L]] * 4), ("strang[axis]", [[A, A, A]] * 4))]  # fmt: skip
-    silent = {name: one.silent for name, one in atlas.maps(store.combine(cells), "cusp").items()}
+    silent = {name: one.silent for name, one in atlas.maps(datasets.combine(cells), "cusp").items()}
     assert silent["rk4[axis]"] == 0.5
     assert math.isnan(silent["strang[axis]"])
 

@@ -9,9 +9,9 @@ from symtop_studies.convergence import study, tables, words
 import symtop
 from symtop.judging.battery import CLAIMS
 from symtop.judging.claims.order import measured_order
+from symtop.measure import datasets
 from symtop.measure.order import BESIDE, order_verdict
 from symtop.methods.framework.registry import integrator, methods, split_name, variants
-from symtop.runner import store
 from symtop.runner.study import Case
 
 ROWS = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "strang[axis]", "strang[attitude]",
@@ -25,7 +25,7 @@ def data():
     chosen = [case for case in study.on_scene("goldstein", quick=True) if case.integrator in ROWS]
     assert {case.integrator for case in chosen} == set(ROWS)
     longer = [Case(case.scene, case.integrator, case.settings | {"dense": True}) for case in chosen]
-    return store.combine([(case, study.measure(case)) for case in longer])
+    return datasets.combine([(case, study.measure(case)) for case in longer])
 
 
 def test_every_chart_of_every_method_is_a_row_and_a_formula_is_none():

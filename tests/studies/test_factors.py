@@ -39,8 +39,8 @@ from symtop_studies.factors.tables import (
 
 import symtop
 from symtop.measure import settings
+from symtop.measure.datasets import combine
 from symtop.methods.framework.equations import FORMULATIONS
-from symtop.runner.store import combine
 from symtop.runner.study import Case
 
 SCENE = symtop.scene("spheroid")

@@ -16,6 +16,7 @@ import symtop
 from symtop import advise
 from symtop.core import netcdf
 from symtop.measure.accuracy import error_row
+from symtop.measure.datasets import differences
 from symtop.measure.ranking import nearest
 from symtop.measure.settings import TARGETS
 from symtop.measure.timing import Timing
@@ -23,7 +24,6 @@ from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.guard import EXPECTED
-from symtop.runner.cases import differences
 
 INF, NAN = math.inf, math.nan
 

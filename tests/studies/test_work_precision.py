@@ -30,12 +30,11 @@ from symtop_studies.work_precision.timing_rounds import (
 from symtop_studies.work_precision.walk import CAPPED, TOO_WIDE, Walk, least_work, nutation_width, spans, work_table
 
 import symtop
-from symtop.measure import ranking
+from symtop.measure import datasets, ranking
 from symtop.measure.accuracy import error_row
 from symtop.measure.settings import TARGETS, compared, limits
 from symtop.measure.timing import Timing
 from symtop.methods.framework.registry import methods
-from symtop.runner import store
 from symtop.runner.study import Case
 
 
@@ -100,10 +99,10 @@ def timed_study():
     scene = symtop.scene("goldstein")
     far = [10.0 * scene.nutation_period, 100.0 * scene.nutation_period]
     tables = [(Case("goldstein", name), work_table(scene, symtop.integrator(name), far, 4e4)) for name in LEADERS]
-    data = store.combine(tables)
+    data = datasets.combine(tables)
     runs = timed_runs(data.sel(scene="goldstein"), ["stormer-verlet[angles]"])
     seconds = timing_rounds(scene, far, runs, Effort(3, 0.001), Effort(3, 0.002))
-    return store.combine([*tables, (Case("goldstein", "together"), seconds)]).assign_coords(horizon=[10.0, 100.0])
+    return datasets.combine([*tables, (Case("goldstein", "together"), seconds)]).assign_coords(horizon=[10.0, 100.0])
 
 
 def test_the_cheapest_runs_of_each_method_have_a_time_and_no_other_run(timed_study):
@@ -188,7 +187,7 @@ def test_energies_are_compared_within_a_chart():
 
 def called(seconds, table):
     """The winners that are called beyond the noise, by horizon and target, with all winners."""
-    data = store.combine([*table, (Case("goldstein", "together"), seconds)])
+    data = datasets.combine([*table, (Case("goldstein", "together"), seconds)])
     wins = leads.winners(data)
     return {key: won.best.integrator for key, won in wins.items() if won and not won.level}, {
         key: won.best.integrator for key, won in wins.items() if won
@@ -211,7 +210,7 @@ def test_a_winner_that_is_called_beyond_the_noise_wins_in_another_process_too(tm
     far = [count * scene.nutation_period for count in (10.0, 100.0)]
     names = [*LEADERS, "takahashi-imada[axis]", "rk4[axis]", "rk4[angles]", "gauss-8[axis]", "srkn-14-6[axis]"]
     table = [(Case("goldstein", name), work_table(scene, symtop.integrator(name), far, 2e5)) for name in names]
-    runs = [tuple(run) for run in timed_runs(store.combine(table).sel(scene="goldstein"))]
+    runs = [tuple(run) for run in timed_runs(datasets.combine(table).sel(scene="goldstein"))]
     question = tmp_path / "question.pickle"
     question.write_bytes(pickle.dumps((scene, far, runs)))
     outcomes = []

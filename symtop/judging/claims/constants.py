@@ -113,10 +113,6 @@ class LongRun(NamedTuple):
         length = {"steps_run": np.array(self.steps), "nutations_run": np.array(self.nutations)}
         return length | {"long_nutations": times, "energy_change": change}
 
-    def most_in_a_nutation(self, constant: Constant) -> float:
-        """What an error that returns with the nutation cannot exceed: the largest change of a step, all one way."""
-        return constant.a_step * self.steps / self.nutations if self.nutations > 1.0 else math.inf
-
 
 def _run(
     method: Integrator, scene: Scene, chart: str, steps: float, step: float, samples: int
@@ -299,11 +295,13 @@ def _constant(claim: str, claimed: str, run: LongRun, constant: Constant | None)
         why += f", growth exponent {changed.exponent:.2f} +- {changed.exponent_interval:.2f}"
         if kind == "drift":
             why += f", drifting by {changed.rise / max(run.steps, 1):.1e} a step"
+    # an error that returns with the nutation cannot exceed the largest change of a step, all one way
+    most = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
     if run.outcome not in ("ok", "not_finite") or (kind in ("kept", "bounded") and run.outcome != "ok"):
         why += f"; but the run {run.message}"
     elif kind == "unknown":
         why = f"the run {run.message}" if run.outcome != "ok" else f"{why}: no exponent to judge it by"
-    elif claimed == "bounded" and constant.grows is None and changed.largest > run.most_in_a_nutation(constant):
+    elif claimed == "bounded" and constant.grows is None and changed.largest > most:
         verdict, why = "refuted", f"{why}, more than the steps of a nutation can add up to: it does not come back"
     elif claimed == "bounded" and constant.grows is None:
         why += ", which leaves open whether it grows"

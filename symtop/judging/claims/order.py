@@ -116,10 +116,6 @@ class ChartSeries(NamedTuple):
         defect, noise = self.series.defect[term], self.series.noise[term]
         return f"the h^{term} term of a step is off by {defect:.1e} of itself (noise {noise:.0e})"
 
-    def follows(self, power: int) -> bool:
-        """Has the step the motion's terms up to h^power, beyond doubt? Then its runs go to the motion."""
-        return self.order >= power and float(self.series.noise[1]) < CLEAR
-
     def term(self, power: int) -> tuple[float, float]:
         """The largest defect up to h^power, and the least that is told from none."""
         noise = self.series.noise[min(power, self.series.noise.size - 1)]
@@ -205,12 +201,17 @@ def _by_steps(subject: Subject) -> Finding:
         # limit of its runs is extrapolated by a power that they do not have: it looks wrong
         method = replace(method, order=max(series.order, 1))
         fitted = measured_order(method, scene, quick=quick, finest=finest)
-    subject.traces.update(settings_shown(fitted))
+    rank = np.argsort(fitted.step_size)[:SHOWN]
+    columns = {"step_size": fitted.step_size, "error": fitted.error, "fitted": fitted.main.used.astype(float)}
+    padded = np.full(SHOWN - rank.size, math.nan)
+    subject.traces.update({name: np.concatenate([values[rank], padded]) for name, values in columns.items()})
     main = fitted.main
     slopes = ", ".join(f"{name} {fit}" for name, fit in fitted.fits.items() if math.isfinite(fit.slope))
     slopes = f"slopes {slopes} on {fitted.scene}" if slopes else "no slope"
     power = method.order or 1
-    sure = subject.in_plane or (fitted.measured and series and series.follows(max(power, 1)))
+    # runs of a step that has the motion's terms up to h^power, beyond doubt, go to the motion
+    follows = series and series.order >= max(power, 1) and float(series.series.noise[1]) < CLEAR
+    sure = subject.in_plane or (fitted.measured and follows)
     if method.fixed_step and not sure:
         if fitted.measured:
             power = max(1, min(method.order or 99, round(main.slope)))
@@ -331,14 +332,6 @@ def _signed_error(method: Integrator, scene: Scene, horizon: float, steps: int) 
     slip = (float(run.p_theta[-1]) - scene.top.I1 * float(true.theta_dot[0])) / scene.momentum_scale
     turn = [] if run.psi is None else [float(run.psi[-1]) - float(true.psi[0])]
     return np.array([*(run.axis[-1] - axis), slip, *turn])
-
-
-def settings_shown(fitted: Order) -> dict[str, Array]:
-    """Steps, errors and the mask of the fit, in order of the step and padded to one length, for a dataset."""
-    rank = np.argsort(fitted.step_size)[:SHOWN]
-    columns = {"step_size": fitted.step_size, "error": fitted.error, "fitted": fitted.main.used.astype(float)}
-    padded = np.full(SHOWN - rank.size, math.nan)
-    return {name: np.concatenate([values[rank], padded]) for name, values in columns.items()}
 
 
 def _exactness(subject: Subject) -> Finding:

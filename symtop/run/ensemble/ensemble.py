@@ -187,7 +187,10 @@ def _job(
         words = "has a fixed step and needs step_size or per_nutation"
         raise SymtopError(f"{method.name} {words}", "step_size", "per_nutation")
     numbers, names, n = members.numbers, members.names, len(members.numbers)
-    period = _periods(numbers, names) if "per_nutation" in given or "nutations" in given else None
+    period = nutation_periods(numbers) if "per_nutation" in given or "nutations" in given else None
+    for i in np.flatnonzero(~np.isfinite(period))[:1] if period is not None else ():
+        words = f"per_nutation and nutations count nutation periods, and that of {called(names, i)} is endless"
+        raise SymtopError(words, "per_nutation", "nutations")
     horizon = _horizons(members, given, period)
     steps = bounds = None
     if method.fixed_step:
@@ -219,15 +222,6 @@ def _horizons(members: Members, given: dict[str, Any], period: Array | None) -> 
         words = f"not {horizon[i]!s} as of {called(names, i)}"
         raise SymtopError(f"horizon must be at most {LONGEST_TIME:g}, {words}", "horizon")
     return horizon
-
-
-def _periods(numbers: Array, names: Any) -> Array:
-    """Nutation periods; SymtopError for a member that has none."""
-    period = nutation_periods(numbers)
-    for i in np.flatnonzero(~np.isfinite(period))[:1]:
-        words = f"per_nutation and nutations count nutation periods, and that of {called(names, i)} is endless"
-        raise SymtopError(words, "per_nutation", "nutations")
-    return period
 
 
 def _parts(period: Array, counted: Array, horizon: Array, names: Any) -> Array:

@@ -70,7 +70,7 @@ from symtop.run.reference.independent_checks import (
     iterate_map_with_error,
     largest_errors,
 )
-from symtop.run.reference.sensitivity import conditioning, unbounded
+from symtop.run.reference.sensitivity import FAR, LEAST, conditioning
 from symtop.run.trajectory import dataset
 
 PRECISIONS = ("closed-form", "double", "longdouble", "quad")
@@ -173,7 +173,7 @@ def conditioned(scene: Scene, horizon: float) -> str:
     if math.isnan(factor):  # a changed start that comes too close to a pole
         return "unknown"
     change, anew = f"{factor:.2g} times a change of the start", "rounding the start anew moves the axis by"
-    if unbounded(factor):
+    if factor * LEAST > FAR:  # the factor is only a lower bound: the smallest change of the start moves the axis so far
         known = "nothing is known of the axis but from these very doubles"
         return f"at least {change}; {anew} {factor * EPSILON:.2g} rad or more: {known}"
     return f"{change}; {anew} {factor * EPSILON:.1g} rad" if factor > ILL else change
