@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from symtop.run.simulation import simulate as simulate
     from symtop.runner.study import Case as Case, Picture as Picture, Study as Study, Table as Table
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 _NAMES = {  # by the module that holds them
     "advise": "Advice recommend",

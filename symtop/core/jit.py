@@ -59,11 +59,10 @@ overload(sincos, jit_options=INLINED, strict=False)(lambda *_: polynomials)
 
 @by_name
 def register_jitable(function: Function, options: dict[str, Any] = INLINED) -> Function:
-    """Let kernels call a plain function, inlined wherever they do.
+    """Let kernels call a plain function, inlined wherever they do: LLVM would keep the larger ones as calls.
 
-    Left to itself LLVM keeps the larger ones, such as the drift of a splitting, as calls that pass their results
-    through memory: 1.3 times the time of a step. A function is registered once: numba would add another overload each
-    time, and what a kernel is made of would hang on how many loops a process has built before.
+    A function is registered once: numba would add another overload each time, and what a kernel is made of would hang
+    on how many loops a process has built before.
     """
     if function not in _registered:
         _registered.add(function)
@@ -119,10 +118,9 @@ class _Folder:
 class _Index(IndexDataCacheFile):  # type: ignore[misc]
     """The index of a kernel and its files, each named after the signature whose code it holds.
 
-    numba counts them: two processes that save at the same time give two signatures one file, and from then on each
-    process that asks for one of them gets the code of the other. And it runs what it finds: a single byte that has
-    flipped on the disk ended the process (SIGSEGV, SIGILL) in one trial out of five. Here the code follows its hash,
-    and an index that cannot be read is empty.
+    numba counts them: two processes that save at the same time give two signatures one file, and each gets the code of
+    the other. And it runs what it finds, damaged bytes, too. Here the code follows its hash, and an index that cannot
+    be read is empty.
     """
 
     def save(self, key: Any, data: Any) -> None:

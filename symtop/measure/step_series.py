@@ -63,8 +63,8 @@ class Series(NamedTuple):
         return min(first - 1, self.resolved)
 
     @property
-    def seen(self) -> bool:
-        """Is the first term seen that is not the motion's? Else the order may be higher."""
+    def is_exact(self) -> bool:
+        """Is the order known, by a first term that is not the motion's? Else it may be higher."""
         return self.order < self.resolved
 
     def worst(self, power: int) -> float:

@@ -158,7 +158,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
         scripts=[(templates / name).read_text(encoding="utf-8") for name in ("page.js", "chart.js")],
         studies=studies,
         answer=first,
-        glossary=method.glossary(markdown.spoken(first)) if first else [],
+        glossary=method.glossary(markdown.sentences(first)) if first else [],
         leads=[(study, picture) for study in studies for picture in study["pictures"] if picture["lead"]],
         measured=measured,
         mathml=lambda formula: convert(formula, display="block"),

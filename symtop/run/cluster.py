@@ -44,7 +44,7 @@ def connect(address: str) -> Any:
     client, failure = None, ""
     try:
         with ThreadPoolExecutor(1) as apart:  # the caller's thread may run a loop of its own, as in a notebook
-            apart.submit(asyncio.run, _asked(address)).result()
+            apart.submit(asyncio.run, _query(address)).result()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # other versions there; the digest of every case is compared anyway
             client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
@@ -60,7 +60,7 @@ def connect(address: str) -> Any:
     return client
 
 
-async def _asked(address: str) -> None:
+async def _query(address: str) -> None:
     """Raise TimeoutError if a scheduler does not answer: a client waits for ever for one that takes the connection."""
     from distributed import rpc
 

@@ -145,7 +145,7 @@ def long_run(
     par, rule, state = solver.setup(chosen.top, chosen.start, h)
     checkpoints = _Checkpoint(checkpoint, _identity(chosen, method, h, count, compensated))
     result = None if output is None else checkpoints.checked(file_path("output", output))
-    at, rows = checkpoints.resumed(loop.begun(par, rule, state, h))
+    at, rows = checkpoints.resumed(loop.start(par, rule, state, h))
     ends, outcome, reached, title = windows(count), OK, at.k, f"{method.name} on {chosen.name}"
     gauge = watch(chosen, method, h) if len(rows) < len(ends) else None
     bar = tqdm(total=count, initial=at.k, desc=title, unit="step", unit_scale=True, disable=quiet or None, leave=False)

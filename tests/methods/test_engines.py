@@ -194,7 +194,7 @@ def test_a_run_in_stretches_has_the_bits_of_the_run_in_one(name):
     solver = symtop.integrator(name).solvers["attitude"]
     par, rule, state = solver.setup(GOLDSTEIN.top, GOLDSTEIN.start, 0.01)
     whole = solver.loop(par, rule, state, 0.01, np.array([700]))
-    at = solver.loop.begun(par, rule, state, 0.01)
+    at = solver.loop.start(par, rule, state, 0.01)
     _, at = solver.loop.advance(par, rule, at, 0.01, np.array([311]))
     rest, _ = solver.loop.advance(par, rule, at, 0.01, np.array([700]))
     np.testing.assert_array_equal(rest.states, whole.states)

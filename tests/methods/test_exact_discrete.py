@@ -259,7 +259,7 @@ def test_a_stretched_run_keeps_what_its_sums_round_off():
     par, state = on_oscillators(scene.top, scene.start)
     h = scene.nutation_period / 4.37
     rule = solver.rule(scene.top, scene.start, h)
-    begun = solver.loop.begun(par, rule, state, h)
+    begun = solver.loop.start(par, rule, state, h)
     whole, end = solver.loop.advance(par, rule, begun, h, np.array([5000]))
     _, half = solver.loop.advance(par, rule, begun, h, np.array([1234]))
     rest, last = solver.loop.advance(par, rule, half, h, np.array([5000]))

@@ -55,14 +55,14 @@ def assert_runs_alone(solver, numbers, h, marks, done):
 def left_alone(solver, numbers, h, marks):
     """The members that the lanes give back."""
     whole = solver._whole
-    done = Many.begun(len(h), marks.shape[1], whole.size)
+    done = Many.empty(len(h), marks.shape[1], whole.size)
     return whole.blocks().run(np.arange(len(h)), numbers, whole.table, h, marks, done, loops.BLOCK)
 
 
 def times_faster(solver, numbers, h, marks):
     """How many times faster members are in lanes than one after another."""
     whole, everyone = solver._whole, np.arange(len(h))
-    done = Many.begun(len(h), marks.shape[1], whole.size)
+    done = Many.empty(len(h), marks.shape[1], whole.size)
     together, alone = timings(
         [lambda: whole.blocks().run(everyone, numbers, whole.table, h, marks, done, loops.BLOCK),
          lambda: in_turn(whole.alone[0], everyone, numbers, whole.rule, h, marks, done)], batches=25, batch=0.005,

@@ -131,7 +131,7 @@ def test_a_run_in_stretches_has_the_bits_of_the_run_alone(stages, phase):
     """Also where some steps are swept and others are solved by Newton."""
     par, y, h = started("spheroid", phase)
     whole = march_axis(par, gauss_rule(stages), tuple(y), h, np.arange(1, 61))
-    at, parts = march_axis.begun(par, gauss_rule(stages), tuple(y), h), []
+    at, parts = march_axis.start(par, gauss_rule(stages), tuple(y), h), []
     for first in range(1, 61, 20):
         done, at = march_axis.advance(par, gauss_rule(stages), at, h, np.arange(first, first + 20))
         parts.append(done.states)

@@ -77,7 +77,7 @@ def test_a_run_in_stretches_has_the_bits_of_one_in_one_piece(name):
     par, rule, state = solver.setup(WHERE.top, WHERE.start, H)
     marks = np.array([3, 50, 51, 200])
     whole = solver.loop(par, rule, state, H, marks)
-    first, at = solver.loop.advance(par, rule, solver.loop.begun(par, rule, state, H), H, marks[:2])
+    first, at = solver.loop.advance(par, rule, solver.loop.start(par, rule, state, H), H, marks[:2])
     again = at._replace(carry=regrown(at.carry, iter(leaves(at.carry))))
     for position in (at, again):
         second, end = solver.loop.advance(par, rule, position, H, marks[2:])
@@ -90,7 +90,7 @@ def test_a_run_in_stretches_has_the_bits_of_one_in_one_piece(name):
 def test_what_was_rounded_off_is_part_of_a_position():
     _, solver = chart_of(symtop.integrator("stormer-verlet"))
     par, rule, state = solver.setup(WHERE.top, WHERE.start, H)
-    _, at = solver.loop.advance(par, rule, solver.loop.begun(par, rule, state, H), H, np.array([1000]))
+    _, at = solver.loop.advance(par, rule, solver.loop.start(par, rule, state, H), H, np.array([1000]))
     forgetful = at._replace(low=(0.0,) * 4)
     ends = [solver.loop.advance(par, rule, one, H, np.array([20_000]))[0].states for one in (at, forgetful)]
     assert not np.array_equal(*ends)

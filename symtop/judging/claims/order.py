@@ -124,7 +124,7 @@ class ChartSeries(NamedTuple):
     @property
     def measured(self) -> Measured:
         """The order that is seen, or the least that it can be."""
-        text = f"{self.order} by its h^{self.order + 1} term" if self.series.seen else f"{self.order} or more"
+        text = f"{self.order} by its h^{self.order + 1} term" if self.series.is_exact else f"{self.order} or more"
         return Measured("by a term", self.order, text=text)
 
 
@@ -196,7 +196,13 @@ def _by_steps(subject: Subject) -> Finding:
     method, scene, quick, finest = subject.method, subject.scene, subject.quick, subject.finest
     series, claim = series_of(subject), method.order
     fitted = _in_plane(subject) if subject.in_plane else measured_order(method, scene, quick=quick, finest=finest)
-    if series and not subject.in_plane and not fitted.measured and series.series.seen and series.order < (claim or 0):
+    if (
+        series
+        and not subject.in_plane
+        and not fitted.measured
+        and series.series.is_exact
+        and series.order < (claim or 0)
+    ):
         # a method of high order is tried at long steps, whose errors fall as no power where the order is low, and the
         # limit of its runs is extrapolated by a power that they do not have: it looks wrong
         method = replace(method, order=max(series.order, 1))
@@ -268,7 +274,7 @@ def _claimed(power: int, fitted: Order, series: ChartSeries | None, slopes: str)
     verdict = order_verdict(power, main, fits)
     value, resolution = main.slope, BESIDE + main.interval
     why = f"{slopes}; {series.words(power)}" if series else slopes
-    if series is not None and series.order == power and series.series.seen and verdict != "confirmed":
+    if series is not None and series.order == power and series.series.is_exact and verdict != "confirmed":
         early = bool(measured) and main.slope > power and all(not fit.slope < power - BESIDE for fit in fits)
         if early or (not measured and _agree(fitted, power)):
             why = f"{why} ({main.reason or 'at steps too long for a slope'})"

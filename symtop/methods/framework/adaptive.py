@@ -52,7 +52,7 @@ class Adaptive:
         `numbers` (n, 9), `tolerance` (n,), `times` (n, samples), of which the first `counts` (n,) are asked for. Each
         member has the bits of a run alone and fails alone. Work is in force evaluations.
         """
-        done, reached = Many.begun(len(numbers), times.shape[1], self.size), np.zeros(len(numbers))
+        done, reached = Many.empty(len(numbers), times.shape[1], self.size), np.zeros(len(numbers))
         out, times = refused(self.check, numbers), np.ascontiguousarray(times)
         done.outcome[out] = LEFT_CHART
         for i, plain in enumerate(map(tuple, numbers.tolist())):

@@ -321,7 +321,7 @@ class Many(NamedTuple):
     outcome: Whole  # (n,) indices into OUTCOMES
 
     @classmethod
-    def begun(cls, n: int, samples: int, size: int) -> "Many":
+    def empty(cls, n: int, samples: int, size: int) -> "Many":
         """Room for n members, none of which has made a step."""
         states, momenta = np.full((n, samples, size), np.nan), np.full((n, samples, 2), np.nan)
         return cls(states, momenta, *(np.zeros(n, dtype=np.int64) for _ in range(3)))

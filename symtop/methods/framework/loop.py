@@ -87,7 +87,7 @@ def as_stepped(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
 class Loop:
     """The loop around one kernel family, compiled when it is first used: ``loop(par, rule, state, h, marks)``.
 
-    A run records the state after ``marks[j]`` steps for each j (increasing; 0 is the start). `begun` and `advance` do
+    A run records the state after ``marks[j]`` steps for each j (increasing; 0 is the start). `start` and `advance` do
     the same in stretches, and the bits do not depend on where a stretch ends. ``whole(kind, prepare, scale, sample)``
     is a run in one compiled call, from plain numbers (`preparation`) to filled arrays: ``run(numbers, rule, h, marks,
     states, momenta)``, with momenta (2, samples), returns steps, work and outcome. `lanes` is what the family has for a
@@ -104,9 +104,9 @@ class Loop:
 
     def __call__(self, par: Any, rule: Any, state: tuple[float, ...], h: float, marks: Marks) -> March:
         """From the start to the last mark."""
-        return self.advance(par, rule, self.begun(par, rule, state, h), h, marks)[0]
+        return self.advance(par, rule, self.start(par, rule, state, h), h, marks)[0]
 
-    def begun(self, par: Any, rule: Any, state: tuple[float, ...], h: float) -> Position:
+    def start(self, par: Any, rule: Any, state: tuple[float, ...], h: float) -> Position:
         """A run before its first step."""
         state, carry = self.prepare(par, rule, state, h)
         return Position(state, (0.0,) * len(state), carry, 0)
@@ -300,18 +300,18 @@ class FixedStep:
         out = many.refused(check, numbers)
         left, done = np.flatnonzero(~out), None
         if whole is not None:
-            done = Many.begun(len(numbers), marks.shape[1], whole.size)
+            done = Many.empty(len(numbers), marks.shape[1], whole.size)
             left = whole.run(left, numbers, h, marks, done)
         for i, top in zip(left.tolist(), many.members_of(numbers[left]), strict=True):
             heed()
             run = self(*top, Plan.steps(float(h[i]), marks[i]))
             if done is None:
-                done = Many.begun(len(numbers), *run.states.shape)
+                done = Many.empty(len(numbers), *run.states.shape)
             done.states[i], done.momenta[i, :, 0], done.momenta[i, :, 1] = run.states, run.p_phi, run.p_psi
             done.steps[i], done.outcome[i] = run.steps, OUTCOMES.index(run.outcome)
             done.work[i] = (run.force_evaluations - run.steps * self.each_step) // self.evaluations
         if done is None:  # nobody ran, and only angles refuse a start
-            done = Many.begun(len(numbers), marks.shape[1], charts.DIMENSIONS["angles"])
+            done = Many.empty(len(numbers), marks.shape[1], charts.DIMENSIONS["angles"])
         done.outcome[out] = LEFT_CHART
         return done
 

@@ -52,7 +52,7 @@ def _rates(par: Any, e: Any, x: Any) -> Any:
 
 
 @register_jitable
-def _begun(par: Any, state: Any) -> Any:
+def _initial(par: Any, state: Any) -> Any:
     """W' of the start, in space."""
     e = axis_of(state[0], state[1], state[2], state[3])
     w = _rates(par, e, (state[4], state[5], state[6]))
@@ -61,7 +61,7 @@ def _begun(par: Any, state: Any) -> Any:
 
 def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     """a and W' of the start, in space."""
-    carry, change = np.empty(6), _begun(par, state)
+    carry, change = np.empty(6), _initial(par, state)
     for k in range(3):
         carry[k] = carry[3 + k] = change[k]
     return carry
@@ -136,7 +136,7 @@ def turn(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
 
 
 def _carried(par: Any, rule: Any, state: Any, h: float) -> Any:
-    change = _begun(par, state)
+    change = _initial(par, state)
     return (*change, *change)
 
 

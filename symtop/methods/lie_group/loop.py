@@ -242,7 +242,7 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
         return body(*top_of(table, 0, j)), rule_of(table, tops, j), carried(block, CARRY, j), row[j]
 
     @register_jitable
-    def begun(block, table, row, j):  # type: ignore[no-untyped-def]
+    def prepare(block, table, row, j):  # type: ignore[no-untyped-def]
         par, rule, carry, h = given(block, table, row, j)
         _, e, L = entered(block, j)
         fixed, x = start(par, rule, e, L, carry, h)
@@ -272,7 +272,7 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
     def part(block, table, row):  # type: ignore[no-untyped-def]
         wide_vectors()
         for j in range(W):
-            begun(block, table, row, j)
+            prepare(block, table, row, j)
         for _ in range(most // 2):
             for j in range(W):
                 passed(block, table, row, j)

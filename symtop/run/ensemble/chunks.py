@@ -352,7 +352,7 @@ def sampled(solver: FixedStep, numbers: Array, plan: Schedule) -> Many:
         solver.many(numbers[rows], plan.step_size[rows], plan.marks[rows, :count])
         for rows, count in zip(groups, counts, strict=True)
     ]
-    done = Many.begun(len(numbers), plan.marks.shape[1], parts[0].states.shape[2])
+    done = Many.empty(len(numbers), plan.marks.shape[1], parts[0].states.shape[2])
     for rows, count, part in zip(groups, counts, parts, strict=True):
         done.states[rows, :count], done.momenta[rows, :count] = part.states, part.momenta
         done.steps[rows], done.work[rows], done.outcome[rows] = part[2:]
