@@ -38,6 +38,7 @@ ROWS = (
 )
 KINDS = {".png": "image/png", ".gif": "image/gif"}
 LONGEST_ANCHOR = 60  # letters
+MATHML = "http://www.w3.org/1998/Math/MathML"
 
 
 def prepared(chart: Mapping[str, Any]) -> str:
@@ -161,7 +162,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
         glossary=method.glossary(markdown.sentences(first)) if first else [],
         leads=[(study, picture) for study in studies for picture in study["pictures"] if picture["lead"]],
         measured=measured,
-        mathml=lambda formula: convert(formula, display="block"),
+        mathml=lambda formula: convert(formula, display="block").replace(f' xmlns="{MATHML}"', ""),  # HTML needs none
         explanations=lambda study: markdown.explanations(study, titles),
         integrators=tables.columns([method.record() for method in integrators().values()]),
         provenance=facts,
