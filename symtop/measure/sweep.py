@@ -20,9 +20,9 @@ from symtop.core import code_hash, netcdf
 from symtop.core.errors import SymtopError, boolean, file_path, positive, row, whole
 from symtop.core.parallel import MOST_THREADS, cores, in_threads
 from symtop.core.progress import beating
+from symtop.measure import columns
 from symtop.measure.accuracy import as_table, enough_samples, error_row
 from symtop.measure.errors import QUANTITIES
-from symtop.measure.settings import ANGLES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.simulation import chart_of, make_plan
@@ -113,7 +113,7 @@ def sweep(
             [[chart_of(method, one.observes, observe) for method in methods] for one in chosen],
         )
         units = chosen[0].units if len({one.units for one in chosen}) == 1 else ""
-        return _described(netcdf.describe(data, "errors and work of a sweep", units=units))
+        return netcdf.describe(columns.described(data, "sweep", units), "errors and work of a sweep", units=units)
 
     kept = time.monotonic()
     with beating(
@@ -239,7 +239,7 @@ def _stored(file: Path) -> dict[tuple[str, str], _Stored]:
     """The cells of an earlier sweep by scene and integrator; SymtopError for a file that is no sweep's."""
     if not file.exists():
         return {}
-    data = netcdf.read(file)
+    data = netcdf.read(file).drop_attrs()
     if "made_of" not in data:
         raise SymtopError(f"path must be a new file or that of a sweep, not {str(file)!r}")
     if "integrator" in data.coords:  # a file of version 0.2
@@ -265,13 +265,3 @@ def _few(names: list[str]) -> str:
     """The first of some names, and how many more there are."""
     more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
     return ", ".join(names[:MOST_NAMED]) + more
-
-
-def _described(data: xr.Dataset) -> xr.Dataset:
-    """Words and units for the errors, whose names are those of other quantities elsewhere."""
-    ends = {"": "largest over the run", "_end": "at the horizon", "_bound": "the least that can be judged"}
-    for name, words in QUANTITIES.items():
-        for end, what in ends.items():
-            unit = "rad" if name in ANGLES else "1"
-            data[f"{name}{end}"].attrs = {"long_name": f"{words}, {what}", "units": unit}
-    return data

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from symtop.core import files, netcdf
 from symtop.core.errors import label, shown
+from symtop.measure import columns
 from symtop.runner import fingerprint, manifest, scripts, store
 from symtop.runner.cases import StudyCases
 from symtop.runner.execute_case import prepare
@@ -42,7 +43,7 @@ def analyse_stored(work: Analysis) -> dict[str, Any]:
 
 def drawing_digest(study: Study, save: Save | None) -> str:
     """Hash of what combines, draws and judges."""
-    return fingerprint.drawing_digest(study, scripts.file_of(study.name), store.combine, save)
+    return fingerprint.drawing_digest(study, scripts.file_of(study.name), store.combine, columns.described, save)
 
 
 def analyse(cases: StudyCases, made_of: str, save: Save | None, *, quick: bool) -> dict[str, Any]:
@@ -54,6 +55,7 @@ def analyse(cases: StudyCases, made_of: str, save: Save | None, *, quick: bool) 
             netcdf.sweep(file)
         combined = cases.combined()
         units = store.units_of(case.scene for case in cases.cases.values())
+        combined = columns.described(combined, study.name, units)
         combined = netcdf.describe(combined, study.title, units=units, question=study.question)
         netcdf.write(combined, dataset)
         store.forget(results, study, cases.cases)
