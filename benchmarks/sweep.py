@@ -4,7 +4,7 @@
 
 The starts are a grid of inclinations and spins of one top, run with one method for a few nutations, all in one process.
 A certificate compares the closed form of one start with 40 digits and an integration
-(`symtop.run.reference.certificate`), as every reference once did; some of the starts are certified, and their time is
+(`symtop.run.reference.truth`), as every reference once did; some of the starts are certified, and their time is
 what all would take.
 """
 

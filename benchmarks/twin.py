@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian import discrete_lagrangian, exact_discrete, galerkin, unreduced
 from symtop.methods.lie_group import energy_momentum, generalised_alpha, runge_kutta, variational
@@ -79,15 +79,15 @@ FAMILIES: dict[Callable[..., Any], tuple[str, str]] = {
     kahan.march_axis: ("kahan", ""),
     kahan.march_frame: ("kahan", "FRAME"),
     runge_kutta.march: ("lie_group", "RUNGE_KUTTA"),
-    variational.march: ("lie_group", "VARIATIONAL"),
+    **dict.fromkeys(variational.MARCH.values(), ("lie_group", "VARIATIONAL")),
     energy_momentum.march: ("lie_group", "ENERGY_MOMENTUM"),
     generalised_alpha.march: ("lie_group", "ALPHA"),
     collective_gauss.march: ("lie_group", "COLLECTIVE"),
 }
 # maps between the variables that are stepped and those that are shown, once a run
 SHOWN: dict[Callable[..., Any], tuple[Callable[..., Any], Callable[..., Any]]] = {
-    space.march_axis: (space.enter_axis, space.present_axis),
-    space.march_attitude: (space.enter_attitude, space.present_attitude),
+    space.march_axis: (space.AXIS.enter, space.AXIS.present),
+    space.march_attitude: (space.ATTITUDE.enter, space.ATTITUDE.present),
     exact_discrete.march_axis: (exact_discrete.enter, exact_discrete.present_axis),
     exact_discrete.march_attitude: (exact_discrete.enter, exact_discrete.present_attitude),
     series.march_attitude(DEFAULT_ORDER): (lambda _par, _rule, state, _h: state, series.present),
@@ -140,7 +140,8 @@ class Twin:
         self._march.restype = ctypes.c_long
         pointer = ctypes.c_void_p
         self._march.argtypes = [pointer, pointer, pointer, ctypes.c_double, ctypes.c_long, pointer]
-        self._par, self._rule = np.array(numbers(kernel.par)), np.array(numbers(kernel.rule))
+        rule = kernel.rule if kernel.march is not collective_gauss.march else (*kernel.rule[:2], kernel.rule.shares)
+        self._par, self._rule = np.array(numbers(kernel.par)), np.array(numbers(rule))
         start = kernel.state if self._enter is None else self._enter(kernel.par, kernel.rule, kernel.state, kernel.h)
         self._start = np.array(start)
 

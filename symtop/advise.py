@@ -1,12 +1,10 @@
 """`recommend`: the cheapest integrator, with its step or tolerance, that meets an accuracy on a scene.
 
     1. Candidates. A stored population study counts on how many of the random tops nearest to this one a method was
-       the cheapest or nearly so; a stored work-precision study lists the methods that were cheapest on the nearest
-       scene. The distance is that of four dimensionless numbers which fix the motion of the axis
-       (`symtop.measure.nearest`). Without a stored study every compiled method is a candidate.
+       the cheapest or nearly so (`symtop.measure.ranking`); a stored work-precision study lists the methods that were
+       cheapest on the nearest scene. Without a stored study every compiled method is a candidate.
     2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
-       (`symtop.measure.settings`). The error is measured against the closed form, its target is lowered by the law of
-       growth, and one run is timed.
+       (`symtop.measure.settings`), against the closed form and a target lowered by the law of growth; one run is timed.
     3. Confirmation. The three fastest candidates are run to the whole horizon, if a budget of force evaluations allows
        it, and their settings are corrected.
 
@@ -17,17 +15,16 @@ The confidence of the advice is one of:
     extrapolated               it was not run to the end
     none                       no method meets the accuracy; the integrator is None
 
-An accuracy below the bound of the reference is answered with ``none`` before any run, because no run could show it.
-
-The closed form is no candidate: it is what errors are measured by, and a top with friction, drive or another body
-attached has none. For the top as it stands it is mostly the fastest way, and the advice says so with its time.
+An accuracy below the bound of the reference is answered with ``none`` before any run. The closed form is no candidate:
+it is what errors are measured by, and a top with friction, drive or another body attached has none. For the top as it
+stands it is mostly the fastest way, and the advice says so with its time.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -35,14 +32,15 @@ import xarray as xr
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, one_of, positive
 from symtop.measure import ranking, settings
-from symtop.measure.errors import QUANTITIES
-from symtop.measure.nearest import STORED, Near, distances, nearest, regime
+from symtop.measure.errors import QUANTITIES, errors
 from symtop.measure.phase import FREQUENCIES
+from symtop.measure.ranking import STORED, Near, distances, nearest, regime
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import Integrator, integrator, integrators, is_built_in, split_name
 from symtop.model import scenes
 from symtop.model.scenes import Scene, horizon_of
-from symtop.run.guard.guard import MOST_STEPS
+from symtop.run.guard import MOST_STEPS
+from symtop.run.simulation import simulate
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
 STORED_STUDY = "work_precision.nc"
@@ -54,6 +52,27 @@ CONFIDENCE = {
     "at the reference's limit": "measured to the end, as far as the reference can tell",
     "extrapolated": "extrapolated from a short run",
 }
+SETTINGS = {  # the maps of an engine by its settings, the default first
+    "mujoco": {
+        "Euler": "mujoco-euler", "implicit": "mujoco-implicit", "implicitfast on a free body": "mujoco-implicit",
+        "RK4 of 4.0": "rkmk4", "RK4 up to 3.17": "mujoco3-rk4",
+    },
+    "bullet": {"rigid body": "bullet-float32", "multibody": "mujoco-euler", "rigid body, flags 0": "no-gyro-float32"},
+    "pybullet": {"multibody": "mujoco-euler"},
+    "dart": {"default": "mujoco-euler"},
+    "jolt": {"default": "no-gyro-float32", "gyroscopic force on": "jolt-float32"},
+    "physx": {"default": "no-gyro-float32", "gyroscopic forces on": "physx-float32"},
+    "havok": {"default": "no-gyro-float32"},
+    "rapier": {"default": "rapier-float32"},
+    "cannon-es": {"default": "no-gyro-linear"},
+    "ode": {"default": "ode", "gyroscopic mode off": "no-gyro-linear"},
+    "lammps": {"fix rigid": "lammps-rigid", "fix rigid/nve": "no-squish"},
+    "yade": {"exactAsphericalRot": "yade"},
+    "jsbsim": {"default": "jsbsim-default", "Buss2 and AB2": "jsbsim-buss2"},
+    "exudyn": {"RK44": "rkmk4"},
+}  # fmt: skip
+STEP = 1.0 / 240.0  # s
+WORST = 0.5  # rad: an axis that is further off needs no method to match it
 MARGIN = 0.8  # fraction of the accuracy that a run must meet at its samples; between them its error may be larger
 
 
@@ -70,13 +89,13 @@ class Advice:
     quantity: str
     accuracy: float
     horizon: float
-    integrator: str | None
-    step_size: float | None
-    tolerance: float | None
-    expected_error: float
-    seconds: float
-    confidence: str
-    reason: str
+    integrator: str | None = None
+    step_size: float | None = None
+    tolerance: float | None = None
+    expected_error: float = math.nan
+    seconds: float = math.nan
+    confidence: str = "none"
+    reason: str = ""
     runner_up: str = ""
     closed_form: str = ""
     nearest: str = ""
@@ -85,12 +104,11 @@ class Advice:
     python: str = ""
 
     def __str__(self) -> str:
-        named = {"Runner-up": self.runner_up, "": self.nearest, " ": self.closed_form}
-        lines = [f"{name}: {text}" if name.strip() else text for name, text in named.items() if text]
-        last = {"Run it": self.command, "In Python": self.python}
-        return "\n".join(
-            [self.reason, *lines, *self.fails, *(f"{name}: {text}" for name, text in last.items() if text)]
-        )
+        lines = [
+            self.reason, self.runner_up and f"Runner-up: {self.runner_up}", self.nearest, self.closed_form, *self.fails,
+            self.command and f"Run it: {self.command}", self.python and f"In Python: {self.python}",
+        ]  # fmt: skip
+        return "\n".join(filter(None, lines))
 
 
 class _Question(NamedTuple):
@@ -142,31 +160,31 @@ def recommend(
     guesses, source = _candidates(question, data, near)
     source += f" ({Path(results) / STORED_STUDY})" if results is not None else ""
     trials: list[_Trial] = []
-    fails: dict[str, list[str]] = {}
-    patience = math.inf
-    methods = {name: integrator(name) for name in guesses}
-    # Methods of high order first: they are the cheapest at most accuracies, and their cost ends the other searches.
-    ordered = sorted(guesses, key=lambda name: -(methods[name].order or 0))
-    for name in ordered:
-        trial = _try(question, methods[name], guesses[name], patience)
-        if isinstance(trial, _Trial):
-            trials.append(trial)
-            patience = min(patience, TOO_DEAR * trial.met.evaluations)
-        else:
-            fails.setdefault(trial, []).append(name)
-    trials.sort(key=lambda trial: trial.seconds)
     ranked: list[_Trial] = []
-    for number, trial in enumerate(trials):
-        if number >= FINALISTS and ranked:
-            break
-        confirmed = _confirm(question, trial)
-        if isinstance(confirmed, _Trial):
-            ranked.append(confirmed)
-        else:
-            fails.setdefault(confirmed, []).append(trial.met.integrator.name)
+    fails: dict[str, list[str]] = {}
+    # those of high order first: they are the cheapest at most accuracies, and their cost ends the other searches
+    for method in sorted(map(integrator, guesses), key=lambda method: -(method.order or 0)):
+        patience = TOO_DEAR * min((one.met.evaluations for one in trials), default=math.inf)
+        trial = _try(question, method, guesses[method.name], patience)
+        _sort_in(trial, trials, fails, method.name)
+    for number, tried in enumerate(sorted(trials, key=lambda trial: trial.seconds)):
+        if number < FINALISTS or not ranked:
+            _sort_in(_confirm(question, tried), ranked, fails, tried.met.integrator.name)
     ranked.sort(key=lambda trial: trial.seconds)
+    # Times of the user's own methods in plain Python say nothing beside those of compiled ones.
+    own = [one.name for one in integrators().values() if one.implementation == "python" and not is_built_in(one.name)]
+    if own:
+        fails["Not tried, as only compiled methods are timed"] = own
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
-    return _advice(question, ranked, sentences + _not_tried(), source, near)
+    return _advice(question, ranked, sentences, source, near)
+
+
+def _sort_in(trial: "_Trial | str", trials: list[_Trial], fails: dict[str, list[str]], name: str) -> None:
+    """To the trials, or its name to those that fail for the same reason."""
+    if isinstance(trial, _Trial):
+        trials.append(trial)
+    else:
+        fails.setdefault(trial, []).append(name)
 
 
 def _stored(file: Path) -> xr.Dataset:
@@ -184,21 +202,12 @@ def _stored(file: Path) -> xr.Dataset:
 
 
 def _usable(quantity: str) -> list[str]:
-    """What can be recommended: compiled methods with a step or a tolerance, in each chart that shows the quantity.
-
-    A method is named with its chart, ``rk4[axis]``, if it has several.
-    """
+    """Compiled methods with a step or a tolerance, each in the charts that show the quantity, which it then names."""
     return [
         variant.name if len(integrator(variant.method).charts()) > 1 else variant.method
         for variant in settings.compared(settings.observed(quantity))
         if variant.control is not None and variant.implementation == "compiled"
     ]
-
-
-def _not_tried() -> tuple[str, ...]:
-    """A sentence on the user's own methods in plain Python, whose times say nothing beside those of compiled ones."""
-    names = [own.name for own in integrators().values() if own.implementation == "python" and not is_built_in(own.name)]
-    return (f"Not tried, as only compiled methods are timed: {', '.join(names)}.",) if names else ()
 
 
 def _same(variant: str, usable: Sequence[str]) -> str | None:
@@ -224,37 +233,26 @@ def _candidates(
     closest = min(stored, key=lambda name: float(distances(regime(stored[name])[np.newaxis], numbers)[0]))
     column = int(np.argmin(np.abs(np.log(data["horizon"].values / max(horizon / scene.nutation_period, 1e-3)))))
     cell = data.sel(scene=closest).isel(horizon=column)
+    served = [_same(name, usable) for name, count in near.served.items() if count] if near is not None else []
+    often = dict.fromkeys(filter(None, served))  # the methods that served most of the nearest tops first
+    scale = scene.nutation_period / stored[closest].nutation_period
     cheapest: dict[str, float | None] = {}
     stored_as = "axis" if quantity == "attitude" else quantity  # the study runs what shows the axis
     for place in ranking.cheapest(cell, accuracy, stored_as):
         name = _same(place.integrator, usable)
         if name is not None and name not in cheapest:
             run = cell.sel(variant=place.integrator).isel(setting=place.setting)
-            cheapest[name] = _setting(run, scene, stored[closest])
-    served = _served(near, usable)
-    chosen = {name: cheapest.get(name) for name in [*served, *cheapest][:CANDIDATES]}
+            step, fixed = float(run["step_size"]), bool(np.isfinite(run["step_size"]))
+            scaled = step * scale if math.isfinite(scale) and scale > 0.0 else step
+            cheapest[name] = scaled if fixed else float(run["tolerance"])
+    chosen = {name: cheapest.get(name) for name in [*often, *cheapest][:CANDIDATES]}
     if not chosen:
         return everyone, f"tried all {len(everyone)} compiled methods (none met it on {closest}, the nearest scene)"
-    count = sum(name in served for name in chosen)
+    count = sum(name in often for name in chosen)
     words = [f"{count} methods that served the {near.tops} nearest random tops most often"] if near and count else []
     if len(chosen) > count:
         words.append(f"{len(chosen) - count} methods that are cheapest on {closest}, the nearest stored scene")
     return chosen, f"tried the {' and '.join(words)}"
-
-
-def _served(near: Near | None, usable: Sequence[str]) -> list[str]:
-    """The usable methods that served one of the nearest tops or more, the most first."""
-    names = [_same(variant, usable) for variant, count in near.served.items() if count] if near is not None else []
-    return list(dict.fromkeys(filter(None, names)))
-
-
-def _setting(run: xr.Dataset, scene: Scene, stored: Scene) -> float:
-    """A stored step, scaled by the ratio of the nutation periods, or a stored tolerance."""
-    step = float(run["step_size"])
-    if not math.isfinite(step):
-        return float(run["tolerance"])
-    scale = scene.nutation_period / stored.nutation_period
-    return step * scale if math.isfinite(scale) and scale > 0.0 else step
 
 
 def _try(question: _Question, method: Integrator, guess: float | None, patience: float) -> "_Trial | str":
@@ -273,10 +271,7 @@ def _try(question: _Question, method: Integrator, guess: float | None, patience:
 
 
 def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
-    """The trial run to the whole horizon with its setting corrected, or the reason why it fails there.
-
-    A trial that would need too many evaluations is not run so far; its setting is rounded all the same.
-    """
+    """The trial run to the whole horizon, if not too much, with its setting corrected; or the reason why it fails."""
     scene, accuracy, quantity, horizon = question
     short = trial.met
     if short.evaluations * horizon / short.horizon > settings.MOST_EVALUATIONS[short.integrator.implementation]:
@@ -297,19 +292,18 @@ def _advice(
     goal = f"{quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}"
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}."
-        return Advice(
-            scene.name, quantity, accuracy, horizon, integrator=None, step_size=None, tolerance=None,
-            expected_error=math.nan, seconds=math.nan, confidence="none", reason=reason,
-            closed_form=_without_steps(question, math.nan), fails=fails,
-        )  # fmt: skip
+        without = _without_steps(question, math.nan)
+        return Advice(scene.name, quantity, accuracy, horizon, reason=reason, closed_form=without, fails=fails)
     best = ranked[0]
+    name, fixed = best.met.integrator.name, best.met.integrator.fixed_step
     worth = f"error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
     runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
-    step, tolerance = (best.met.setting, None) if best.met.integrator.fixed_step else (None, best.met.setting)
+    served = _same(name, list(near.served)) if near is not None else None  # None: the study has no chart of it
     return Advice(
-        scene.name, quantity, accuracy, horizon, best.met.integrator.name, step, tolerance, best.error, best.seconds,
-        best.confidence, f"{best.words()} meets {goal}: {worth}; {source}.", runner_up="".join(runners),
-        closed_form=_without_steps(question, best.seconds), nearest=_on_nearest(near, best.met.integrator.name),
+        scene.name, quantity, accuracy, horizon, name, best.met.setting if fixed else None,
+        None if fixed else best.met.setting, best.error, best.seconds, best.confidence,
+        f"{best.words()} meets {goal}: {worth}; {source}.", runner_up="".join(runners),
+        closed_form=_without_steps(question, best.seconds), nearest=near.words(served) if near and served else "",
         fails=fails, **_lines(question, best.met),
     )  # fmt: skip
 
@@ -327,16 +321,6 @@ def _lines(question: _Question, met: settings.Met) -> dict[str, str]:
     return {"command": command if known else "", "python": python}
 
 
-def _on_nearest(near: Near | None, name: str) -> str:
-    """How many of the nearest random tops a method served; empty if its variants are not in the study."""
-    variants = (
-        [variant for variant in near.served if split_name(variant)[0] == split_name(name)[0]]
-        if near is not None
-        else []
-    )
-    return near.words(name if name in variants else variants[0]) if near is not None and variants else ""
-
-
 def _without_steps(question: _Question, best: float) -> str:
     """What the closed form costs beside a run of `best` seconds (nan if there is none), and why it is not advised."""
     scene, _, quantity, horizon = question
@@ -352,3 +336,68 @@ def _without_steps(question: _Question, best: float) -> str:
         f"The fastest way is no integrator: the closed form (exact) takes {taken * 1e6:.2g} us, {best / taken:.2g} "
         f"times less{error}. The integrators are compared for what they do where there is no closed form."
     )
+
+
+@dataclass(frozen=True)
+class EngineAdvice:
+    """Axis errors (rad) of an engine's settings at a step, and a method that does as well as the best of them.
+
+    `errors` has the settings in the order of the engine, the default first; pi is a run that ended early. `advice` is
+    None if even the best setting is no accuracy to match. `gain` is how many times fewer force evaluations it takes.
+    """
+
+    scene: str
+    engine: str
+    step_size: float
+    horizon: float
+    errors: dict[str, float]
+    best: str
+    gain: float
+    advice: Advice | None
+
+    def __str__(self) -> str:
+        default, maps = next(iter(self.errors)), SETTINGS[self.engine]
+        lines = [
+            f"{self.engine} on {self.scene}, step {self.step_size:g}, to t = {self.horizon:g}: the axis is off by",
+            *(f"    {value:.2e} rad  {name} ({maps[name]})" for name, value in self.errors.items()),
+        ]
+        if self.best != default:
+            times = self.errors[default] / self.errors[self.best]
+            lines.append(f"Its best setting is {self.best}, {times:.3g} times nearer than {default}.")
+        if self.advice is None:
+            return "\n".join([*lines, f"No setting is within {WORST:g} rad, so that there is nothing to match."])
+        much = f"{self.gain:.3g} times fewer" if self.gain >= 1.0 else f"{1.0 / self.gain:.3g} times more"
+        lines.append(f"As near as {self.best} with {much} force evaluations: {self.advice.reason}")
+        return "\n".join(lines)
+
+
+def i_use(engine: str, scene: "str | Scene", *, step_size: float = STEP, horizon: float | None = None) -> EngineAdvice:
+    """What the settings of an engine make of a scene at a step, and which method does as well for how much less.
+
+    `step_size` is in the units of the scene, `horizon` its own by default. Raises SymtopError for an engine that is
+    not known and for numbers that are out of range. It takes some seconds.
+    """
+    one_of("engine", engine, SETTINGS)
+    start, h = scenes.scene(scene), positive("step_size", step_size)
+    end = start.horizon if horizon is None else horizon_of(horizon)
+    if h >= end:
+        raise SymtopError(f"step_size must be below the horizon {end:g}, not {h:g}", "step_size")
+    measured = {name: _error_and_forces(start, method, h, end) for name, method in SETTINGS[engine].items()}
+    best = min(measured, key=lambda name: measured[name][0])
+    (error, forces), off = measured[best], {name: value for name, (value, _) in measured.items()}
+    advice = recommend(start, accuracy=error, horizon=end) if error <= WORST else None
+    if advice is None or advice.integrator is None:
+        return EngineAdvice(start.name, engine, h, end, off, best, math.nan, None)
+    setting: dict[str, Any] = {"step_size": advice.step_size, "tolerance": advice.tolerance}
+    needed = simulate(start, advice.integrator, **setting, horizon=end, guard=False, observe="axis")
+    gain = forces / float(needed.attrs["force_evaluations"])
+    return EngineAdvice(start.name, engine, h, end, off, best, gain, advice)
+
+
+def _error_and_forces(start: Scene, method: str, h: float, horizon: float) -> tuple[float, float]:
+    """The axis error of a map, and its force evaluations."""
+    observe = "axis" if "axis" in integrator(method).charts() else "attitude"
+    run = simulate(start, method, step_size=h, horizon=horizon, guard=False, observe=observe)
+    if run.attrs["outcome"] != "ok":
+        return math.pi, float(run.attrs["force_evaluations"])
+    return float(errors(run)["axis"].max()), float(run.attrs["force_evaluations"])

@@ -11,7 +11,7 @@ from symtop.methods.framework.registry import integrators
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
-from symtop.run.guard import guard
+from symtop.run import guard
 from symtop.run.simulation import make_plan
 
 MOST_STEPS = 1.5e5

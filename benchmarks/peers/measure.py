@@ -25,8 +25,9 @@ import symtop
 from benchmarks.measured import circumstances
 from benchmarks.peers import Peer, own
 from benchmarks.peers.common import Inner, Library, axes_of
-from symtop.measure.accuracy import SAMPLES, judge_limit
-from symtop.measure.settings import seek, step_ladder
+from symtop.core.numbers import EPSILON
+from symtop.measure.accuracy import SAMPLES
+from symtop.measure.settings import ladder as settings, seek
 from symtop.measure.timing import timings
 from symtop.methods.framework.registry import Integrator, methods
 from symtop.model import charts
@@ -78,13 +79,14 @@ def accuracy(scene: Scene, method: Integrator, setting: float) -> Point:
     error = float(np.max(charts.axis_distance(axis, truth["axis"].values)))
     failed = not math.isfinite(error) or (run is not None and run.outcome != "ok")
     steps, work = (run.steps, run.force_evaluations) if run is not None else (len(times) - 1, 0)
-    return Point(setting, math.nan if failed else error, judge_limit(scene, truth, truth, "axis"), steps, work, elapsed)
+    bound = float(truth["axis_error_bound"].max()) + EPSILON
+    return Point(setting, math.nan if failed else error, bound, steps, work, elapsed)
 
 
 def ladder(scene: Scene, method: Integrator) -> list[float]:
     """Settings from coarse to fine."""
     if method.fixed_step:
-        return step_ladder(method, scene, PERIODS * scene.nutation_period, RUNGS, most=1e5)
+        return settings(method, scene, PERIODS * scene.nutation_period, RUNGS, most=1e5)
     return [float(value) for value in np.geomspace(1e-3, 1.0001 * max(method.least_tolerance, 1e-15), RUNGS)]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from symtop_studies.convergence.tables import TARGET, least_work, named_variants
 
-from symtop.measure.growth import tops
+from symtop.measure.conservation import tops
 from symtop.methods.framework.registry import split_name
 from symtop.model.charts import Array
 from symtop.report.figures import SMALLEST, error_band

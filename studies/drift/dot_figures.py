@@ -6,8 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from symtop.measure.conservation import CONSTANTS
-from symtop.measure.growth import RUN_ROUNDING
+from symtop.measure.conservation import CONSTANTS, RUN_ROUNDING
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.report import style
 from symtop.runner.study import Picture

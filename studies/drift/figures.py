@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.measure.conservation import CONSTANTS
-from symtop.measure.growth import tops
+from symtop.measure.conservation import CONSTANTS, tops
 from symtop.methods.framework.registry import integrator, integrators, split_name
 from symtop.report import style
 from symtop.report.figures import name_ends

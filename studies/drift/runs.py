@@ -20,8 +20,6 @@ import numpy as np
 import xarray as xr
 
 from symtop.core.errors import whole
-from symtop.measure.conservation import history
-from symtop.measure.growth import ensemble_growth
 from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
@@ -36,6 +34,8 @@ from symtop.run.long_run import (
     watch,
     windows as windows_until,
 )
+
+from .growth import ensemble_growth, history
 
 SPACING = 0.01  # rad, between the starts of an ensemble
 MEAN = 2  # place of the mean among least, largest and mean

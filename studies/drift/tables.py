@@ -2,7 +2,7 @@
 
 The dataset is a tree of four groups, each over ``scene`` and ``variant``; these say what their variables are:
 
-    histories   a million steps of every method          `symtop.measure.conservation.history`
+    histories   a million steps of every method          `growth.history`
     windows     10^8 steps of four methods               `symtop.run.long_run.long_run`
     rounding    ensembles of runs of the same four       `runs.rounding`
     horizons    loss of phase of the fixed-step methods  `phase_loss.phase_loss`
@@ -12,7 +12,7 @@ import math
 
 import xarray as xr
 
-from symtop.measure.growth import RUN_ROUNDING, behaviour
+from symtop.measure.conservation import RUN_ROUNDING, behaviour
 from symtop.model.scenes import scenes
 
 HISTORIES, WINDOWS, ROUNDINGS, HORIZONS = "histories", "windows", "rounding", "horizons"  # groups

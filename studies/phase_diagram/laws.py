@@ -2,7 +2,7 @@
 
 The largest errors E_k in stretches that end at the horizons H_k are fitted in relative terms by one power, or by two:
 
-    E(H) = a H^p    or    a H^p + b H^q,    a, b >= 0,    p < q of 0, 1/2, 1, 3/2, 2 (see `symtop.measure.growth`)
+    E(H) = a H^p    or    a H^p + b H^q,    a, b >= 0,    p < q of 0, 1/2, 1, 3/2, 2 (see `symtop.measure.conservation`)
 
 minimising sum (E(H_k)/E_k - 1)^2. The single power with the least sum is taken, or a pair with a smaller one if both
 of its coefficients are positive at the level of `DOUBT` (Student) and the second carries at least `SHARE` of the error
@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import stdtrit
 
-from symtop.measure.statistics import student
+from symtop.measure.order import student
 from symtop.model.charts import Array
 
 POWERS = (0.0, 0.5, 1.0, 1.5, 2.0)

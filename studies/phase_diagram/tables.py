@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from symtop_studies.memoize import of_one_dataset
 
-from symtop.core.memoize import of_one_dataset
 from symtop.methods.framework.registry import integrator
 from symtop.model.charts import Array
 

@@ -10,7 +10,7 @@ import xarray as xr
 from symtop.methods.framework.registry import split_name
 from symtop.report import style
 from symtop.report.style import LEAST_TEXT, few_ticks, grid, headline, look, number, panels
-from symtop.run.guard.guard import EXPECTED
+from symtop.run.guard import EXPECTED
 from symtop.runner.study import Picture
 
 from . import messages, verdicts, words

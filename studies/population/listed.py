@@ -5,7 +5,7 @@ import math
 import numpy as np
 import xarray as xr
 
-from symtop.run.guard.guard import EXPECTED
+from symtop.run.guard import EXPECTED
 from symtop.runner.study import Table
 
 from . import verdicts, words

@@ -26,7 +26,7 @@ import xarray as xr
 
 from symtop.measure.timing import Timing, timings
 from symtop.methods.framework.adaptive import Adaptive
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.charts import Array
@@ -70,11 +70,16 @@ class Pair(NamedTuple):
     long: Call
 
     def slopes(self, short: Timing, long: Timing, rounds: int) -> Array:
-        """Seconds of an evaluation by the smallest samples of all rounds, and by those of either half of them, (3,)."""
+        """Seconds of an evaluation by the smallest samples of all rounds, and by those of either half of them, (3,).
+
+        Where noise makes the short run the slower one, the long run's whole time counts, which is more than the price.
+        """
         (_, few), (_, most) = self
         samples = [np.array(taken.samples[-rounds:]) for taken in (short, long)]
         parts = slice(None), slice(0, None, 2), slice(1, None, 2)
-        return np.array([(samples[1][part].min() - samples[0][part].min()) / (most - few) for part in parts])
+        least = np.array([[each[part].min() for part in parts] for each in samples])
+        slopes = (least[1] - least[0]) / (most - few)
+        return np.where(slopes > 0.0, slopes, least[1] / most)
 
 
 @functools.cache

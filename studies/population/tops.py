@@ -22,13 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.core.numbers import EPSILON, GOLDEN, TINY
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import members_of
 from symtop.model import charts, scenes
 from symtop.model.charts import Array, axis_of, space_energy
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import Angles, SymmetricTop, effective_potential
 from symtop.run.ensemble.population import NUMBERS, STRATA, population
-from symtop.run.reference.bounds import ROUNDING
+from symtop.run.reference.truth import ROUNDING
 
 FIRST = 1.0925  # steps a nutation of the coarsest run
 SAMPLES = 12
@@ -47,7 +47,7 @@ class Body(NamedTuple):
 
 
 class Shown(Protocol):
-    """What n runs have shown, such as `symtop.methods.framework.many.Many`."""
+    """What n runs have shown, such as `symtop.methods.framework.lanes.Many`."""
 
     @property
     def states(self) -> Array:
@@ -114,7 +114,7 @@ class Tops:
 
     @cached_property
     def regime(self) -> Array:
-        """Four numbers without units that fix the motion of the axis, (n, 4); see `symtop.measure.nearest`."""
+        """Four numbers without units that fix the motion of the axis, (n, 4); see `symtop.measure.ranking`."""
         I1, _, mgl = (self.numbers[:, k] for k in range(3))
         unit = np.sqrt(I1 * np.maximum(np.abs(mgl), TINY))
         high, low = np.cos(self.forms.theta_range.T)
@@ -126,7 +126,7 @@ class Tops:
     def bounds(self) -> dict[str, Array]:
         """The least error of each quantity that the truth can judge over the horizon, (n,).
 
-        That of the axis and the attitude is the rounding of the closed form, which `symtop.run.reference.bounds`
+        That of the axis and the attitude is the rounding of the closed form, which `symtop.run.reference.truth`
         states. Variants in the angles chart show phi and psi as doubles, whose rounding is an angle; it counts for all
         variants.
         """

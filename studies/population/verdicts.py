@@ -20,10 +20,10 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from symtop_studies.memoize import of_one_dataset
 
-from symtop.core.memoize import of_one_dataset
 from symtop.model.charts import Array
-from symtop.run.guard.guard import EXPECTED
+from symtop.run.guard import EXPECTED
 
 from .costs import Detection, Share, Winner, detection, quantiles, slowdowns, winner, wins
 from .ladder import KEPT, TENTHS, WRONG

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.report.sentences import abridged, joined
-from symtop.run.guard.guard import EXPECTED
+from symtop.run.guard import EXPECTED
 
 from . import verdicts
 from .costs import TIE, Share

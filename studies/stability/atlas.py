@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.measure.verdicts import BOUNDED_BUT_WRONG, JUDGED, VERDICTS
 from symtop.methods.framework.registry import Integrator, integrator, integrators, split_name
 
+from .many_verdicts import BOUNDED_BUT_WRONG, JUDGED, VERDICTS
 from .outcome_maps import NOT_RUN, SETTLED
 from .tables import MECHANISMS, Column
 

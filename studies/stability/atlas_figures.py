@@ -12,11 +12,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.measure.verdicts import ACCURATE, OUTSIDE, VERDICTS
+from symtop.measure.verdicts import ACCURATE, OUTSIDE
 from symtop.methods.framework.registry import split_name
 from symtop.report.style import GREY, LEAST_TEXT, OUTCOME_COLORS, WIDTH, headline, panels
 
 from .atlas import OutcomeMap, accurate_everywhere, closed_forms, common, maps
+from .many_verdicts import VERDICTS
 from .tables import PERIODS, Column
 
 RASTER = {"small": (55, 90), "enlarged": (150, 220)}  # pixels of a map: hatches stay visible

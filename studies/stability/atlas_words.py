@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.measure.verdicts import BOUNDED_BUT_WRONG, DRIFT
+from symtop.measure.verdicts import DRIFT
 from symtop.methods.framework.registry import split_name
 from symtop.report.sentences import counted, few
 from symtop.runner.study import Table
 
 from .atlas import COMMON, NOTABLE, OutcomeMap, accurate_everywhere, closed_forms, common, maps, pole_effect
+from .many_verdicts import BOUNDED_BUT_WRONG
 from .outcome_maps import SETTLED_STEPS, SETTLED_TOLERANCES
 from .tables import CURVE_STEPS, PERIODS, Column
 

@@ -6,11 +6,11 @@ scenes of a family. A *spin* family is one scene with its spin changed, in units
     r = I3 w3 / (2 sqrt(I1 mgl)),
 
 so that it is a pendulum at r = 0.1 and a fast gyroscope at r = 30. The *grazing* family falls past a pole at a distance
-of 1.1 delta. `verdicts.judge` compares every run with the closed form.
+of 1.1 delta. Every run is compared with the closed form.
 
 Compiled methods run whole columns of a map in one call, in lanes where the method has them: the runs of a column have
 equally many steps, so that no lane waits for another. Other methods run one after another. The constants of a row's
-closed form are computed once, and all runs are judged in compiled passes (`symtop.measure.verdicts`). Samples are
+closed form are computed once, and all runs are judged in compiled passes (`many_verdicts`). Samples are
 taken at the same fractions of a nutation for every spin, and these are not commensurate with the nutation.
 
 Half of the steps of a map stand in its shortest octave, where most methods have long been accurate. So a map is run
@@ -29,9 +29,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.measure.verdicts import Judged, judge_runs, truths
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model import charts, scenes
@@ -39,6 +38,8 @@ from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, flat
 from symtop.run.simulation import sample_times
+
+from .many_verdicts import Judged, judge_runs, truths
 
 NOT_RUN, SETTLED = 255, 254  # stored where a map has no run, and where a run was not made as it would be accurate
 SAMPLES = 49  # of a run
@@ -182,7 +183,7 @@ class _Descent:
         self.followed[slice(None) if followed is None else list(followed)] = True
         checks = np.linspace(0, m - 1, CHECKED).round().astype(int)
         self.of_all = frozenset(np.union1d(np.flatnonzero(self.followed), checks).tolist())  # where all scenes are run
-        self.judged, self.made = Judged.begun(n, m), np.zeros((n, m), dtype=bool)
+        self.judged, self.made = Judged.empty(n, m), np.zeros((n, m), dtype=bool)
         self.factor = SETTLED_STEPS if method.fixed_step else SETTLED_TOLERANCES
         self.since, self.accurate = np.full(n, math.nan), np.zeros(n, dtype=np.int64)  # how long a scene has been so
         self.settled, self.refuted, self.checks = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), 0

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from symtop.report.sentences import counted, few
-from symtop.run.linear_stability import GROWING
 
+from .linear_limits import GROWING
 from .tables import SOUGHT_STEPS, Column
 
 VERLET = "stormer-verlet[angles]"

@@ -16,9 +16,10 @@ from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian.discrete_lagrangian import is_midpoint, rule_of
 from symtop.model import scenes
 from symtop.model.scenes import Scene
-from symtop.run.linear_stability import NO_TRACE, linear_limits, sleeping_threshold, surpasses, trace, with_momenta
+from symtop.run.linear_stability import NO_TRACE, trace, with_momenta
 
 from .failures import sampled_energy_error, separatrix_horizon, surviving_displacements
+from .linear_limits import linear_limits, sleeping_threshold, surpasses
 from .outcome_maps import SETTLED, family, outcome_map
 from .solver_tolerance import solver_sweep, textbook_midpoint
 

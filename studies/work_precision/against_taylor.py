@@ -17,6 +17,8 @@ from symtop.methods.framework.registry import split_name
 from symtop.report.sentences import joined
 from symtop.runner.study import Table
 
+from . import leads
+
 RIVAL = "taylor"
 LONGER = ("taylor-longdouble", "taylor-quad")  # the same of heyoka, in longer arithmetic
 FINE = 1e-9  # rad: errors up to it are fine
@@ -60,7 +62,7 @@ def compared(data: xr.Dataset) -> dict[tuple[str, int, float], Ratio]:
     for scene in data["scene"].values:
         for far in range(data.sizes["horizon"]):
             cell = data.sel(scene=scene).isel(horizon=far)
-            for target in ranking.targets(cell):
+            for target in leads.targets(cell):
                 ratios[str(scene), far, target] = _ratio(ranking.cheapest(cell, target, implementation="compiled"))
     return ratios
 

@@ -10,6 +10,8 @@ from symtop.measure.settings import TARGETS
 from symtop.report.sentences import joined
 from symtop.runner.study import Table
 
+from . import leads
+
 
 class Beside(NamedTuple):
     """The fastest compiled variant of one scene, horizon and target, and the closed form timed in the same rounds."""
@@ -35,7 +37,7 @@ def compared(data: xr.Dataset) -> list[Beside]:
     taken = data["seconds"].sel(variant=names)
     taken = taken.min([dim for dim in taken.dims if dim not in ("scene", "horizon")])
     pairs = []
-    for (scene, far, target), won in ranking.winners(data).items():
+    for (scene, far, target), won in leads.winners(data).items():
         beside = float(taken.sel(scene=scene).isel(horizon=far))
         if won is not None and np.isfinite(beside):
             pairs.append(Beside(scene, far, target, won.best.integrator, won.best.cost, beside))

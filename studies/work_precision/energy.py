@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from symtop_studies.memoize import of_one_dataset
 
-from symtop.core.memoize import of_one_dataset
 from symtop.measure import ranking
 from symtop.methods.framework.registry import integrator, integrators, split_name
 from symtop.report.sentences import abridged, joined

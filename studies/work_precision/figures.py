@@ -12,7 +12,6 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import PercentFormatter
 
 from symtop.measure import ranking
-from symtop.measure.phase import PARTS
 from symtop.measure.settings import TARGETS
 from symtop.methods.framework.registry import split_name
 from symtop.report import style
@@ -21,7 +20,8 @@ from symtop.report.sentences import joined
 from symtop.report.style import BLUE, GREY, LEAST_TEXT, VERMILLION, headline, legend_below, look, number, panels
 from symtop.runner.study import Picture
 
-from . import energy, fronts, growth, words
+from . import energy, fronts, growth, leads, words
+from .growth import PARTS
 
 SAME = 1.5  # an error that grows less stays the same
 MARKS = {"shape": ("o", "black", "black"), "nutation_lag": ("s", "white", VERMILLION),
@@ -217,7 +217,7 @@ def winners(data: xr.Dataset) -> Picture:
     from matplotlib.colors import to_rgb
 
     scenes = [str(name) for name in data["scene"].values]
-    wins = ranking.winners(data)
+    wins = leads.winners(data)
     figure, axes = panels(1, data.sizes["horizon"], height=0.75 + 0.42 * len(scenes), sharey=True)
     for line, scene in enumerate(scenes):
         for far, axis in enumerate(axes[0]):
@@ -302,9 +302,9 @@ def slowdown(data: xr.Dataset) -> Picture:
     """How many targets every compiled variant meets, and its median time over the fastest one's."""
     compiled = words.of_implementation(data, "compiled")
     names = [name for name in ranking.ranked(data) if name in compiled]
-    costs = [ranking.relative_costs(data.isel(horizon=[far]), names) for far in range(data.sizes["horizon"])]
+    costs = [leads.relative_costs(data.isel(horizon=[far]), names) for far in range(data.sizes["horizon"])]
     merged = xr.concat(costs, "problem").sel(variant=names)
-    order = ranking.leaders(merged, len(names))
+    order = leads.leaders(merged, len(names))
     asked, rows = middles(merged.sel(variant=order))
     shown = [row for row in rows if np.isfinite(row.ratio)]
     told = _told(rows)

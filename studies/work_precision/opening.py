@@ -10,7 +10,7 @@ from symtop.measure.errors import QUANTITIES
 from symtop.report.sentences import abridged
 from symtop.runner.study import Chart, Opening, Series, Table
 
-from . import energy
+from . import energy, leads
 from .fronts import COSTS
 from .words import COMPARED, not_asked, of_implementation, seconds, spans
 
@@ -28,10 +28,10 @@ def opening(data: xr.Dataset) -> Opening:
     names = [name for name in ranking.ranked(data) if name in compiled]
     ahead: Counter[str] = Counter()
     for far, span in enumerate(spans(data)):
-        table = ranking.relative_costs(data.isel(horizon=[far]), names).sel(variant=names)
+        table = leads.relative_costs(data.isel(horizon=[far]), names).sel(variant=names)
         for target in table["target"].values:
             ratios = table.sel(target=[target]).dropna("problem", how="all")
-            best = ranking.leaders(ratios, 3) if ratios.sizes["problem"] else []
+            best = leads.leaders(ratios, 3) if ratios.sizes["problem"] else []
             ahead.update(best[:1])
             row = [span, f"{target:.0e}", "none", "", "", ""]
             if best:

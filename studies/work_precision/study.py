@@ -6,14 +6,14 @@ attitude where it has one of the axis alone: that shows the same axis, for about
 
 Two rounds. First every variant walks down to each target on every scene and over both horizons, all runs kept
 (`measure/settings.py`). Then the variants of each scene are timed against each other
-(`timing_rounds.py`). `tables.py` lists the variables; `measure/ranking.py` answers questions from them.
+(`timing_rounds.py`). `tables.py` lists the variables; `leads.py` answers questions from them.
 """
 
 import xarray as xr
+from symtop_studies.grid import grid_scenes
 
 from symtop.measure.settings import compared
 from symtop.model.scenes import TAGS
-from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
 from . import energy, words

@@ -15,19 +15,19 @@ its own), target (rad), batch.
     structured                                      chart, "step_size", "tolerance" or "", 1 if symplectic or symmetric
     set_up_seconds, sample_seconds                  seconds of a variant without steps, NaN of the others
     stopped(horizon)                                why it tried nothing finer
-    reached(horizon, target)                        "met", or why not: one of `work.STOPS`, `TOO_WIDE`, `CAPPED`, or
+    reached(horizon, target)                        "met", or why not: one of `walk.STOPS`, `TOO_WIDE`, `CAPPED`, or
                                                     the outcome of a variant's runs if none ended well
     nutation_width                                  of a scene: angle between the turning points, rad
 """
 
 import xarray as xr
 
-from symtop.measure.settings import spans, work_table
 from symtop.methods.framework.registry import integrator
 from symtop.model import scenes
 from symtop.runner.study import Case
 
 from .timing_rounds import Effort, TimedRun, timing_rounds
+from .walk import spans, work_table
 
 
 def errors_and_work(case: Case) -> xr.Dataset:

@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.measure import ranking
-from symtop.measure.timing import AGAIN, MISSED
 from symtop.runner.study import Table
+
+from . import leads
+from .leads import AGAIN, MISSED
 
 
 class Trust(NamedTuple):
@@ -39,7 +40,7 @@ def trust(data: xr.Dataset) -> Trust:
     miss = abs(taken / times["seconds_forecast"] - 1.0)
     samples = np.sort(times["seconds_samples"].transpose(..., "batch").values, axis=-1)
     margins = [
-        ranking.margin(times.sel(scene=name).isel(horizon=far))
+        leads.margin(times.sel(scene=name).isel(horizon=far))
         for name in data["scene"].values
         for far in range(data.sizes["horizon"])
     ]
@@ -82,6 +83,6 @@ def table(data: xr.Dataset) -> Table:
         [f"times without a second sample within {AGAIN:.0%} of the smallest", str(known.noisy),
          "no lead of theirs, or over them, counts"],
         ["least ratio of two times that counts as a lead", f"{least:.2f} to {most:.2f}",
-         f"{rule} {ranking.MARGIN:g}"],
+         f"{rule} {leads.MARGIN:g}"],
     ]  # fmt: skip
     return Table("How far the times can be trusted", ["what", "value", "rule"], rows)

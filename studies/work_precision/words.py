@@ -7,12 +7,13 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure import ranking
-from symtop.measure.settings import CAPPED, TARGETS, TOO_WIDE
+from symtop.measure.settings import TARGETS
 from symtop.methods.framework.registry import split_name
 from symtop.report.sentences import abridged, joined
 from symtop.runner.study import Table
 
-from . import against_taylor, closed_form, energy, growth, trust, worth
+from . import against_taylor, closed_form, energy, growth, leads, trust, worth
+from .walk import CAPPED, TOO_WIDE
 
 LEVEL = 3  # names of a list of level variants; the others are counted
 SHOWN = ("axis", "reached", "set_up_seconds", "sample_seconds")  # by the tables, beside what a ranking needs
@@ -64,7 +65,7 @@ def of_implementation(data: xr.Dataset, kind: str) -> list[str]:
     return [str(name) for name, known in zip(data["variant"].values, kinds, strict=True) if kind in known]
 
 
-def lead(won: ranking.Win) -> str:
+def lead(won: leads.Win) -> str:
     """The fastest variant at a target, its time, and the variants that are level with it or else its lead."""
     parts = [won.best.integrator, seconds(won.best.cost)]
     if won.level:
@@ -87,7 +88,7 @@ def not_asked(data: xr.Dataset) -> str:
     listed = []
     for name in data["scene"].values:
         cell = data.sel(scene=name)
-        asked = ranking.targets(cell)
+        asked = leads.targets(cell)
         left = [f"{target:.0e}" for target in TARGETS if target not in asked]
         if left:
             listed.append(f"{' and '.join(left)} on {name} ({float(cell['nutation_width'].max()):.2g} rad wide)")
@@ -111,7 +112,7 @@ def beside(data: xr.Dataset) -> str:
 
 def sentences(data: xr.Dataset) -> list[str]:
     """The fastest variants, the closed form, heyoka's, the energies, plain Python, and what the times are worth."""
-    wins = [won for won in ranking.winners(data).values() if won]
+    wins = [won for won in leads.winners(data).values() if won]
     said = [
         fastest(data, wins),
         least_times(data),
@@ -126,7 +127,7 @@ def sentences(data: xr.Dataset) -> list[str]:
     return [sentence for sentence in said if sentence]
 
 
-def fastest(data: xr.Dataset, wins: Sequence[ranking.Win]) -> str:
+def fastest(data: xr.Dataset, wins: Sequence[leads.Win]) -> str:
     """Which variants win most of the combinations, and how many leads are sure."""
     if not wins:
         return "No compiled variant meets any of the errors."
@@ -144,17 +145,17 @@ def fastest(data: xr.Dataset, wins: Sequence[ranking.Win]) -> str:
 def least_times(data: xr.Dataset) -> str:
     """From where to where the times of the fastest variants lie at each run length, and their leads."""
     times: dict[int, list[float]] = {}
-    leads = []
-    for (_, far, _), won in ranking.winners(data).items():
+    ratios = []
+    for (_, far, _), won in leads.winners(data).items():
         if won is not None:
             times.setdefault(far, []).append(won.best.cost)
-            leads += [won.ratio] if won.behind and not won.level else []
+            ratios += [won.ratio] if won.behind and not won.level else []
     parts = [f"{seconds(min(values))} to {seconds(max(values))} {spans(data)[far]}" for far, values in times.items()]
     if not parts:
         return ""
     said = f"The fastest variant takes {joined(parts)}, by scene and error."
-    if leads:
-        said += f" Where its lead is sure, the next variant takes {min(leads):.1f} to {max(leads):.1f} times as long."
+    if ratios:
+        said += f" Where its lead is sure, the next variant takes {min(ratios):.1f} to {max(ratios):.1f} times as long."
     return said
 
 
@@ -206,9 +207,9 @@ def tables(data: xr.Dataset) -> list[Table]:
 def _winners(cell: xr.Dataset, implementation: str) -> list[str]:
     """The fastest variant of an implementation at every target, or why there is none."""
     rows = [row for row in of_implementation(cell, implementation) if row in ranking.ranked(cell)]
-    asked, shown = ranking.targets(cell), []
+    asked, shown = leads.targets(cell), []
     for target in TARGETS:
-        won = ranking.win(cell, target, implementation) if target in asked else None
+        won = leads.win(cell, target, implementation) if target in asked else None
         none = f"none ({reasons(cell, target, rows)})" if target in asked else f"({TOO_WIDE})"
         shown.append(none if won is None else lead(won))
     return shown
@@ -216,7 +217,7 @@ def _winners(cell: xr.Dataset, implementation: str) -> list[str]:
 
 def _every_time(cell: xr.Dataset) -> list[list[str]]:
     """Every variant of a scene and horizon: its time to each target, or why it has none."""
-    rows, asked = ranking.ranked(cell), ranking.targets(cell)
+    rows, asked = ranking.ranked(cell), leads.targets(cell)
     met = {target: {place.integrator: seconds(place.cost) for place in ranking.cheapest(cell, target)}
            for target in asked}  # fmt: skip
     why = cell["reached"].sel(variant=rows, target=list(TARGETS)).transpose("variant", "target").values

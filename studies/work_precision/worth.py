@@ -1,7 +1,7 @@
 """When to choose each variant, from the times of this study alone.
 
 A problem is a scene, a horizon and a target. A variant is worth choosing where it is the fastest compiled variant or
-level with it (`ranking.win`) and within the `WITHIN` of it that the rounds of the timing tell apart: a variant that is
+level with it (`leads.win`) and within the `WITHIN` of it that the rounds of the timing tell apart: a variant that is
 farther behind may pass for level because a round was disturbed. A variant that never is has its best showing instead,
 the least ratio of its time to the fastest. What
 a variant keeps of the motion beside the axis is not weighed here: that is in the claims and in the drift study.
@@ -15,6 +15,7 @@ import xarray as xr
 from symtop.measure import ranking
 from symtop.runner.study import Table
 
+from . import leads
 from .timing_rounds import WITHIN
 
 HEADER = ["variant", "fastest in", "tied with the fastest in", "met", "at its best", "median", "when to choose it"]
@@ -41,8 +42,8 @@ def table(data: xr.Dataset) -> Table:
     """Every compiled variant: how often it wins, how far it is behind, and when to choose it."""
     kind = data["implementation"]
     names = [row for row in ranking.ranked(data) if "compiled" in kind.sel(variant=row).values]
-    wins = {problem: won for problem, won in ranking.winners(data).items() if won is not None}
-    costs, scenes = ranking.relative_costs(data, names), [str(scene) for scene in data["scene"].values]
+    wins = {problem: won for problem, won in leads.winners(data).items() if won is not None}
+    costs, scenes = leads.relative_costs(data, names), [str(scene) for scene in data["scene"].values]
 
     def place(scene: str, far: int) -> int:
         return scenes.index(scene) * data.sizes["horizon"] + far

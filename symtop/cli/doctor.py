@@ -1,10 +1,6 @@
 """``symtop doctor``: checks of the packages, the caches, the folders and a few computed numbers.
 
-Each finding is healthy or says what to do. The self-check takes some seconds: published values of this problem, the
-closed form against heyoka's Taylor series, and one compiled method against the closed form.
-
-With ``--warm`` every kernel is compiled first, so that no run waits for the compiler later. A kernel is compiled when a
-run needs it that the cache does not hold: every method is run for two steps in each of its charts, alone and in an
+With ``--warm`` every kernel is compiled first: every method is run for two steps in each of its charts, alone and in an
 ensemble of two tops, beside the truth and its errors, in a process a core.
 """
 
@@ -47,52 +43,42 @@ class Finding(NamedTuple):
 
 def examine(results: Path) -> list[Finding]:
     """Run every check; one that raises becomes a finding that is not healthy."""
-    checks: list[Callable[[], list[Finding]]] = [
-        _python, _packages, _heyoka, _caches, lambda: _results(results), _tools, _self_check,
-    ]  # fmt: skip
-    findings = []
     from tqdm import tqdm
 
-    with beating(tqdm(total=len(checks), desc="checking", unit="check", disable=None, leave=False)) as bar:
-        for check in checks:
+    findings = []
+    with beating(tqdm(CHECKS.items(), desc="checking", unit="check", disable=None, leave=False)) as bar:
+        for topic, check in bar:
             try:
-                findings += check()
+                findings += check(results)
             except Exception as error:  # noqa: BLE001  (one check that fails must not hide the others)
-                topic = check.__name__.strip("_").replace("_", " ")
                 findings.append(Finding(topic, words_of(error), False, "report this with all of this page"))
-            bar.update()
     return findings
 
 
-def page(findings: list[Finding]) -> str:
-    """The findings as text, one a line, and the advice at the end."""
-    width = max(len(finding.topic) for finding in findings)
-    lines = [f"{'ok ' if f.healthy else 'BAD'}  {f.topic.ljust(width)}  {f.result}" for f in findings]
-    advice = [f"{finding.topic}: {finding.advice}" for finding in findings if not finding.healthy]
-    return "\n".join([*lines, "", *(advice or ["No faults were found."])])
+def _machine(_: Path) -> list[Finding]:
+    from symtop.runner import scripts
 
-
-def _python() -> list[Finding]:
-    result = f"{platform.python_version()} at {sys.executable}, {platform.system()} {platform.machine()}"
+    python = f"{platform.python_version()} at {sys.executable}, {platform.system()} {platform.machine()}"
     oldest = ".".join(map(str, OLDEST_PYTHON))
-    return [Finding("python", result, sys.version_info >= OLDEST_PYTHON, f"symtop needs Python {oldest} or newer")]
+    return [
+        Finding("python", python, sys.version_info >= OLDEST_PYTHON, f"symtop needs Python {oldest} or newer"),
+        Finding("studies", f"{len(scripts.names())} in {scripts.folder()}"),
+        Finding("cores", f"{os.cpu_count()}"),
+        Finding("gcc", shutil.which("gcc") or "absent; only the benchmarks of a checkout (make bench) need it"),
+    ]
 
 
-def _packages() -> list[Finding]:
-    """Every requirement of symtop's metadata that applies to this machine, and whether its version is in range.
-
-    A requirement of an extra may be absent; one that is installed must be in range too.
-    """
+def _packages(_: Path) -> list[Finding]:
+    """Every requirement that applies to this machine, and whether its version is in range; one of an extra may lack."""
     from packaging.requirements import Requirement
 
     extras = importlib.metadata.metadata("symtop").get_all("Provides-Extra") or []
     findings = []
     for requirement in map(Requirement, importlib.metadata.requires("symtop") or []):
         marker, requirement.marker = requirement.marker, None
-        applies = [marker is None or marker.evaluate({"extra": extra}) for extra in ("", *extras)]
-        if not any(applies):
+        required, *optional = (marker is None or marker.evaluate({"extra": extra}) for extra in ("", *extras))
+        if not (required or any(optional)):
             continue  # for another system or another Python
-        required = applies[0]
         try:
             result = importlib.metadata.version(requirement.name)
             healthy = requirement.specifier.contains(result, prereleases=True)
@@ -104,7 +90,7 @@ def _packages() -> list[Finding]:
     return findings
 
 
-def _heyoka() -> list[Finding]:
+def _heyoka(_: Path) -> list[Finding]:
     """The precisions that this build of heyoka has."""
     if importlib.util.find_spec("heyoka") is None:
         advice = "heyoka has wheels for Linux only; elsewhere try conda-forge. The closed form works without it"
@@ -125,7 +111,7 @@ def _heyoka() -> list[Finding]:
     return findings
 
 
-def _caches() -> list[Finding]:
+def _caches(_: Path) -> list[Finding]:
     root, yesterday = cache_root(), time.time() - DAY
     findings = [_writable("cache", root, "set SYMTOP_CACHE to a folder that can be written")]
     for name, kind, remedy in (("kernels", "kernel", "compiled again"), ("reference", "file", "computed again")):
@@ -156,20 +142,8 @@ def _writable(topic: str, folder: Path, advice: str) -> Finding:
     return Finding(topic, f"{folder}, {_bytes(free)} free", free > LEAST_SPACE, f"make room, or {advice}")
 
 
-def _tools() -> list[Finding]:
-    from symtop.runner import scripts
-
-    return [
-        Finding("studies", f"{len(scripts.names())} in {scripts.folder()}"),
-        Finding("cores", f"{os.cpu_count()}"),
-        Finding("gcc", shutil.which("gcc") or "absent; only the benchmarks of a checkout (make bench) need it"),
-    ]
-
-
-def _self_check() -> list[Finding]:
+def _self_check(_: Path) -> list[Finding]:
     """Published values, and three ways to compute one motion, against each other."""
-    import numpy as np
-
     from symtop.measure.published import published_values
     from symtop.run.simulation import simulate
 
@@ -180,72 +154,63 @@ def _self_check() -> list[Finding]:
     result = f"{len(values) - len(missed)} of {len(values)} reproduced{': not ' + '; '.join(missed) if missed else ''}"
     findings = [Finding("published values", result, not missed, wrong)]
     exact = simulate("spheroid", "exact", samples=41)
-    runs: list[tuple[str, float | None, float]] = [("midpoint", 1e-3, MIDPOINT_GAP)]
-    runs += [("taylor", None, TAYLOR_GAP)] if importlib.util.find_spec("heyoka") else []
-    for name, step, allowed in runs:
+    for name, step, allowed in (("midpoint", 1e-3, MIDPOINT_GAP), ("taylor", None, TAYLOR_GAP)):
+        if name == "taylor" and importlib.util.find_spec("heyoka") is None:
+            continue
         data = simulate("spheroid", name, step_size=step, samples=41, observe="attitude", guard=False)
-        gap = float(np.max(np.abs(data["axis"].values - exact["axis"].values)))
+        gap = float(abs(data["axis"] - exact["axis"]).max())
         result = f"{gap:.1e} rad from the truth on spheroid (allowed {allowed:g})"
         findings.append(Finding(name, result, gap <= allowed, wrong))
     return [*findings, Finding("self-check", f"{time.perf_counter() - began:.1f} s")]
 
 
 def _bytes(size: float) -> str:
-    for unit in ("B", "kB", "MB"):
-        if size < 1000.0:
-            return f"{size:.0f} {unit}"
-        size /= 1000.0
-    return f"{size:.1f} GB"
+    power = min(math.floor(math.log10(max(size, 1.0))) // 3, 3)
+    return f"{size / 1000.0**power:.{power // 3}f} {('B', 'kB', 'MB', 'GB')[power]}"
 
 
+CHECKS: dict[str, Callable[[Path], list[Finding]]] = {
+    "machine": _machine, "packages": _packages, "heyoka": _heyoka, "caches": _caches, "results": _results,
+    "self-check": _self_check,
+}  # fmt: skip
 SCENE = "goldstein"
 PERIODS = 0.02  # of a nutation: the length of a run that compiles
 
 
-def _two_steps(name: str) -> dict[str, Any]:
-    """The settings of two steps of a variant, or so."""
-    from symtop.methods.framework.registry import integrator
-    from symtop.model.scenes import scene
-
-    variant, span = integrator(name), PERIODS * scene(SCENE).nutation_period
-    (chart,) = variant.charts()
-    setting = variant.setting(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance))
-    observe = "attitude" if chart == "angles" else chart
-    return {**setting.kwargs(), "horizon": span, "samples": 2, "observe": observe}
-
-
-def _run(task: tuple[str, str]) -> str:
-    """Make the runs of a variant alone or together, or those of the truth; returns why it could not be done."""
+def _run(name: str) -> str:
+    """Compile what a variant runs alone and in an ensemble, or the truth without a name; returns why it could not."""
     from symtop.core.lazy_kernel import LAZY
+    from symtop.methods.framework.registry import integrator
     from symtop.model.scenes import scene
     from symtop.run.ensemble.ensemble import ensemble
     from symtop.run.reference.truth import reference
     from symtop.run.simulation import simulate
 
-    kind, name = task
+    span = PERIODS * scene(SCENE).nutation_period
     try:
-        if kind == "alone":
-            simulate(SCENE, name, **_two_steps(name))
-        elif kind == "together":
-            ensemble([SCENE] * 2, name, **_two_steps(name), threads=1, quiet=True)
-        else:
+        if not name:
             for kernel in LAZY:
                 kernel.compile()
-            period = scene(SCENE).nutation_period
-            run = simulate(SCENE, "strang", step_size=period / 100.0, horizon=period, samples=3)
+            run = simulate(SCENE, "strang", step_size=span / 2, horizon=50 * span, samples=3)
             reference(SCENE, run["time"].values)
+            return ""
+        variant = integrator(name)
+        setting = variant.setting(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance)).kwargs()
+        observe = "attitude" if variant.charts() == ("angles",) else variant.charts()[0]
+        options: dict[str, Any] = {**setting, "observe": observe, "horizon": span, "samples": 2}
+        simulate(SCENE, name, **options)
+        ensemble([SCENE] * 2, name, **options, threads=1, quiet=True)
     except Exception as error:  # noqa: BLE001  (one that fails must not keep the others from being compiled)
-        return f"{name or kind}: {words_of(error)}"
+        return f"{name or 'truth'}: {words_of(error)}"
     return ""
 
 
-def tasks() -> list[tuple[str, str]]:
-    """Every run that compiles something: what it is, and the variant ``method[chart]``."""
+def variants() -> list[str]:
+    """Every variant, ``method[chart]``, that compiles something."""
     from symtop.methods.framework.registry import integrators
 
     compiled = [method for method in integrators().values() if method.implementation in {"compiled", "heyoka"}]
-    names = [f"{method.name}[{chart}]" for method in compiled for chart in method.charts()]
-    return [("truth", ""), *(("alone", name) for name in names), *(("together", name) for name in names)]
+    return [f"{method.name}[{chart}]" for method in compiled for chart in method.charts()]
 
 
 def kernels() -> int:
@@ -257,16 +222,14 @@ def compile_all(jobs: int | None = None) -> tuple[int, list[str]]:
     """Compile what is not on disk; returns how many kernels came to the cache, and which runs could not be done."""
     from tqdm import tqdm
 
-    from symtop.core.parallel import context, cores
+    from symtop.core.parallel import OneThreadEach, cores
 
-    before, todo = kernels(), tasks()
-    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), context()) as pool:
-        reasons = []
-        with beating(tqdm(desc="compiling", total=len(todo), unit="run", disable=None, leave=False)) as bar:
-            for reason in pool.map(_run, todo):
-                reasons.append(reason)
-                bar.update()
-    return kernels() - before, list(filter(None, reasons))
+    before, names = kernels(), ["", *variants()]
+    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), OneThreadEach()) as pool:
+        runs = pool.map(_run, names)
+        with beating(tqdm(runs, "compiling", len(names), unit="run", disable=None, leave=False)) as bar:
+            reasons = list(filter(None, bar))
+    return kernels() - before, reasons
 
 
 @click.command(short_help="Check the installation; say what to do about faults.")
@@ -287,6 +250,10 @@ def doctor(results: str, warm: bool, as_json: bool) -> None:
     if as_json:
         click.echo(as_text([finding._asdict() for finding in findings]))
     else:
-        click.echo(page(findings))
+        width = max(len(finding.topic) for finding in findings)
+        for finding in findings:
+            click.echo(f"{'ok ' if finding.healthy else 'BAD'}  {finding.topic.ljust(width)}  {finding.result}")
+        advice = [f"{finding.topic}: {finding.advice}" for finding in findings if not finding.healthy]
+        click.echo("\n".join(["", *(advice or ["No faults were found."])]))
     if not all(finding.healthy for finding in findings):
         sys.exit(1)

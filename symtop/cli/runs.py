@@ -3,10 +3,12 @@
 import math
 import sys
 from collections import Counter
+from typing import Any
 
 import click
 
-from symtop.cli.common import File, as_text, check_outputs, completing, json_option, plugin_option, say, table, warn
+from symtop.cli import common
+from symtop.cli.common import File, as_text, check_outputs, completing, say, say_written, separated, table, warn
 from symtop.core.errors import SymtopError, whole
 from symtop.core.progress import ticking
 
@@ -33,12 +35,11 @@ EXECUTION = {
 @click.option("--guard/--no-guard", default=True, help="Warn before the run if a large error is expected.")
 @click.option("--output", type=File(), help="Write the run to this netCDF file.")
 @click.option("--figure", type=File(), help="Draw the run and its errors: .png, .svg or .pdf.")
-@plugin_option
-@json_option
+@common.plugin_option
+@common.json_option
 def run(
-    scene: str, integrator: str, step_size: float | None, tolerance: float | None, horizon: float | None, samples: int,
-    observe: str | None, budget: float | None, guard: bool, output: str | None, figure: str | None, as_json: bool,
-) -> None:  # fmt: skip
+    scene: str, integrator: str, guard: bool, output: str | None, figure: str | None, as_json: bool, **settings: Any
+) -> None:
     """Run one INTEGRATOR on one SCENE and compare it with the exact motion.
 
     INTEGRATOR is a method, which runs in the smallest of its charts that shows what the scene observes, or a method in
@@ -52,52 +53,43 @@ def run(
     check_outputs(output=output, figure=figure)
     with ticking("running"):  # the packages are loaded under the clock, too
         from symtop.core import netcdf
-        from symtop.measure.errors import QUANTITIES, errors_against
+        from symtop.measure.errors import QUANTITIES, errors
         from symtop.measure.verdicts import judgement
         from symtop.model import scenes
         from symtop.run.reference.truth import reference
         from symtop.run.simulation import simulate
 
-        data = simulate(
-            scene, integrator, step_size=step_size, tolerance=tolerance, horizon=horizon, samples=samples,
-            observe=observe, guard=warn if guard else False, budget=budget,
-        )  # fmt: skip
+        data = simulate(scene, integrator, guard=warn if guard else False, **settings)
         if output is not None:
             netcdf.write(data, output)
         chosen = scenes.scene(scene)
         truth = reference(chosen, data["time"].values, precision="closed-form")
-        error = errors_against(chosen, data, truth)
+        error = errors(data)
         verdict = judgement(chosen, data, error["axis"].values)
         if figure is not None:
             from symtop.report.plot import draw_run
 
             draw_run(chosen, data, truth, error, figure)
     series = {name: error[name].dropna("time").values for name in QUANTITIES if name in error}
-    largest = {
-        name: {"largest": float(values.max()), "last": float(values[-1])}
-        for name, values in series.items()
-        if values.size
-    }
+    largest = {name: {"largest": values.max(), "last": values[-1]} for name, values in series.items() if values.size}
+    facts = data.attrs
     if as_json:
         names = ("outcome", "outcome_message", "reached_time", "steps", "force_evaluations")
-        findings = {**{name: data.attrs[name] for name in names}, "judgement": verdict._asdict(), "errors": largest}
+        findings = {**{name: facts[name] for name in names}, "judgement": verdict._asdict(), "errors": largest}
         click.echo(as_text(findings))
     else:
-        facts, method = data.attrs, data.attrs["integrator"]
+        method, used, wanted = facts["integrator"], facts["step_size"], settings["step_size"]
         variant = method if method.endswith("]") else f"{method}[{facts['chart']}]"
         say(f"{variant} on {chosen.name}: {facts['outcome_message']}")
-        used = facts["step_size"]
-        other = step_size is not None and abs(used / step_size - 1.0) > SAME
+        other = wanted is not None and abs(used / wanted - 1.0) > SAME
         of = f" of {used:.6g}, for a whole number of them fills the horizon" if other else ""
         say(f"{facts['steps']} steps{of}, {facts['force_evaluations']} force evaluations")
-        if data.attrs["outcome"] == "ok":
+        if facts["outcome"] == "ok":
             say(f"judged against the truth: {verdict.words()}")
         for name, values in largest.items():
             click.echo(f"  {QUANTITIES[name]:<30} largest {values['largest']:.3e}   last {values['last']:.3e}")
-    for file in () if as_json else (output, figure):
-        if file is not None:
-            click.echo(f"written to {file}")
-    if data.attrs["outcome"] != "ok":
+        say_written(output, figure)
+    if facts["outcome"] != "ok":
         sys.exit(3)
 
 
@@ -108,7 +100,7 @@ def run(
 @click.option("--step-size", type=float, help="Step; a thousandth of a nutation period by default.")
 @click.option("--checkpoint", type=File(), help="File to resume from; symtop's own by default.")
 @click.option("--output", type=File(), help="Write the windows to this netCDF file.")
-@plugin_option
+@common.plugin_option
 def long(
     scene: str, integrator: str, steps: float, step_size: float | None, checkpoint: str | None, output: str | None
 ) -> None:
@@ -137,18 +129,12 @@ def long(
         sys.exit(130)
     say(f"{data.attrs['title']}: {data.attrs['outcome_message']}")
     if data.sizes["window"]:
-        rows = [
-            [
-                name,
-                *(f"{float(value):+.3e}" for value in (
-                    data[f"{name}_least"].min(), data[f"{name}_largest"].max(), data[f"{name}_mean"][-1],
-                )),
-            ]
-            for name in ("energy", "modified_energy", "p_phi", "p_psi")
-        ]  # fmt: skip
+        rows = []
+        for name in ("energy", "modified_energy", "p_phi", "p_psi"):
+            least, most, mean = (data[f"{name}_{kind}"] for kind in ("least", "largest", "mean"))
+            rows.append([name, *(f"{float(value):+.3e}" for value in (least.min(), most.max(), mean[-1]))])
         click.echo(table(["change since the start", "least", "largest", "last window's mean"], rows))
-    if output is not None:
-        click.echo(f"written to {output}")
+    say_written(output)
     if data.attrs["outcome"] != "ok":
         sys.exit(3)
 
@@ -165,19 +151,17 @@ def long(
 @click.option("--nutations", type=float, help="In place of a horizon: nutation periods of each top.")
 @click.option("--samples", type=int, default=101, show_default=True, help="Number of samples of each top.")
 @click.option("--observe", help="nutation, axis or attitude; the axis by default.")
-@click.option("--variables", metavar="NAMES", help="What is kept over time, with commas; all by default.")
+@click.option("--variables", metavar="NAME,...", callback=separated, help="What is kept over time; all by default.")
 @click.option("--budget", type=float, help="Most steps of a top, or force evaluations of an adaptive method.")
 @click.option("--threads", type=int, help="Threads; one a core by default.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on this dask cluster.")
 @click.option("--output", "-o", type=File(), help="Stream the runs to this netCDF file.")
 @click.option("--figure", type=File(), help="Draw quantiles of the errors over time: .png, .svg or .pdf.")
-@plugin_option
-@json_option
+@common.plugin_option
+@common.json_option
 def ensemble(
-    integrator: str, members: int, seed: int, kind: str, step_size: float | None, per_nutation: float | None,
-    tolerance: float | None, horizon: float | None, nutations: float | None, samples: int, observe: str | None,
-    variables: str | None, budget: float | None, threads: int | None, scheduler: str | None, output: str | None,
-    figure: str | None, as_json: bool,
+    integrator: str, members: int, seed: int, kind: str, variables: list[str] | None, output: str | None,
+    figure: str | None, as_json: bool, **settings: Any,
 ) -> None:  # fmt: skip
     """Run one INTEGRATOR on tops of a random population and compare each with the exact motion.
 
@@ -190,22 +174,17 @@ def ensemble(
     """
     check_outputs(output=output, figure=figure)
     whole("members", members, 1)  # which is n in Python
-    names = None if variables is None else [name.strip() for name in variables.split(",")]
     with ticking("drawing tops"):
-        from symtop.measure.spread import LEVELS, QUANTITIES, largest, member_errors, spread
+        from symtop.report.spread import LEVELS, QUANTITIES, largest, member_errors, spread
         from symtop.run.ensemble import ensemble as runs
         from symtop.run.ensemble.population import population
 
         tops = population(members, seed=seed, kind=kind)
-    compared = [name for name in QUANTITIES if names is None or name in names]
+    compared = [name for name in QUANTITIES if variables is None or name in variables]
     if figure is not None and not compared:
         raise SymtopError("--figure needs axis or energy among --variables, whose errors it shows")
     try:
-        data = runs.ensemble(
-            tops, integrator, step_size=step_size, per_nutation=per_nutation, tolerance=tolerance, horizon=horizon,
-            nutations=nutations, samples=samples, observe=observe, variables=names, budget=budget, path=output,
-            threads=threads, scheduler=scheduler,
-        )  # fmt: skip
+        data = runs.ensemble(tops, integrator, variables=variables, path=output, **settings)
     except KeyboardInterrupt:
         warn("interrupted" + ("" if output is None else "; the tops that were run are kept: the same command resumes"))
         sys.exit(130)
@@ -219,9 +198,7 @@ def ensemble(
         worst = {name: spread(largest(member_errors(few, shown, name))[:, None])[:, 0].tolist() for name in compared}
     data.close()
     if as_json:
-        errors = {
-            name: {f"{level:g}": error for level, error in zip(LEVELS, worst[name], strict=True)} for name in worst
-        }
+        errors = {name: dict(zip(map("{:g}".format, LEVELS), row, strict=True)) for name, row in worst.items()}
         click.echo(as_text({"outcomes": outcomes, "steps": steps, "largest_errors": errors}))
     else:
         counts = ", ".join(f"{count} {OUTCOME.get(name, name)}" for name, count in outcomes.items())
@@ -230,9 +207,7 @@ def ensemble(
         heading = [f"largest error, {few.sizes['member']} tops", *(f"{100.0 * level:g} %" for level in LEVELS)]
         if worst:
             click.echo(table(heading, [[QUANTITIES[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
-        for file in (output, figure):
-            if file is not None:
-                click.echo(f"written to {file}")
+        say_written(output, figure)
     if "ok" not in outcomes:
         sys.exit(3)
 
@@ -240,7 +215,7 @@ def ensemble(
 @click.command(short_help="Open the explorer: one run in a browser, with sliders.")
 @click.option("--port", type=int, default=0, help="Port to listen on; a free one by default.")
 @click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
-@plugin_option
+@common.plugin_option
 def explore(port: int, no_browser: bool) -> None:
     """Show one run beside the exact motion in a browser, with sliders for the top, the start and the step."""
     import webbrowser

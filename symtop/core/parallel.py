@@ -1,12 +1,9 @@
 """Threads for functions that release Python's lock, and processes that each use one thread for linear algebra.
 
-A process a core with a thread a core in each makes as many threads as cores squared, and OpenBLAS spins while it waits:
-a least-squares fit that takes milliseconds with one thread takes a hundred times as long with two on two busy cores.
-The library reads its variable when it is loaded, so that it is set while a process starts; a user's own setting is
-kept.
+OpenBLAS spins while it waits: a least-squares fit takes a hundred times as long with two threads on two busy cores as
+with one. It reads its variable when it is loaded, so that it is set while a process starts; a user's own setting stays.
 """
 
-import multiprocessing
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
@@ -19,7 +16,7 @@ Piece = TypeVar("Piece")
 Result = TypeVar("Result")
 
 MOST_THREADS = 1024
-AHEAD = 2  # pieces a thread that are begun or done before they are asked for: what is waiting takes memory
+AHEAD = 2  # pieces for each thread that are computed before their turn: results that wait take memory
 _stop = threading.local()
 
 
@@ -37,13 +34,8 @@ def cores() -> int:
 
 def heed() -> None:
     """Raise `StoppedError` if the work was interrupted; for long pieces to call between their compiled calls."""
-    asked = getattr(_stop, "asked", None)
-    if asked is not None and asked.is_set():
+    if (stopped := getattr(_stop, "stopped", None)) is not None and stopped.is_set():
         raise StoppedError
-
-
-def _listen(asked: threading.Event) -> None:
-    _stop.asked = asked
 
 
 def in_threads(work: Callable[[Piece], Result], pieces: Iterable[Piece], threads: int) -> Iterator[Result]:
@@ -55,12 +47,12 @@ def in_threads(work: Callable[[Piece], Result], pieces: Iterable[Piece], threads
     if threads == 1:
         yield from map(work, pieces)
         return
-    asked = threading.Event()
-    pool = ThreadPoolExecutor(threads, initializer=_listen, initargs=(asked,))
+    stopped = threading.Event()
+    pool = ThreadPoolExecutor(threads, initializer=setattr, initargs=(_stop, "stopped", stopped))
     try:
         yield from in_order(pool, work, pieces, AHEAD * threads)
     except BaseException:
-        asked.set()
+        stopped.set()
         pool.shutdown(wait=False, cancel_futures=True)
         raise
     pool.shutdown()
@@ -69,10 +61,10 @@ def in_threads(work: Callable[[Piece], Result], pieces: Iterable[Piece], threads
 def in_order(pool: Executor, work: Callable[[Piece], Result], pieces: Iterable[Piece], ahead: int) -> Iterator[Result]:
     """The results of the pieces that a pool computes, in their order; `ahead` of them are with the pool at a time."""
     rest = iter(pieces)
-    begun: list[Future[Result]] = [pool.submit(work, piece) for piece in islice(rest, ahead)]
-    while begun:
-        yield begun.pop(0).result()
-        begun += [pool.submit(work, piece) for piece in islice(rest, 1)]
+    submitted: list[Future[Result]] = [pool.submit(work, piece) for piece in islice(rest, ahead)]
+    while submitted:
+        yield submitted.pop(0).result()
+        submitted += [pool.submit(work, piece) for piece in islice(rest, 1)]
 
 
 VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")  # of NumPy's and SciPy's builds
@@ -92,10 +84,7 @@ class OneThread(SpawnProcess):
                 del os.environ[name]
 
 
-class _Context(SpawnContext):
+class OneThreadEach(SpawnContext):
+    """What pools start such processes with."""
+
     Process: ClassVar[Any] = OneThread
-
-
-def context() -> multiprocessing.context.SpawnContext:
-    """What `concurrent.futures.ProcessPoolExecutor` starts such processes with."""
-    return _Context()

@@ -1,8 +1,7 @@
 """The explorer's answers: one run beside the exact motion, as a dataset, and as a script; a map of many runs.
 
-The page sends a flat mapping of numbers and names, which `setup` reads; ``scene`` names the run in its sentences. The
-run is made by the public functions (`Scene`, `simulate`, the closed form), so that the script gives the same numbers to
-the last bit.
+The page sends a flat mapping of numbers and names, which `setup` reads. The script gives the numbers of the page to the
+last bit.
 
 The map is one method on one top over a grid of steps and spins, as one ensemble. A cell is the run from the page's
 start with its own psi_dot (row) and step size (column). Its value is the largest angle in radians between its axis and
@@ -169,6 +168,10 @@ def answer(chosen: Setup) -> dict[str, Any]:
             "axis_error": charts.axis_distance(run.axis, charts.axis_from_quaternion(truth)),
             "attitude_error": charts.attitude_distance(attitude, truth),
         }
+        largest = {}
+        for name in (*CONSTANTS, "axis_error"):
+            good = np.abs(arrays[name][np.isfinite(arrays[name])])
+            largest[name] = float(good.max()) if good.size else None
         coded = {name: _float32(values) for name, values in arrays.items()}
     return {
         "outcome": run.outcome,
@@ -179,7 +182,7 @@ def answer(chosen: Setup) -> dict[str, Any]:
         "period": period,
         "run_ms": 1e3 * (ran - began),
         "all_ms": 1e3 * (time.perf_counter() - began),
-        "largest": {name: _largest(arrays[name]) for name in (*CONSTANTS, "axis_error")},
+        "largest": largest,
         "arrays": coded,
     }
 
@@ -187,11 +190,6 @@ def answer(chosen: Setup) -> dict[str, Any]:
 def _float32(values: Any) -> str:
     """Base64 of the values as float32, little-endian."""
     return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode()
-
-
-def _largest(values: Any) -> float | None:
-    good = np.abs(values[np.isfinite(values)])
-    return float(good.max()) if good.size else None
 
 
 def grid(fields: Mapping[str, Any]) -> tuple[Setup, np.ndarray, np.ndarray]:
@@ -251,21 +249,17 @@ def script(chosen: Setup) -> str:
     name, samples = chosen.method.name, chosen.samples
     options = "" if chosen.method.control is None else f", {chosen.method.control}={chosen.setting!r}"
     options += "" if chosen.budget is None else f", budget={chosen.budget!r}"
-    return "\n".join(
-        [
-            f'"""A run of symtop explore, symtop {__version__}."""',
-            "",
-            "import symtop",
-            "",
-            f"top = symtop.SymmetricTop({top})",
-            f"start = symtop.Angles({start})",
-            f'scene = symtop.Scene("{scene.name}", top, start, horizon={scene.horizon!r})',
-            f'run = symtop.simulate(scene, "{name}"{options}, observe="attitude", samples={samples})',
-            'run.to_netcdf("explored.nc")',
-            'print(run.attrs["title"] + ": " + run.attrs["outcome_message"])',
-            "",
-        ]
-    )
+    return f'''"""A run of symtop explore, symtop {__version__}."""
+
+import symtop
+
+top = symtop.SymmetricTop({top})
+start = symtop.Angles({start})
+scene = symtop.Scene("{scene.name}", top, start, horizon={scene.horizon!r})
+run = symtop.simulate(scene, "{name}"{options}, observe="attitude", samples={samples})
+run.to_netcdf("explored.nc")
+print(run.attrs["title"] + ": " + run.attrs["outcome_message"])
+'''
 
 
 def catalogue() -> dict[str, Any]:

@@ -126,7 +126,12 @@ class Handler(BaseHTTPRequestHandler):
                 self._refuse(413, f"a question must be at most {LONGEST_BODY} bytes, not {length}")
                 return
             read, action, kind = ACTIONS[self.place]
-            chosen = read(_parsed(self.rfile.read(length)))
+            body = self.rfile.read(length)
+            try:
+                question = json.loads(body)
+            except (ValueError, RecursionError) as error:
+                raise SymtopError(f"a question must be JSON: {error}") from None
+            chosen = read(question)
             with _at_work:
                 if self._has_left():
                     self.close_connection = True
@@ -177,13 +182,6 @@ class Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:
         """Print nothing for a request."""
-
-
-def _parsed(body: bytes) -> Any:
-    try:
-        return json.loads(body)
-    except (ValueError, RecursionError) as error:
-        raise SymtopError(f"a question must be JSON: {error}") from None
 
 
 def serve(port: int = 0) -> ThreadingHTTPServer:

@@ -1,10 +1,16 @@
-"""What a run does to the constants of the motion: residuals, their trends, and momenta that are only reported.
+"""What a run does to the constants of the motion: residuals, their trends and growth, and momenta only reported.
 
 A trend is the slope of the least-squares line through the means of `BLOCKS` equal stretches, with Student's 95 %
 interval, widened by the correlation of what the line leaves over. Samples are never commensurate with the
 nutation, so that a fast oscillation averages out. A random walk, which is what rounding makes, has no slope but
 wanders: in 33 % of cases its interval is too narrow (white noise: 3 %), so that near rounding the exponent of growth,
 1/2, is the better witness.
+
+An exponent of error ~ t^alpha is the least-squares slope of the logarithm of the largest error in logarithmic windows:
+
+    alpha   0         1/2                       1                        3/2                        2
+    means   bounded   random walk (rounding     steady drift (phase of   phase under a random       phase under a steady
+                      at its best)              a symplectic method)     walk of the energy         drift of the energy
 
 In the angles chart p_phi and p_psi are parameters of a state. What the trajectory itself says of them are its rates,
 
@@ -16,29 +22,27 @@ those of its start shows a difference that drifts, as far as its momenta do (`fr
 """
 
 import math
-from typing import Any, NamedTuple
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from symtop.core.numbers import GOLDEN
-from symtop.measure.growth import change_point, growth, law, tops
-from symtop.measure.phase import nutation_phase
-from symtop.measure.statistics import line, student
+from symtop.measure.order import Fit, line, power_law, student
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan, Run
+from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop
-from symtop.run.simulation import integrate
 from symtop.run.trajectory import Trajectory
 
 CONSTANTS = ("energy", "p_phi", "p_psi")
+LAWS = {0.0: "bounded", 0.5: "random walk", 1.0: "linear", 1.5: "t^3/2", 2.0: "quadratic"}
+RUN_ROUNDING = 3e-13  # relative: the largest change that a million steps of rounding explain where sums are compensated
+WALK = 100.0  # times what rounding explains: a larger growth as t^1/2 is no walk of rounding
 BLOCKS = 24
-WINDOWS = 24  # for a change of law: each side of it needs at least five
-SETTLED = 30.0  # nutations: before, an oscillation switches on, which is no change of law
 
 
 class Trend(NamedTuple):
@@ -75,43 +79,75 @@ def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> C
     )
 
 
-def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:
-    """One run and what became of the constants of the motion and of its phase.
-
-    Dimension ``sample``: ``sample_time`` and, for energy, p_phi and p_psi, ``NAME_residual``. For each of them the
-    ``largest``, the linear ``slope`` with its ``interval`` and ``rise``, and the ``exponent`` of growth over the last
-    two decades; for the phase of the nutation (rad; NaN where there is none) ``largest`` and ``exponent``, over the
-    last decade, because a wrong frequency gives way to a drifting one only late. ``exponent_interval`` goes with each,
-    and ``law``, its name; where one law gives way to another, ``change`` is the time, ``before`` and ``after`` are the
-    exponents (NaN where none does).
-    """
-    run = integrate(scene, method, observe="nutation", **settings)
-    time = run.time
-    columns: dict[str, Any] = {"sample_time": ("sample", time), "outcome": run.outcome, "steps": run.steps}
-    period = scene.nutation_period
-    late = time > (SETTLED * period if math.isfinite(period) else 0.0)
-    for name, values in residuals(scene, run).items():
-        columns[f"{name}_residual"] = ("sample", values)
-        columns |= _columns(name, constant_of(time, values)._asdict(), time[late], values[late])
-    phase = nutation_phase(scene, time, run.theta, run.p_theta / scene.top.I1)
-    changed = constant_of(time, phase, 1.0)._asdict()
-    without_trend = {part: value for part, value in changed.items() if part not in Trend._fields}
-    return xr.Dataset(columns | _columns("phase", without_trend, time[late], phase[late]))
-
-
-def _columns(name: str, changed: dict[str, Any], time: np.ndarray, values: np.ndarray) -> dict[str, Any]:
-    """What became of a quantity, and where within the last two decades another law than that of the end ended."""
-    change = change_point(*tops(time, values, count=WINDOWS)) if time.size else None
-    when, before, after = (math.nan,) * 3 if change is None else change
-    parts = changed | {"change": when, "before": before, "after": after}
-    return {f"{name}_{part}": value for part, value in parts.items()}
-
-
 def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
     """Relative change of energy, p_phi and p_psi since the start, signed."""
     scales = {"energy": scene.energy_scale, "p_phi": scene.momentum_scale, "p_psi": scene.momentum_scale}
     values = {name: getattr(run, name) for name in CONSTANTS}
     return {name: (values[name] - values[name][0]) / scales[name] for name in CONSTANTS}
+
+
+def growth(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Fit:
+    """The exponent of |residual| ~ t^exponent, from the largest values in logarithmic windows of the last `decades`.
+
+    What happens within the first nutations is an oscillation that switches on, not growth.
+    """
+    return power_law(*tops(time, residual, decades))
+
+
+def tops(
+    time: ArrayLike, residual: ArrayLike, decades: float = 2.0, count: int = 12
+) -> tuple[list[float], list[float]]:
+    """Middles of `count` logarithmic windows that fill the last `decades`, and the largest |residual| in each."""
+    t, r = np.asarray(time, float), np.abs(np.asarray(residual, float))
+    edges = np.geomspace(t[-1] / 10.0**decades, t[-1], count + 1)
+    middles, largest = [], []
+    for low, high in pairwise(edges):
+        inside = (t > low) & (t <= high) & np.isfinite(r)
+        if inside.any():
+            middles.append(math.sqrt(low * high))
+            largest.append(float(r[inside].max()))
+    return middles, largest
+
+
+def law(fit: Fit, slack: float = 0.1) -> str:
+    """The name of the exponent that a fit agrees with, within its interval or `slack`; otherwise the exponent.
+
+    "undecided" if another law lies within the interval as well.
+    """
+    if not math.isfinite(fit.slope):
+        return "not judged"
+    nearest = min(LAWS, key=lambda exponent: abs(exponent - fit.slope))
+    if any(abs(exponent - fit.slope) <= fit.interval for exponent in LAWS if exponent != nearest):
+        return "undecided"
+    agrees = abs(nearest - fit.slope) <= max(fit.interval, slack)
+    return LAWS[nearest] if agrees else f"t^{fit.slope:.2f}"
+
+
+def behaviour(size: float, slope: float, interval: float, grain: float = 1.0, rounding: float = 0.0) -> str:
+    """What became of a constant whose largest change is `size` and grows as t^slope (95 %: +- interval).
+
+    The one rule of every study. `grain` is the rounding of the constant in units of the machine's, 1 or more (see
+    `Scene.energy_grain`); `rounding` is what rounding explains beyond ``RUN_ROUNDING * grain``, where sums are plain.
+
+        kept          size <= RUN_ROUNDING grain, whatever the exponent; or size <= rounding, and not bounded
+        bounded       the exponent is nearest to 0, and its interval excludes 1/2: an error of the step, however small
+        random walk   nearest to 1/2, the interval excludes 0 and 1, and size <= `WALK` times rounding
+        drift         nearest to 1 or larger, and the interval excludes 1/2
+        growing       anything else: the interval does not tell two laws apart, a growth as t^1/2 that is too large for
+                      rounding, or no exponent (NaN)
+    """
+    if size <= RUN_ROUNDING * grain:
+        return "kept"
+    low, high = slope - interval, slope + interval
+    if slope < 0.25 and high < 0.5:
+        return "bounded"
+    rounding = max(rounding, RUN_ROUNDING * grain)
+    if size <= rounding:
+        return "kept"
+    if slope >= 0.75 and low > 0.5:
+        return "drift"
+    walks = 0.25 <= slope < 0.75 and low > 0.0 and high < 1.0
+    return "random walk" if walks and size <= WALK * rounding else "growing"
 
 
 def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
@@ -160,22 +196,19 @@ def from_increments(method: Integrator, scene: Scene, plan: Plan) -> Difference 
     marks = (middles[:, None] + np.arange(-REACH, REACH + 1)).ravel()
     again = Plan.steps(plan.step_size, np.unique(marks))
     run = solve(method, "angles", scene.top, scene.start, again, f" on {scene.name}")
-    return compared(scene, again, run, middles) if run.outcome == "ok" else None
-
-
-def compared(scene: Scene, plan: Plan, run: Run, middles: Array) -> Difference:
-    """The difference whose drift is larger, of a run that was sampled around `middles`."""
-    place = np.searchsorted(plan.marks, middles)
+    if run.outcome != "ok":
+        return None
+    place = np.searchsorted(again.marks, middles)
     around = run.states[place[:, None] + np.arange(-REACH, REACH + 1)]  # (places, 9, 4)
-    implied = dict(zip(("p_phi", "p_psi"), momenta_of(scene.top, around, plan.step_size), strict=True))
-    times, sizes = plan.times[place], {}
+    implied = dict(zip(("p_phi", "p_psi"), momenta_of(scene.top, around, again.step_size), strict=True))
+    times, sizes = again.times[place], {}
     for name, values in implied.items():
         reported = getattr(run, name)[place]
         apart, own = trend(times, (values - reported) / scene.momentum_scale), trend(times, values)
         hidden = abs(apart.rise) > max(LEAST, SHARE * abs(own.rise) / scene.momentum_scale)
         sizes[name] = abs(apart.rise) if hidden and abs(apart.slope) > SURE * apart.interval else 0.0
     name = max(sizes, key=lambda one: sizes[one])
-    return Difference(name, sizes[name], LEAST, f"more at the end of {int(plan.marks[-1])} steps than at their start")
+    return Difference(name, sizes[name], LEAST, f"more at the end of {int(again.marks[-1])} steps than at their start")
 
 
 def momenta_of(top: SymmetricTop, around: Array, h: float) -> tuple[Array, Array]:

@@ -28,7 +28,7 @@ from symtop.model import charts
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.reference.truth import PRECISIONS, reference
-from symtop.run.trajectory import dataset
+from symtop.run.trajectory import Trajectory, dataset
 
 QUANTITIES: dict[str, str] = {
     "axis": "angle between axes (rad)",
@@ -79,96 +79,68 @@ def errors(
     run = sampled(run) if isinstance(run, xr.Dataset) else run
     chosen = scene_of(run) if scene is None else find_scene(scene)
     refuse_other_scene(run, chosen)
-    data = checked(run) if foreign or not isinstance(run, xr.Dataset) else run
-    truth = reference(chosen, data["time"].values, precision)
-    if foreign and "quaternion" in data:
-        refuse_other_order(data, truth)
+    data = checked(run) if foreign else Trajectory.of_data(run)
+    truth = reference(chosen, data.time, precision)
+    if foreign and data.quaternion is not None:
+        refuse_other_order(data.quaternion, truth)
     data = completed(data) if foreign else data
-    columns = _columns(chosen, data, truth)
-    for sentence in doubts(data, columns, chosen.horizon) if foreign else ():
+    columns = errors_against(chosen, data, truth)
+    for sentence in doubts(data.time, columns, chosen.horizon) if foreign else ():
         warnings.warn(f"on {chosen.name}: {sentence}", SymtopWarning, stacklevel=2)
-    bounds = {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns}
-    shown = _beside(data, columns | bounds)
+    shown = dataset(data.time, columns | {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns})
     for name in columns:
         words, units = ERRORS[name]
         shown.variables[name].attrs.update(long_name=words, units=units)
         shown.variables[f"{name}_bound"].attrs.update(long_name=f"least {words} to be told from none", units=units)
-    told = {"scene": chosen.name, "precision": truth.attrs["precision"]}
-    if isinstance(run, xr.Dataset) and "integrator" in run.attrs:
-        told["integrator"] = run.attrs["integrator"]
-    shown.attrs.update(netcdf.CONVENTIONS, title=f"errors on {chosen.name}", **told)
+    attributes = {"scene": chosen.name, "precision": truth.attrs["precision"]}
+    if isinstance(run, xr.Dataset) and not foreign:
+        shown.variables["time"].attrs.update(run["time"].attrs)
+        attributes |= {"integrator": run.attrs["integrator"]} if "integrator" in run.attrs else {}
+    shown.attrs.update(netcdf.CONVENTIONS, title=f"errors on {chosen.name}", **attributes)
     return shown
 
 
-def error_bound(scene: Scene, run: xr.Dataset, truth: xr.Dataset, quantity: str) -> charts.Array:
+def error_bound(scene: Scene, run: Trajectory, truth: xr.Dataset, quantity: str) -> charts.Array:
     """The reference's bound on a quantity and the rounding of the compared doubles, at every sample (n,)."""
     if quantity in CONSTANTS:
         grain = scene.energy_grain if quantity == "energy" else 1.0
         return np.full(truth.sizes["time"], 4.0 * EPSILON * grain)
-    true = truth.variables
+    true = truth.variables  # ``truth[name]`` would make a DataArray
     bound: charts.Array = true[f"{quantity}_error_bound"].values + EPSILON
-    if quantity == "attitude" and "quaternion" not in run:  # phi and psi come as doubles; their rounding is an angle
+    if quantity == "attitude" and run.quaternion is None:  # phi and psi come as doubles; their rounding is an angle
         bound = bound + 0.5 * EPSILON * (np.abs(true["phi"].values) + np.abs(true["psi"].values))
     return bound
 
 
-def errors_against(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> xr.Dataset:
-    """Error of every quantity that a run shows at every sample; NaN where the run had failed.
+def errors_against(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str, charts.Array]:
+    """Error of every quantity that a run shows at every sample (n,); NaN where the run had failed.
 
     Where the reference knows a value beyond double, the difference is taken from both of its halves: a run that is
-    right to its last digit has the error of that digit and not zero. `truth` holds `axis`, `theta`,
-    `quaternion`, `energy`, `p_phi`, `p_psi` at the same times (see `reference`).
+    right to its last digit has the error of that digit and not zero. `truth` is `reference` at the same times.
     """
-    return _beside(run, _columns(scene, run, truth))
-
-
-def _beside(run: xr.Dataset, columns: dict[str, charts.Array]) -> xr.Dataset:
-    """Columns over the times of a run."""
-    time = run.variables["time"]
-    shown = dataset(time.values, columns)
-    shown.variables["time"].attrs.update(time.attrs)
-    return shown
-
-
-def _columns(scene: Scene, run: xr.Dataset, truth: xr.Dataset) -> dict[str, charts.Array]:
-    mine, true = run.variables, truth.variables  # ``run[name]`` would make a DataArray
-    columns = {}
+    true = {name: variable.values for name, variable in truth.variables.items()}
     units = {"theta": 1.0, "energy": scene.energy_scale, "p_phi": scene.momentum_scale, "p_psi": scene.momentum_scale}
+    columns = {}
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
-        if "axis" in mine:
-            columns["axis"] = charts.axis_distance(mine["axis"].values, true["axis"].values, _low(truth, "axis"))
+        if run.axis is not None:
+            columns["axis"] = charts.axis_distance(run.axis, true["axis"], true.get("axis_lo", 0.0))
         for name, unit in units.items():
-            if name in mine:
-                columns[name] = np.abs((mine[name].values - true[name].values) - _low(truth, name)) / unit
-        if "quaternion" in mine or "psi" in mine:
-            columns["attitude"] = attitude_error(run, truth)
+            if (mine := getattr(run, name)) is not None:
+                columns[name] = np.abs((mine - true[name]) - true.get(f"{name}_lo", 0.0)) / unit
+        if run.quaternion is not None or run.psi is not None:
+            attitude = run.quaternion
+            if attitude is None:
+                attitude = charts.quaternion_from_angles(run.theta, run.phi, run.psi)
+            low = true.get("quaternion_lo", 0.0)
+            columns["attitude"] = charts.attitude_distance(attitude, true["quaternion"], low)
     return columns
-
-
-def attitude_error(run: xr.Dataset, truth: xr.Dataset) -> charts.Array:
-    """Angle between the attitudes of a run that shows them and of the truth, at every sample."""
-    if "quaternion" in run:
-        attitude = run["quaternion"].values
-    else:
-        attitude = charts.quaternion_from_angles(run["theta"].values, run["phi"].values, run["psi"].values)
-    return charts.attitude_distance(attitude, truth["quaternion"].values, _low(truth, "quaternion"))
-
-
-def _low(truth: xr.Dataset, name: str) -> charts.Array | float:
-    """What the reference knows of a value beyond its double."""
-    low: charts.Array | float = truth.variables[f"{name}_lo"].values if f"{name}_lo" in truth.variables else 0.0
-    return low
 
 
 LENGTH = 1e-3  # how far from one the length of an axis or a quaternion may be: more than single precision leaves
 FAR, NEAR = 0.1, 0.01  # rad from the true attitude: another order of a quaternion, and the right one
 BEYOND = 100.0  # horizons: milliseconds for seconds are a thousand
 CONSTANTS = ("energy", "p_phi", "p_psi")
-SHAPES: dict[str, tuple[tuple[str, ...], tuple[int, ...]]] = {
-    "axis": (("time", "component"), (3,)),
-    "quaternion": (("time", "part"), (4,)),
-    **dict.fromkeys(("theta", "phi", "psi", *CONSTANTS), (("time",), ())),
-}
+SHAPES = {"axis": (3,), "quaternion": (4,), **dict.fromkeys(("theta", "phi", "psi", *CONSTANTS), ())}
 ENOUGH = ("axis", "quaternion", "theta")  # one of them there must be
 
 
@@ -193,10 +165,10 @@ def refuse_other_scene(run: xr.Dataset | Mapping[str, Any], scene: Scene) -> Non
     attributes = getattr(run, "attrs", {})
     for name, own in (("top", scene.top), ("start", scene.start)):
         try:
-            told = type(own)(**json.loads(attributes[name]))
+            stored = type(own)(**json.loads(attributes[name]))
         except (KeyError, TypeError, ValueError):  # they do not say
             continue
-        if told != own:
+        if stored != own:
             raise SymtopError(
                 f"scene must be that of the data, {attributes.get('scene', 'of another name')}, whose {name} is "
                 f"{attributes[name]}, not {scene.name}; drop_attrs() makes them a trajectory that is compared with any"
@@ -214,8 +186,8 @@ def sampled(run: xr.Dataset) -> xr.Dataset:
     return run if there.all() else run.isel(time=there)
 
 
-def checked(data: xr.Dataset | Mapping[str, Any]) -> xr.Dataset:
-    """The known variables of a foreign trajectory over ``time``; an axis and a quaternion are scaled to length one.
+def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
+    """The known variables of a foreign trajectory; an axis and a quaternion are scaled to length one.
 
     Raises SymtopError for anything that is not such a trajectory.
     """
@@ -224,34 +196,27 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> xr.Dataset:
             f"data must be a Dataset or a mapping with time and axis, quaternion or theta, not {type(data).__name__}"
         )
     time = _times(data)
-    variables = {name: _values(data, name, time.size) for name in SHAPES if name in data}
-    if not set(ENOUGH) & set(variables):
+    columns: dict[str, Any] = {name: _numbers(name, data[name]) for name in SHAPES if name in data}
+    for name, values in columns.items():
+        if values.shape != (wanted := (time.size, *SHAPES[name])):
+            raise SymtopError(f"{name} must have the shape {wanted}, one row for each time, not {values.shape}")
+    if not set(ENOUGH) & set(columns):
         raise SymtopError("data must hold one of axis, quaternion, theta beside time, to show where the top is")
     for name in ("axis", "quaternion"):
-        if name in variables:
-            variables[name] = _unit(name, variables[name], time)
-    if "theta" in variables:
-        _inclined(variables["theta"], time)
-    return xr.Dataset({name: (SHAPES[name][0], values) for name, values in variables.items()}, {"time": time})
+        if name in columns:
+            length = np.sqrt(np.sum(columns[name] ** 2, axis=-1))
+            if (off := np.abs(length - 1.0) > LENGTH).any():  # false where it is NaN
+                where = f"{length[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
+                raise SymtopError(f"{name} must be of length 1 within {LENGTH:g}, but its length is {where}")
+            columns[name] = columns[name] / length[:, None]
+    theta = columns.get("theta", np.zeros(1))
+    if (off := (theta < 0.0) | (theta > np.pi)).any():
+        where = f"{theta[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
+        raise SymtopError(f"theta must be radians from the vertical in [0, pi], but it is {where}")
+    return Trajectory(time, **columns)
 
 
-def completed(data: xr.Dataset) -> xr.Dataset:
-    """The same with the axis, the attitude and theta that follow from what is there."""
-    with np.errstate(all="ignore"):  # of samples that are NaN
-        if "quaternion" not in data and all(name in data for name in ("theta", "phi", "psi")):
-            attitude = charts.quaternion_from_angles(*(data[name].values for name in ("theta", "phi", "psi")))
-            data = data.assign(quaternion=(("time", "part"), attitude))
-        if "axis" not in data and "quaternion" in data:
-            data = data.assign(axis=(("time", "component"), charts.axis_from_quaternion(data["quaternion"].values)))
-        if "axis" not in data and all(name in data for name in ("theta", "phi")):
-            axis = charts.axis_from_angles(data["theta"].values, data["phi"].values)
-            data = data.assign(axis=(("time", "component"), axis))
-        if "theta" not in data:
-            data = data.assign(theta=("time", charts.theta_from_axis(data["axis"].values)))
-    return data
-
-
-def _times(data: xr.Dataset | Mapping[str, Any]) -> charts.Array:
+def _times(data: Mapping[Any, Any]) -> charts.Array:
     if "time" not in data:
         raise SymtopError("data must hold time, elapsed since the start of the scene; there is none")
     time = _numbers("time", data["time"])
@@ -262,6 +227,22 @@ def _times(data: xr.Dataset | Mapping[str, Any]) -> charts.Array:
     return time
 
 
+def completed(data: Trajectory) -> Trajectory:
+    """The same with the axis, the attitude and theta that follow from what is there."""
+    angles, axis, attitude, theta = [data.theta, data.phi, data.psi], data.axis, data.quaternion, data.theta
+    known = [angle is not None for angle in angles]
+    with np.errstate(all="ignore"):  # of samples that are NaN
+        if attitude is None and all(known):
+            attitude = charts.quaternion_from_angles(*angles)
+        if axis is None and attitude is not None:
+            axis = charts.axis_from_quaternion(attitude)
+        elif axis is None and all(known[:2]):
+            axis = charts.axis_from_angles(*angles[:2])
+        if theta is None and axis is not None:
+            theta = charts.theta_from_axis(axis)
+    return data._replace(axis=axis, quaternion=attitude, theta=theta)
+
+
 def _numbers(name: str, values: Any) -> charts.Array:
     try:
         given = np.asarray(values)
@@ -270,40 +251,12 @@ def _numbers(name: str, values: Any) -> charts.Array:
         raise SymtopError(f"{name} must be an array of real numbers, not {type(values).__name__}") from error
 
 
-def _values(data: xr.Dataset | Mapping[str, Any], name: str, count: int) -> charts.Array:
-    values, wanted = _numbers(name, data[name]), (count, *SHAPES[name][1])
-    if values.shape != wanted:
-        raise SymtopError(f"{name} must have the shape {wanted}, one row for each time, not {values.shape}")
-    return values
-
-
-def _unit(name: str, values: charts.Array, time: charts.Array) -> charts.Array:
-    length = np.sqrt(np.sum(values * values, axis=-1))
-    off = np.abs(length - 1.0) > LENGTH  # false where it is NaN
-    if off.any():
-        k = int(np.argmax(off))
-        raise SymtopError(
-            f"{name} must be of length 1 within {LENGTH:g}, but its length is {length[k]:.6g} at t = {time[k]:.6g}"
-        )
-    unit: charts.Array = values / length[:, None]
-    return unit
-
-
-def _inclined(theta: charts.Array, time: charts.Array) -> None:
-    off = (theta < 0.0) | (theta > np.pi)
-    if off.any():
-        k = int(np.argmax(off))
-        raise SymtopError(
-            f"theta must be radians from the vertical in [0, pi], but it is {theta[k]:.6g} at t = {time[k]:.6g}"
-        )
-
-
-def refuse_other_order(data: xr.Dataset, truth: xr.Dataset) -> None:
+def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
     """Refuse quaternions whose first sample is the true attitude only when it is read in another convention."""
-    finite = np.flatnonzero(np.isfinite(data["quaternion"].values).all(axis=1))
+    finite = np.flatnonzero(np.isfinite(quaternion).all(axis=1))
     if not finite.size:
         return
-    first, true = data["quaternion"].values[finite[0]], truth["quaternion"].values[finite[0]]
+    first, true = quaternion[finite[0]], truth["quaternion"].values[finite[0]]
     as_given = float(charts.attitude_distance(first, true))
     for other, moved in (("x, y, z, w", np.roll(first, 1)), ("from space to body", first * [1.0, -1.0, -1.0, -1.0])):
         if as_given > FAR and float(charts.attitude_distance(moved, true)) < NEAR:
@@ -313,26 +266,26 @@ def refuse_other_order(data: xr.Dataset, truth: xr.Dataset) -> None:
             )
 
 
-def doubts(data: xr.Dataset, errors: Mapping[str, charts.Array], horizon: float) -> list[str]:
+def doubts(time: charts.Array, errors: Mapping[str, charts.Array], horizon: float) -> list[str]:
     """What is wrong with a foreign trajectory as a whole: another start, another clock, samples that are not numbers.
 
     `horizon` is that of the scene: times far beyond it may be in another unit.
     """
-    said, time = [], data["time"].values
+    sentences = []
     name = "attitude" if "attitude" in errors else "axis" if "axis" in errors else "theta"
     if errors[name][0] > FAR:
-        said.append(
+        sentences.append(
             f"the first sample, at t = {time[0]:.6g}, is {errors[name][0]:.2g} rad from the true {name}: is this the "
             "start of the scene, and is its time counted from there?"
         )
     if time[-1] > BEYOND * horizon:
-        said.append(
+        sentences.append(
             f"times reach to {time[-1]:.6g}, {time[-1] / horizon:.3g} times the horizon {horizon:.6g}: are they in the "
             "scene's unit of time?"
         )
     for name, values in errors.items():
         if np.isnan(values).any():
             since = time[int(np.argmax(np.isnan(values)))]
-            said.append(f"{name} is not a number from t = {since:.6g}; a largest error leaves these samples out")
+            sentences.append(f"{name} is not a number from t = {since:.6g}; a largest error leaves these samples out")
             break
-    return said
+    return sentences

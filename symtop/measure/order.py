@@ -33,8 +33,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from symtop.measure.statistics import line, student
-
 LEAST = 5
 LARGEST_ERROR = 1e-2
 FLOOR = 1e3  # times the reference's bound: a finest error beyond it has not met rounding
@@ -65,6 +63,34 @@ class Fit(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.slope:.3f} +- {self.interval:.3f}" if math.isfinite(self.slope) else "not judged"
+
+
+class Line(NamedTuple):
+    """A straight line through points, by least squares."""
+
+    slope: float
+    error: float  # standard error of the slope
+    middle: tuple[float, float]  # the point of means, which is on the line
+    rest: Array  # what the line leaves
+
+
+def line(x: Array, y: Array) -> Line:
+    """The line through points (n,), n at least 3."""
+    middle = x.mean(), y.mean()
+    dx, dy = x - middle[0], y - middle[1]
+    spread = float(dx @ dx)
+    slope = float(dx @ dy) / spread
+    rest = dy - slope * dx
+    error = math.sqrt(float(rest @ rest) / (x.size - 2) / spread)
+    return Line(slope, error, middle, rest)
+
+
+@functools.lru_cache(maxsize=256)
+def student(freedom: int) -> float:
+    """By how much a standard error is multiplied for a 95 % interval."""
+    from scipy.special import stdtrit  # what scipy.stats asks, which takes a second to import
+
+    return float(stdtrit(freedom, 0.975))
 
 
 def power_law(x: ArrayLike, y: ArrayLike, used: ArrayLike | None = None) -> Fit:
@@ -105,14 +131,15 @@ def order(
     used = np.isfinite(e) & (e > 10.0 * b) & (e < LARGEST_ERROR)
     used &= h * omega < LARGEST_PHASE * max(claim or 2, 2) / 2.0
     places = rank[used[rank]]
-    series = _series(h[places], e[places], b[places], 2 if symmetric else 1)
+    points = (values[places].tobytes() for values in (h, e, b))
+    series = _widest(*points, 2 if symmetric else 1)
     if series is None:
         if np.min(finest) > FLOOR * np.max(judged):
             return _unjudged(used, "the error does not fall to rounding as a power of the step")
         return _unjudged(used, "fewer than five points follow a power of the step before rounding")
     used = np.zeros(h.shape, dtype=bool)
-    used[places[series.window]] = True
-    return Fit(series.slope, series.interval, series.constant, used)
+    used[places[series[3]]] = True
+    return Fit(*series[:3], used)
 
 
 def _round_off(h: Array, e: Array) -> float:
@@ -151,23 +178,12 @@ def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> s
     return "confirmed" if off <= BESIDE else "undecided"
 
 
-class _Series(NamedTuple):
-    """The fitted series over points from fine to coarse."""
-
-    slope: float
-    interval: float
-    constant: float
-    window: slice
-
-
-def _series(h: Array, e: Array, b: Array, power: int) -> _Series | None:
-    """The fit to points from fine to coarse, over the widest window that the series describes; None without one."""
-    return _widest(h.tobytes(), e.tobytes(), b.tobytes(), power)
-
-
 @functools.lru_cache(maxsize=4096)  # the words, tables and figures of a study ask for the same 1,600
-def _widest(steps: bytes, errors: bytes, bounds: bytes, power: int) -> _Series | None:
-    """`_series` of the bytes of the points."""
+def _widest(steps: bytes, errors: bytes, bounds: bytes, power: int) -> tuple[float, float, float, slice] | None:
+    """Slope, interval and constant of the series over the widest window of points, fine to coarse, that it describes.
+
+    The window comes last; None without one.
+    """
     h, e, b = (np.frombuffer(values) for values in (steps, errors, bounds))
     first, last = 0, h.size
     while last - first >= LEAST:
@@ -182,7 +198,7 @@ def _widest(steps: bytes, errors: bytes, bounds: bytes, power: int) -> _Series |
         fitted, deviations, freedom = _regularised(columns, values, weights)
         interval = student(max(int(freedom), 1)) * float(deviations[1])
         if interval <= WIDEST and np.max(np.abs(columns[:, 2:] @ fitted[2:])) <= CORRECTION:
-            return _Series(float(fitted[1]), max(interval, RESOLVED), math.exp(float(fitted[0])), window)
+            return float(fitted[1]), max(interval, RESOLVED), math.exp(float(fitted[0])), window
         last -= 1
     return None
 

@@ -1,29 +1,37 @@
-"""Which variant, a method in one chart, is the fastest at an accuracy, and whether its lead is more than noise.
+"""Which variant, a method in one chart, is the fastest at an accuracy, from the datasets of stored studies.
 
-The cost of a target is that of a variant's cheapest timed run that meets it: the smallest of its samples, because noise
-only adds. A lead is sure if it would be found again. The last `MOST_ROUNDS` rounds that both variants took part in are
-dealt to two halves, and in each half the ratio of the smallest samples is at least a margin (`margin`), which comes
-from the noise of the scene's own times. Each variant has met its smallest sample again (`timing.met_again`). And if a
-time misses its forecast by more than `MISSED`, the forecast leads too. Otherwise the two are level, unless they are
-`FAR` apart: every sample of the one is that many times every sample of the other, whatever rounds they were taken in.
+The work-precision study times variants on scenes. The cost of a target is that of a variant's cheapest timed run that
+meets it: the smallest of its samples, because noise only adds. Only variants that take steps are ranked. The closed
+form is what errors are measured by, and its cost is that of its constants, whatever the horizon.
 
-Only variants that take steps are ranked. The closed form is what errors are measured by, and its cost is that of its
-constants, whatever the horizon: it stands beside the rankings. A target that is wider than the nutation is not asked.
+The population study counts costs on random tops. Those nearest to a scene say which variants served it:
+
+    regime     four numbers without units that fix the motion of the axis: cos(theta) at both turning points, and asinh
+               of p_psi and p_phi over sqrt(I1 |mgl|). A top with mgl < 0 moves as one with -mgl whose axis is named the
+               other way round: cos(theta) and p_psi change sign, p_phi does not
+    distance   Euclid's, to a top or to its mirror image, in which both momenta change sign
+    served     the seconds of a variant, alone, are at most `WITHIN` times the least of all variants on the same top
+
+Of the costs, 60 MB for 10,000 tops, the part of one horizon, one quantity and one target is used.
 """
 
+import math
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from symtop.core.memoize import of_one_dataset
-from symtop.measure.settings import TARGETS
-from symtop.measure.timing import MISSED, met_again
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError
+from symtop.core.numbers import TINY
+from symtop.model.scenes import Scene
 
-MARGIN = 1.1  # the least: the same code in another process, elsewhere in memory, differs by some per cent
 NEEDS = ("control", "nutation_width", "outcome", "implementation", "seconds", "seconds_samples", "seconds_forecast")
-LEAST_ROUNDS, MOST_ROUNDS = 3, 8
-FAR = 3.0  # no spell of a machine that is shared by seven processes made a time 2.4 times as long
+STORED = "population.nc"
+NEAREST = 50  # tops
+WITHIN = 2.0
+SHOWN_AS = {"theta": "axis"}  # quantities that the study has under another name
 
 
 class Place(NamedTuple):
@@ -34,27 +42,6 @@ class Place(NamedTuple):
     setting: int
     samples: np.ndarray  # seconds, one a round; NaN for a round without it
     forecast: float  # seconds, from the variant's other runs; NaN if there are too few
-
-    @property
-    def doubtful(self) -> bool:
-        """Does the time miss its forecast, though it was taken again?"""
-        return abs(self.cost / self.forecast - 1.0) > MISSED
-
-
-class Lead(NamedTuple):
-    """How far the first of two is ahead, second time over first, and whether that is more than noise."""
-
-    ratio: float
-    sure: bool
-
-
-class Win(NamedTuple):
-    """The fastest variant at one target, those that are level with it, and the lead over the first behind them."""
-
-    best: Place
-    level: tuple[str, ...]
-    behind: Place | None
-    ratio: float  # of the times, `behind` over `best`; NaN if nothing is behind
 
 
 def ranked(data: xr.Dataset) -> list[str]:
@@ -68,119 +55,105 @@ def ranked(data: xr.Dataset) -> list[str]:
     ]
 
 
-def targets(cell: xr.Dataset) -> list[float]:
-    """The targets that are asked on a scene: those below the width of its nutation."""
-    width = float(cell["nutation_width"].max())
-    return [target for target in TARGETS if target < width]
-
-
 def cheapest(cell: xr.Dataset, target: float, quantity: str = "axis", implementation: str | None = None) -> list[Place]:
     """The cheapest timed run of each ranked variant that meets a target, cheapest first.
 
     `cell` is one scene and one horizon of the study's dataset.
     """
-    few = cell[[quantity, "seconds", "seconds_forecast", "outcome", "seconds_samples", "implementation"]]
-    cell = few.sel(variant=ranked(cell))  # of these alone: a dataset has dozens
-    table = cell[[quantity, "seconds", "seconds_forecast", "outcome"]].transpose("variant", "setting")
-    seconds, forecast = table["seconds"].values, table["seconds_forecast"].values
-    good = (table[quantity].values <= target) & (table["outcome"].values == "ok")
-    price = np.where(good & np.isfinite(seconds), seconds, np.inf)
+    columns = (quantity, "outcome", "seconds", "seconds_forecast")
+    cell = cell[[*columns, "seconds_samples", "implementation"]].sel(variant=ranked(cell))  # of dozens of variables
+    error, outcome, seconds, forecast = (cell[name].transpose("variant", "setting").values for name in columns)
+    price = np.where((error <= target) & (outcome == "ok") & np.isfinite(seconds), seconds, np.inf)
     samples = cell["seconds_samples"].transpose("variant", "setting", "batch").values
-    implementations = cell["implementation"].transpose("variant", ...).values.reshape(len(price), -1)[:, 0]
+    kinds = cell["implementation"].transpose("variant", ...).values.reshape(len(price), -1)[:, 0]
     places = [
         Place(float(price[row, k]), str(name), k, samples[row, k], float(forecast[row, k]))
         for row, (name, k) in enumerate(zip(cell["variant"].values, map(int, price.argmin(axis=1)), strict=True))
-        if np.isfinite(price[row, k]) and implementation in (None, str(implementations[row]))
+        if np.isfinite(price[row, k]) and implementation in (None, str(kinds[row]))
     ]
     return sorted(places, key=lambda place: place[:2])
 
 
-def margin(cell: xr.Dataset) -> float:
-    """The ratio of two times of one scene and horizon from which on it is more than noise.
+class Near(NamedTuple):
+    """How many of the nearest tops each variant served, at one target of a quantity over one horizon."""
 
-    Nine of ten times lie closer to what the other times of their variant foretell than some distance; both times of a
-    ratio may be off by it. On a quiet machine it is 0.02 to 0.12. With seven busy processes on two cores it is 0.1 to
-    1.4, and there a fixed margin of 1.1 called 2 of 7 winners that did not win again.
+    served: dict[str, int]  # by variant; the most first, then the cheapest in the median
+    tops: int
+    quantity: str
+    target: float
+    nutations: float
+
+    def words(self, row: str) -> str:
+        """What the nearest tops say of a variant."""
+        return (
+            f"{row} was the cheapest or within {WITHIN:g} times the cheapest on {self.served[row]} of the {self.tops} "
+            f"nearest random tops ({self.quantity} {self.target:.0e} over {self.nutations:g} nutations)."
+        )
+
+
+def regime(scene: Scene) -> np.ndarray:
+    """Four dimensionless numbers of a scene: cos(theta) at both turning points, asinh of both scaled momenta."""
+    top, start = scene.top, scene.start
+    low, high = sorted(top.turning_cosines(start))
+    unit = math.sqrt(top.I1 * max(abs(top.mgl), TINY))
+    momenta = top.momenta(start)
+    numbers = [low, high, math.asinh(momenta.p_psi / unit), math.asinh(momenta.p_phi / unit)]
+    return np.array(numbers if top.mgl >= 0.0 else [-high, -low, -numbers[2], numbers[3]])
+
+
+def distances(regimes: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """Distances of regimes (n, 4) from one, (n,)."""
+    images = numbers * np.array([[1.0, 1.0, 1.0, 1.0], [1.0, 1.0, -1.0, -1.0]])
+    each = np.sqrt(((regimes[:, np.newaxis] - images) ** 2).sum(axis=2))
+    return np.asarray(each.min(axis=1))
+
+
+def nearest(file: Path, scene: Scene, quantity: str, accuracy: float, horizon: float) -> Near | None:
+    """The variants that served the tops nearest to a scene; None where the study is not stored or has no answer.
+
+    The target and the horizon of the study are those nearest to `accuracy` and to `horizon` in logarithms. Raises
+    SymtopError for a file that is damaged or of an older version.
     """
-    miss = np.abs(cell["seconds"].values / cell["seconds_forecast"].values - 1.0)
-    miss = miss[np.isfinite(miss)]
-    return max(MARGIN, 1.0 + 2.0 * float(np.quantile(miss, 0.9))) if miss.size else MARGIN
-
-
-def lead(first: Place, second: Place, least: float = MARGIN) -> Lead:
-    """By how much the first place is ahead of the second, and whether that is sure.
-
-    It is not if a ratio is less than `least` or there are fewer than `LEAST_ROUNDS` common rounds, but for two that are
-    `FAR` apart in every sample.
-    """
-    both = np.flatnonzero(np.isfinite(first.samples) & np.isfinite(second.samples))[-MOST_ROUNDS:]
-    ratio = second.cost / first.cost
-    slow, fast = (place.samples[np.isfinite(place.samples)] for place in (second, first))
-    if fast.size >= LEAST_ROUNDS and slow.size > 1 and slow.min() >= max(FAR, least) * fast.max():
-        return Lead(ratio, True)
-    if both.size < LEAST_ROUNDS:
-        return Lead(ratio, False)
-    slowest = max(first.cost, first.forecast) if first.doubtful else first.cost
-    soonest = min(second.cost, second.forecast) if second.doubtful else second.cost
-    halves = [second.samples[half].min() / first.samples[half].min() for half in (both[::2], both[1::2])]
-    steady = all(met_again(place.samples) for place in (first, second))
-    return Lead(ratio, bool(steady and min(*halves, soonest / slowest) >= least))
-
-
-def win(cell: xr.Dataset, target: float, implementation: str = "compiled") -> Win | None:
-    """The fastest compiled (or plain Python) variant at a target, or None if none met it."""
-    places = cheapest(cell, target, implementation=implementation)
-    if not places:
+    quantity = SHOWN_AS.get(quantity, quantity)
+    if not file.is_file():
         return None
-    best, *others = places
-    least = margin(cell)
-    leads = [(other, lead(best, other, least)) for other in others]
-    level = tuple(other.integrator for other, ahead in leads if not ahead.sure)
-    behind, ratio = next(((other, ahead.ratio) for other, ahead in leads if ahead.sure), (None, np.nan))
-    return Win(best, level, behind, ratio)
+    remedy = "run symtop study population --fresh"
+    try:
+        data = netcdf.read_any(file)  # whole: a tree that is read lazily and closed has ended a process in HDF5
+        tree = data if isinstance(data, xr.DataTree) else xr.DataTree(data)
+        return _counted(tree, regime(scene), quantity, accuracy, horizon / scene.nutation_period)
+    except KeyError as error:
+        raise SymtopError(f"{file} is of an older version, without {error}; {remedy}") from error
+    except (OSError, ValueError, RuntimeError) as error:
+        raise SymtopError(f"{file} cannot be read ({error}); {remedy}") from error
 
 
-@of_one_dataset
-def winners(data: xr.Dataset) -> dict[tuple[str, int, float], Win | None]:
-    """The compiled winners in axis error of every scene, horizon (by index) and target that is asked there."""
-    data = data[["axis", *NEEDS]]
-    return {
-        (str(scene), far, target): win(data.sel(scene=scene).isel(horizon=far), target)
-        for scene in data["scene"].values
-        for far in range(data.sizes["horizon"])
-        for target in targets(data.sel(scene=scene))
-    }
-
-
-def relative_costs(data: xr.Dataset, among: list[str]) -> xr.DataArray:
-    """Seconds of every ranked variant's cheapest run to each target, over the least that any variant of `among` needs.
-
-    Dimensions target, variant, problem; a problem is a scene with a horizon. Infinite where a variant does not meet the
-    target, or none of `among` does; NaN where the target is not asked.
-    """
-    names, data = ranked(data), data[["axis", *NEEDS]]
-    problems = [data.sel(scene=scene).isel(horizon=far)
-                for scene in data["scene"].values for far in range(data.sizes["horizon"])]  # fmt: skip
-    table = np.full((len(TARGETS), len(names), len(problems)), np.inf)
-    for k, cell in enumerate(problems):
-        asked = targets(cell)
-        for number, target in enumerate(TARGETS):
-            if target not in asked:
-                table[number, :, k] = np.nan
-                continue
-            for place in cheapest(cell, target):
-                table[number, names.index(place.integrator), k] = place.cost
-    costs = xr.DataArray(table, {"target": list(TARGETS), "variant": names}, ("target", "variant", "problem"))
-    best = costs.sel(variant=among).min("variant")
-    return (costs / best.where(np.isfinite(best))).fillna(np.inf).where(costs.notnull())
-
-
-def leaders(ratios: xr.DataArray, count: int) -> list[str]:
-    """The variants that meet the targets on the most problems, and of these first those that come closest to the best.
-
-    How close a variant comes is the mean of 1/ratio over problems and targets.
-    """
-    met = np.isfinite(ratios.transpose("variant", ...).values).reshape(ratios.sizes["variant"], -1).sum(axis=1)
-    merit = (1.0 / ratios).mean(("target", "problem")).values
-    order = np.lexsort((-merit, -met))
-    return [str(ratios["variant"].values[k]) for k in order[:count] if met[k] > 0]
+def _counted(data: xr.DataTree, numbers: np.ndarray, quantity: str, accuracy: float, nutations: float) -> Near | None:
+    groups = {name: data[name].to_dataset() for name in ("short", "long") if name in data}
+    if not groups:
+        raise KeyError("short")
+    spans = {name: float(np.nanmax(group["nutations"].values)) for name, group in groups.items()}
+    nutations = nutations if math.isfinite(nutations) else 1e-3
+    span = min(spans, key=lambda name: abs(math.log(spans[name] / max(nutations, 1e-3))))
+    group = groups[span].isel(scene=0)
+    if quantity not in group["quantity"]:
+        return None
+    target = min(group["target"].values.tolist(), key=lambda value: abs(math.log(value / accuracy)))
+    price = data["prices"].to_dataset()["alone"].min("scene").sel(variant=group["variant"].values)
+    cost = group["cost"].sel(quantity=quantity, target=target).transpose("variant", "member").values
+    cost *= price.values[:, np.newaxis]
+    rows = ~np.isnan(cost).all(axis=1)
+    regimes = data["tops"].to_dataset()["regime"].transpose(..., "member", "number").values
+    far = distances(regimes.reshape(-1, 4)[: cost.shape[1]], numbers)
+    far[np.isnan(cost).all(axis=0) | ~np.isfinite(far)] = np.inf  # nothing was asked of them
+    chosen = np.argsort(far, kind="stable")[: min(NEAREST, int(np.isfinite(far).sum()))]
+    if not chosen.size:
+        return None
+    cost = np.where(np.isnan(cost), np.inf, cost)[np.ix_(rows, chosen)]
+    best = cost.min(axis=0)
+    served = ((cost <= WITHIN * best) & np.isfinite(cost)).sum(axis=1)
+    slow = np.median(np.where(np.isfinite(best), cost, np.inf) / np.where(np.isfinite(best), best, 1.0), axis=1)
+    names = group["variant"].values[rows]
+    order = np.lexsort((slow, -served))
+    counts = {str(names[row]): int(served[row]) for row in order}
+    return Near(counts, int(chosen.size), quantity, float(target), spans[span])

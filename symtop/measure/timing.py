@@ -8,27 +8,24 @@ time, and the ratio of two of them is less noisy than the ratio of two minima.
 """
 
 import math
+import os
 import random
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from concurrent.futures import Future
+from typing import Any, NamedTuple
 
 from symtop.methods.framework.plan import Run
-from symtop.methods.framework.registry import Integrator
+from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.exact import closed_form
-from symtop.model.scenes import Scene
+from symtop.model.scenes import Scene, scene
 from symtop.run.simulation import make_plan
 
 BATCH = 0.02  # seconds
 CLEAR = 1e-3  # seconds: a trial that long shows how many calls make a batch
 STRIDE = 16  # the calls of a trial grow at most so much
 NOISY = 0.25  # relative spread beyond which a timing is not called reliable
-AGAIN = 0.1  # a smallest sample that no other comes so close to may be an accident
-MISSED = 0.25  # relative miss of a forecast beyond which a time is taken again
 
 
 class Timing(NamedTuple):
@@ -51,12 +48,6 @@ class Timing(NamedTuple):
     def reliable(self) -> bool:
         """Is the spread small enough for a verdict?"""
         return self.spread < NOISY
-
-
-def met_again(samples: ArrayLike) -> bool:
-    """Does another sample come to within `AGAIN` of the smallest? NaN is no sample."""
-    least = np.sort(np.asarray(samples, dtype=float), axis=None)[:2]  # NaN comes last
-    return bool(least.size == 2 and least[1] <= (1.0 + AGAIN) * least[0])
 
 
 def _batch(function: Callable[[], object], calls: int) -> float:
@@ -115,29 +106,6 @@ def timings(
     return [Timing(tuple(taken), first) for taken, first in zip(samples, firsts, strict=True)]
 
 
-def forecasts(seconds: ArrayLike, evaluations: ArrayLike, steps: ArrayLike, *, fixed_step: bool) -> NDArray[np.float64]:
-    """The time of each run of a method as its other runs foretell it: (n,), NaN with fewer than two others.
-
-    A run costs a call, its force evaluations and its steps, and, of an adaptive method, as much for every evaluation in
-    proportion to the evaluations of a step: a Taylor derivative is the dearer the higher it is. The costs are those of
-    the least relative squares over the other runs. Nothing is shown that comes from here: a time that misses its
-    forecast is taken again. On a quiet machine 1 in 90 misses it by a quarter, and half by 1 %.
-    """
-    times, work, count = (np.asarray(values, dtype=float) for values in (seconds, evaluations, steps))
-    costs = [work, np.ones_like(work), count]
-    columns = np.stack(costs if fixed_step else [*costs, work**2 / np.maximum(count, 1.0)], axis=1)
-    expected = np.full(times.size, np.nan)
-    for k in range(times.size):
-        others = np.arange(times.size) != k
-        size = min(columns.shape[1], int(others.sum()) - 1)
-        if size > 0:
-            relative = columns[others, :size] / times[others, None]
-            unit = np.linalg.norm(relative, axis=0)
-            cost, *_ = np.linalg.lstsq(relative / unit, np.ones(len(relative)), rcond=1e-6)
-            expected[k] = columns[k, :size] @ (cost / unit)
-    return expected
-
-
 def bare_run(
     scene: Scene, method: Integrator, chart: str, setting: float, horizon: float, samples: int = 2
 ) -> Callable[[], Run]:
@@ -145,3 +113,41 @@ def bare_run(
     plan, _ = make_plan(scene, method, **method.setting(setting).kwargs(), horizon=horizon, samples=samples)
     solve = method.solvers[chart]
     return lambda: solve(scene.top, scene.start, plan)
+
+
+SPAN = 0.03  # seconds of a worker in one turn
+TURNS = 7
+TRIES = 20  # to have all workers at once, the first time when they have to start
+DISTURBED = 1.05  # times as long as alone: beyond it timed cases run one after another
+
+
+def timed_turn() -> tuple[int, float, float, float]:
+    """Process, begin, end and mean seconds of short runs of a compiled method for `SPAN` seconds."""
+    run = bare_run(scene("spheroid"), integrator("strang"), "axis", 1e-3, 4.0)
+    run()  # its kernel may have to be compiled
+    begin, count = time.monotonic(), 0  # of the clock that all processes share
+    while (end := time.monotonic()) < begin + SPAN:
+        run()
+        count += 1
+    return os.getpid(), begin, end, (end - begin) / count
+
+
+def slowdown(submit: Callable[..., "Future[Any]"], size: int) -> float:
+    """How many times longer a run takes while `size` workers run; infinite if they never did at once.
+
+    Workers time the same run, one of them alone and all at once, in turns. Beside others it takes as long as alone
+    where cores share nothing that a run needs, and up to twice as long where two of them are threads of one core.
+    """
+
+    def at_once() -> list[tuple[int, float, float, float]]:
+        return [future.result() for future in [submit(timed_turn) for _ in range(size)]]
+
+    for _ in range(TRIES):
+        if len({process for process, *_ in at_once()}) == size:
+            break
+    ratios = []
+    for _ in range(TURNS):
+        alone, together = submit(timed_turn).result(), at_once()
+        if min(end for _, _, end, _ in together) - max(begin for _, begin, _, _ in together) > 0.5 * SPAN:
+            ratios.append(max(seconds for *_, seconds in together) / alone[-1])
+    return statistics.median(ratios) if ratios else math.inf

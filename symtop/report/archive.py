@@ -3,31 +3,42 @@
     README.md                     what each file and variable is, its units, and how it was made
     results/*.nc, *.json          datasets and findings of the studies and of the comparisons beside them
     results/report.html, .md      the report, results/figures/ its figures
-    scenes/scenes.csv             tops and starts;  scenes/states.csv, .nc: their states to 30 digits (`scene_states`)
+    scenes/scenes.csv             tops and starts;  scenes/states.csv, .nc: their states to 30 digits
     citations.bib                 sources of the methods
     versions.txt, machine.txt     every installed package; processor, cores, memory, system
     SHA256SUMS                    of all others, as ``sha256sum -c`` reads them
 
 Equal files make an equal bundle, but for the machine and the packages: it holds no time of its making.
+
+The states are a test set for integrators of other people: ten times a scene, from a tenth of its horizon to all of it,
+written with six digits. They are those of the closed form in 40 digits (`symtop.model.exact.digits`), from the top, the
+start and the times as doubles hold them, so that a program that reads the printed numbers as doubles has the same
+problem. The sign of a quaternion is continued from the start.
 """
 
+import csv
+import functools
 import hashlib
+import io
 import os
 import platform
 import tempfile
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import metadata, resources
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from symtop import __version__
 from symtop.core import netcdf
-from symtop.model.scenes import scenes
+from symtop.measure import columns
+from symtop.model.exact.digits import PreciseForm
+from symtop.model.scenes import Scene, scenes
 from symtop.report import page
 from symtop.report.tables import table
-from symtop.run.reference import scene_states
 
 NAME = f"symtop-{__version__}-data"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every file in the bundle: zip has none before
@@ -59,9 +70,15 @@ def bundle(results: Path, target: Path | None = None) -> Path:
     """
     page.write(results)
     files = {f"results/{path.relative_to(results).as_posix()}": path.read_bytes() for path in _stored(results)}
-    files |= _test_set()
+    with tempfile.TemporaryDirectory() as folder:
+        written = netcdf.write(states(list(scenes().values())), Path(folder) / "states.nc")
+        files["scenes/states.nc"] = written.read_bytes()
+    files["scenes/states.csv"] = states_csv(list(scenes().values())).encode()
+    files["scenes/scenes.csv"] = scenes_csv(list(scenes().values())).encode()
     files["citations.bib"] = resources.files("symtop.methods").joinpath("citations.bib").read_bytes()
-    files["versions.txt"] = _packages().encode()
+    packages = {(str(one.metadata["Name"]), one.version) for one in metadata.distributions()}
+    versions = (f"{name}=={version}\n" for name, version in sorted(packages, key=lambda pair: pair[0].lower()))
+    files["versions.txt"] = "".join(versions).encode()  # as pip writes them
     files["machine.txt"] = _machine().encode()
     files["README.md"] = readme(results, files).encode()
     sums = "".join(f"{hashlib.sha256(content).hexdigest()}  {name}\n" for name, content in sorted(files.items()))
@@ -82,26 +99,15 @@ def _stored(results: Path) -> list[Path]:
     return sorted([*files, *shown])
 
 
-def _test_set() -> dict[str, bytes]:
-    chosen = list(scenes().values())
-    with tempfile.TemporaryDirectory() as folder:
-        binary = netcdf.write(scene_states.states(chosen), Path(folder) / "states.nc").read_bytes()
-    return {
-        "scenes/states.nc": binary,
-        "scenes/states.csv": scene_states.states_csv(chosen).encode(),
-        "scenes/scenes.csv": scene_states.scenes_csv(chosen).encode(),
-    }
-
-
 def readme(results: Path, files: Mapping[str, bytes]) -> str:
     """What is in the bundle, in Markdown: how it was made, its files, and every variable of every dataset."""
     words = INTRODUCTION.format(
-        version=__version__, revision=netcdf.provenance()["symtop_revision"], times=scene_states.TIMES,
-        digits=scene_states.DIGITS, working=scene_states.WORKING,
+        version=__version__, revision=netcdf.provenance()["symtop_revision"], times=TIMES,
+        digits=DIGITS, working=WORKING,
     )  # fmt: skip
     listed = table(["file", "bytes"], [[name, f"{len(content):,}"] for name, content in sorted(files.items())])
     described = [_described(f"results/{path.name}", netcdf.read_any(path)) for path in sorted(results.glob("*.nc"))]
-    described.append(_described("scenes/states.nc", scene_states.states(list(scenes().values()))))
+    described.append(_described("scenes/states.nc", states(list(scenes().values()))))
     return "\n\n".join([f"# {NAME}", words.strip(), "## Files", listed, "## Datasets", *described]) + "\n"
 
 
@@ -121,12 +127,6 @@ def _described(name: str, data: xr.Dataset | xr.DataTree) -> str:
     return "\n\n".join(filter(None, parts))
 
 
-def _packages() -> str:
-    """Every package of this Python with its version, as pip writes them."""
-    named = {(str(one.metadata["Name"]), one.version) for one in metadata.distributions()}
-    return "".join(f"{name}=={version}\n" for name, version in sorted(named, key=lambda pair: pair[0].lower()))
-
-
 def _machine() -> str:
     """The machine that makes the bundle, a fact a line."""
     facts = {key: value for key, value in netcdf.provenance().items() if key != "dependencies"}
@@ -134,3 +134,98 @@ def _machine() -> str:
     if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
         facts["memory"] = f"{os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') / 2**30:.1f} GiB"
     return "".join(f"{key}: {value}\n" for key, value in facts.items())
+
+
+DIGITS, WORKING = 30, 40  # printed, and computed
+TIMES = 10  # a scene
+ANGLES = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
+COLUMNS = (*ANGLES, "axis_x", "axis_y", "axis_z", "quaternion_w", "quaternion_x", "quaternion_y", "quaternion_z")
+TITLE = f"States of the scenes at {TIMES} times, from the closed form in {WORKING} digits"
+
+
+def times_of(scene: Scene, count: int = TIMES) -> list[float]:
+    """The times of a scene in the test set, in its units."""
+    return [float(f"{scene.horizon * k / count:.6g}") for k in range(1, count + 1)]
+
+
+def precise(scene: Scene, times: Sequence[float]) -> list[list[Any]]:
+    """The columns of `COLUMNS` at each time, as `mpmath.mpf` of 40 digits."""
+    return _precise(scene, tuple(times))
+
+
+@functools.lru_cache(maxsize=256)  # 0.2 s a scene, and a bundle asks three times
+def _precise(scene: Scene, times: tuple[float, ...]) -> list[list[Any]]:
+    form = PreciseForm(scene.top, scene.start, WORKING)
+    return [[*form(time), *form.axis(time), *form.quaternion(time)] for time in times]
+
+
+def printed(number: Any) -> str:
+    """A number with `DIGITS` significant digits."""
+    from mpmath import nstr
+
+    return str(nstr(number, DIGITS, min_fixed=0, max_fixed=0, strip_zeros=False))
+
+
+def states_csv(chosen: Iterable[Scene]) -> str:
+    """The states as CSV: scene, time, and `COLUMNS` with 30 digits each."""
+    lines = [
+        [scene.name, repr(time), *map(printed, state)]
+        for scene in chosen
+        for time, state in zip(times_of(scene), precise(scene, times_of(scene)), strict=True)
+    ]
+    return _csv([["scene", "time", *COLUMNS], *lines])
+
+
+def scenes_csv(chosen: Iterable[Scene]) -> str:
+    """Tops and starts as CSV, every number with the 17 digits that name its double; angles in radians."""
+    header = ["scene", "I1", "I3", "mgl", *ANGLES, "horizon", "nutation_period", "units", "purpose"]
+    lines = [
+        [scene.name, *map(repr, _problem(scene)), repr(scene.horizon), repr(scene.nutation_period),
+         scene.units or "any consistent", scene.purpose]
+        for scene in chosen
+    ]  # fmt: skip
+    return _csv([header, *lines])
+
+
+def states(chosen: Sequence[Scene]) -> xr.Dataset:
+    """The states as pairs of doubles: dimensions scene, sample, component and part.
+
+    A value is ``NAME + NAME_lo``, which is good to 31 digits; I1, I3, mgl and the start ``NAME_0`` depend on scene.
+    """
+    values = np.empty((len(chosen), TIMES, len(COLUMNS)))
+    low = np.empty_like(values)
+    for place, scene in enumerate(chosen):
+        for sample, state in enumerate(precise(scene, times_of(scene))):
+            values[place, sample] = [float(number) for number in state]
+            low[place, sample] = [float(number - float(number)) for number in state]
+    both = ("scene", "sample")
+    variables: dict[str, Any] = {"time": (both, [times_of(scene) for scene in chosen])}
+    for ending, numbers in (("", values), ("_lo", low)):
+        variables |= {f"{name}{ending}": (both, numbers[..., k]) for k, name in enumerate(ANGLES)}
+        variables[f"axis{ending}"] = ((*both, "component"), numbers[..., 6:9])
+        variables[f"quaternion{ending}"] = ((*both, "part"), numbers[..., 9:])
+    problem = np.array([_problem(scene) for scene in chosen])
+    variables |= {name: ("scene", problem[:, k]) for k, name in enumerate(("I1", "I3", "mgl"))}
+    variables |= {f"{name}_0": ("scene", problem[:, 3 + k]) for k, name in enumerate(ANGLES)}
+    coordinates = {
+        "scene": [scene.name for scene in chosen],
+        "component": ["x", "y", "z"],
+        "part": ["w", "x", "y", "z"],
+    }
+    data = netcdf.describe(columns.described(xr.Dataset(variables, coordinates)), TITLE)
+    for name in (*ANGLES, "axis", "quaternion"):
+        data[f"{name}_lo"].attrs.update(long_name=f"what {name} lacks, to be added", units=data[name].attrs["units"])
+    for name in ANGLES:
+        data[f"{name}_0"].attrs.update(long_name=f"{name} at the start", units=data[name].attrs["units"])
+    return data
+
+
+def _problem(scene: Scene) -> list[float]:
+    top, start = scene.top, scene.start
+    return [top.I1, top.I3, top.mgl, *(getattr(start, name) for name in ANGLES)]
+
+
+def _csv(rows: Iterable[Sequence[str]]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()

@@ -17,9 +17,7 @@ import numpy as np
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home
-from symtop.judging.findings import Finding, claim_name
-from symtop.judging.judge_step import StepLedger
-from symtop.judging.text_report import description
+from symtop.judging.findings import Finding, StepLedger, claim_name, description
 from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels
 
 LEAST = 1e-17  # what is smaller is drawn here
@@ -36,7 +34,7 @@ def figures(ledger: StepLedger) -> tuple[Any, Any]:
     return first, second
 
 
-def _drawn(figure: Any) -> str:
+def _as_svg(figure: Any) -> str:
     """A figure as SVG, from its opening tag on."""
     drawn = io.StringIO()
     figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
@@ -57,7 +55,8 @@ def _order(axis: Any, ledger: StepLedger) -> None:
     axis.plot(steps[valid & fitted], errors[valid & fitted], "o", color=BLUE, label="in the fit")
     axis.set(xscale="log", yscale="log")
     claimed = finding.declared.isdigit()
-    order = int(finding.declared) if claimed else _integer(finding.value)
+    slope = float(finding.declared) if claimed else finding.value
+    order = round(slope) if 0.5 < slope < 99.0 else None
     if order is not None:
         used = np.flatnonzero(valid & fitted) if (valid & fitted).any() else np.flatnonzero(valid)
         first, last = used[np.argmin(steps[used])], used[np.argmax(steps[used])]
@@ -65,10 +64,6 @@ def _order(axis: Any, ledger: StepLedger) -> None:
         label = f"h^{order}{', as claimed' if claimed else ''}"
         axis.plot(ends, errors[first] * (ends / ends[0]) ** order, color=GREY, lw=0.9, ls=(0, (5, 3)), label=label)
     axis.legend(frameon=False)
-
-
-def _integer(slope: float) -> int | None:
-    return round(slope) if 0.5 < slope < 99.0 else None
 
 
 def _energy(axis: Any, ledger: StepLedger) -> None:
@@ -111,7 +106,7 @@ def card(ledger: StepLedger, path: str | Path) -> Path:
         scene=ledger.scene,
         described=description(ledger.findings),
         badge=badge(ledger),
-        drawings=[_drawn(figure) for figure in figures(ledger)],
+        drawings=[_as_svg(figure) for figure in figures(ledger)],
         rows=[_row(one) for one in ledger.findings if one.declared or one.verdict != "inapplicable"],
     )
     return _written(text, path)

@@ -9,22 +9,20 @@ from symtop.report.tables import table
 FEW = 14  # rows of a table that is shown at once; longer ones are folded
 
 
-def _folded(title: str, body: str, count: int) -> str:
-    if count <= FEW:
-        return f"**{title}**\n\n{body}"
-    return f"<details><summary>{title} ({count} rows)</summary>\n\n{body}\n\n</details>"
-
-
 def section(study: Mapping[str, Any]) -> str:
     """One study: question, verdict, figures, how to read them, tables."""
-    tables = ((item["title"], table(item["header"], item["rows"]), len(item["rows"])) for item in study["tables"])
+    tables = []
+    for item in study["tables"]:
+        title, body, count = item["title"], table(item["header"], item["rows"]), len(item["rows"])
+        folded = f"<details><summary>{title} ({count} rows)</summary>\n\n{body}\n\n</details>"
+        tables.append(f"**{title}**\n\n{body}" if count <= FEW else folded)
     parts = [
         f"## {study['title']}",
         f"*{study['question']}*",
         "\n".join(f"- {sentence}" for sentence in study["verdict"]),
         *(f"![{item['alt']}](figures/{item['file']})\n\n{item['caption']}" for item in study["pictures"]),
         f"**How to read it.** {study['how_to_read']}",
-        *(_folded(*item) for item in tables),
+        *tables,
         *study["failures"],
         study["measured"],
     ]
@@ -40,13 +38,13 @@ def opening(study: Mapping[str, Any], titles: Mapping[str, str]) -> str:
     if not first:
         return ""
     answer = "\n".join(f"- {sentence}" for sentence in first["sentences"])
-    words = "\n".join(f"- {name}: {meaning}" for name, meaning in glossary(spoken(study)))
+    words = "\n".join(f"- {name}: {meaning}" for name, meaning in glossary(sentences(study)))
     parts = [f"## {first['question']}", answer, table(first["table"]["header"], first["table"]["rows"]), words]
-    links = [f"[{words}](#{_anchor(titles[name])})" for name, words in explanations(study, titles)]
+    links = [f"[{words}](#{titles[name].lower().replace(' ', '-')})" for name, words in explanations(study, titles)]
     return "\n\n".join(filter(None, [*parts, f"More: {'; '.join(links)}."] if links else parts))
 
 
-def spoken(study: Mapping[str, Any]) -> str:
+def sentences(study: Mapping[str, Any]) -> str:
     """All words of a study's answer, with those of its table."""
     first = study["opening"]
     cells = [*first["table"]["header"], *(cell for row in first["table"]["rows"] for cell in row)]
@@ -68,11 +66,6 @@ def _block(block: Block) -> str:
 def explanations(study: Mapping[str, Any], titles: Mapping[str, str]) -> list[tuple[str, str]]:
     """The studies on the page that explain a study's answer, and what the answer calls them."""
     return [(name, words) for name, words in study["opening"].get("explained", {}).items() if name in titles]
-
-
-def _anchor(title: str) -> str:
-    """What a heading is called in a link to it."""
-    return title.lower().replace(" ", "-")
 
 
 def page(studies: Sequence[Mapping[str, Any]], opening: Sequence[str], provenance: Mapping[str, str]) -> str:

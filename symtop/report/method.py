@@ -113,7 +113,10 @@ def glossary(text: str) -> list[tuple[str, str]]:
 def parts() -> list[Part]:
     """The section, part by part."""
     catalogue = list(scenes().values())
-    bounds = {scene.name: _bound(scene) for scene in catalogue}
+    bounds = {  # of the true axis at the end of each scene, in radians
+        scene.name: float(reference(scene, np.array([scene.horizon]))["axis_error_bound"].values[0])
+        for scene in catalogue
+    }
     return [
         Part("top", "The top and its equations", TOP),
         Part("scenes", "The scenes", _scenes(catalogue, bounds)),
@@ -165,8 +168,3 @@ def _truth(largest: float) -> list[Block]:
         r"\Omega^2 = \frac{mgl\,(u_3 - u_1)}{2 I_1}",
     ]
     return [Block(EXACT), Block(formulas=formulas), Block(words)]
-
-
-def _bound(scene: Scene) -> float:
-    """The bound of the true axis at the end of a scene, in radians."""
-    return float(reference(scene, np.array([scene.horizon]))["axis_error_bound"].values[0])

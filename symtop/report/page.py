@@ -16,11 +16,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from symtop.core import netcdf
 from symtop.core.errors import SymtopError
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.report import markdown, method, tables
+from symtop.report.sources import report_files, report_hash
 from symtop.report.style import look
-from symtop.runner import manifest, plugins, run as runner, store
+from symtop.run import plugins
+from symtop.runner import manifest, run as runner
 
 WORDS = "report.md"
 TITLE = "Integrators on the heavy symmetric top"
@@ -35,6 +38,7 @@ ROWS = (
 )
 KINDS = {".png": "image/png", ".gif": "image/gif"}
 LONGEST_ANCHOR = 60  # letters
+MATHML = "http://www.w3.org/1998/Math/MathML"
 
 
 def prepared(chart: Mapping[str, Any]) -> str:
@@ -54,13 +58,6 @@ def _series(name: str, points: Sequence[tuple[float | None, float | None, str]])
         "dashed": method is not None and method.implementation == "python",
         "points": [list(point) for point in points if all(x is not None and 0.0 < x < math.inf for x in point[:2])],
     }
-
-
-def _size(image: bytes) -> tuple[int, int]:
-    """Width and height of a PNG or a GIF in pixels, so that the page does not move while its figures load."""
-    if image.startswith(b"\x89PNG"):
-        return int.from_bytes(image[16:20]), int.from_bytes(image[20:24])
-    return int.from_bytes(image[6:8], "little"), int.from_bytes(image[8:10], "little")
 
 
 class Anchors:
@@ -89,7 +86,7 @@ def gather(results: Path, *, embed: bool = False) -> list[dict[str, Any]]:
     studies, gathered = list(runner.names()), []
     others = sorted({file.stem for file in results.glob("*.json")} - set(studies))
     for name in [*studies, *others]:
-        findings = store.read_json(results / f"{name}.json")
+        findings = netcdf.read_json(results / f"{name}.json")
         if findings is None or (name in others and not (isinstance(findings, dict) and "pictures" in findings)):
             continue
         try:
@@ -113,9 +110,12 @@ def gather(results: Path, *, embed: bool = False) -> list[dict[str, Any]]:
 
 
 def _shown(file: Path, *, embed: bool) -> dict[str, Any]:
-    """Address, width and height of a picture."""
+    """Address, width and height of a PNG or a GIF, so that the page does not move while its figures load."""
     image = file.read_bytes()
-    width, height = _size(image)
+    if image.startswith(b"\x89PNG"):
+        width, height = (int.from_bytes(image[at : at + 4]) for at in (16, 20))
+    else:
+        width, height = (int.from_bytes(image[at : at + 2], "little") for at in (6, 8))
     inside = f"data:{KINDS.get(file.suffix, 'image/png')};base64,{base64.b64encode(image).decode()}" if embed else ""
     return {"source": inside or f"figures/{file.name}", "width": width, "height": height}
 
@@ -141,7 +141,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
         loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    made_of, sources = manifest.report_hash(results, embed=embed), manifest.report_files(results)
+    made_of, sources = report_hash(results, embed=embed), report_files(results)
     studies = gather(results, embed=embed)
     _named(studies)
     titles = {study["study"]: study["title"] for study in studies}
@@ -159,10 +159,10 @@ def write(results: Path, *, embed: bool = False) -> Path:
         scripts=[(templates / name).read_text(encoding="utf-8") for name in ("page.js", "chart.js")],
         studies=studies,
         answer=first,
-        glossary=method.glossary(markdown.spoken(first)) if first else [],
+        glossary=method.glossary(markdown.sentences(first)) if first else [],
         leads=[(study, picture) for study in studies for picture in study["pictures"] if picture["lead"]],
         measured=measured,
-        mathml=lambda formula: convert(formula, display="block"),
+        mathml=lambda formula: convert(formula, display="block").replace(f' xmlns="{MATHML}"', ""),  # HTML needs none
         explanations=lambda study: markdown.explanations(study, titles),
         integrators=tables.columns([method.record() for method in integrators().values()]),
         provenance=facts,
@@ -170,9 +170,9 @@ def write(results: Path, *, embed: bool = False) -> Path:
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
     )
     target = results / manifest.PAGE
-    store.write_text(target, text)
+    netcdf.write_text(target, text)
     opening = ["# " + TITLE, INTRODUCTION, *(markdown.opening(study, titles) for study in studies), ROWS]
     opening.append(markdown.measured(measured))
-    store.write_text(results / WORDS, markdown.page(studies, opening, facts))
+    netcdf.write_text(results / WORDS, markdown.page(studies, opening, facts))
     manifest.note(results, manifest.PAGE, "" if plugins.loaded() else made_of, [target, results / WORDS, *sources])
     return target

@@ -13,10 +13,10 @@ import numpy as np
 import xarray as xr
 
 from symtop.core.errors import SymtopError, at_home, one_of
-from symtop.measure import spread
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES, errors
 from symtop.model.scenes import Scene
+from symtop.report import spread
 from symtop.report.style import (
     BLACK,
     BLUE,
@@ -65,12 +65,11 @@ def plot(
         raise SymtopError(f"data must be a dataset of simulate, sweep or ensemble, not {type(data).__name__}")
     if not isinstance(quantity, str):
         raise SymtopError(f"quantity must be the name of one, not {type(quantity).__name__}")
-    drawn = _ensemble if "member" in data.dims else _sweep if "setting" in data.dims else _over_time
     if ax is None:
         ax = plt.subplots(figsize=(7.2, 4.4), layout="constrained")[1]
-    if drawn is _ensemble:
+    if "member" in data.dims:
         _ensemble(ax, data, quantity, members)
-    elif drawn is _sweep:
+    elif "setting" in data.dims:
         _sweep(ax, data, quantity, x)
     else:
         _over_time(ax, data, quantity)
@@ -100,12 +99,8 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         ax.plot(times, values.values, color=color, lw=1.2)
         ax.set_ylabel(f"{quantity} ({unit})" if unit else quantity)
     title, ended = (data.attrs.get(word, "") for word in ("title", "outcome_message"))
-    ax.set(xlabel=f"time{_unit(data)}", title=f"{title}: {ended}" if ended else title)
-
-
-def _unit(data: xr.Dataset) -> str:
     unit = data["time"].attrs.get("units", "")
-    return f" ({unit})" if unit else ""
+    ax.set(xlabel=f"time ({unit})" if unit else "time", title=f"{title}: {ended}" if ended else title)
 
 
 def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
@@ -119,7 +114,9 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
             data = data.expand_dims(dim)
     controls = [name for name in ("step_size", "tolerance") if name in data and data[name].notnull().any()]
     x = x or (controls[0] if len(controls) == 1 else "force_evaluations")
-    x = one_of("x", x, [str(name) for name, values in data.data_vars.items() if _can_be_x(values)])
+    numbers = {name: values for name, values in data.data_vars.items() if values.dtype.kind in "iuf"}
+    of_runs = [str(name) for name, values in numbers.items() if {*values.dims} == {"scene", "variant", "setting"}]
+    x = one_of("x", x, of_runs)
     for number, scene in enumerate(data["scene"].values):
         for name in data["variant"].values:
             cell = data.sel(scene=scene, variant=name)
@@ -136,11 +133,6 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
             )  # fmt: skip
     ax.set(xscale="log", yscale="log", ylabel=f"largest {QUANTITIES[quantity]}", xlabel=x.replace("_", " "))
     ax.legend(fontsize=8, frameon=False)
-
-
-def _can_be_x(values: xr.DataArray) -> bool:
-    """Has it a number for each run of a sweep?"""
-    return values.dtype.kind in "iuf" and {*values.dims} == {"scene", "variant", "setting"}
 
 
 def _ensemble(ax: "Axes", data: xr.Dataset, quantity: str, members: Any) -> None:
@@ -196,7 +188,7 @@ def draw_ensemble(members: xr.Dataset, data: xr.Dataset, path: str | Path) -> No
 
 
 def _bands(axis: Any, members: xr.Dataset, data: xr.Dataset, quantity: str) -> None:
-    """Quantiles over members of an error against time, on one Axes, at places of `symtop.measure.spread.at_places`.
+    """Quantiles over members of an error against time, on one Axes, at places of `symtop.report.spread.at_places`.
 
     Errors beyond `MOST` are drawn there: angles do not exceed pi, and a quantile of runs that failed is named so. Where
     all members have as many steps a nutation, a sample at a whole nutation is one for all of them, and energy errors

@@ -156,36 +156,21 @@ def ink(color: str) -> tuple[float, ...]:
     return tuple(map(float, shown))
 
 
+PAPER: dict[Any, Any] = {
+    "figure.dpi": 100, "savefig.dpi": DPI, "figure.constrained_layout.use": True, "font.size": 8.0,
+    "figure.titlesize": 9.5, "axes.titlesize": 8.0, "axes.labelsize": 8.0, "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5, "legend.fontsize": 7.5, "legend.title_fontsize": 7.5, "axes.grid": True,
+    "grid.color": "#DDDDDD", "grid.linewidth": 0.5, "axes.axisbelow": True, "axes.linewidth": 0.6,
+    "axes.spines.top": False, "axes.spines.right": False, "lines.linewidth": 1.1, "lines.markersize": 4.0,
+    "hatch.linewidth": 0.5, "svg.hashsalt": "symtop",
+    "pdf.fonttype": 42,  # letters that can be searched and edited
+}  # fmt: skip
+
+
 def use() -> None:
     """Set matplotlib up for the report: no display, legible in print, reproducible bytes."""
     mpl.use("Agg")
-    plt.rcParams.update(
-        {
-            "figure.dpi": 100,
-            "savefig.dpi": DPI,
-            "figure.constrained_layout.use": True,
-            "font.size": 8.0,
-            "figure.titlesize": 9.5,
-            "axes.titlesize": 8.0,
-            "axes.labelsize": 8.0,
-            "xtick.labelsize": 7.5,
-            "ytick.labelsize": 7.5,
-            "legend.fontsize": 7.5,
-            "legend.title_fontsize": 7.5,
-            "axes.grid": True,
-            "grid.color": "#DDDDDD",
-            "grid.linewidth": 0.5,
-            "axes.axisbelow": True,
-            "axes.linewidth": 0.6,
-            "axes.spines.top": False,
-            "axes.spines.right": False,
-            "lines.linewidth": 1.1,
-            "lines.markersize": 4.0,
-            "hatch.linewidth": 0.5,
-            "svg.hashsalt": "symtop",
-            "pdf.fonttype": 42,  # letters that can be searched and edited
-        }
-    )
+    plt.rcParams.update(PAPER)
 
 
 def compact(picture: "Image.Image") -> "Image.Image":
@@ -204,19 +189,17 @@ def compact(picture: "Image.Image") -> "Image.Image":
     palette = Image.new("P", (1, 1))
     palette.putpalette([*fixed.ravel().tolist(), *free][:768])
     drawn = picture.quantize(palette=palette, dither=Image.Dither.NONE)
-    colors, known = _as_numbers(picture), _as_numbers(Image.fromarray(fixed[np.newaxis])).ravel()
+    colors, known = (  # every colour as one number
+        np.asarray(image.convert("RGBA")).view(np.uint32)[..., 0]
+        for image in (picture, Image.fromarray(fixed[np.newaxis]))
+    )
+    known = known.ravel()
     order = np.argsort(known)
     nearest = order[np.minimum(np.searchsorted(known, colors, sorter=order), len(known) - 1)]
-    places = np.where(
-        known[nearest] == colors, nearest, np.asarray(drawn)
-    )  # the library's search for the nearest is a little coarse
+    # The library's search for the nearest is a little coarse.
+    places = np.where(known[nearest] == colors, nearest, np.asarray(drawn))
     drawn.frombytes(places.astype(np.uint8).tobytes())
     return drawn
-
-
-def _as_numbers(picture: "Image.Image") -> Any:
-    """Every colour of a picture as one number."""
-    return np.asarray(picture.convert("RGBA")).view(np.uint32)[..., 0]
 
 
 def save(figure: Any, target: Path) -> None:
@@ -241,30 +224,26 @@ def publish(figure: Any, target: Path) -> None:
 
 
 def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
-    netcdf.sweep(target)
-    with netcdf.replacing(target, target.suffix) as partial:
-        _written(figure, partial, dpi)
-
-
-def _written(figure: Any, path: Path, dpi: float) -> None:
-    """A figure in a file of its kind; ``savefig`` draws a PNG or a PDF twice, once to lay it out."""
+    """A figure in a file of its kind; ``savefig`` would draw a PNG or a PDF twice, once to lay it out."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
     from PIL import Image
 
-    metadata = {UNDATED.get(path.suffix, "Software"): None}
-    if path.suffix not in {".png", ".pdf"}:
-        figure.savefig(path, metadata=metadata, dpi=dpi)
-        return
-    figure.set_dpi(dpi)
-    if path.suffix == ".pdf":
-        FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
-    elif dpi == DPI:
-        canvas = FigureCanvasAgg(figure)
-        canvas.draw()
-        compact(Image.fromarray(np.asarray(canvas.buffer_rgba()))).save(path, compress_level=LEVEL)
-    else:
-        FigureCanvasAgg(figure).print_png(path, metadata=metadata)
+    metadata = {UNDATED.get(target.suffix, "Software"): None}
+    netcdf.sweep(target)
+    with netcdf.replacing(target, target.suffix) as path:
+        if target.suffix not in {".png", ".pdf"}:
+            figure.savefig(path, metadata=metadata, dpi=dpi)
+            return
+        figure.set_dpi(dpi)
+        if target.suffix == ".pdf":
+            FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
+        elif dpi == DPI:
+            canvas = FigureCanvasAgg(figure)
+            canvas.draw()
+            compact(Image.fromarray(np.asarray(canvas.buffer_rgba()))).save(path, compress_level=LEVEL)
+        else:
+            FigureCanvasAgg(figure).print_png(path, metadata=metadata)
 
 
 def number(value: float, digits: int = 2) -> str:

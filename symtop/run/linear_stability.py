@@ -13,21 +13,16 @@ A method that keeps the energy and both momenta has |t| <= 2 at every step that 
 least at the steady precession, and small nutations stay on its level lines. Gauss methods are of this kind. As the
 precession becomes slow beside the nutation, their t tends to 2 Re R(i h omega), R the diagonal Pade approximant of exp.
 
-Near the upright (sleeping) top the axis z = e_x + i e_y obeys the same with c = 0 and complex t and d, |d| = 1, in
-charts without poles; in the angles chart the inclination does if p_phi = p_psi. The top sleeps while t^2/d lies in
-[0, 4]. With I1 = mgl = 1 and a = I3 w3 that ends for Strang's splitting where a tan(a h/4) = h, for Cayley's where
-a^2 = 4 + h^2; the motion itself sleeps for a >= 2. Source: Hairer, Lubich, Wanner, Geometric Numerical Integration,
+Source: Hairer, Lubich, Wanner, Geometric Numerical Integration,
 sections I.5 and X.4 (stability, resonance); Arnold, Mathematical Methods of Classical Mechanics, appendix 7.
 """
 
-import functools
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from symtop.core.numbers import EPSILON, TINY, sign_changes
+from symtop.core.numbers import EPSILON, TINY
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan, Run
 from symtop.methods.framework.registry import Integrator
@@ -36,15 +31,14 @@ from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
 
 NUDGE = 1e-6  # rad: nonlinear terms are 1e-12 of the linear ones, rounding 1e-10
-SINGLE_NUDGE = 1e-3  # rad, of a method in single precision: rounding is 1e-4
-BEGUN = 4  # strides before those that are compared: a multistep method has begun by then
+SINGLE_NUDGE, SINGLE_EPSILON = 1e-3, 2.0**-23  # rad, of a method in single precision; the spacing of its numbers at 1
+WARM_UP = 4  # strides before those that are compared: a multistep method has its start behind it by then
 ROUNDING = 32.0 * EPSILON  # of an inclination after some steps, rad
-LEFT, LEFT_OUT = 2e-3, 5e-4  # of the difference that the recurrence may leave; of a method that leaves out a term: less
+RESIDUAL, RESIDUAL_WITHOUT_ORDER = 2e-3, 5e-4  # of the recurrence, relative; less of a method that leaves out a term
 STRIDE = 0.5  # rad of nutation between two places of a recurrence of `nutation_growth`
 SLOWEST = 1e-6  # growth of a step below which rounding adds up for a million of them
 LONG = 120  # strides that a difference is followed which obeys no recurrence of two terms
 MOST_STRIDE = {"compiled": 50, "python": 5}  # steps
-TILT = 1e-5  # rad, of the sleeping top
 STEPS = 4
 ROUNDS = 6  # of the search for a fixed point
 
@@ -85,9 +79,6 @@ class Trace(NamedTuple):
 NO_TRACE = Trace(math.nan, math.nan, math.nan)
 
 
-_standing = functools.lru_cache(maxsize=256)(SymmetricTop.steady_theta)
-
-
 def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None) -> Trace:
     """The trace of the map of one step h at the method's fixed point next to the steady precession of these momenta.
 
@@ -95,7 +86,7 @@ def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None) 
     """
     top, momenta = scene.top, scene.top.momenta(scene.start)
     chart = chart or method.chart_for("axis")
-    theta, moved = _standing(top, momenta), math.inf
+    theta, moved = top.steady_theta(momenta), math.inf
     for _ in range(ROUNDS):
         if not 1e-3 < theta < math.pi - 1e-3:
             return NO_TRACE
@@ -137,44 +128,34 @@ class Growth(NamedTuple):
     size: float  # rad, of what the method adds to them: its own offset from the steady precession, and its rounding
 
 
-UNKNOWN = Growth(math.nan, 0.0)
-
-
 def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, frequency: float) -> Growth:
     """By what a method multiplies small nutations about the steady precession of these momenta in a step.
 
     It need not be symmetric. Two starts on both sides of the steady precession are stepped, and their difference obeys
-    delta_{k+1} = t delta_k - d delta_{k-1}: what both drift by in a step, `trace` takes for growth (0.6 % in a step of
-    1/17 nutation of `commutator-free-4`, which neither grows nor shrinks), and what is even in the distance cancels.
-    Beside a pole the difference is that of e_x + i e_y, and t and d are complex. Some steps of a fine h are one of the
-    recurrence, so that it turns by a good part of a radian; `frequency` is that of small nutations. Where the
-    difference does not obey it (a method with more roots than two, say), its size is followed for longer. Rounding
-    comes anew in every step and adds up, as a random walk, until what came first has grown by e.
+    delta_{k+1} = t delta_k - d delta_{k-1}: what both drift by in a step, which `trace` takes for growth, and what is
+    even in the distance cancels. Beside a pole the difference is that of e_x + i e_y, and t and d are complex. Some
+    steps of a fine h are one of the recurrence, so that it turns by a good part of a radian; `frequency` is that of
+    small nutations. Where the difference does not obey it (a method with more roots than two, say), its size is
+    followed for longer. Rounding of each step adds up, as a random walk, until that of the first has grown by e.
     """
-    stride = _stride(method, h, frequency)
+    stride = max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))  # steps
     runs, delta, off = _apart(method, scene, h, chart, NUDGE, stride)
+    nudge, rounding, places = NUDGE, EPSILON, runs[0].states[1:, :3]
     with np.errstate(over="ignore"):  # of a run that has blown up
-        single = chart != "angles" and bool(
-            (runs[0].states[:, :3].astype(np.float32) == runs[0].states[:, :3])[1:].all()
-        )
-    nudge, rounding = (SINGLE_NUDGE, float(np.finfo(np.float32).eps)) if single else (NUDGE, EPSILON)
+        single = chart != "angles" and bool((places.astype(np.float32) == places).all())
     if single:
+        nudge, rounding = SINGLE_NUDGE, SINGLE_EPSILON
         delta, off = _apart(method, scene, h, chart, nudge, stride)[1], 0.0
-    factor = _root(delta, LEFT if method.order else LEFT_OUT)
+    factor = _root(delta, RESIDUAL if method.order else RESIDUAL_WITHOUT_ORDER)
     if math.isnan(factor) and method.order:
         long = np.abs(_apart(method, scene, h, chart, nudge, stride, LONG)[1])
         third = long.size // 3
         with np.errstate(all="ignore"):
             factor = float(np.max(long[-third:]) / np.max(long[:third])) ** (1.0 / (2 * third))
     if not math.isfinite(factor):
-        return UNKNOWN
+        return Growth(math.nan, 0.0)
     factor **= 1.0 / stride
     return Growth(factor, off + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), SLOWEST)))
-
-
-def _stride(method: Integrator, h: float, frequency: float) -> int:
-    """Steps between two places of a recurrence."""
-    return max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))
 
 
 def _apart(
@@ -182,21 +163,21 @@ def _apart(
 ) -> tuple[list[Run], np.ndarray, float]:
     """Two runs at a distance of two nudges, half their difference every `stride` steps, how far off their middle is."""
     top, momenta = scene.top, scene.top.momenta(scene.start)
-    theta = _standing(top, momenta)
+    theta = top.steady_theta(momenta)
     beside = chart != "angles" and min(theta, math.pi - theta) < 10.0 * nudge
     if beside:
         tilt, spin = math.pi - nudge if theta > 1.0 else nudge, momenta.p_psi / top.I3
         pair = [Angles(tilt, phi, psi_dot=spin) for phi in (0.0, math.pi)]
     else:
         pair = [with_momenta(top, min(max(theta + side, nudge), math.pi - nudge), momenta) for side in (nudge, -nudge)]
-    runs = [few_steps(method, chart, top, at, h, (count + BEGUN) * stride) for at in pair]
+    runs = [few_steps(method, chart, top, at, h, (count + WARM_UP) * stride) for at in pair]
     with np.errstate(all="ignore"):
         if beside:
             one, other = (axis[:, 0] + 1j * axis[:, 1] for axis in (axis_of(chart, run.states) for run in runs))
         else:
             one, other = (np.asarray(View(chart, top, run.states).theta) for run in runs)
         off = 0.0 if beside else float(np.max(np.abs(0.5 * (one + other) - theta)))
-        return runs, 0.5 * (one - other)[BEGUN * stride :: stride], off
+        return runs, 0.5 * (one - other)[WARM_UP * stride :: stride], off
 
 
 def _root(delta: np.ndarray, left_over: float) -> float:
@@ -207,123 +188,3 @@ def _root(delta: np.ndarray, left_over: float) -> float:
     t, minus_d = np.linalg.lstsq(known, delta[2:], rcond=None)[0]
     left = np.max(np.abs(known @ np.array([t, minus_d]) - delta[2:])) / np.max(np.abs(delta))
     return float(np.max(np.abs(np.roots([1.0, -t, -minus_d])))) if left < left_over else math.nan
-
-
-def sleep_margin(method: Integrator, spin: float, h: float) -> float:
-    """Above zero while the method's upright top sleeps at this spin w3 and step, below when it falls; 1 at most.
-
-    x (1 - x) 4 with x = t^2/4d: the two ways to end it, x = 1 (a pair of frequencies meets) and x = 0 (the step turns
-    the top by half a turn), are both simple sign changes.
-    """
-    body = SymmetricTop(1.0, 1.0, 1.0)
-    chart = method.chart_for("axis")
-    p_psi = body.I3 * spin
-    if chart == "angles":  # p_phi = p_psi: the axis would pass through the pole, and V is a parabola
-        rate = p_psi / (2.0 * body.I1 * math.cos(0.5 * TILT) ** 2)
-        start = Angles(theta=TILT, phi_dot=rate, psi_dot=spin - rate * math.cos(TILT))
-    else:
-        start = Angles(theta=TILT, psi_dot=spin)
-    states = few_steps(method, chart, body, start, h, 3).states
-    z = states[:, 0] + 0j if chart == "angles" else states[:, 0] + 1j * states[:, 1]
-    if not np.isfinite(z).all():
-        return math.nan
-    # z2 = t z1 - d z0, z3 = t z2 - d z1
-    base = z[1] * z[1] - z[0] * z[2]
-    if base == 0.0:
-        return math.nan
-    t, d = (z[1] * z[2] - z[0] * z[3]) / base, (z[2] * z[2] - z[1] * z[3]) / base
-    x = float((t * t / (4.0 * d)).real)
-    return 4.0 * x * (1.0 - x)
-
-
-def sleeping_threshold(method: Integrator, h: float) -> float:
-    """The spin w3 at which the upright top of I1 = I3 = mgl = 1 begins to sleep under this method; the motion's is 2.
-
-    The largest root below the spin that turns the top by half a turn in a step. NaN where there is none, and for a
-    method that is not symmetric, whose tops all rise or fall a little in every step.
-    """
-    if not method.symmetric:
-        return math.nan
-    top_spin = min(6.0, 0.9 * 2.0 * math.pi / h)
-    roots = sign_changes(lambda spin: sleep_margin(method, spin, h), np.linspace(1.0, top_spin, 61))
-    return roots[-1] if roots else math.nan
-
-
-STEADILY = 1e-7  # t - 2 beyond rounding
-GROWING = 1e-4  # growth of a nutation per step that counts, for a method that is not symmetric
-FAR = 0.01  # rad, of a precession that has drifted away in some steps
-
-
-def surpasses(at: Trace, doubt: float = 0.0) -> float:
-    """Above zero where small nutations of a symmetric method grow, below where they do not, NaN without fixed point."""
-    return max(at.trace - 2.0 - max(STEADILY, doubt), -2.0 - doubt - at.trace)  # small steps have t just below 2
-
-
-def linear_limits(method: Integrator, scene: Scene, grid: np.ndarray) -> tuple[float, float]:
-    """Steps h of a grid at which small nutations first grow, and at which they first turn by a third of a turn.
-
-    NaN where that happens at no step of the grid, or at its first.
-
-    Both at the steady precession of `scene`. A fixed point that is lost between two steps (an implicit equation without
-    a solution, say) counts as the end of stability; a window narrower than the grid is not seen. Where a method is not
-    symmetric, the limit is where nutations begin to grow by 1e-4 a step, if that can be followed so far (`_growing`),
-    and a third of a turn has no meaning.
-    """
-    if not method.symmetric:
-        return _limit_of_growth(method, scene, grid), math.nan
-
-    def turned(at: Trace) -> float:
-        return -1.0 - at.trace
-
-    third = last = math.nan
-    before = NO_TRACE
-    for h in map(float, grid):
-        at = trace(method, scene, h)
-        if math.isnan(third) and turned(at) >= 0.0 > turned(before):
-            third = _edge(lambda x: turned(trace(method, scene, x)), last, h, lost=-1.0)
-        if not surpasses(at, at.doubt) <= 0.0:
-            limit = _edge(lambda x: surpasses(trace(method, scene, x)), last, h, lost=1.0)
-            return limit, third if not third > limit else math.nan
-        last, before = h, at
-    return math.nan, third
-
-
-def _limit_of_growth(method: Integrator, scene: Scene, grid: np.ndarray) -> float:
-    """The step of a grid at which small nutations first grow by `GROWING`, for a method that need not be symmetric."""
-    frequency, last = scene.top.nutation_frequency(scene.top.momenta(scene.start)), math.nan
-    for h in map(float, grid):
-        over = _growing(method, scene, h, frequency)
-        if math.isnan(over):
-            return math.nan
-        if over > 0.0:
-            return _edge(lambda x: _growing(method, scene, x, frequency), last, h, lost=-1.0)
-        last = h
-    return math.nan
-
-
-def _growing(method: Integrator, scene: Scene, h: float, frequency: float) -> float:
-    """By how much the growth of small nutations in a step exceeds what counts; NaN where that cannot be followed.
-
-    What counts is `GROWING`, and the way that the precession itself goes meanwhile: some methods drift to another
-    inclination, where nutations have another size, and `FAR` away none is left next to which growth could be told.
-    """
-    factor, size = nutation_growth(method, scene, h, method.chart_for("axis"), frequency)
-    return factor - 1.0 - max(GROWING, size) if size < FAR else math.nan
-
-
-def _edge(value: Callable[[float], float], a: float, b: float, *, lost: float) -> float:
-    """Where a function that is negative at a first is not, before b; `lost` is what it is where it has no value.
-
-    NaN if a is. A trace is known to 1e-10. Brent's search takes 5 to 15 of them, and no more than bisection where the
-    function jumps.
-    """
-    from scipy.optimize import brentq  # takes 0.3 s, which a study with nothing to do need not
-
-    if math.isnan(a):
-        return math.nan
-
-    def known(x: float) -> float:
-        at = value(x)
-        return lost if math.isnan(at) else at
-
-    return float(brentq(known, a, b, xtol=1e-10 * b)) if known(a) < 0.0 else a

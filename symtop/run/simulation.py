@@ -1,16 +1,15 @@
 """simulate(): one scene, one integrator, one step or tolerance -> one dataset.
 
-Samples never bend the step: a fixed-step run has h = T/N exactly and is sampled at whole steps, t = k h. Samples
-are uniform unless they would fall on the same few phases of the nutation again and again (an energy error
-that is sampled at multiples of the nutation period reads 1e5 times too small); then they are dithered by the
-golden ratio, and the dataset says so.
+Samples never bend the step: a fixed-step run has h = T/N exactly and is sampled at whole steps, t = k h. Samples are
+uniform unless they would fall on the same few phases of the nutation again and again (where an energy error may read
+1e5 times too small); then they are dithered by the golden ratio, and the dataset says so.
 """
 
 import functools
 import math
 import warnings
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,12 +18,11 @@ from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, boolean, one_of, positive, shown, whole
 from symtop.core.numbers import GOLDEN
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan, Run, sentence
+from symtop.methods.framework.plan import Plan, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import OBSERVABLES, Scene, horizon_of, scene as find_scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.run.guard.forecast import repeats
-from symtop.run.guard.guard import MOST_STEPS, warning
+from symtop.run.guard import MOST_STEPS, warning
 from symtop.run.trajectory import Trajectory, dataset
 
 MOST_SAMPLES = 10_000_000
@@ -61,8 +59,8 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
     if steps is not None and steps <= last:  # every step is shown
         marks: Any = np.arange(steps + 1)
         return marks * (horizon / steps), marks, False
+    place: Any = np.arange(samples, dtype=float)
     for dithered in (False, True):
-        place: Any = np.arange(samples, dtype=float)
         if dithered:
             place[1:last] += np.mod(GOLDEN * place[1:last], 1.0) - 0.5
         if steps is None:
@@ -71,9 +69,9 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
             marks = _marks(steps, place, last)
             times = marks * (horizon / steps)
         long_enough = math.isfinite(period) and horizon > 2.0 * period
-        if not long_enough or _unseen(times, period) < WIDEST_GAP:
-            return times, marks, dithered
-    return times, marks, True
+        if dithered or not long_enough or _unseen(times, period) < WIDEST_GAP:
+            break
+    return times, marks, dithered
 
 
 def chart_of(method: Integrator, watched: str, observe: str | None = None) -> str:
@@ -92,12 +90,18 @@ def likely_step(scene: Scene, method: Integrator, horizon: float, accuracy: floa
     return min(0.2 * scene.time_scale(horizon) * math.pow(accuracy, 1.0 / power), horizon)
 
 
-def check_formula(method: Integrator, words: str, step: object, tolerance: object) -> None:
-    """Refuse a step (`words` is what it is called) and a tolerance for a formula, which has nothing to tune."""
+def check_control(method: Integrator, step: object, tolerance: object, name: str = "step_size") -> None:
+    """Refuse a step, which the caller calls `name`, or a tolerance that the method does not take."""
+    if method.fixed_step and tolerance is not None:
+        words = f"has a fixed step: give step_size, not tolerance = {shown(tolerance)}"
+        raise SymtopError(f"{method.name} {words}", "step_size", "tolerance")
+    if method.adaptive and step is not None:
+        words = f"chooses its own steps: give tolerance, not {name} = {shown(step)}"
+        raise SymtopError(f"{method.name} {words}", "tolerance", name)
     if not method.fixed_step and not method.adaptive:
-        for name, value in ((words, step), ("tolerance", tolerance)):
+        for control, value in ((name, step), ("tolerance", tolerance)):
             if value is not None:
-                raise SymtopError(f"{method.name} has nothing to tune: leave out {name} = {shown(value)}", name)
+                raise SymtopError(f"{method.name} has nothing to tune: leave out {control} = {shown(value)}", control)
 
 
 def make_plan(
@@ -106,38 +110,21 @@ def make_plan(
 ) -> tuple[Plan, bool]:  # fmt: skip
     """Check the step or tolerance against the integrator and the budget, and lay out steps and samples."""
     period = scene.nutation_period
+    check_control(method, step_size, tolerance)
     if method.fixed_step:
-        if tolerance is not None:
-            raise SymtopError(
-                f"{method.name} has a fixed step: give step_size, not tolerance = {shown(tolerance)}",
-                "step_size",
-                "tolerance",
-            )
         if step_size is None:
-            proposal = likely_step(scene, method, horizon, USUAL)
-            raise SymtopError(
-                f"{method.name} has a fixed step and needs step_size, for example {proposal:.1g}", "step_size"
-            )
+            words = f"needs step_size, for example {likely_step(scene, method, horizon, USUAL):.1g}"
+            raise SymtopError(f"{method.name} has a fixed step and {words}", "step_size")
         step = positive("step_size", step_size)
         if step > horizon:
             raise SymtopError(f"step_size must be at most the horizon {horizon!r}, not {step!r}", "step_size")
         most = MOST_STEPS if budget is None else budget
         if horizon / step > most:
-            raise SymtopError(
-                f"step_size {step!r} asks for {horizon / step:.3g} steps; the limit is {most:.3g} (see budget)",
-                "step_size",
-                "budget",
-            )
+            words = f"asks for {horizon / step:.3g} steps; the limit is {most:.3g} (see budget)"
+            raise SymtopError(f"step_size {step!r} {words}", "step_size", "budget")
         steps = max(1, round(horizon / step))
         _, marks, dithered = sample_times(horizon, samples, period, steps)
         return Plan.steps(horizon / steps, marks, horizon), dithered
-    check_formula(method, "step_size", step_size, tolerance)
-    if step_size is not None:
-        raise SymtopError(
-            f"{method.name} chooses its own steps: give tolerance, not step_size = {shown(step_size)}",
-            "tolerance",
-            "step_size",
-        )
     bound = method.check_tolerance(tolerance) if method.adaptive else math.nan
     swings = horizon * max(1.0 / period, math.sqrt(abs(scene.top.mgl) / scene.top.I1) / (2.0 * math.pi))
     if method.adaptive and swings > MOST_SWINGS:
@@ -163,26 +150,25 @@ def simulate(
     ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows every step. A whole number of
     steps fills the horizon, the one nearest to horizon/step_size: the attribute ``step_size`` is the step made.
 
-    Before the run the `guard` (`symtop.run.guard.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a
-    large error is expected; the run is the same either way. Give a function to be handed the sentence instead, or
-    False for no warning. `budget` is the most steps of a fixed-step run
-    (`MOST_STEPS` by default; more are refused) and the most force evaluations, or Taylor steps, of an adaptive one,
-    which then ends `out_of_budget` (by default after about half a minute).
+    Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
+    error is expected; the run is the same either way. Give a function to be handed the sentence instead, or False for
+    no warning. `budget` is the most steps of a fixed-step run (`MOST_STEPS` by default; more are refused) and the most
+    force evaluations, or Taylor steps, of an adaptive one, which then ends `out_of_budget`.
 
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
     heard = guard if callable(guard) else _warn if boolean("guard", guard) else None
-    run = _prepared(scene, integrator, step_size, tolerance, horizon, samples, observe, budget)
-    trajectory, caution = _guarded(run, heard)
-    chosen, method, plan = run.scene, run.method, run.plan
+    given = scene, integrator, step_size, tolerance, horizon, samples, observe, budget
+    chosen, method, chart, plan, dithered = _prepared(*given)
+    trajectory, caution = _guarded(chosen, method, chart, plan, heard)
     data = dataset(trajectory.time, trajectory.columns, chosen.units)
     data.attrs = netcdf.attributes_of(
-        f"{method.name} on {chosen.name}", integrator=method.name, scene=chosen.name, chart=run.chart,
+        f"{method.name} on {chosen.name}", integrator=method.name, scene=chosen.name, chart=chart,
         implementation=method.implementation, horizon=plan.horizon, step_size=plan.step_size, tolerance=plan.tolerance,
         steps=trajectory.steps, force_evaluations=trajectory.force_evaluations,
         newton_iterations=trajectory.newton_iterations, outcome=trajectory.outcome,
         outcome_message=sentence(trajectory.outcome, trajectory.reached_time, plan.horizon),
-        reached_time=trajectory.reached_time, guard=caution, sampling="dithered" if run.dithered else "uniform",
+        reached_time=trajectory.reached_time, guard=caution, sampling="dithered" if dithered else "uniform",
         top=_json(chosen.top), start=_json(chosen.start),
     )  # fmt: skip
     return data
@@ -193,50 +179,33 @@ def integrate(
     **settings: Any,
 ) -> Trajectory:  # fmt: skip
     """The run of `simulate` as plain arrays; without a function for the sentence there is no guard."""
-    return _guarded(_prepared(scene, integrator, **settings), guard)[0]
-
-
-class _Run(NamedTuple):
-    """A run that has not begun: what a solver is called with, and whether its samples are dithered."""
-
-    scene: Scene
-    method: Integrator
-    chart: str
-    plan: Plan
-    dithered: bool
-
-    def solve(self) -> Run:
-        """Make the run."""
-        return solve(self.method, self.chart, self.scene.top, self.scene.start, self.plan, f" on {self.scene.name}")
+    chosen, method, chart, plan, _ = _prepared(scene, integrator, **settings)
+    return _guarded(chosen, method, chart, plan, guard)[0]
 
 
 def _prepared(
     scene: "str | Scene", integrator: "str | Integrator", step_size: object = None, tolerance: object = None,
     horizon: object = None, samples: int = 501, observe: str | None = None, budget: object = None,
-) -> _Run:  # fmt: skip
-    """Check the arguments of `simulate`, and choose chart, steps and samples."""
+) -> tuple[Scene, Integrator, str, Plan, bool]:  # fmt: skip
+    """Check the arguments of `simulate`, choose the chart, and lay out steps and samples, which may be dithered."""
     chosen, method = find_scene(scene), find_integrator(integrator)
     end = chosen.horizon if horizon is None else horizon_of(horizon)
     count = whole("samples", samples, 2, MOST_SAMPLES)
     chart = chart_of(method, chosen.observes, observe)
     limit = None if budget is None else positive("budget", budget)
     plan, dithered = make_plan(chosen, method, step_size, tolerance, horizon=end, samples=count, budget=limit)
-    return _Run(chosen, method, chart, plan, dithered)
+    return chosen, method, chart, plan, dithered
 
 
-def _guarded(run: _Run, guard: Callable[[str], object] | None) -> tuple[Trajectory, str]:
-    """Make a run, after the guard's sentence if there is one; "off" is the sentence of no guard.
-
-    A run that the guard's probe would repeat step by step is made first, and the probe reads it: that saves a third of
-    the guard's time.
-    """
-    states, caution = None, "off"
-    if guard is not None:
-        states = run.solve() if repeats(run.method, run.plan) else None
-        caution = warning(run.scene, run.method, run.chart, run.plan, states)
-        if caution:
-            guard(caution)
-    return Trajectory.of_run(run.scene, run.chart, run.plan, states or run.solve()), caution
+def _guarded(
+    scene: Scene, method: Integrator, chart: str, plan: Plan, guard: Callable[[str], object] | None
+) -> tuple[Trajectory, str]:
+    """Make a run, after the guard's sentence if there is one; "off" is the sentence of no guard."""
+    caution = "off" if guard is None else warning(scene, method, chart, plan)
+    if caution and guard is not None:
+        guard(caution)
+    states = solve(method, chart, scene.top, scene.start, plan, f" on {scene.name}")
+    return Trajectory.of_run(scene, chart, plan, states), caution
 
 
 def _warn(sentence: str) -> None:

@@ -78,33 +78,60 @@ COLUMNS, FACTS = Trajectory._fields[1:10], Trajectory._fields[10:]
 def dataset(time: Array, columns: Mapping[str, Array], units: str = "") -> xr.Dataset:
     """Columns (n,) or (n, 3 or 4) of doubles over ``time`` and ``component`` (x, y, z) or ``part`` (w, x, y, z).
 
-    Variables that symtop knows have their long names and units: "SI", or empty for a problem without units. Columns of
-    one run have one length and one clock, so that nothing is left to check: ``xr.Dataset(...)`` would take as long as
-    all the rest of a short run, and twice as long as that.
+    Variables that symtop knows have their long names and units: "SI", or empty for a problem without units. One run has
+    one clock, so that nothing is left to align, and ``xr.Dataset(...)`` would take as long as all the rest of a short
+    run. So the dataset is put together as xarray does it after its checks, which is private: where the two differ in a
+    small example, the public constructor is used.
     """
+    return (_direct if _direct_works() else _public)(time, columns, units)
+
+
+def _public(time: Array, columns: Mapping[str, Array], units: str) -> xr.Dataset:
     attributes = netcdf.variable_attributes
+    variables = {name: (_DIMS[values.shape[1:]], values, attributes(name, units)) for name, values in columns.items()}
+    used = [name for name in LABELS if any(name in dims for dims, _, _ in variables.values())]
+    coordinates = {name: (name, list(LABELS[name]), attributes(name, units)) for name in used}
+    return xr.Dataset(variables, {"time": ("time", time, attributes("time", units)), **coordinates})
+
+
+def _direct(time: Array, columns: Mapping[str, Array], units: str) -> xr.Dataset:
+    def variable(kind: type, dims: tuple[str, ...], data: Any, name: str, encoding: Any = None) -> Any:
+        made: Any = object.__new__(kind)
+        made._dims, made._data, made._encoding = dims, data, encoding
+        made._attrs = dict(netcdf.variable_attributes(name, units)) or None
+        return made
+
     variables: dict[str, Any] = {}
     sizes = {"time": len(time)}
     for name, values in columns.items():
         dims = _DIMS[values.shape[1:]]
-        variables[name] = xr.Variable(dims, values, attributes(name, units), fastpath=True)
+        variables[name] = variable(xr.Variable, dims, values, name)
         sizes[dims[-1]] = values.shape[-1]
-    clock = pd.Index(time, name="time")
-    indexes: dict[str, Any] = {"time": xr.indexes.PandasIndex(clock, "time")}
-    variables["time"] = xr.IndexVariable("time", clock, attributes("time", units), fastpath=True)
+    clock = pd.Index._simple_new(time.copy(), name="time")
+    indexes: dict[str, Any] = {"time": xr.indexes.PandasIndex(clock, "time", time.dtype, fastpath=True)}
+    adapter = type(_labels("component")[1])
+    variables["time"] = variable(xr.IndexVariable, ("time",), adapter(clock), "time", {})
     for name in LABELS:
         if name in sizes:
             indexes[name], labels = _labels(name)
-            variables[name] = labels.copy(deep=False)
-            variables[name].attrs = attributes(name, units)
-    try:
-        return xr.Dataset._construct_direct(variables, set(indexes), sizes, indexes=indexes)
-    except (AttributeError, TypeError):  # of another version of xarray, where that is private
-        return xr.Dataset(variables, {name: variables.pop(name) for name in indexes})
+            variables[name] = variable(xr.IndexVariable, (name,), labels, name, {})
+    return xr.Dataset._construct_direct(variables, set(indexes), sizes, indexes=indexes)
 
 
 @functools.cache
 def _labels(name: str) -> tuple[Any, Any]:
-    """The index and the variable of a second dimension."""
+    """The index of a second dimension, and what its variable holds; nobody can write to them."""
     data = xr.Dataset(coords={name: list(LABELS[name])})
-    return data.xindexes[name], data.variables[name]
+    return data.xindexes[name], data.variables[name]._data
+
+
+@functools.cache
+def _direct_works() -> bool:
+    """Does this version of xarray hold a dataset as `_direct` builds it?"""
+    example = np.array([0.0, 0.5]), {"theta": np.ones(2), "axis": np.ones((2, 3)), "quaternion": np.ones((2, 4))}
+    try:
+        direct, public = _direct(*example, ""), _public(*example, "")
+        kinds = [[(type(part), type(part._data)) for part in data.variables.values()] for data in (direct, public)]
+        return direct.identical(public) and kinds[0] == kinds[1]
+    except (AttributeError, TypeError):
+        return False

@@ -6,8 +6,8 @@ import pytest
 from click.testing import CliRunner
 
 import symtop
+from symtop.advise import SETTINGS, i_use
 from symtop.cli.main import main
-from symtop.cli.recommend import SETTINGS, i_use
 from symtop.methods.framework.registry import engines
 
 
@@ -42,14 +42,6 @@ def test_an_engine_without_a_gyroscopic_term_has_nothing_to_match():
 def test_bad_input_is_refused_in_a_sentence(engine, step, message):
     with pytest.raises(symtop.SymtopError, match=message):
         i_use(engine, "goldstein", step_size=step, horizon=10.0)
-
-
-@pytest.mark.parametrize(
-    "words", [[], ["--accuracy", "1e-6", "--i-use", "ode"], ["--accuracy", "1e-6", "--step-size", "0.1"]]
-)
-def test_the_command_asks_for_one_of_both(words):
-    done = CliRunner().invoke(main, ["recommend", "goldstein", *words])
-    assert done.exit_code == 2
 
 
 def test_the_command_says_what_an_engine_does():

@@ -104,16 +104,6 @@ def test_a_few_variables_are_kept_and_compared_and_a_budget_is_one(tmp_path, mon
     assert "largest error" not in done.output
 
 
-@pytest.mark.parametrize(
-    ("name", "told"),
-    [("strang", "32 tops at a time"), ("rk45-compiled", "one top after another in compiled code"),
-     ("rk45", "one top after another, each by a call of Python")],
-)  # fmt: skip
-def test_how_tops_were_computed_is_said_in_words(name, told):
-    setting = ("--per-nutation", 30) if name == "strang" else ("--tolerance", 1e-3)
-    assert f"steps, computed {told}" in call(name, "--members", 2, *setting, "--nutations", 1).output
-
-
 def test_members_that_raise_are_told_in_one_sentence(tmp_path, monkeypatch):
     registry = importlib.import_module("symtop.methods.framework.registry")
     monkeypatch.setattr(registry, "_registry", registry.integrators())

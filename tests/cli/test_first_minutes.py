@@ -12,7 +12,7 @@ from terminal import recorded
 import symtop
 from symtop.cli.main import main
 from symtop.measure.verdicts import ACCURATE
-from symtop.run.guard.guard import EXPECTED
+from symtop.run.guard import EXPECTED
 
 AXIS_ONLY = """\
 import symtop

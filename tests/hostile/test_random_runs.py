@@ -11,7 +11,7 @@ import pytest
 
 import symtop
 from symtop.model.scenes import steady
-from symtop.run.guard.forecast import forecast, landmarks
+from symtop.run.guard import forecast, landmarks
 from symtop.run.linear_stability import nutation_growth, trace
 from symtop.run.simulation import make_plan
 from tests.hostile.random_runs import LONGEST, drawn, one, run_all, told
@@ -20,13 +20,7 @@ from tests.hostile.random_runs import LONGEST, drawn, one, run_all, told
 SILENT = [
     *((k, 20_000) for k in (1055, 1275, 1763, 1892, 1976, 2577, 2896, 4661, 8100, 10078, 11067, 11649, 12727, 13569)),
     *((k, 20_000) for k in (16036, 16754, 17553, 18038, 18170, 18335)),
-    (3649, 1),
-    (13968, 2),
-    (6006, 4),
-    (6460, 4),
-    (9501, 5),
-    (4513, 6),
-    (9380, 6),
+    *zip((3649, 13968, 6006, 6460, 9501, 4513, 9380), (1, 2, 4, 4, 5, 6, 6), strict=True),
 ]
 FALSE = [74, 511, 780, 990, 1929, 2413, 4178, 5013]  # right runs that were warned of growth that was none
 

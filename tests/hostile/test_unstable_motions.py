@@ -12,7 +12,7 @@ from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.exact.digits import PreciseForm
 from symtop.model.top import flat
-from symtop.run.guard import guard
+from symtop.run import guard
 from symtop.run.reference.sensitivity import conditioning, displacement
 from symtop.run.simulation import make_plan
 

@@ -7,7 +7,7 @@ import symtop
 from symtop.core.numbers import EPSILON
 from symtop.measure import order_table
 from symtop.measure.accuracy import SAMPLES, enough_samples, error_table
-from symtop.measure.errors import attitude_error, error_bound, errors_against
+from symtop.measure.errors import error_bound, errors_against
 from symtop.measure.order import LARGEST_ERROR, order
 from symtop.measure.order_table import asymptotic_steps, extended_errors, extended_order_data
 from symtop.methods.framework.registry import integrator
@@ -15,6 +15,8 @@ from symtop.model.charts import axis_from_angles, momentum_parts
 from symtop.model.scenes import scene
 from symtop.run.reference.independent_checks import have_heyoka
 from symtop.run.reference.truth import reference
+from symtop.run.simulation import integrate
+from symtop.run.trajectory import Trajectory
 
 DENSE, EVEN = 40_001, 331
 HORIZONS = (10.037, 100.37, 1003.7)  # nutations
@@ -25,7 +27,7 @@ def largest_errors(name, method, nutations, samples):
     period = where.nutation_period
     run = symtop.simulate(where, method, step_size=period / 40.0, horizon=nutations * period, samples=samples,
                           observe="axis", guard=False)  # fmt: skip
-    errors = errors_against(where, run, reference(where, run["time"].values, "closed-form"))
+    errors = symtop.errors(run)
     return np.array([float(errors[quantity].max()) for quantity in ("axis", "theta")])
 
 
@@ -54,7 +56,7 @@ def test_as_many_samples_at_one_phase_of_the_nutation_see_less():
 def test_errors_are_taken_from_both_halves_of_the_reference():
     where = scene("goldstein")
     truth = reference(where, np.linspace(0.0, 20.0, 41), "longdouble")
-    rounded = truth[["axis", "quaternion", "theta"]]  # right to the last digit of a double, and no further
+    rounded = Trajectory.of_data(truth[["axis", "quaternion", "theta"]])  # right to the last digit
     with_low = errors_against(where, rounded, truth)
     for name, low in (("axis", "axis_lo"), ("attitude", "quaternion_lo"), ("theta", "theta_lo")):
         assert 1e-18 < float(with_low[name].max()) < EPSILON
@@ -65,13 +67,13 @@ def test_errors_are_taken_from_both_halves_of_the_reference():
 
 def test_a_run_that_shows_its_quaternion_is_judged_without_the_rounding_of_its_angles():
     where = scene("spheroid")
-    angles, attitude = (symtop.simulate(where, name, step_size=0.01, samples=101, observe="attitude")
+    angles, attitude = (integrate(where, name, step_size=0.01, samples=101, observe="attitude")
                         for name in ("stormer-verlet", "gauss-12"))  # fmt: skip
-    truth = reference(where, angles["time"].values, "closed-form")
+    truth = reference(where, angles.time, "closed-form")
     turned = float(np.max(np.abs(truth["phi"].values) + np.abs(truth["psi"].values)))
     wide, narrow = (float(error_bound(where, run, truth, "attitude").max()) for run in (angles, attitude))
     assert wide - narrow == pytest.approx(0.5 * EPSILON * turned, rel=0.05)
-    assert float(attitude_error(attitude.isel(time=slice(1, 2)), truth.isel(time=slice(1, 2)))[0]) < 3.0 * narrow
+    assert errors_against(where, attitude, truth)["attitude"][1] < 3.0 * narrow
 
 
 def test_added_steps_lie_where_the_error_is_a_power_of_the_step():

@@ -4,13 +4,14 @@ import math
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import symtop
 from symtop.measure.phase import phase, split
 from symtop.model import charts
 from symtop.model.scenes import closed_form
 from symtop.run.reference.truth import reference
+from symtop.run.simulation import integrate
+from symtop.run.trajectory import Trajectory
 
 
 def moved(name, periods=20.0, early=0.0, faster=0.0, turned=0.0, turning=0.0, lifted=0.0, samples=301):
@@ -23,8 +24,7 @@ def moved(name, periods=20.0, early=0.0, faster=0.0, turned=0.0, turning=0.0, li
         "phi": motion.phi + turned + turning * times,
         "p_theta": scene.top.I1 * motion.theta_dot,
     }
-    run = xr.Dataset({key: ("time", value) for key, value in columns.items()}, {"time": times}, {"outcome": "ok"})
-    return scene, run, reference(scene, times, precision="closed-form")
+    return scene, Trajectory(times, **columns), reference(scene, times, precision="closed-form")
 
 
 @pytest.mark.parametrize("name", ["spheroid", "cusp", "hairer-lubich-wanner", "bruls-cardona-arnold"])
@@ -32,7 +32,7 @@ def test_a_motion_that_is_early_and_turned_has_the_right_shape(name):
     scene, run, truth = moved(name, early=0.013, turned=-0.2)
     parts = phase(scene, run, truth)
     omega = 2.0 * math.pi / scene.nutation_period
-    sine = np.sin(run["theta"].values)
+    sine = np.sin(run.theta)
     assert parts.shape < 1e-13
     assert parts.nutation_lag == pytest.approx(0.013 * omega, rel=1e-9)
     assert parts.precession_lag == pytest.approx(0.2 * sine.max(), rel=1e-9)
@@ -43,7 +43,7 @@ def test_a_motion_that_is_early_and_turned_has_the_right_shape(name):
 def test_lags_may_be_longer_than_a_nutation_and_a_turn():
     scene, run, truth = moved("goldstein", early=0.3, faster=0.1, turned=9.0)
     parts = split(scene, run)
-    assert np.max(np.abs(parts.lag - (0.3 + 0.1 * run["time"].values))) < 1e-11
+    assert np.max(np.abs(parts.lag - (0.3 + 0.1 * run.time))) < 1e-11
     assert np.max(np.abs(parts.turn - 9.0)) < 1e-10
     assert phase(scene, run, truth).shape < 1e-12
 
@@ -65,17 +65,15 @@ def test_a_motion_of_another_shape_is_not_called_late():
     assert 3e-5 < parts.shape < 2e-4
     omega = 2.0 * math.pi / scene.nutation_period
     assert parts.nutation_lag < 1e-3
-    assert parts.nutation_period < 3.0 * parts.nutation_lag / (omega * float(run["time"][-1]))  # a bounded lag
+    assert parts.nutation_period < 3.0 * parts.nutation_lag / (omega * float(run.time[-1]))  # a bounded lag
 
 
 def test_a_pole_that_is_passed_on_the_other_side_is_not_a_turn():
     scene = symtop.scene("bruls-cardona-arnold")
     period = scene.nutation_period
-    run = symtop.simulate(
-        scene, "strang", step_size=period / 40.37, horizon=400.0 * period, samples=331, observe="axis", guard=False
-    )
-    truth = reference(scene, run["time"], precision="closed-form")
-    distance = charts.axis_distance(run["axis"].values, truth["axis"].values).max()
+    run = integrate(scene, "strang", step_size=period / 40.37, horizon=400.0 * period, samples=331, observe="axis")
+    truth = reference(scene, run.time, precision="closed-form")
+    distance = charts.axis_distance(run.axis, truth["axis"].values).max()
     assert phase(scene, run, truth).precession_lag < 2.0 * distance
 
 
@@ -91,11 +89,9 @@ def test_a_steady_precession_has_no_nutation_to_be_late():
 @pytest.mark.parametrize("name", ["spheroid", "fast"])
 def test_frequencies_of_the_exact_motion_are_wrong_by_no_more_than_their_bounds(name):
     scene = symtop.scene(name)
-    run = symtop.simulate(scene, "exact", horizon=10.0 * scene.nutation_period, samples=331, observe="axis")
-    parts = phase(scene, run, reference(scene, run["time"], precision="closed-form"))
+    run = integrate(scene, "exact", horizon=10.0 * scene.nutation_period, samples=331, observe="axis")
+    parts = phase(scene, run, reference(scene, run.time, precision="closed-form"))
     assert parts.nutation_period <= parts.nutation_period_bound
     assert parts.precession_rate <= parts.precession_rate_bound
-    failed = phase(
-        scene, run.assign_attrs(outcome="left_chart"), reference(scene, run["time"], precision="closed-form")
-    )
+    failed = phase(scene, run._replace(outcome="left_chart"), reference(scene, run.time, precision="closed-form"))
     assert all(math.isnan(value) for value in failed)

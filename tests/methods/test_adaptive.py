@@ -7,11 +7,11 @@ import pytest
 
 import symtop
 from symtop.methods.framework.adaptive import Adaptive
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
+from symtop.run.ensemble.chunks import nutation_periods
 from symtop.run.ensemble.inputs import read_members
-from symtop.run.sampling import nutation_periods
 
 SOLVERS = {
     row.name: row.solvers[row.charts()[0]] for row in variants() if isinstance(row.solvers[row.charts()[0]], Adaptive)

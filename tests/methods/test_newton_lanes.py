@@ -6,6 +6,7 @@ import pytest
 from symtop.methods.framework.lanes import W
 from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.lagrangian.discrete_lagrangian import discrete_lagrangian
+from symtop.methods.lagrangian.unreduced import built_in as unreduced
 from symtop.model.scenes import scene
 from symtop.model.top import flat
 from tests.methods.test_lanes import SOLVERS, assert_runs_alone, left_alone, members
@@ -33,6 +34,11 @@ def test_sweeps_of_gauss_have_the_bits_of_runs_alone(name):
     done = solver.many(*given)
     assert_runs_alone(solver, *given, done)
     assert {OUTCOMES[k] for k in done.outcome} == {"ok", "not_converged"}
+
+
+def test_gauss_methods_of_more_stages_and_unreduced_kernels_run_alone():
+    assert not any(SOLVERS[name].in_lanes for name in ("gauss-12[axis]", "gauss-6[attitude]"))
+    assert not any(method.solvers["angles"].in_lanes for method in unreduced())
 
 
 def test_a_rule_of_ones_own_runs_in_lanes():

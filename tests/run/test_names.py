@@ -4,14 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from symtop_studies.stability.linear_limits import linear_limits, sleeping_threshold
 
 import symtop
 from symtop.judging.battery import judge
 from symtop.methods.framework import registry
 from symtop.methods.lagrangian.discrete_lagrangian import is_midpoint
-from symtop.methods.lagrangian.galerkin import is_galerkin
-from symtop.run.guard.forecast import forecast
-from symtop.run.linear_stability import linear_limits, sleeping_threshold
+from symtop.run.guard import forecast
 from symtop.run.long_run import long_run
 from symtop.run.modified_energy import modified_energy
 from symtop.run.simulation import make_plan
@@ -95,8 +94,6 @@ def test_other_ways_to_step_a_rule_know_it_by_its_numbers():
     assert is_midpoint(symtop.discrete_lagrangian("mine", (0.5,), (1.0,)))
     assert not is_midpoint(symtop.integrator("trapezoidal"))
     assert not is_midpoint(symtop.integrator("midpoint-unreduced"))
-    assert is_galerkin(dataclasses.replace(symtop.integrator("galerkin-simpson"), name="mine"))
-    assert not is_galerkin(symtop.integrator("midpoint"))
 
 
 @pytest.mark.parametrize("conserves", [{"charm"}, "energy", 3, {"energy", "p_theta"}])
@@ -127,6 +124,14 @@ def test_a_row_is_a_method_in_one_chart_and_every_table_can_name_it():
     names = [row.name for row in registry.variants()]
     assert len(names) == len(set(names)) == sum(len(entry.charts()) for entry in registry.methods().values())
     assert {row.charts()[0] for row in registry.variants("attitude")} == {"angles", "attitude"}
+
+
+def test_a_variant_is_made_once_and_again_when_its_method_is_replaced(monkeypatch):
+    monkeypatch.setattr(registry, "_registry", dict(symtop.integrators()))
+    first = symtop.integrator("rk4[axis]")
+    assert symtop.integrator("rk4[axis]") is first
+    symtop.register(dataclasses.replace(symtop.integrator("rk4"), order=3), replace=True)
+    assert (first.order, symtop.integrator("rk4[axis]").order) == (4, 3)
 
 
 @pytest.mark.parametrize("name", ["strang[angles]", "rk4[nutation]", "rk5[axis]", "[axis]"])

@@ -14,12 +14,19 @@ import pytest
 from mpmath import mp, mpf, workdps
 
 import symtop
-from symtop.model import charts
+from symtop.model import charts, scenes
 from symtop.model.exact import closed_form
+from symtop.model.exact.constants import RATE
 from symtop.model.exact.digits import PreciseForm
-from symtop.run.reference.certificate import Certificate
-from symtop.run.reference.independent_checks import check_times, flown, integrate, precise_attitude
-from symtop.run.reference.truth import UNCERTIFIED, _cache_path, reference as reference_function
+from symtop.run.reference.independent_checks import check_times, integrate, integrate_with_checks, precise_attitude
+from symtop.run.reference.truth import (
+    UNCERTIFIED,
+    Certificate,
+    _cache_path,
+    closed_bounds,
+    closed_values,
+    reference as reference_function,
+)
 
 
 @pytest.fixture
@@ -53,14 +60,10 @@ def random_regime(draw: random.Random, k: int) -> symtop.Scene:
     elif regime == 7:  # next to Woodhouse's separatrix
         g = math.sqrt(top.mgl / I1)
         theta = math.pi / 3.0
-        rates = [
-            0.0,
-            2.0 * g / math.sqrt(3.0),
-            (3.0 * I1 - top.I3) * g / (top.I3 * math.sqrt(3.0)) * (1.0 + draw.uniform(-1, 1) * 1e-6),
-        ]
-    return symtop.Scene(
-        f"regime-{regime}-{k}", top, symtop.Angles(theta, draw.uniform(-3, 3), draw.uniform(-3, 3), *rates), 1.0
-    )
+        spin = (3.0 * I1 - top.I3) * g / (top.I3 * math.sqrt(3.0)) * (1.0 + draw.uniform(-1, 1) * 1e-6)
+        rates = [0.0, 2.0 * g / math.sqrt(3.0), spin]
+    start = symtop.Angles(theta, draw.uniform(-3, 3), draw.uniform(-3, 3), *rates)
+    return symtop.Scene(f"regime-{regime}-{k}", top, start, 1.0)
 
 
 def true_errors(where, data):
@@ -112,6 +115,21 @@ def test_bounds_hold_on_500_random_tops(precision):
     assert check_bounds(500, precision, seed=2026) < 100.0
 
 
+@pytest.mark.parametrize("name", ["spheroid", "goldstein", "fast", "cusp"])
+def test_the_bound_of_the_closed_form_holds_the_rounding_and_the_rates(name):
+    """Twice what `benchmarks/accuracy.py` finds; the error of a rate times the time and the angular velocity."""
+    where, times = symtop.scene(name), np.array([0.0, 1e14])
+    motion = scenes.closed_form(where)(np.linspace(0.0, where.nutation_period, 400))
+    across = motion.phi_dot * np.sin(motion.theta)
+    along = motion.psi_dot + motion.phi_dot * np.cos(motion.theta)
+    fastest = np.sqrt(motion.theta_dot**2 + across**2 + along**2).max()
+    bounds = closed_bounds(where, times, closed_values(where, times))
+    for quantity, rounding in {"theta": 7.1e-16, "axis": 8.8e-16, "attitude": 8.8e-16}.items():
+        assert bounds[quantity][0] >= 2.0 * rounding
+        assert np.diff(bounds[quantity]) >= RATE * times[1] * fastest
+    assert min(bounds["phi"][0], bounds["psi"][0]) >= 2.0 * 4.8e-16
+
+
 def test_a_bound_that_is_too_small_would_be_seen():
     """The negative control: the same check with the bound of a method a thousand times better fails."""
     where = symtop.scene("spheroid")
@@ -140,8 +158,8 @@ def test_the_times_at_which_an_integration_is_read_change_no_bit():
     run = symtop.scene("goldstein")
     for precision in ("double", "longdouble", "quad"):
         times = np.array([3.0, 11.0, 20.0])
-        both, alone = flown(run, times, precision), integrate(run, times, precision)[0]
-        assert (both.states[both.asked] == alone).all()
+        both, alone = integrate_with_checks(run, times, precision), integrate(run, times, precision)[0]
+        assert (both.states[both.chosen] == alone).all()
         assert (both.axes == charts.axis_from_quaternion(alone[:, :4])).all()
 
 
@@ -245,14 +263,8 @@ def test_a_damaged_cache_file_is_noticed_said_and_computed_again(cache, damage):
         changed["theta"][3] += 1e-9
         changed.to_netcdf(path)
     else:
-        path.write_bytes(
-            {
-                "truncated": content[: len(content) // 2],
-                "zeros": b"\0" * len(content),
-                "empty": b"",
-                "foreign": b"GIF89a",
-            }[damage]
-        )
+        half, zeros = content[: len(content) // 2], b"\0" * len(content)
+        path.write_bytes({"truncated": half, "zeros": zeros, "empty": b"", "foreign": b"GIF89a"}[damage])
     with pytest.warns(symtop.SymtopWarning, match="is damaged and is computed again"):
         again = symtop.reference("spheroid", times, "longdouble")
     assert again.equals(good)

@@ -14,7 +14,7 @@ import xarray as xr
 
 import symtop
 from symtop.core import files
-from symtop.run.ensemble import chunked_output, chunks, ensemble as ensembles
+from symtop.run.ensemble import chunks, ensemble, ensemble as ensembles
 
 SOME = symtop.population(60, seed=5)
 ASKED = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
@@ -64,7 +64,7 @@ def test_times_of_runs_of_few_steps_are_a_row_in_the_file_as_well(tmp_path, smal
 def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_path, small_pieces, monkeypatch, threads):
     calm, path = tmp_path / "calm.nc", tmp_path / "runs.nc"
     symtop.ensemble(SOME, "strang[axis]", path=calm, **ASKED).close()
-    made, keep = [], chunked_output.Stream.keep
+    made, keep = [], ensemble.Stream.keep
 
     def interrupted(stream, piece, columns):
         if len(made) == 4:
@@ -72,7 +72,7 @@ def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_pa
         made.append(piece.start)
         keep(stream, piece, columns)
 
-    monkeypatch.setattr(chunked_output.Stream, "keep", interrupted)
+    monkeypatch.setattr(ensemble.Stream, "keep", interrupted)
     with pytest.raises(KeyboardInterrupt):
         symtop.ensemble(SOME, "strang[axis]", path=path, threads=threads, **ASKED)
     assert {file.name for file in (tmp_path / "runs.nc.parts").glob("*.npz")} == {
@@ -80,7 +80,7 @@ def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_pa
     }
     assert not path.exists()
     again = []
-    monkeypatch.setattr(chunked_output.Stream, "keep", lambda *given: again.append(given[1].start) or keep(*given))
+    monkeypatch.setattr(ensemble.Stream, "keep", lambda *given: again.append(given[1].start) or keep(*given))
     symtop.ensemble(SOME, "strang[axis]", path=path, threads=threads, **ASKED).close()
     assert (made, again) == ([0, 7, 14, 21], [28, 35, 42, 49, 56])
     assert path.read_bytes() == calm.read_bytes()
@@ -88,7 +88,7 @@ def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_pa
 
 def test_the_beginning_of_another_ensemble_and_a_damaged_piece_are_refused(tmp_path, small_pieces, monkeypatch):
     path, folder = tmp_path / "runs.nc", tmp_path / "runs.nc.parts"
-    monkeypatch.setattr(chunked_output.Stream, "finish", lambda *_: xr.Dataset())
+    monkeypatch.setattr(ensemble.Stream, "finish", lambda *_: xr.Dataset())
     symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
     for changed in ({"samples": 20}, {"per_nutation": 21}, {"variables": ["axis"]}):
         with pytest.raises(symtop.SymtopError, match="beginning of another ensemble"):
@@ -106,7 +106,7 @@ def test_the_beginning_of_another_ensemble_and_a_damaged_piece_are_refused(tmp_p
 
 
 def test_what_a_process_has_computed_before_does_not_make_it_another_ensemble(tmp_path, monkeypatch):
-    monkeypatch.setattr(chunked_output.Stream, "finish", lambda *_: xr.Dataset())
+    monkeypatch.setattr(ensemble.Stream, "finish", lambda *_: xr.Dataset())
     for name in ("strang[attitude]", "gauss-4[axis]", "rk45-compiled[axis]"):
         asked = {"nutations": 2, "samples": 11, "quiet": True}
         asked |= {"tolerance": 1e-6} if name.startswith("rk45") else {"per_nutation": 20}
@@ -118,7 +118,7 @@ def test_what_a_process_has_computed_before_does_not_make_it_another_ensemble(tm
 
 def test_one_process_at_a_time_writes_a_file(tmp_path, small_pieces, monkeypatch):
     """A second one on the same path is told so in a sentence; another path, and the same one later, are free."""
-    path, keep, told = tmp_path / "runs.nc", chunked_output.Stream.keep, []
+    path, keep, told = tmp_path / "runs.nc", ensemble.Stream.keep, []
     second = f"import symtop; symtop.ensemble(symtop.population(2, seed=5), 'strang', path={str(path)!r}, **{ASKED})"
 
     def disturbed(stream, piece, columns):
@@ -128,7 +128,7 @@ def test_one_process_at_a_time_writes_a_file(tmp_path, small_pieces, monkeypatch
             symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "other.nc", **ASKED).close()
         keep(stream, piece, columns)
 
-    monkeypatch.setattr(chunked_output.Stream, "keep", disturbed)
+    monkeypatch.setattr(ensemble.Stream, "keep", disturbed)
     with symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED) as data:
         assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **ASKED))
     assert [code for code, _ in told] == [1]
@@ -137,13 +137,13 @@ def test_one_process_at_a_time_writes_a_file(tmp_path, small_pieces, monkeypatch
 
 
 def test_a_piece_that_was_removed_is_not_called_damaged(tmp_path, small_pieces, monkeypatch):
-    path, finish = tmp_path / "runs.nc", chunked_output.Stream.finish
+    path, finish = tmp_path / "runs.nc", ensemble.Stream.finish
 
     def robbed(stream, some):
         (tmp_path / "runs.nc.parts" / "7-14.npz").unlink()
         return finish(stream, some)
 
-    monkeypatch.setattr(chunked_output.Stream, "finish", robbed)
+    monkeypatch.setattr(ensemble.Stream, "finish", robbed)
     with pytest.raises(symtop.SymtopError, match=r"7-14.npz is not there any more, so somebody has removed it"):
         symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
     monkeypatch.undo()
@@ -205,14 +205,14 @@ def test_what_a_killed_writer_left_is_swept_and_a_library_without_room_says_so(t
     def no_room(*_):
         raise full
 
-    monkeypatch.setattr(chunked_output, "_lay_out", no_room)
+    monkeypatch.setattr(ensemble, "_lay_out", no_room)
     with pytest.raises(symtop.SymtopError, match="is the disk full"):
         symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
     assert not left.exists()
     assert {file.name for file in tmp_path.iterdir()} == {"runs.nc.parts"}
     monkeypatch.undo()
     monkeypatch.setattr(chunks, "CHUNK", 21 * 7)
-    monkeypatch.setattr(chunks.Job, "columns", no_room)  # nothing is left to be computed
+    monkeypatch.setattr(ensemble.Stream, "keep", no_room)  # nothing is left to be computed
     symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED).close()
     assert path.exists()
 

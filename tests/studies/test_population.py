@@ -1,30 +1,29 @@
 """The study of populations: scales and errors of many tops, the arithmetic of costs and shares, and its verdicts."""
 
-import dataclasses
 import math
-import time
 
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.population import costs, ladder, messages, prices as pricing, study, tops as tops_module, verdicts
+from symtop_studies.population import costs, ladder, prices as pricing, study, tops as tops_module, verdicts, words
 from symtop_studies.population.costs import Share, cost_to_reach, detection, quantiles, run_lengths, slowdowns, winner
-from symtop_studies.population.prices import prices
-from symtop_studies.population.tops import ASKED, FIRST, MOMENTA, Tops, numbers_of, strata_of
+from symtop_studies.population.prices import Pair, prices
+from symtop_studies.population.tops import ASKED, FIRST, MOMENTA, Tops, strata_of
 from symtop_studies.population.verdicts import Cell
+from symtop_studies.work_precision.walk import nutation_width
 
 import symtop
 from symtop import advise
 from symtop.core import netcdf
 from symtop.measure.accuracy import error_row
-from symtop.measure.nearest import nearest
-from symtop.measure.settings import TARGETS, nutation_width
+from symtop.measure.datasets import differences
+from symtop.measure.ranking import nearest
+from symtop.measure.settings import TARGETS
 from symtop.measure.timing import Timing
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
-from symtop.model.top import Angles, SymmetricTop, flat
-from symtop.run.guard.guard import EXPECTED
-from symtop.runner.check import differences
+from symtop.model.top import Angles, SymmetricTop
+from symtop.run.guard import EXPECTED
 
 INF, NAN = math.inf, math.nan
 
@@ -108,11 +107,6 @@ def test_the_area_of_a_perfect_score_is_one_and_that_of_a_constant_a_half():
     assert math.isnan(detection(np.ones(4), np.ones(4, bool)).area)
 
 
-def test_costs_are_stored_to_a_per_mille():
-    values = np.array([1.0, 616.0, 12345.678, INF])
-    assert ladder.stored(values) == pytest.approx(values, rel=1e-3)
-
-
 # ---- many tops against one -------------------------------------------------------------------------------------------
 
 
@@ -178,16 +172,6 @@ def test_errors_do_not_hang_on_how_many_are_computed_together(tops, monkeypatch)
         assert at_once.keys() == in_pieces.keys()
         for quantity, values in at_once.items():
             assert np.array_equal(values, in_pieces[quantity])
-
-
-def test_tops_are_drawn_once_and_their_members_are_made_once():
-    drawn = Tops.drawn(20, 7, 5.0)
-    assert Tops.drawn(20, 7, 5.0) is drawn
-    assert np.array_equal(Tops(numbers_of(20, 7), 5.0).numbers, drawn.numbers)
-    chosen = np.array([3, 0, 11])
-    members = list(drawn.members(chosen))
-    assert np.array_equal([flat(*one) for one in members], drawn.numbers[chosen])
-    assert all(one is other for one, other in zip(members, drawn.members(chosen), strict=True))
 
 
 def test_a_failed_run_has_an_infinite_error(tops):
@@ -271,19 +255,6 @@ def test_runs_that_the_trial_of_the_guard_covers_are_no_forecasts(strang):
     assert (share.count, share.total) == ((exact & wrong_ones).sum(), wrong_ones.sum())
 
 
-def test_a_row_is_asked_for_what_it_shows_and_does_not_keep_anyway():
-    assert ladder.quantities_of(integrator("strang[axis]"), twin=False) == ("axis", "energy")
-    assert ladder.quantities_of(integrator("strang[attitude]"), twin=True) == ("attitude",)
-    assert ladder.quantities_of(integrator("midpoint[angles]"), twin=False) == ASKED
-    assert ladder.quantities_of(integrator("gauss-4[axis]"), twin=False) == ("axis",)
-
-
-def test_the_grid_has_every_compiled_row_and_says_what_it_leaves_out():
-    names = {case.integrator for case in study.STUDY.cases(True) if case.group == "short"}
-    assert {"strang[axis]", "strang[attitude]", "midpoint[angles]", "rk45-compiled[angles]", "taylor[axis]"} <= names
-    assert not {name for name in names if "unreduced" in name or name.startswith("exact")}
-
-
 # ---- verdicts --------------------------------------------------------------------------------------------------------
 
 
@@ -356,23 +327,6 @@ def test_a_price_is_a_slope_whatever_a_call_costs():
     assert samples[1][0] / 1e4 > 1.4 * each  # the time of the long run over its evaluations
 
 
-@pytest.mark.parametrize("name", ["series-adaptive[axis]", "strang[axis]"])
-def test_a_call_that_is_dearer_makes_no_evaluation_dearer(name, monkeypatch):
-    """A solver that waits for 0.2 ms before it runs, of a variant with a tolerance and of one with a step."""
-
-    def waiting(*args):
-        end = time.perf_counter() + 2e-4
-        while time.perf_counter() < end:
-            pass
-        return solver(*args)
-
-    row = integrator(name)
-    solver = row.solvers["axis"]
-    plain = float(prices([name], 9, 2e-3)["alone"][0])
-    monkeypatch.setattr(pricing, "integrator", lambda _: dataclasses.replace(row, solvers={"axis": waiting}))
-    assert float(prices([name], 9, 2e-3)["alone"][0]) == pytest.approx(plain, rel=0.3)
-
-
 def test_the_runs_that_are_timed_go_on_to_their_end():
     """Ten times the nutations take ten times the evaluations; tops that leave the chart of angles took fewer."""
     for name in (*EACH, "stormer-verlet[angles]", "rk4[angles]"):
@@ -431,6 +385,13 @@ def test_standings_of_known_costs():
     assert third.solved == Share(1, 4)
 
 
+def test_the_widest_solves_the_most_tops_and_is_the_first_of_equals():
+    for fails_too, row in ((0, "b"), (4, "a")):
+        data = tree({"a": [1.0] * 6 + [INF] * 4, "b": [3.0] * (10 - fails_too) + [INF] * fails_too})
+        taken = verdicts.costs(data, Cell("short", "axis", 1e-3), "alone")
+        assert verdicts.widest(verdicts.standings(taken)).name == row
+
+
 def test_a_method_made_worse_loses():
     """The same costs with a hundredth of noise: level; one of them twice as dear: it wins nowhere."""
     draw = np.random.default_rng(1)
@@ -441,14 +402,6 @@ def test_a_method_made_worse_loses():
     _, won = verdicts.best(tree({"a": 2.0 * same["a"], "b": same["b"]}), Cell("short", "axis", 1e-3), "alone")
     assert won.sure
     assert (won.row, won.share, won.next_share) == (1, Share(500, 500), Share(0, 500))
-
-
-def test_what_is_not_zero_is_not_printed_as_zero_and_what_is_not_all_not_as_all():
-    shares = Share(0, 9), Share(1, 9000), Share(32, 9883), Share(1, 2)
-    assert [messages.share_won(share) for share in shares] == ["0%", "<0.1%", "0.3%", "50%"]
-    assert messages.found_of(Share(9998, 10000)) == "all but 2 of 10,000 wrong runs"
-    assert messages.found_of(Share(70, 70)) == "all 70 wrong runs"
-    assert messages.found_of(Share(70, 100), whole=False) == "70.0% of wrong runs"
 
 
 def test_a_winner_by_times_that_are_not_met_again_is_not_sure():
@@ -521,3 +474,22 @@ def test_advice_counts_the_nearest_tops_of_the_quick_results(quick_results, quan
     advice = symtop.recommend(scene, accuracy=1e-6, quantity=quantity, horizon=20.0, results=quick_results)
     assert "of the 50 nearest random tops" in advice.nearest
     assert advice.nearest in str(advice)
+
+
+def test_silent_runs_at_small_steps_are_counted_by_kind_of_top(quick_results):
+    data = netcdf.read_any(quick_results / "population.nc")
+    share, each = words.hidden(data), words.hidden_by_steps(data)
+    assert share.kind in verdicts.strata(data)
+    assert share.of_kind <= share.silent_fine == pytest.approx(share.fine * share.wrong_fine)
+    assert [step for step, _, _ in each] == sorted(step for step, _, _ in each)
+    assert sum(wrong for step, wrong, _ in each if step >= words.FINE) == share.wrong_fine < share.wrong
+    assert sum(silent for step, _, silent in each if step >= words.FINE) == pytest.approx(share.silent_fine)
+
+
+def test_a_price_lost_in_noise_is_the_long_runs_whole_time():
+    """A short run that was timed longer than the long one gives no slope; a price is positive all the same."""
+    pair = Pair((lambda: None, 100.0), (lambda: None, 300.0))
+    assert pair.slopes(Timing((1.0, 2.0), 0.0), Timing((5.0, 4.0), 0.0), 2) == pytest.approx(
+        [3 / 200, 4 / 200, 2 / 200]
+    )
+    assert pair.slopes(Timing((6.0, 6.0), 0.0), Timing((3.0, 3.0), 0.0), 2) == pytest.approx([0.01] * 3)

@@ -3,10 +3,18 @@
 A member has the bits of `simulate` alone: the same steps, samples and observables. Steps are made in one compiled call
 (`FixedStep.many`, or the closed form's) where the method has one, or in one for each member (`Adaptive.many`); any
 other method runs its members one after another by `calling.solve`, as anybody's solver is called.
+
+Whether samples have to be dithered, `simulation.sample_times` decides for one run by the widest stretch of nutation
+phases that none of them shows; `schedule` decides it for row after row in compiled code, by the same operations on the
+same nutation period.
 """
 
+import contextlib
+import functools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,23 +22,27 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError
+from symtop.core.jit import compile_kernel, register_jitable
+from symtop.core.numbers import GOLDEN
 from symtop.core.parallel import heed
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.lanes import W
-from symtop.methods.framework.many import Many, members_of
+from symtop.methods.framework.lanes import Many, W, column, members_of, put
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, OUTCOMES, Plan
+from symtop.methods.framework.preparation import Body, Start
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
-from symtop.model import charts
+from symtop.methods.simd import wide_vectors
+from symtop.model import charts, top as model
 from symtop.model.charts import View
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import SymmetricTop
-from symtop.run.sampling import Schedule, nutation_periods, schedule
+from symtop.run.simulation import STRETCHES, WIDEST_GAP
 from symtop.run.trajectory import LABELS
 
 Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
 
 CHUNK = 65_536  # values of one column in a chunk: half a megabyte, which stays in a core's cache
 CHUNK_STEPS = 5_000_000  # in a chunk: a hundredth of a second in lanes, to a second
@@ -42,27 +54,140 @@ IN_LANES = "lanes"
 IN_TURN = "compiled, one after another"
 IN_PYTHON = "one call of Python for each"
 
-SHOWN = {  # by each chart, in this order
-    chart: ("theta", "phi", *psi, "axis", *quaternion, "energy", "p_theta", "p_phi", "p_psi")
-    for chart, psi, quaternion in (
-        ("angles", ("psi",), ()), ("axis", (), ()), ("attitude", ("psi",), ("quaternion",)),
-    )
-}  # fmt: skip
-TOLD = (  # of each member, beside what it shows
+SHOWN = {  # by each chart
+    "angles": ("theta", "phi", "psi", "axis", "energy", "p_theta", "p_phi", "p_psi"),
+    "axis": ("theta", "phi", "axis", "energy", "p_theta", "p_phi", "p_psi"),
+    "attitude": ("theta", "phi", "psi", "axis", "quaternion", "energy", "p_theta", "p_phi", "p_psi"),
+}
+PER_MEMBER = (  # columns, beside what a member shows
     "outcome", "steps", "force_evaluations", "newton_iterations", "reached_time", "step_size", "horizon", "dithered",
 )  # fmt: skip
 
 
-class _Top(NamedTuple):
-    """The tops of a chunk with the names of `SymmetricTop`, each (n, 1)."""
+class Schedule(NamedTuple):
+    """When n runs are sampled. A run of fewer steps than samples shows every step; the rest of its row is padded."""
 
-    I1: Array
-    I3: Array
-    mgl: Array
+    step_size: Array  # (n,), NaN where a method chooses its steps
+    marks: Whole  # (n, samples) whole steps; the last one again beyond `counts`, zeros without a step
+    times: Array  # (n, samples), NaN beyond `counts`
+    counts: Whole  # (n,) samples of each
+    dithered: NDArray[np.bool_]  # (n,)
 
-    def reduced_energy(self, *state: Array) -> Any:
-        """`SymmetricTop.reduced_energy` of rows of states."""
-        return SymmetricTop.reduced_energy(self, *state)  # type: ignore[arg-type]
+
+def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -> Schedule:
+    """Times and marks of n runs with so many steps each, or without steps of their own (None)."""
+    n, last = len(horizon), samples - 1
+    h = np.full(n, np.nan) if steps is None else horizon / steps
+    marks, times = np.zeros((n, samples), np.int64), np.full((n, samples), np.nan)
+    laid_out = Schedule(h, marks, times, np.full(n, samples), np.zeros(n, dtype=bool))
+    uniform = np.arange(samples, dtype=float)
+    dithered = uniform.copy()
+    dithered[1:last] += np.mod(GOLDEN * uniform[1:last], 1.0) - 0.5
+    by_steps = np.zeros(0, np.int64) if steps is None else np.ascontiguousarray(steps)
+    places = np.stack([uniform / last, dithered / last])
+    _lay_out()(np.ascontiguousarray(period), np.ascontiguousarray(horizon), by_steps, places, *laid_out)
+    return laid_out
+
+
+def nutation_periods(numbers: Array) -> Array:
+    """`SymmetricTop.nutation_period` of tops and starts (n, 9), to the bit; infinite on a separatrix."""
+    periods = np.empty(len(numbers))
+    _all_periods()(np.ascontiguousarray(numbers), periods)
+    return periods
+
+
+@functools.cache
+def _all_periods() -> Any:
+    """The compiled loop over members, whose bisections run in lanes: a third of the time."""
+    period_between, cubic_of, bisected, none = model.period_between, model.nutation_cubic, model.bisected, (0.0,) * 9
+
+    @register_jitable
+    def member(numbers, i):  # type: ignore[no-untyped-def]
+        at = numbers[i]
+        return Body(at[0], at[1], at[2]), Start(at[3], at[4], at[5], at[6], at[7], at[8])
+
+    def all_periods(numbers, periods):  # type: ignore[no-untyped-def]
+        wide_vectors()
+        n, lanes = len(numbers), np.empty(len(none) * W)
+        for first in range(0, n, W):
+            for j in range(W):
+                top, start = member(numbers, min(first + j, n - 1))
+                cosine = math.cos(start.theta)
+                put(lanes, 0, j, (*cubic_of(top, start), cosine, -1.0, cosine, 1.0, cosine))
+            for _ in range(model.BISECTIONS):
+                for j in range(W):
+                    at = column(lanes, 0, j, none)
+                    put(lanes, 5, j, bisected(at[:4], at[4], *at[5:]))
+            for j in range(min(W, n - first)):
+                top, start = member(numbers, first + j)
+                low, below, high, above = column(lanes, 5, j, none[:4])
+                periods[first + j] = period_between(top, start, 0.5 * (low + below), 0.5 * (high + above))
+
+    return compile_kernel(all_periods)
+
+
+@register_jitable
+def unseen(times: Any, period: float, phases: Any) -> Any:
+    """`simulation._unseen` of one row; `phases` is room for as many numbers."""
+    seen = 0
+    for k in range(len(times)):
+        turns = times[k] / period
+        phases[k] = turns - np.floor(turns)  # the remainder, exactly, and 50 ns less
+        seen |= 1 << int(STRETCHES * phases[k])
+    every = (1 << STRETCHES) - 1
+    if seen & every == every:
+        return 2.0 / STRETCHES
+    phases.sort()
+    gap = phases[0] + 1.0 - phases[-1]
+    for k in range(1, len(phases)):
+        gap = max(gap, phases[k] - phases[k - 1])
+    return gap
+
+
+@functools.cache
+def _lay_out() -> Any:  # noqa: C901  (one loop, read in one piece)
+    """The compiled loop over rows of a `Schedule`."""
+
+    def lay_out(period, horizon, steps, places, h, marks, times, counts, dithered):  # type: ignore[no-untyped-def]
+        samples = places.shape[1]
+        phases = np.empty(samples)
+        for i in range(len(horizon)):
+            if len(steps) and steps[i] < samples:  # every step is shown
+                counts[i] = steps[i] + 1
+                for k in range(samples):
+                    marks[i, k] = min(k, steps[i])
+                for k in range(counts[i]):
+                    times[i, k] = k * h[i]
+            else:
+                long_enough = np.isfinite(period[i]) and horizon[i] > 2.0 * period[i]
+                for row in range(2):
+                    dithered[i] = row == 1
+                    if len(steps) == 0:
+                        for k in range(samples):
+                            times[i, k] = horizon[i] * places[row, k]
+                    else:
+                        counts[i] = _distinct(steps[i], places[row], marks[i])
+                        for k in range(counts[i]):
+                            times[i, k] = marks[i, k] * h[i]
+                    times[i, counts[i] :] = np.nan
+                    asked = row == 0 and long_enough
+                    if not asked or unseen(times[i, : counts[i]], period[i], phases[: counts[i]]) < WIDEST_GAP:
+                        break
+
+    return compile_kernel(lay_out)
+
+
+@register_jitable
+def _distinct(steps: int, places: Any, marks: Any) -> int:
+    """Whole steps next to places that ascend, each once, and the last again in the rest of the row; how many."""
+    count = 0
+    for k in range(len(places)):
+        mark = np.int64(np.rint(steps * places[k]))
+        if k == 0 or mark > marks[count - 1]:
+            marks[count] = mark
+            count += 1
+    marks[count:] = marks[count - 1]
+    return count
 
 
 class _Runs(NamedTuple):
@@ -97,24 +222,19 @@ class Job:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For workers elsewhere, which know integrators by their names; one that they do not know goes as it is."""
-        words = {part.name: getattr(self, part.name) for part in fields(self)}
-        try:
-            known = find_integrator(self.method.name) == self.method
-        except SymtopError:
-            known = False
-        return _sent, (words | {"method": self.method.name if known else self.method},)
+        values = {part.name: getattr(self, part.name) for part in fields(self)}
+        with contextlib.suppress(SymtopError):
+            if find_integrator(self.method.name) == self.method:
+                values["method"] = self.method.name
+        return _received, (values,)
 
     @property
     def execution(self) -> str:
         """How the members are run, in words."""
         solver = self.method.solvers[self.chart]
-        if solver is exact.solve:
-            return IN_TURN
-        if isinstance(solver, Adaptive):
-            return IN_TURN
-        if not isinstance(solver, FixedStep) or solver.in_python:
-            return IN_PYTHON
-        return IN_LANES if solver.in_lanes else IN_TURN
+        if isinstance(solver, FixedStep) and not solver.in_python:
+            return IN_LANES if solver.in_lanes else IN_TURN
+        return IN_TURN if solver is exact.solve or isinstance(solver, Adaptive) else IN_PYTHON
 
     def chunks(self) -> Iterator[slice]:
         """Members in stretches that neither hold more than `CHUNK` values a column nor make too many steps.
@@ -139,17 +259,18 @@ class Job:
         return replace(self, first=self.first + members.start, **cut)
 
     def columns(self) -> dict[str, Any]:
-        """The runs: ``time``, what they show, what is `TOLD` of each member, and what the first said that `RAISED`."""
+        """The runs: ``time``, what they show, `PER_MEMBER`, and the first exception's message where one was raised."""
         period = nutation_periods(self.numbers) if self.period is None else self.period
         plan = schedule(period, self.horizon, self.samples, self.steps)
         with np.errstate(all="ignore"):  # a run may blow up, and that is a result
             runs = _whole(self._runs(plan), plan)
             columns = self._observables(runs, plan.times)
-        told = dict(zip(TOLD, (
+        each: tuple[Any, ...] = (
             np.array(ENDS)[runs.outcome], runs.steps, runs.force_evaluations, runs.newton_iterations, runs.reached,
             plan.step_size, self.horizon, plan.dithered,
-        ), strict=True))  # fmt: skip
-        return {"time": plan.times, **columns, **told} | ({RAISED: runs.raised} if runs.raised else {})
+        )  # fmt: skip
+        columns = {"time": plan.times, **columns, **dict(zip(PER_MEMBER, each, strict=True))}
+        return columns | ({RAISED: runs.raised} if runs.raised else {})
 
     def _runs(self, plan: Schedule) -> _Runs:
         """The states of the members, by the quickest way there is."""
@@ -162,17 +283,13 @@ class Job:
             done, ended = solver.many(self.numbers, self.tolerance, plan.times, plan.counts, self.budget)
             return _Runs(done.states, done.momenta, done.steps, done.work, 0 * done.work, done.outcome, ended)
         if solver is exact.solve:
-            states, momenta = exact.solve_many(self.numbers, np.nan_to_num(plan.times))
+            states, momenta = ClosedForms(self.numbers).run(np.nan_to_num(plan.times))
             none = np.zeros(len(self.numbers), dtype=np.int64)
             return _Runs(states, momenta, none, plan.counts, none, none, self.horizon)
         return self._in_turn(plan)
 
     def _in_turn(self, plan: Schedule) -> _Runs:
-        """The same by one call of a solver for each member.
-
-        A member fails alone if it starts on a pole, where the angles chart ends, if its numbers leave the range of the
-        arithmetic that a solver in Python does (`ArithmeticError`), and if the solver raises anything else.
-        """
+        """The same by one call of a solver for each member; one fails alone whatever its solver raises."""
         n = len(plan.counts)
         states = np.full((n, self.samples, charts.DIMENSIONS[self.chart]), np.nan)
         momenta, (steps, evaluations, iterations, outcome) = (
@@ -211,19 +328,18 @@ class Job:
 
     def _observables(self, runs: _Runs, times: Array) -> dict[str, Array]:
         """Of what a `Trajectory` shows of one run, what is asked for, of all."""
-        top: Any = _Top(*(self.numbers[:, k : k + 1] for k in range(3)))
-        seen = View(self.chart, top, runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
+        top: Any = SimpleNamespace(**{name: self.numbers[:, k : k + 1] for k, name in enumerate(("I1", "I3", "mgl"))})
+        top.reduced_energy = functools.partial(SymmetricTop.reduced_energy, top)  # of all tops at once
+        view = View(self.chart, top, runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
+        columns = {name: getattr(view, name) for name in self.shown}
         turned = [name for name in ("phi", "psi") if name in self.shown and self.chart != "angles"]
         truth = ClosedForms(self.numbers)(np.nan_to_num(times)) if turned else None
-        return {
-            name: charts.unwrapped(getattr(seen, name), getattr(truth, name)) if name in turned else getattr(seen, name)
-            for name in self.shown
-        }
+        return columns | {name: charts.unwrapped(columns[name], getattr(truth, name)) for name in turned}
 
 
-def _sent(words: dict[str, Any]) -> Job:
+def _received(values: dict[str, Any]) -> Job:
     """A job as it was before it was sent."""
-    return Job(**words | {"method": find_integrator(words["method"])})
+    return Job(**values | {"method": find_integrator(values["method"])})
 
 
 def sampled(solver: FixedStep, numbers: Array, plan: Schedule) -> Many:
@@ -236,7 +352,7 @@ def sampled(solver: FixedStep, numbers: Array, plan: Schedule) -> Many:
         solver.many(numbers[rows], plan.step_size[rows], plan.marks[rows, :count])
         for rows, count in zip(groups, counts, strict=True)
     ]
-    done = Many.begun(len(numbers), plan.marks.shape[1], parts[0].states.shape[2])
+    done = Many.empty(len(numbers), plan.marks.shape[1], parts[0].states.shape[2])
     for rows, count, part in zip(groups, counts, parts, strict=True):
         done.states[rows, :count], done.momenta[rows, :count] = part.states, part.momenta
         done.steps[rows], done.work[rows], done.outcome[rows] = part[2:]
@@ -244,7 +360,7 @@ def sampled(solver: FixedStep, numbers: Array, plan: Schedule) -> Many:
 
 
 def _whole(runs: _Runs, plan: Schedule) -> _Runs:
-    """A run that shows a state that is not finite and says nothing of it ends there, as in `simulation`."""
+    """A run that shows a state that is not finite, and reports nothing of it, ends there, as in `simulate`."""
     if np.isfinite(runs.states.sum()):  # a tenth of the time
         return runs
     finite = np.isfinite(runs.states).all(axis=2) | np.isnan(plan.times)
@@ -269,20 +385,12 @@ def as_dataset(columns: dict[str, Any], labels: dict[str, Any], *, shared: bool 
 
     `shared` says so where the columns are not those of all members.
     """
-    times = columns["time"]
-    if shared is None:
-        shared = same_times(times, times[0])
-    parts = [name for name, held in (("component", "axis"), ("part", "quaternion")) if held in columns]
-    ends = {"axis": "component", "quaternion": "part"}
+    columns, vectors = columns | labels, {"axis": "component", "quaternion": "part"}
+    times = columns.pop("time")
+    shared = same_times(times, times[0]) if shared is None else shared
     variables = {
-        name: (("member", "time", *([ends[name]] if name in ends else []))[: values.ndim], values)
-        for name, values in columns.items()
-        if name != "time"
+        name: (("member", "time", vectors.get(name, ""))[: values.ndim], values) for name, values in columns.items()
     }
-    return xr.Dataset(
-        {**variables, **{name: ("member", values) for name, values in labels.items()}},
-        {
-            "time": ("time", times[0]) if shared else (("member", "time"), times),
-            **{name: list(LABELS[name]) for name in parts},
-        },
-    )
+    coordinates = {dim: list(LABELS[dim]) for name, dim in vectors.items() if name in columns}
+    clock = ("time", times[0]) if shared else (("member", "time"), times)
+    return xr.Dataset(variables, {"time": clock, **coordinates})

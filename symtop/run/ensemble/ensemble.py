@@ -1,38 +1,44 @@
 """ensemble(): many tops, one integrator, each with a step and a horizon of its own -> one dataset.
 
 Members are computed in chunks (`symtop.run.ensemble.chunks`), on threads or on a cluster, and a member has the bits of
-`simulate` alone. What does not fit into memory goes to a file as it is computed (`symtop.run.ensemble.chunked_output`).
+`simulate` alone. What does not fit into memory goes to a file as it is computed (`Stream`), and is resumed from there.
 """
 
 import contextlib
 import warnings
-from collections.abc import Callable, Generator, Iterable
+import zipfile
+from collections.abc import Callable, Generator, Iterable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
+import netCDF4
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from symtop.core import cluster, netcdf
-from symtop.core.errors import SymtopError, SymtopWarning, boolean, file_path, positive, shown, whole
+from symtop.core import netcdf
+from symtop.core.code_hash import digest, hashed, packages
+from symtop.core.errors import SymtopError, SymtopWarning, boolean, check_replaceable, file_path, positive, whole
+from symtop.core.files import locked
+from symtop.core.jit import code
 from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
 from symtop.core.progress import beating
+from symtop.core.signals import ending_on_sigterm
 from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
-from symtop.run.ensemble.chunked_output import streaming
-from symtop.run.ensemble.chunks import RAISED, SHOWN, Job, as_dataset
+from symtop.run import cluster
+from symtop.run.ensemble.chunks import CHUNK, CHUNK_STEPS, RAISED, SHOWN, Job, as_dataset, nutation_periods, same_times
 from symtop.run.ensemble.inputs import Members, called, for_each, read_members
-from symtop.run.guard.guard import MOST_STEPS
-from symtop.run.sampling import nutation_periods
-from symtop.run.simulation import MOST_SAMPLES, MOST_SWINGS, chart_of, check_formula
+from symtop.run.guard import MOST_STEPS
+from symtop.run.simulation import MOST_SAMPLES, MOST_SWINGS, chart_of, check_control
 
 Array = NDArray[np.float64]
 
 SAMPLES = 101
+IDENTITY = "identity"  # the file that says which ensemble a folder belongs to
 MOST_VALUES = 250_000_000  # of all members, samples and variables, 2 GB: more goes to a file
 
 
@@ -55,12 +61,12 @@ def ensemble(
 
     Dimensions ``member``, ``time``, ``component`` (x, y, z). Variables as `simulate` has them: ``theta``, ``phi``,
     ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, or those of them that `variables`
-    names (``phi`` and ``psi`` of the space frame take the closed form, 12 microseconds a member); for each member
-    ``outcome``, ``steps``, ``force_evaluations``, ``newton_iterations``, ``reached_time``, ``step_size``, ``horizon``,
-    ``dithered``. ``time`` is a row where all members are sampled at the same times, and otherwise an array over
-    ``member`` and ``time``; ``data.isel(member=i)`` has a row either way. A member of fewer steps than `samples` shows
-    every step, and the rest of its row is NaN. Labels of members, a coordinate ``member``, are kept, and what is given
-    for each as a DataArray with such labels is taken by label.
+    names (``phi`` and ``psi`` of the space frame take the closed form); for each member ``outcome``, ``steps``,
+    ``force_evaluations``, ``newton_iterations``, ``reached_time``, ``step_size``, ``horizon``, ``dithered``. ``time``
+    is a row where all members are sampled at the same times, and otherwise an array over ``member`` and ``time``;
+    ``data.isel(member=i)`` has a row either way. A member of fewer steps than `samples` shows every step, and the rest
+    of its row is NaN. Labels of members, a coordinate ``member``, are kept, and what is given for each as a DataArray
+    with such labels is taken by label.
 
     A member that fails fails alone: its samples are NaN from there, ``outcome`` says why. One that starts on a pole has
     left the angles chart at once, and one on which somebody's solver raises an exception has "raised": a warning
@@ -71,8 +77,7 @@ def ensemble(
     Work is done on as many `threads` as there are cores, or by the workers of the dask cluster at the address
     `scheduler`. The attribute ``execution`` says how members were run: in "lanes", 32 side by side, where the method
     can. With a `path`, members go to that netCDF file as they are computed, in memory that does not grow with
-    `samples`: 0.25 kB a member for its nine numbers, its plan and their copies, beside the 0.13 of a population. The
-    same call resumes one that was killed, to the same file, and the dataset reads from the file what it is asked for.
+    `samples` (0.4 kB a member). The same call resumes one that was killed, to the same file, and the dataset is lazy.
 
     Raises SymtopError for arguments that make no sense, for members that are no top or no start, by number, and for a
     path to which another process is writing.
@@ -81,56 +86,53 @@ def ensemble(
     count, silent = whole("samples", samples, 2, MOST_SAMPLES), boolean("quiet", quiet)
     workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
     chart = chart_of(method, read.observes, observe)
-    names = _shown(variables, chart)
+    shown, n = _shown(variables, chart), len(read.numbers)
     if path is None:
-        _check_memory(len(read.numbers), count, names)
+        _check_memory(n, count, shown)
     limit = None if budget is None else positive("budget", budget)
-    asked = _Asked(step_size, per_nutation, tolerance, horizon, nutations)
-    job = _job(read, method, chart, asked, count, limit, names)
+    names, values = ("step_size", "per_nutation", "horizon", "nutations"), (step_size, per_nutation, horizon, nutations)
+    settings = {name: value for name, value in zip(names, values, strict=True) if value is not None}
+    job = _job(read, method, chart, settings, tolerance, count, limit, shown)
     if scheduler is not None:
         cluster.check_sent(scheduler, job.part(slice(0, 1)), method.name)
-    n, chunks = len(read.numbers), list(job.chunks())
+    chunks = list(job.chunks())
     words = {
         "title": f"{method.name} on {n} tops", "units": read.units, "integrator": method.name, "chart": chart,
         "implementation": method.implementation, "execution": job.execution,
     }  # fmt: skip
 
-    def compute(rest: list[slice], keep: Callable[[slice, dict[str, Any]], object]) -> _Raised:
-        left, raised = sum(chunk.stop - chunk.start for chunk in rest), _Raised(0, "")
-        with (
-            beating(
-                tqdm(total=n, initial=n - left, desc=words["title"], unit="top", disable=silent or None, leave=False)
-            ) as bar,
-            contextlib.closing(_computed(job, rest, workers, scheduler)) as parts,
-        ):
+    def compute(rest: list[slice], keep: Callable[[slice, dict[str, Any]], object]) -> tuple[int, str]:
+        """On how many members a solver raised an exception, and the first one's message."""
+        raised, first, left = 0, "", sum(chunk.stop - chunk.start for chunk in rest)
+        bar = tqdm(total=n, initial=n - left, desc=words["title"], unit="top", disable=silent or None, leave=False)
+        with beating(bar), contextlib.closing(_computed(job, rest, workers, scheduler)) as parts:
             for chunk, part in zip(rest, parts, strict=True):
-                raised = raised.and_of(part)
+                if message := part.pop(RAISED, ""):
+                    raised, first = raised + int((part["outcome"] == RAISED).sum()), first or message
                 keep(chunk, part)
                 bar.update(chunk.stop - chunk.start)
-        return raised
+        return raised, first
 
     if path is None:
         columns = dict[str, Any]()
-        raised = compute(chunks, lambda chunk, part: _fill(columns, part, chunk, n))
-        raised.refuse(n)
-        said = {RAISED: raised.first} if raised.members else {}
-        data = netcdf.describe(as_dataset(columns, read.labels), **words, **said)
+        raised, first = compute(chunks, lambda chunk, part: _fill(columns, part, chunk, n))
+        if raised == n:
+            raise SymtopError(first)
+        data = netcdf.describe(as_dataset(columns, read.labels), **words, **({RAISED: first} if raised else {}))
     else:
-        with streaming(file_path("path", path), job, read.labels, words) as stream:
-            raised = compute(stream.missing(chunks), stream.keep)
-            if raised.members == n:
+        with _stream(file_path("path", path), job, read.labels, words) as stream:
+            raised, first = compute(stream.missing(chunks), stream.keep)
+            if raised == n:
                 stream.forget(chunks)  # there is nothing to resume
-            raised.refuse(n)
+                raise SymtopError(first)
             data = stream.finish(chunks)
-    if raised.members:
-        sentence = f"{raised.members} of {n} members raised an exception, the first: {raised.first}"
+    if raised:
+        sentence = f"{raised} of {n} members raised an exception, the first: {first}"
         warnings.warn(sentence, SymtopWarning, stacklevel=2)
     return data
 
 
-def _computed(
-    job: Job, chunks: list[slice], threads: int, scheduler: str | None
-) -> Generator[dict[str, Any], None, None]:
+def _computed(job: Job, chunks: list[slice], threads: int, scheduler: str | None) -> Generator[Any, None, None]:
     """The columns of each chunk, in their order."""
     parts = map(job.part, chunks)
     if scheduler is None:
@@ -138,23 +140,6 @@ def _computed(
     else:
         with cluster.connected(scheduler) as client:
             yield from in_order(client.get_executor(pure=False), Job.columns, parts, cluster.width(client))
-
-
-class _Raised(NamedTuple):
-    """How many members a solver raised an exception on, and what the first of them was told."""
-
-    members: int
-    first: str
-
-    def and_of(self, part: dict[str, Any]) -> "_Raised":
-        """With those of a chunk, whose sentence is taken out of it."""
-        said = part.pop(RAISED, "")
-        return _Raised(self.members + int((part["outcome"] == RAISED).sum()), self.first or said) if said else self
-
-    def refuse(self, n: int) -> None:
-        """SymtopError if that are all n."""
-        if self.members == n:
-            raise SymtopError(self.first)
 
 
 def _fill(columns: dict[str, Any], part: dict[str, Any], chunk: slice, n: int) -> None:
@@ -172,117 +157,71 @@ def _shown(variables: Iterable[str] | None, chart: str) -> tuple[str, ...]:
         return SHOWN[chart]
     if isinstance(variables, str) or not isinstance(variables, Iterable):
         raise SymtopError(f"variables must be a list of names, not {variables!r}", "variables")
-    wanted = list(variables)
+    wanted, known = list(variables), SHOWN[chart]
     for name in wanted:
-        if name not in SHOWN[chart]:
-            raise SymtopError(
-                f"variables in the {chart} chart are {', '.join(SHOWN[chart])}, not {name!r}", "variables"
-            )
-    return tuple(name for name in SHOWN[chart] if name in wanted)
+        if name not in known:
+            raise SymtopError(f"variables in the {chart} chart are {', '.join(known)}, not {name!r}", "variables")
+    return tuple(name for name in known if name in wanted)
 
 
 def _check_memory(n: int, samples: int, shown: tuple[str, ...]) -> None:
     """Refuse a dataset that does not fit into memory."""
     values = n * samples * (1 + sum({"axis": 3, "quaternion": 4}.get(name, 1) for name in shown))
     if values > MOST_VALUES:
-        raise SymtopError(
-            f"{n} members with {samples} samples are {values:.3g} numbers, more than the {MOST_VALUES:.3g} that are "
-            f"kept in memory: give a path to stream them to a netCDF file, fewer samples, or fewer variables"
-        )
-
-
-class _Asked(NamedTuple):
-    """The settings of an ensemble as they were given: one for all members, one for each, or none."""
-
-    step_size: object
-    per_nutation: object
-    tolerance: object
-    horizon: object
-    nutations: object
-
-    def check(self, method: Integrator) -> None:
-        """Refuse settings that exclude each other or are not what the method has."""
-        for one, other in (("step_size", "per_nutation"), ("horizon", "nutations")):
-            if getattr(self, one) is not None and getattr(self, other) is not None:
-                raise SymtopError(f"give {one} or {other}, not both", one, other)
-        words, step = next(
-            ((name, value) for name, value in zip(self._fields[:2], self[:2], strict=True) if value is not None),
-            ("step_size", None),
-        )
-        if method.fixed_step and self.tolerance is not None:
-            raise SymtopError(
-                f"{method.name} has a fixed step: give step_size, not tolerance = {shown(self.tolerance)}",
-                "step_size",
-                "tolerance",
-            )
-        if method.fixed_step and step is None:
-            raise SymtopError(
-                f"{method.name} has a fixed step and needs step_size or per_nutation", "step_size", "per_nutation"
-            )
-        check_formula(method, words, step, self.tolerance)
-        if not method.fixed_step and step is not None:
-            raise SymtopError(
-                f"{method.name} chooses its own steps: give tolerance, not {words} = {shown(step)}", "tolerance", words
-            )
+        size = f"{n} members with {samples} samples are {values:.3g} numbers, more than the {MOST_VALUES:.3g} that are"
+        remedy = "give a path to stream them to a netCDF file, fewer samples, or fewer variables"
+        raise SymtopError(f"{size} kept in memory: {remedy}")
 
 
 def _job(
-    members: Members, method: Integrator, chart: str, asked: _Asked, samples: int, budget: float | None,
-    shown: tuple[str, ...],
+    members: Members, method: Integrator, chart: str, given: dict[str, Any], tolerance: object, samples: int,
+    budget: float | None, shown: tuple[str, ...],
 ) -> Job:  # fmt: skip
-    """What is asked of an integrator, checked."""
-    asked.check(method)
-    n, numbers, horizon = len(members.numbers), members.numbers, members.horizon
-    names = members.names
-    period = None
-    if asked.per_nutation is not None or asked.nutations is not None:
-        period = _periods(numbers, names)
-    if period is not None and asked.nutations is not None:
-        with np.errstate(over="ignore"):  # an infinite horizon is refused below
-            horizon = for_each("nutations", asked.nutations, n, names) * period
-    elif asked.horizon is not None:
-        horizon = for_each("horizon", asked.horizon, n, names)
-    if horizon is None:
-        raise SymtopError(
-            "give horizon or nutations: these members have no horizon of their own", "horizon", "nutations"
-        )
-    horizon_of(float(horizon.min()))
-    _check_ends(horizon, asked, names)
+    """The job of an integrator, from settings that are checked here."""
+    for one, other in (("step_size", "per_nutation"), ("horizon", "nutations")):
+        if one in given and other in given:
+            raise SymtopError(f"give {one} or {other}, not both", one, other)
+    control = "per_nutation" if "per_nutation" in given else "step_size"
+    check_control(method, given.get(control), tolerance, control)
+    if method.fixed_step and control not in given:
+        words = "has a fixed step and needs step_size or per_nutation"
+        raise SymtopError(f"{method.name} {words}", "step_size", "per_nutation")
+    numbers, names, n = members.numbers, members.names, len(members.numbers)
+    period = nutation_periods(numbers) if "per_nutation" in given or "nutations" in given else None
+    for i in np.flatnonzero(~np.isfinite(period))[:1] if period is not None else ():
+        words = f"per_nutation and nutations count nutation periods, and that of {called(names, i)} is endless"
+        raise SymtopError(words, "per_nutation", "nutations")
+    horizon = _horizons(members, given, period)
     steps = bounds = None
-    if period is not None and asked.per_nutation is not None:
-        counted = for_each("per_nutation", asked.per_nutation, n, names)
-        steps = _steps(_parts(period, counted, horizon, names), horizon, budget or MOST_STEPS, names)
-    elif method.fixed_step:
-        steps = _steps(for_each("step_size", asked.step_size, n, names), horizon, budget or MOST_STEPS, names)
+    if method.fixed_step:
+        step = for_each(control, given[control], n, names)
+        step = step if period is None or control == "step_size" else _parts(period, step, horizon, names)
+        steps = _steps(step, horizon, budget or MOST_STEPS, names)
     elif method.adaptive:
         period = nutation_periods(numbers) if period is None else period
-        bounds = _tolerances(method, asked.tolerance, members, horizon, period)
+        bounds = _tolerances(method, tolerance, members, horizon, period)
     return Job(method, chart, numbers, horizon, steps, bounds, samples, budget, shown, period, names)
 
 
-def _check_ends(horizon: Array, asked: "_Asked", names: Any) -> None:
-    """Refuse a horizon beyond the times that the closed form takes."""
+def _horizons(members: Members, given: dict[str, Any], period: Array | None) -> Array:
+    """The horizon of each member: given, so many periods, or its own."""
+    horizon, names, n = members.horizon, members.names, len(members.numbers)
+    if "horizon" in given:
+        horizon = for_each("horizon", given["horizon"], n, names)
+    elif period is not None and "nutations" in given:
+        with np.errstate(over="ignore"):  # an infinite horizon is refused below
+            horizon = for_each("nutations", given["nutations"], n, names) * period
+    if horizon is None:
+        words = "give horizon or nutations: these members have no horizon of their own"
+        raise SymtopError(words, "horizon", "nutations")
+    horizon_of(float(horizon.min()))
     for i in np.flatnonzero(horizon > LONGEST_TIME)[:1]:
-        if asked.nutations is not None:
-            raise SymtopError(
-                f"nutations must be fewer: they take {called(names, i)} beyond a time of {LONGEST_TIME:g}", "nutations"
-            )
-        raise SymtopError(
-            f"horizon must be at most {LONGEST_TIME:g}, not {horizon[i]!s} as of {called(names, i)}", "horizon"
-        )
-
-
-def _periods(numbers: Array, names: Any) -> Array:
-    """Nutation periods; SymtopError for a member that has none."""
-    period = nutation_periods(numbers)
-    endless = np.flatnonzero(~np.isfinite(period))
-    if endless.size:
-        raise SymtopError(
-            f"per_nutation and nutations count nutation periods, and that of {called(names, endless[0])} is endless",
-            "per_nutation",
-            "nutations",
-        )
-    return period
+        if "nutations" in given:
+            words = f"they take {called(names, i)} beyond a time of {LONGEST_TIME:g}"
+            raise SymtopError(f"nutations must be fewer: {words}", "nutations")
+        words = f"not {horizon[i]!s} as of {called(names, i)}"
+        raise SymtopError(f"horizon must be at most {LONGEST_TIME:g}, {words}", "horizon")
+    return horizon
 
 
 def _parts(period: Array, counted: Array, horizon: Array, names: Any) -> Array:
@@ -291,9 +230,8 @@ def _parts(period: Array, counted: Array, horizon: Array, names: Any) -> Array:
         step: Array = period / counted
     for i in np.flatnonzero(step > horizon)[:1]:
         least = f"{period[i] / horizon[i]:.4g}, a step within the horizon"
-        raise SymtopError(
-            f"per_nutation must be at least {least}, not {counted[i]:.4g} as of {called(names, i)}", "per_nutation"
-        )
+        words = f"not {counted[i]:.4g} as of {called(names, i)}"
+        raise SymtopError(f"per_nutation must be at least {least}, {words}", "per_nutation")
     return step
 
 
@@ -302,14 +240,11 @@ def _steps(step: Array, horizon: Array, most: float, names: Any) -> NDArray[np.i
     with np.errstate(over="ignore"):
         ratio = horizon / step
     for i in np.flatnonzero(step > horizon)[:1]:
-        raise SymtopError(
-            f"step_size must be at most the horizon, not {step[i]!s} of {horizon[i]!s} as of {called(names, i)}",
-            "step_size",
-        )
+        words = f"not {step[i]!s} of {horizon[i]!s} as of {called(names, i)}"
+        raise SymtopError(f"step_size must be at most the horizon, {words}", "step_size")
     for i in np.flatnonzero(ratio > most)[:1]:
-        raise SymtopError(
-            f"{called(names, i)} asks for {ratio[i]:.3g} steps; the limit is {most:.3g} (see budget)", "budget"
-        )
+        words = f"{ratio[i]:.3g} steps; the limit is {most:.3g} (see budget)"
+        raise SymtopError(f"{called(names, i)} asks for {words}", "budget")
     return np.maximum(1, np.rint(ratio)).astype(np.int64)
 
 
@@ -319,13 +254,133 @@ def _tolerances(method: Integrator, tolerance: object, members: Members, horizon
     pendulum = np.sqrt(np.abs(numbers[:, 2]) / numbers[:, 0]) / (2.0 * np.pi)
     swings = horizon * np.maximum(1.0 / period, pendulum)
     for i in np.flatnonzero(swings > MOST_SWINGS)[:1]:
-        raise SymtopError(
-            f"the horizon of {called(names, i)} is {swings[i]:.3g} swings of the top; an adaptive method may take "
-            f"{MOST_SWINGS:.3g}"
-        )
+        words = f"{swings[i]:.3g} swings of the top; an adaptive method may take {MOST_SWINGS:.3g}"
+        raise SymtopError(f"the horizon of {called(names, i)} is {words}")
     if np.ndim(tolerance) == 0:  # type: ignore[arg-type]
         return np.broadcast_to(method.check_tolerance(tolerance), len(numbers))
     row = for_each("tolerance", tolerance, len(numbers), names)
     for value in (row.min(), row.max()):
         method.check_tolerance(float(value))
     return row
+
+
+@contextlib.contextmanager
+def _stream(path: Path, job: Job, labels: dict[str, Any], words: dict[str, Any]) -> Iterator["Stream"]:
+    """The stream to a file, while nobody else has one; SymtopError if another process does."""
+    check_replaceable(path)
+    folder = path.with_name(f"{path.name}.parts")
+    with locked(folder, wait=False) as ours:
+        if not ours:
+            raise SymtopError(f"another process is writing {path}: wait until it has ended, or name another path")
+        yield Stream(path, folder, job, labels, words)
+
+
+class Stream:
+    """The netCDF file of an ensemble, and its chunks on disk.
+
+    Each chunk is in a file of its own, whole or absent, in the folder ``PATH.parts``, beside the file `IDENTITY`. When
+    all are there they are put together, one after another, into the netCDF file, which replaces `PATH` in one move;
+    then they are removed, `IDENTITY` last. The bytes of the file do not depend on how often the work was interrupted.
+    While it is put together it takes its size twice. One process at a time may do so: it holds the lock ``.PATH.lock``.
+    Nothing is removed or replaced that symtop did not write.
+    """
+
+    def __init__(self, path: Path, folder: Path, job: Job, labels: dict[str, Any], attributes: dict[str, Any]) -> None:
+        self.path, self.folder, self.labels, self.attributes = path, folder, labels, attributes
+        self.n = len(job.numbers)
+        identity, stored = _identity(job, labels), self.folder / IDENTITY
+        empty = not self.folder.exists() or (self.folder.is_dir() and not any(self.folder.iterdir()))
+        if not empty and not stored.is_file():
+            words = "is there and does not say which ensemble it is of: remove it or name another path than"
+            raise SymtopError(f"{self.folder} {words} {path}")
+        netcdf.sweep(path)
+        if stored.is_file() and stored.read_text(encoding="utf-8") != identity:
+            words = "holds the beginning of another ensemble, or of another version's; remove it or name another path"
+            raise SymtopError(f"{self.folder} {words} than {path}")
+        with netcdf.replacing(stored) as partial:
+            partial.write_text(identity, encoding="utf-8")
+
+    def missing(self, chunks: list[slice]) -> list[slice]:
+        """The chunks that are not on disk."""
+        return [chunk for chunk in chunks if not self._part(chunk).is_file()]
+
+    def keep(self, chunk: slice, columns: dict[str, Any]) -> None:
+        """Put a chunk on disk."""
+        with ending_on_sigterm(), netcdf.replacing(self._part(chunk), ".npz") as partial:
+            np.savez(partial, **columns)
+
+    def finish(self, chunks: list[slice]) -> xr.Dataset:
+        """Put the chunks together; the dataset reads from the file what it is asked for."""
+        with self._writing(), netcdf.alone(), netcdf.replacing(self.path) as partial:
+            first = self._columns(chunks[0])
+            shared = all(same_times(self._columns(chunk, "time")["time"], first["time"][0]) for chunk in chunks)
+            labels = {name: values[: chunks[0].stop] for name, values in self.labels.items()}
+            pattern = netcdf.describe(as_dataset(first, labels, shared=shared), **self.attributes)
+            with contextlib.closing(netCDF4.Dataset(partial, "w")) as file:
+                _lay_out(file, pattern, self.n)
+                for chunk in chunks:
+                    columns = self._columns(chunk) | {name: values[chunk] for name, values in self.labels.items()}
+                    if shared:
+                        del columns["time"]
+                    for name, values in columns.items():
+                        file[name][chunk] = values.astype(object) if values.dtype.kind == "U" else values
+        self.forget(chunks)
+        return xr.open_dataset(self.path, engine="netcdf4")
+
+    def forget(self, chunks: list[slice]) -> None:
+        """Remove the chunks, and at last the file that says whose they are."""
+        for file in (*map(self._part, chunks), self.folder / IDENTITY):
+            file.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # something of somebody else's is in it
+            self.folder.rmdir()
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[None]:
+        """The netCDF library has an error of its own for a disk that is full."""
+        try:
+            yield
+        except RuntimeError as error:
+            words = f"What was computed is in {self.folder}, and the same call goes on from there"
+            raise SymtopError(f"cannot write {self.path}: {error}; is the disk full? {words}") from error
+
+    def _part(self, chunk: slice) -> Path:
+        return self.folder / f"{chunk.start}-{chunk.stop}.npz"
+
+    def _columns(self, chunk: slice, *names: str) -> dict[str, Any]:
+        """The columns of a chunk, or some of them."""
+        path = self._part(chunk)
+        try:
+            with path.open("rb") as file, np.load(file) as columns:
+                return {name: columns[name] for name in names or columns.files}
+        except FileNotFoundError as error:
+            words = "is not there any more, so somebody has removed it: run the same again, and it is computed"
+            raise SymtopError(f"{path} {words}") from error
+        except (OSError, ValueError, zipfile.BadZipFile) as error:
+            raise SymtopError(f"{path} is damaged ({error}): remove it, and it is computed again") from error
+
+
+def _lay_out(file: Any, pattern: xr.Dataset, n: int) -> None:
+    """Dimensions, variables, attributes and coordinates of the file, from a dataset of its first members."""
+    file.set_fill_off()
+    for name, size in pattern.sizes.items():
+        file.createDimension(name, n if name == "member" else size)
+    variables, attributes = xr.conventions.encode_dataset_coordinates(pattern)
+    for name, variable in variables.items():
+        values = variable.values
+        kind = str if values.dtype.kind == "U" else "i1" if values.dtype.kind == "b" else values.dtype
+        made = file.createVariable(name, kind, variable.dims, contiguous=kind is not str)
+        made.setncatts(variable.attrs | ({"dtype": "bool"} if values.dtype.kind == "b" else {}))
+        if "member" not in variable.dims:
+            made[:] = values.astype(object) if kind is str else values
+    file.setncatts(attributes)
+
+
+def _identity(job: Job, labels: dict[str, Any]) -> str:
+    """A hash of all that decides the bytes of the file: code, and what it is given."""
+    arrays = job.numbers, job.horizon, job.steps, job.tolerance
+    limits = job.chart, job.samples, job.budget, job.shown, CHUNK, CHUNK_STEPS
+    return digest({
+        **code().reasons("integrator", job.method, Job), **packages(),
+        "numbers": hashed(*(netcdf.array_hash(values) for values in (*arrays, *labels.values()))),
+        "limits": hashed(repr(limits)),
+    })  # fmt: skip

@@ -1,0 +1,179 @@
+"""What a long run does to the constants of the motion and to its phase: histories, and laws of growth.
+
+The root mean square over the members of an ensemble grows as n^1/2 where each is a random walk. One walk may return to
+zero and its largest value says little; drawing members with replacement (bootstrap) gives the interval. Source of the
+laws of rounding: Brouwer, Astron. J. 46 (1937) 149; of the interval: Efron, Ann. Statist. 7 (1979) 1.
+
+When a tolerance is lost is foretold by the parabola error = a + b t + c t^2 through a short run: b is a wrong frequency
+and c the drift of the frequency that comes with a drift of energy. A c or an a that is not significant is left out: one
+of less than four standard errors, which are error_k^2 = rest.rest/(n - m) (A^T A)^-1_kk of the columns A (n, m).
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from symtop.core.numbers import TINY
+from symtop.measure.conservation import Trend, constant_of, residuals, tops
+from symtop.measure.order import Fit, power_law
+from symtop.measure.phase import nutation_phase
+from symtop.methods.framework.registry import Integrator
+from symtop.model.charts import Array
+from symtop.model.scenes import Scene
+from symtop.run.simulation import integrate
+
+WINDOWS = 24  # for a change of law: each side of it needs at least five
+SETTLED = 30.0  # nutations: before, an oscillation switches on, which is no change of law
+DRAWS, SEED = 2000, 1937  # of the bootstrap
+BLOCKS = 50
+
+
+def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:
+    """One run and what became of the constants of the motion and of its phase.
+
+    Dimension ``sample``: ``sample_time`` and, for energy, p_phi and p_psi, ``NAME_residual``. For each of them the
+    ``largest``, the linear ``slope`` with its ``interval`` and ``rise``, and the ``exponent`` of growth over the last
+    two decades; for the phase of the nutation (rad; NaN where there is none) ``largest`` and ``exponent``, over the
+    last decade, because a wrong frequency gives way to a drifting one only late. ``exponent_interval`` goes with each,
+    and ``law``, its name; where one law gives way to another, ``change`` is the time, ``before`` and ``after`` are the
+    exponents (NaN where none does).
+    """
+    run = integrate(scene, method, observe="nutation", **settings)
+    time = run.time
+    columns: dict[str, Any] = {"sample_time": ("sample", time), "outcome": run.outcome, "steps": run.steps}
+    period = scene.nutation_period
+    late = time > (SETTLED * period if math.isfinite(period) else 0.0)
+    for name, values in residuals(scene, run).items():
+        columns[f"{name}_residual"] = ("sample", values)
+        columns |= _columns(name, constant_of(time, values)._asdict(), time[late], values[late])
+    phase = nutation_phase(scene, time, run.theta, run.p_theta / scene.top.I1)
+    changed = constant_of(time, phase, 1.0)._asdict()
+    without_trend = {part: value for part, value in changed.items() if part not in Trend._fields}
+    return xr.Dataset(columns | _columns("phase", without_trend, time[late], phase[late]))
+
+
+def _columns(name: str, changed: dict[str, Any], time: np.ndarray, values: np.ndarray) -> dict[str, Any]:
+    """What became of a quantity, and where within the last two decades another law than that of the end ended."""
+    change = change_point(*tops(time, values, count=WINDOWS)) if time.size else None
+    when, before, after = (math.nan,) * 3 if change is None else change
+    parts = changed | {"change": when, "before": before, "after": after}
+    return {f"{name}_{part}": value for part, value in parts.items()}
+
+
+class Ensemble(NamedTuple):
+    """Root mean square of drifts over the members of an ensemble, and its growth."""
+
+    rms: np.ndarray  # (windows,)
+    fit: Fit  # interval: half-width of the bootstrap's 95 %
+
+
+def ensemble_growth(steps: ArrayLike, drifts: ArrayLike, least: float) -> Ensemble:
+    """The exponent of the root mean square of `drifts` (members, windows) from `least` steps on."""
+    n, values = np.asarray(steps, float), np.asarray(drifts, float)
+    rms = np.sqrt(np.mean(values**2, axis=0))
+    used = n >= least
+    fit = power_law(n, rms, used)
+    if not math.isfinite(fit.slope):
+        return Ensemble(rms, fit)
+    members = np.random.default_rng(SEED).integers(len(values), size=(DRAWS, len(values)))
+    again = 0.5 * np.log(np.mean(values[members][..., fit.used] ** 2, axis=1))
+    x = np.log(n[fit.used]) - np.log(n[fit.used]).mean()
+    low, high = np.quantile(again @ x / (x @ x), (0.025, 0.975))
+    return Ensemble(rms, fit._replace(interval=float(max(high - fit.slope, fit.slope - low))))
+
+
+class Change(NamedTuple):
+    """Where a growth law gives way to another."""
+
+    time: float
+    before: float  # exponents
+    after: float
+
+
+def change_point(time: ArrayLike, size: ArrayLike, least: int = 5) -> Change | None:
+    """The best break of a log-log curve into two lines, if it halves what one line leaves and earns its two parameters.
+
+    Judged by Schwarz's criterion; each line has at least `least` points, and the two exponents differ by at least 1/4.
+    """
+    t, y = np.asarray(time, float), np.asarray(size, float)
+    good = np.isfinite(t) & np.isfinite(y) & (t > 0.0) & (y > 0.0)
+    u, v = np.log(t[good]), np.log(y[good])
+    n = u.size
+    if n < 2 * least:
+        return None
+
+    def broken(place: float) -> tuple[float, np.ndarray]:
+        columns = np.stack([np.ones(n), u, np.maximum(u - place, 0.0)], axis=1)
+        coefficients = np.linalg.lstsq(columns, v, rcond=None)[0]
+        return float(np.sum((v - columns @ coefficients) ** 2)), coefficients
+
+    straight = float(np.polyfit(u, v, 1, full=True)[1][0]) if n > 2 else 0.0
+    places = u[least - 1 : n - least + 1]
+    rest, place, coefficients = min((*broken(place)[:1], place, broken(place)[1]) for place in map(float, places))
+    gain = n * math.log(max(straight, TINY) / max(rest, TINY)) - 2.0 * math.log(n)
+    if gain <= 0.0 or rest > 0.5 * straight or abs(coefficients[2]) < 0.25:
+        return None
+    return Change(math.exp(place), float(coefficients[1]), float(coefficients[1] + coefficients[2]))
+
+
+class Horizon(NamedTuple):
+    """When an error reaches a tolerance: foretold, with the parabola it comes from."""
+
+    time: float  # inf if it never does
+    constant: float
+    rate: float
+    bend: float
+
+
+def horizon(time: ArrayLike, error: ArrayLike, tolerance: float) -> Horizon:
+    """When |error| will reach `tolerance`, from the parabola through a short run of signed errors."""
+    t, e = _means(time, error)
+    reach = t[-1]
+    powers = [0, 1, 2]
+    while True:
+        columns = np.stack([(t / reach) ** k for k in powers], axis=1)
+        fitted, deviations = columns_fitted(columns, e)
+        terms = zip(powers, fitted, deviations, strict=True)
+        weak = [k for k, value, deviation in terms if k != 1 and abs(value) <= 4.0 * deviation]
+        if not weak:
+            break
+        powers.remove(max(weak))
+    a, b, c = (float(fitted[powers.index(k)]) / reach**k if k in powers else 0.0 for k in range(3))
+    times = [
+        float(root.real)
+        for level in (tolerance, -tolerance)
+        for root in np.roots([c, b, a - level])
+        if abs(root.imag) < 1e-12 * abs(root) and root.real > 0.0
+    ]
+    return Horizon(min(times, default=math.inf), a, b, c)
+
+
+def lost_at(time: ArrayLike, error: ArrayLike, tolerance: float) -> float:
+    """When |error| first reached `tolerance`, between means over short stretches; NaN if it never did, or at once."""
+    t, e = _means(time, error)
+    over = np.abs(e) >= tolerance
+    if not over.any() or over[0]:
+        return math.nan
+    k = int(np.argmax(over))
+    share = (tolerance - abs(e[k - 1])) / (abs(e[k]) - abs(e[k - 1]))
+    return float(t[k - 1] + share * (t[k] - t[k - 1]))
+
+
+def _means(time: ArrayLike, error: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Means over `BLOCKS` equal stretches: the oscillation within a nutation averages out."""
+    t, e = np.asarray(time, float), np.asarray(error, float)
+    good = np.isfinite(e)
+    parts = np.array_split(np.flatnonzero(good), BLOCKS)
+    return tuple(np.array([values[part].mean() for part in parts]) for values in (t, e))  # type: ignore[return-value]
+
+
+def columns_fitted(columns: Array, values: Array) -> tuple[Array, Array]:
+    """Coefficients (m,) of columns (n, m) in values (n,), and their standard errors."""
+    coefficients = np.linalg.lstsq(columns, values, rcond=None)[0]
+    rest = values - columns @ coefficients
+    freedom = values.size - columns.shape[1]
+    variances = float(rest @ rest) / freedom * np.linalg.inv(columns.T @ columns).diagonal()
+    return np.asarray(coefficients), np.asarray(np.sqrt(variances))

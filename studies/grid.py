@@ -1,0 +1,29 @@
+"""Which scenes and variants a study runs: all that suit its question, a user's own too, but for those that it leaves
+out for a reason that it names.
+"""
+
+from collections.abc import Callable, Iterable
+
+from symtop.core.errors import one_of
+from symtop.measure.settings import smallest_charts
+from symtop.methods.framework.registry import Integrator, variants
+from symtop.model.scenes import TAGS, Scene, scenes
+
+
+def grid_scenes(left_out: Iterable[str] = (), suits: Callable[[Scene], bool] = lambda _: True) -> list[str]:
+    """Names of the scenes of a grid, in the order of the catalogue, a user's own at the end.
+
+    Scenes with a tag that is `left_out` (a mapping of tags to reasons, say) are not in the study; `suits` says of a
+    scene whether the question makes sense for it. Raises SymtopError for an unknown tag.
+    """
+    tags = {one_of("left_out", tag, TAGS) for tag in left_out}
+    return [name for name, scene in scenes().items() if not tags.intersection(scene.tags) and suits(scene)]
+
+
+def grid_variants(observe: str, *, attitude: bool = False) -> list[Integrator]:
+    """The variants of a grid: every method in each of its charts that shows the "nutation" or the "axis".
+
+    Where a method has the axis chart, its attitude chart is left out unless `attitude` is true: it steps the same axis
+    and angular momentum, and the rotation about the axis besides, which neither quantity depends on.
+    """
+    return variants(observe) if attitude else smallest_charts(observe)

@@ -1,0 +1,443 @@
+"""The guard: one sentence with a remedy before a run whose error is expected to be large, nothing before any other.
+
+*The forecast.* The method itself is run for two nutations or a tenth of the run, and compared with the closed form. A
+nutation is a closed orbit of the reduced top; its return map is 1 + N with N^2 = 0 (the motion is integrable: errors
+shear, they do not grow exponentially), so that an error e_1 of one piece becomes after n pieces
+
+    e_n = n e_1 + n (n-1)/2 N e_1,      N e_1 = e_2 - 2 e_1.
+
+Symplectic and symmetric methods commit no error along which N shears, and theirs grows linearly. Where two nutations
+cost too much, the probe takes a coarser step and scales its error by the declared order; the passage of a pole is
+then probed by itself at the step of the run.
+
+*The cause* is read from exact landmarks of the motion, in this order:
+
+    instability   small nutations grow at every step (Verlet beyond h omega = 2)
+    separatrix    the motion itself amplifies rounding until it decides the answer
+    pole          the axis precesses by a radian or more in one step at its closest approach to a pole (angles only)
+    aliasing      fewer than two steps a nutation
+    resonance     a step turns the nutation by a third or a quarter of a turn (Verlet at h omega = sqrt 3)
+    early end     the short run ended early
+    no order      the error need not fall with the step: a term is left out, or rounding decides
+    departure     an adaptive method's errors of its tolerance grow with the motion, which is unstable
+    growth        the errors of the nutations add up until the horizon
+
+The guard never changes a run, and does not look at the number of samples: `simulate` dithers samples that would fall on
+the same phases of the nutation. Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, X.3 and XI.3.
+"""
+
+import functools
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.core.numbers import EPSILON, GOLDEN
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan, sentence
+from symtop.methods.framework.registry import Integrator, integrator
+from symtop.model.charts import Array, axes
+from symtop.model.scenes import Scene, closed_form
+from symtop.model.top import Angles, SymmetricTop
+from symtop.run.linear_stability import Growth, nutation_growth, trace
+from symtop.run.reference.sensitivity import SMALL, displacement
+
+STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take these
+AT_LEAST = 0.25  # of them a probe takes in any case, up to the whole run
+SHARE = 0.1  # of the run, which a probe may always take, but no more than the next two:
+MOST_NUTATIONS = 20.0
+MOST_PROBED = 20_000  # steps
+POINTS = 300  # of a probe that are compared with the closed form
+ROUNDED = 1e-13  # rad; a probe that is closer than this shows rounding, which grows as n^1.5
+PARTIAL = 10.0  # distrust of a probe shorter than a nutation: it may have missed where errors are made, or stretched
+AFFORDED = {"compiled": 12_000, "python": 1200}  # evaluations of a longer probe of an adaptive method
+MOST_WORK = {"compiled": 5e6, "python": 5e5}  # evaluations of any probe: 20 nutations take a hundredth; beside a pole
+# the steps of a solver may shrink to nothing, and the probe would take as long as the run
+LOOSE = 1e-4  # tolerance from which a method in Python is probed for a whole nutation: a few of its steps
+LEAST_GROWTH = 0.05  # of the error of a piece: less growth from the first to the second is luck
+COMMITTED = 1e4, 1e7  # tolerances: an error that an adaptive method commits now and then, and one of variable order
+CLOSE, PASSING = 0.2, 100.0  # rad from a pole; tolerances that a step past it in the angles chart commits now and then
+UNSTABLE = 50.0  # times that a stable motion may amplify a change of its start in a nutation
+WORTH = 1e-2  # rad: a law that grows an error faster is looked into where it leads beyond this
+RESOLVED = 0.3  # rad that the axis may precess in one step at a pole: coarser probes say nothing about the passage
+
+EXPECTED = 1e-2  # rad; a larger forecast is worth a warning: the axis error from which a verdict calls a run wrong
+AIM = 1e-3  # rad, what a remedy aims at
+SMALL_TURN = 0.3  # h omega below which no method loses small nutations
+GROWS = 1e-3  # a step that multiplies small nutations by more than 1 + GROWS loses them
+NO_GROWTH = 3e-8  # rounding of the growth of a step
+NONLINEAR = 0.03  # of the nutation that a method adds of its own may pass for growth: 8e-6 at 4e-4 rad
+BESIDE = 1e-2  # rad
+MOST_FOLDS = 100.0  # e times that a nutation grows: any is too much
+NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a resonance
+COARSE = 1.0  # rad of precession in a step
+PRECESSED = 0.1  # the same, of a step that is tried past a pole
+TRIES, LESS = 8, 0.6  # steps that are tried, each at most so much of the one before
+MOST_STEPS = 20_000_000_000  # of a run: ten minutes of the fastest kernel
+
+
+class Landmarks(NamedTuple):
+    """What is known exactly about a motion before it is computed."""
+
+    period: float  # of the nutation
+    frequency: float  # of small nutations about the steady precession with the same momenta
+    width: float  # of the nutation, rad
+    gap: float  # closest approach to a pole, rad
+    pole: str  # upper or lower
+    rate: float  # of precession there, rad per unit time
+    shear: float  # relative change of the period when the start is moved by rounding
+
+
+@functools.lru_cache(maxsize=256)
+def _landmarks(top: SymmetricTop, at: Angles) -> Landmarks:
+    scene, momenta = Scene("landmarks", top, at, 1.0), top.momenta(at)
+    form = closed_form(scene)
+    highest, lowest = form.theta_range
+    upper = highest <= math.pi - lowest
+    gap = highest if upper else math.pi - lowest
+    near, far = (momenta.north, momenta.south) if upper else (momenta.south, momenta.north)
+    sine = math.sin(0.5 * gap) ** 2
+    rate = abs(far / math.cos(0.5 * gap) ** 2 + (near / sine if sine > 0.0 else 0.0)) / (4.0 * top.I1)
+    rounded = (replace(at, phi_dot=at.phi_dot * (1.0 + turn)) for turn in (-4e-16, 4e-16))
+    moved = [scene.nutation_period, *map(top.nutation_period, rounded)]
+    spread = max(moved) - min(moved)
+    shear = spread / max(moved) if math.isfinite(spread) else 1.0
+    pole, frequency = "upper" if upper else "lower", top.nutation_frequency(momenta)
+    return Landmarks(form.nutation_period, frequency, lowest - highest, gap, pole, rate, shear)
+
+
+def landmarks(scene: Scene) -> Landmarks:
+    """The landmarks of a scene's motion; made once and kept."""
+    return _landmarks(scene.top, scene.start)
+
+
+class Probe(NamedTuple):
+    """A short run compared with the closed form."""
+
+    times: Array
+    error: Array  # of the axis, rad; inf where the run had failed
+    outcome: str
+    reached: float  # time of the run, not of the probe
+    evaluations: int  # of the force
+
+
+class Forecast(NamedTuple):
+    """The forecast of one run."""
+
+    axis_error: float  # expected largest, rad; inf if the probe did not get through, 0 if there is nothing to probe
+    rounding: float  # what rounding alone will make of it, rad: large on a separatrix, whatever the method
+    steps_per_nutation: float  # nan for an adaptive method
+    passage: float  # rad of precession in one step at the closest approach to a pole; nan for an adaptive method
+    outcome: str  # of the probe
+    reached: float
+    marks: Landmarks
+    unstable: float = 0.0  # what the motion makes of an error of the tolerance, rad; 0 where a probe shows it
+    whole: bool = False  # the probe was as long as the run
+
+
+@functools.cache
+def _places() -> Array:
+    """Where a probe of length `POINTS` is sampled: not commensurate with the nutation."""
+    place = np.arange(1.0, POINTS + 1.0)
+    place[:-1] += np.mod(GOLDEN * place[:-1], 1.0) - 0.5
+    return place
+
+
+@functools.lru_cache(maxsize=256)
+def _marks(steps: int) -> Any:
+    """The same in whole steps of a probe; there are few such numbers of steps (`STEPS`)."""
+    return np.unique(np.maximum(np.rint(_places() * (steps / POINTS)).astype(np.int64), 1))
+
+
+def _probe(
+    scene: Scene, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
+) -> Probe:
+    """Run `method` from the time `since` of the true motion for `duration`, with `step` or the plan's tolerance."""
+    form, start = closed_form(scene), scene.start
+    if since:
+        start = Angles(*(float(value) for value in form(since)))
+    if method.fixed_step:
+        piece = Plan.steps(step, _marks(max(1, round(duration / step))))
+    else:
+        most = min(plan.most(math.inf), MOST_WORK[method.implementation])
+        piece = Plan.until(duration * (_places() / POINTS), plan.tolerance, most)
+    run = solve(method, chart, scene.top, start, piece)
+    with np.errstate(all="ignore"):
+        error = form.axis_distance(since + piece.times if since else piece.times, axes(chart, run.states))
+    outcome = run.outcome
+    if not math.isfinite(error.sum()):  # no angle is more than pi
+        error[~np.isfinite(error)] = math.inf
+        outcome = "not_finite" if outcome == "ok" else outcome
+    return Probe(piece.times, error, outcome, since + run.reached, run.force_evaluations)
+
+
+def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
+    """The largest error of a probe, grown to the horizon; `straight` if the method's error grows linearly."""
+    half = 0.5 * float(probe.times[-1])
+    whole = float(probe.error.max())
+    n = horizon / half
+    if n <= 2.0 * (1.0 + 1e-9) or not math.isfinite(whole):
+        return whole
+    if whole < ROUNDED:
+        return whole * math.pow(0.5 * n, 1.5)
+    first = float(probe.error[probe.times <= half].max(initial=0.0))
+    if straight:
+        return whole + max(whole - first, LEAST_GROWTH * whole) * (n - 2.0)
+    return n * first + 0.5 * max(abs(whole - 2.0 * first), LEAST_GROWTH * whole) * n * (n - 1.0)
+
+
+def _amplifies(scene: Scene, change: float, horizon: float, marks: Landmarks) -> bool:
+    """Whether the motion multiplies a change of its start by far more than the shear of a stable one does."""
+    return displacement(scene, change, horizon) > change * UNSTABLE * (1.0 + horizon / marks.period)
+
+
+def _fixed(scene: Scene, method: Integrator, probe: Probe, horizon: float, marks: Landmarks) -> float:
+    """The largest error of a probe of steps, grown to the horizon.
+
+    What rounding, or the end of an iteration, leaves is not symmetric, and an unstable motion makes it grow in every
+    nutation: there a symmetric method is no better than others.
+    """
+    straight = bool(method.symplectic or method.symmetric)
+    expected = grown(probe, horizon, straight=straight)
+    if not straight or not expected < WORTH:
+        return expected
+    bent = grown(probe, horizon, straight=False)
+    return bent if bent > WORTH and _amplifies(scene, SMALL, horizon, marks) else expected
+
+
+def _grown_tolerance(scene: Scene, method: Integrator, plan: Plan, marks: Landmarks) -> float:
+    """What becomes of the errors of an adaptive method by the horizon, rad; 0 if the motion is stable.
+
+    A method in Python is probed for less than the run, and an unstable motion amplifies what it does elsewhere: in 44
+    wrong runs of SciPy's methods, up to 3600 times the displacement by one tolerance, and up to 1.6e6 times for LSODA,
+    which takes long steps of a high order while the top stands almost still.
+    """
+    if not _amplifies(scene, plan.tolerance, plan.horizon, marks):
+        return 0.0
+    committed = COMMITTED[method.order is None] * plan.tolerance
+    changes = (plan.tolerance, committed)
+    return max(float(np.nan_to_num(displacement(scene, change, plan.horizon))) for change in changes)
+
+
+def _closest_time(scene: Scene, period: float) -> float:
+    """When the axis first comes closest to a pole."""
+    form, middle, width = closed_form(scene), 0.5 * period, period
+    for _ in range(4):
+        times = middle + width * np.linspace(-0.5, 0.5, 129)
+        middle, width = float(times[int(np.argmin(np.sin(form(times).theta)))]), width / 40.0
+    return middle
+
+
+def _adaptive_forecast(
+    scene: Scene, method: Integrator, chart: str, plan: Plan, period: float, share: float, twice: float
+) -> tuple[float, Probe]:
+    """The same of an adaptive method, whose work is known when a first piece has been probed.
+
+    Where `AFFORDED` work reaches further, a longer probe is taken, up to the whole run. Elsewhere an error below the
+    tolerance is luck.
+    """
+    cheap = method if method.same_steps_as is None else integrator(method.same_steps_as)  # a hundredth of the time
+    least = twice if cheap.implementation == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
+
+    def probed(piece: float) -> tuple[float, Probe]:
+        partial = piece < min(period, 0.5 * plan.horizon)
+        since = max(0.0, _closest_time(scene, period) - 0.5 * piece) if partial else 0.0
+        probe = _probe(scene, cheap, chart, plan, piece, math.nan, since)
+        return grown(probe, plan.horizon, straight=False) * (PARTIAL if partial else 1.0), probe
+
+    piece = max(share, least)
+    expected, probe = probed(piece)
+    afforded = AFFORDED[cheap.implementation] * min(cheap.speed, 1.0)
+    longer = min(plan.horizon, piece * afforded / max(probe.evaluations, 1))
+    if longer > 1.5 * piece:
+        expected, probe = probed(longer)
+    return expected if probe.times[-1] >= plan.horizon else max(expected, plan.tolerance), probe
+
+
+def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks) -> tuple[float, Probe]:
+    """The largest axis error to expect, and the probe that says so."""
+    straight = bool(method.symplectic or method.symmetric)
+    period = marks.period if math.isfinite(marks.period) else plan.horizon
+    share, twice = min(SHARE * plan.horizon, MOST_NUTATIONS * period), min(2.0 * period, plan.horizon)
+    if method.adaptive:
+        return _adaptive_forecast(scene, method, chart, plan, period, share, twice)
+    step = plan.step_size
+    share = min(share, MOST_PROBED * step)
+    allowed = max(STEPS[method.implementation] * step, share)
+    if twice <= allowed:
+        piece = max(twice, share, AT_LEAST * STEPS[method.implementation] * step)
+        probe = _probe(scene, method, chart, plan, min(plan.horizon, piece), step)
+        return _fixed(scene, method, probe, plan.horizon, marks), probe
+    coarse = twice / round(allowed / step)
+    probe = _probe(scene, method, chart, plan, twice, coarse)
+    finer: float = (step / coarse) ** (method.order or 1)
+    expected = _fixed(scene, method, probe, plan.horizon, marks) * finer
+    if chart == "angles" and marks.rate * coarse > RESOLVED:
+        since = max(0.0, _closest_time(scene, period) - 0.5 * allowed)
+        if since < plan.horizon:
+            probe = _probe(scene, method, chart, plan, min(allowed, plan.horizon - since), step, since)
+            passages = max(1.0, plan.horizon / period)
+            expected = float(np.max(probe.error)) * (passages if straight else passages**2)
+    return expected, probe
+
+
+def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Forecast:
+    """Forecast the error of a run from a short run (a probe) of the same method; the run itself is not changed.
+
+    A method without a step or a tolerance, such as the closed form, is not probed.
+    """
+    marks = landmarks(scene)
+    steps, passage = marks.period / plan.step_size, marks.rate * plan.step_size
+    if method.control is None:
+        return Forecast(0.0, 0.0, steps, passage, "ok", plan.horizon, marks)
+    error, probe = _expected(scene, method, chart, plan, marks)
+    partly = method.adaptive and method.implementation == "python" and not probe.times[-1] >= plan.horizon
+    if partly and chart == "angles" and marks.gap < CLOSE:
+        error = max(error, float(np.nan_to_num(displacement(scene, PASSING * plan.tolerance, plan.horizon))))
+    unstable = _grown_tolerance(scene, method, plan, marks) if partly else 0.0
+    turns = plan.horizon / marks.period
+    rounding = marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0
+    whole = bool(probe.times[-1] >= plan.horizon * (1.0 - 1e-9))
+    ended = probe.outcome, probe.reached
+    return Forecast(max(error, unstable), rounding, steps, passage, *ended, marks, unstable, whole)
+
+
+class Trouble(NamedTuple):
+    """Why a run will go wrong, and what to try instead."""
+
+    reason: str  # with what to do, if that is not a step
+    step: float = math.nan  # a first try
+    otherwise: str = ""  # what may be done instead of it
+
+
+def warning(scene: Scene, method: Integrator, chart: str, plan: Plan) -> str:
+    """Warn before the run if a large error is expected: one sentence with a remedy, else an empty one.
+
+    A step is advised if the guard would be silent about it, and otherwise named as one to try.
+    """
+    if method.control is None:
+        return ""
+    expected = forecast(scene, method, chart, plan)
+    trouble = _trouble(scene, method, chart, plan, expected)
+    if trouble is None:
+        return ""
+    remedy = "" if math.isnan(trouble.step) else f"; {_remedy(scene, method, chart, plan, trouble)}"
+    return f"{method.name} on {scene.name}: {trouble.reason}{remedy}"
+
+
+def _remedy(scene: Scene, method: Integrator, chart: str, plan: Plan, trouble: Trouble) -> str:
+    """A step of two digits of which nothing is expected to go wrong: the first try, or the next smaller ones."""
+    step, word, others = trouble.step, "try", f", or {trouble.otherwise}" if trouble.otherwise else ""
+    for _ in range(TRIES):
+        if not plan.horizon / step <= MOST_STEPS:
+            return f"take {trouble.otherwise or 'another method'}: more than {MOST_STEPS:.0e} steps would be needed"
+        step = float(f"{step:.2g}")
+        tried = plan._replace(step_size=step)  # a forecast looks at the step and the horizon
+        expected = forecast(scene, method, chart, tried)
+        if expected.outcome == "ok" and _trouble(scene, method, chart, tried, expected) is None:
+            word = "take"
+            break
+        step = min(LESS * step, _smaller(method, tried, expected))
+    return f"{word} a step of about {step:.2g}{others}"
+
+
+def _trouble(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
+    """Why a run will go wrong; None if it will not."""
+    return _instability(scene, method, chart, plan, expected) or _cause(scene, method, chart, plan, expected)
+
+
+def _growth(scene: Scene, method: Integrator, chart: str, step: float, frequency: float) -> Growth:
+    """What a step does to small nutations; a symmetric method neither adds to them nor makes fine steps unstable."""
+    if not method.symmetric:
+        return nutation_growth(method, scene, step, chart, frequency)
+    return Growth(trace(method, scene, step, chart).growth if step * frequency > SMALL_TURN else 1.0, EPSILON)
+
+
+def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
+    """Small nutations that grow until they show; None if they do not, or if a probe has shown that they do not."""
+    marks, step, frequency = expected.marks, plan.step_size, expected.marks.frequency
+    good_run = expected.whole and expected.outcome == "ok" and expected.axis_error <= EXPECTED
+    if method.adaptive or good_run:
+        return None
+    growth, steps = _growth(scene, method, chart, step, frequency), plan.horizon / step
+    beside = marks.gap if marks.gap < BESIDE else 0.0  # of a pole, what grows is the tilt
+    size, folds = marks.width + beside + growth.size, steps * math.log(max(growth.factor, 1.0))
+    grows = growth.factor > 1.0 + max(NO_GROWTH, NONLINEAR * growth.size)
+    if not grows or not size * math.expm1(min(folds, MOST_FOLDS)) > EXPECTED:
+        return None
+    good, bad = SMALL_TURN / frequency, step
+    if growth.factor > 1.0 + GROWS and good < bad:
+        while bad - good > 1e-3 * bad:
+            middle = 0.5 * (good + bad)
+            stable = _growth(scene, method, chart, middle, frequency).factor <= 1.0 + GROWS
+            good, bad = (middle, bad) if stable else (good, middle)
+        return Trouble(
+            f"small nutations (frequency {frequency:.4g}) grow at a step of {step:.4g}, the method is stable up to "
+            f"{good:.4g} (h omega = {good * frequency:.3f})", 0.5 * good,
+        )  # fmt: skip
+    finer = step * math.pow(math.log1p(AIM / size) / folds, 1.0 / (method.order or 1))
+    return Trouble(
+        f"small nutations (frequency {frequency:.4g}) of {size:.1g} rad grow by {growth.factor - 1.0:.1g} of "
+        f"themselves in each of {steps:.3g} steps", finer,
+    )  # fmt: skip
+
+
+def _cause(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
+    """The first of the other causes."""
+    marks = expected.marks
+    if expected.rounding > EXPECTED and expected.rounding >= min(expected.axis_error, 1.0):
+        return Trouble(
+            "the motion passes so close to a separatrix that rounding alone decides when it falls; no method and no "
+            f"step help, shorten the horizon to less than one nutation of {marks.period:.4g}"
+        )
+    if not expected.axis_error > EXPECTED:
+        return None
+    size = f"expect an axis error of {min(expected.axis_error, math.pi):.1g} rad by t = {plan.horizon:.4g}"
+    if (coarse := _coarse(scene, method, chart, plan, expected, size)) is not None:
+        return coarse
+    if expected.outcome != "ok":
+        return Trouble(f"expect the run to be {sentence(expected.outcome, expected.reached, plan.horizon)}")
+    if method.adaptive:
+        advice = (
+            f"try tolerance {max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance):.1g}"
+        )
+        if expected.unstable >= expected.axis_error:
+            return Trouble(f"{size}: the motion is unstable, and a change of its start grows large; {advice}")
+        return Trouble(f"{size}: errors add up over {plan.horizon / marks.period:.3g} nutations; {advice}")
+    if method.order is None:
+        words = "it has no order, so that a smaller step need not help; take another method, such as strang"
+        return Trouble(f"{size}: {words}")
+    return Trouble(
+        f"{size}: a step is 1/{expected.steps_per_nutation:.3g} of a nutation, and errors add up over "
+        f"{plan.horizon / marks.period:.3g} nutations", _smaller(method, plan, expected),
+    )  # fmt: skip
+
+
+def _coarse(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: Forecast, size: str) -> Trouble | None:
+    """A step that is too long for a pole or for the nutation, or in resonance with it."""
+    marks, step, frequency = expected.marks, plan.step_size, expected.marks.frequency
+    if chart == "angles" and expected.passage > COARSE:
+        return Trouble(
+            f"{size}: the axis passes the {marks.pole} pole at {marks.gap:.2g} rad and precesses there by "
+            f"{expected.passage:.2g} rad in a step", PRECESSED / marks.rate,
+            "an integrator whose chart has no poles, such as strang",
+        )  # fmt: skip
+    if expected.steps_per_nutation < 2.0:
+        words = f"a step of {step:.4g} jumps over the nutation, whose period is {marks.period:.4g}"
+        return Trouble(f"{size}: {words}", marks.period / 20.0)
+    if step * frequency > SMALL_TURN:
+        turn = trace(method, scene, step, chart).turn
+        for order in (3, 4):
+            if abs(order * turn - 2.0 * math.pi) < NEAR * order:
+                return Trouble(
+                    f"{size}: a step turns the nutation by {turn:.4g} rad, close to 1/{order} of a turn, a resonance "
+                    f"(h omega = {step * frequency:.3f})", _smaller(method, plan, expected),
+                )  # fmt: skip
+    return None
+
+
+def _smaller(method: Integrator, plan: Plan, expected: Forecast) -> float:
+    """The step at which the forecast would be `AIM`, if the method keeps its order."""
+    step = plan.step_size * math.pow(AIM / min(expected.axis_error, 1.0), 1.0 / (method.order or 1))
+    return min(step, plan.step_size * expected.steps_per_nutation / 20.0) if expected.axis_error > 1.0 else step

@@ -1,1 +1,0 @@
-"""The guard: a forecast of a run's error, and the warning made from it."""

@@ -1,0 +1,278 @@
+"""What a number was made of: labels, reasons, text and whole files; kernels and checkpoints by their code."""
+
+import cProfile
+import dataclasses
+import importlib.metadata
+import importlib.util
+import inspect
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numba
+import pytest
+
+import symtop
+from symtop.core import code_hash, files, jit
+from symtop.core.code_hash import Code, by_file, changes, digest, merged
+from symtop.runner import fingerprint
+
+
+def loaded(path: Path, name: str):
+    """The module of a file, as a script or a plug-in is loaded."""
+    spec = importlib.util.spec_from_file_location(name, path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+SCRIPT = """
+import math
+from symtop.methods.runge_kutta import gauss
+from symtop.measure.datasets import differences
+
+STEPS = (5,)
+CAPTION = "unused"
+state = {"calls": 0}
+
+def measure():
+    from symtop.measure.errors import error_bound
+    state["calls"] += 1
+    return part() + STEPS[0]
+
+def part():
+    return math.sin(gauss.STILL)
+"""
+
+
+def test_a_script_counts_by_the_functions_and_globals_that_are_reached(tmp_path):
+    (tmp_path / "script.py").write_text(SCRIPT)
+    module = loaded(tmp_path / "script.py", "fingerprint_script")
+    labels = {part.label for part in Code().reached("measure", module.measure)}
+    assert {"function script.py:measure", "function script.py:part", "constant script.py:STEPS"} <= labels
+    assert "function symtop/measure/errors.py:error_bound" in labels  # imported when the function runs
+    assert not any(name in label for label in labels for name in ("cases.py", "CAPTION", "state"))
+    before = Code().reasons("measure", module.measure)
+    module.state["calls"] = 9  # what calls leave behind is no part of code
+    assert Code().reasons("measure", module.measure) == before
+    module.STEPS = (6,)
+    assert changes(before, Code().reasons("measure", module.measure)) == ["code script.py"]
+
+
+def test_changes_name_what_differs():
+    before, now = {"file a": "1", "file b": "2", "scene x": "3"}, {"file a": "1", "file b": "9", "package n": "4"}
+    assert changes(before, now) == ["file b", "scene x (no longer counts)", "package n (did not count before)"]
+    assert changes(now, now) == []
+    assert digest(before) == digest(dict(reversed(before.items())))
+    assert digest(before) != digest(now)
+    assert merged([{"a": "1"}, {"a": "1", "b": "2"}]) == {"a": "1", "b": "2"}
+    assert merged([{"a": "1"}, {"a": "2"}])["a"] not in ("1", "2")
+
+
+def test_words_do_not_count_and_numbers_do():
+    def made(thing):
+        return Code().reasons("thing", thing)
+
+    scene = symtop.scene("spheroid")
+    assert made(dataclasses.replace(scene, purpose="said otherwise", units="")) == made(scene)
+    assert made(dataclasses.replace(scene, horizon=9.0)) != made(scene)
+    method = symtop.integrator("strang")
+    assert made(dataclasses.replace(method, summary="said otherwise")) == made(method)
+    assert made(dataclasses.replace(method, order=4)) != made(method)
+
+
+def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again():
+    from symtop.runner.scripts import load
+    from tests.commands import PROBE
+
+    study, plain = load(str(PROBE)), symtop.integrator("midpoint")
+    case = next(case for case in study.cases(True) if case.integrator == "midpoint")
+    digests = []
+    try:
+        for order in range(2, 12):
+            symtop.register(dataclasses.replace(plain, order=order), replace=True)
+            digests += fingerprint.digests(study, [case])
+    finally:
+        symtop.register(plain, replace=True)
+    assert len(set(digests)) == 10
+    assert digests[:1] == fingerprint.digests(study, [case])
+
+
+CLASSES = """
+class Base:
+    def count(self):
+        return BASE
+
+class Few(Base):
+    COUNT = {}
+
+BASE = {}
+
+def measure():
+    '''{}'''
+    from . import nothing  # {}
+    return Few().count() + Few.COUNT
+"""
+
+
+def test_a_script_counts_by_code_with_its_classes_and_their_bases_and_without_comments():
+    def made(*numbers):
+        text = CLASSES.format(*numbers)
+        space = {"__name__": "few", "__package__": "unknown"}
+        exec(text, space)
+        return Code().reasons("measure", space["measure"])
+
+    plain = made(2, 1, "words", "comment")
+    assert made(2, 1, "other words", "another comment") == plain
+    assert changes(plain, made(2, 3, "words", "comment")) == ["code <string>"]
+    assert made(4, 1, "words", "comment") != plain
+
+
+def test_an_import_inside_a_function_is_followed_at_every_level():
+    space = {"__name__": "symtop.measure.made", "__package__": "symtop.measure"}
+    exec(
+        "def measure():\n    from . import errors\n    from ..methods.runge_kutta.gauss import farthest\n"
+        "    import symtop.run.guard as other\n    return errors.error_bound, other.guard\n",
+        space,
+    )
+    labels = {part.label for part in Code().reached("measure", space["measure"])}
+    for name in ("measure/errors.py:error_bound", "methods/runge_kutta/gauss.py:farthest"):
+        assert f"function symtop/{name}" in labels
+
+
+# ---- kernels ---------------------------------------------------------------------------------------------------------
+
+
+def kernels_of(root: Path, store: Path) -> dict[str, int]:
+    """The index files of the cache and when they were written, after one run; and what it returned."""
+    code = (
+        "import symtop; from symtop.run import long_run as L; "
+        "w, m = symtop.scene('spheroid'), symtop.integrator('gauss-4'); "
+        "print(float(symtop.simulate(w, m, step_size=0.02, guard=False)['theta'][-1]).hex(), "
+        "L._identity(w, m, 0.01, 100, True))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=240, check=True, cwd=root,
+        env={**os.environ, "PYTHONPATH": str(root), "SYMTOP_CACHE": str(store)},
+    )  # fmt: skip
+    files = {str(path.relative_to(store)): path.stat().st_mtime_ns for path in (store / "kernels").rglob("*.nbi")}
+    return {"said": done.stdout.split(), "files": files}
+
+
+@pytest.mark.slow
+def test_an_edited_callee_makes_a_new_kernel_and_a_comment_makes_none(tmp_path):
+    """In a copy of the package, each time in a new process."""
+    skip = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(code_hash.PACKAGE, tmp_path / "symtop", ignore=skip)
+    before = kernels_of(tmp_path, tmp_path / "cache")
+    assert before["files"]
+    for name in ("measure/errors.py", "run/modified_energy.py", "explore/answers.py", "methods/runge_kutta/gauss.py",
+                 "methods/framework/loop.py", "core/jit.py", "core/code_hash.py"):  # fmt: skip
+        file = tmp_path / "symtop" / name
+        text = file.read_text()
+        assert "\nfrom " in text
+        file.write_text(text.replace("\nfrom ", "\n# a comment\nfrom ", 1))  # every line below moves down
+    assert kernels_of(tmp_path, tmp_path / "cache") == before  # nothing compiled, and the checkpoint is still valid
+    callee = tmp_path / "symtop" / "methods" / "framework" / "space.py"
+    text = callee.read_text()
+    assert "par.mgl" in text
+    callee.write_text(text.replace("par.mgl", "(1.5 * par.mgl)"))  # called from gauss.py, compiled in loop.py
+    after = kernels_of(tmp_path, tmp_path / "cache")
+    assert len(after["files"]) > len(before["files"])
+    assert before["files"].items() <= after["files"].items()
+    assert after["said"][0] != before["said"][0]
+    assert after["said"][1] != before["said"][1]
+    callee.write_text(text)
+    assert kernels_of(tmp_path, tmp_path / "cache") == after | {"said": before["said"]}
+
+
+def test_a_kernel_is_told_by_what_it_calls():
+    def kernel_of(part):
+        def kernel(x):
+            """Words."""
+            return part(x)  # more words
+
+        return digest(by_file(jit.code_of(kernel)))
+
+    def made(source):
+        space = {"__name__": "part"}
+        exec(source, space)
+        return jit.register_jitable(space["part"])
+
+    plain = kernel_of(made("def part(x):\n    return 2.0 * x\n"))
+    assert kernel_of(made("\n\n# moved\ndef part(x):\n    # said\n    return 2.0 * x\n")) == plain
+    assert kernel_of(made("def part(x):\n    'Documented.'\n    return 2.0 * x\n")) == plain
+    assert kernel_of(made("def part(x):\n    return 3.0 * x\n")) != plain
+    assert kernel_of(made("K = 2.0\ndef part(x):\n    return K * x\n")) != kernel_of(
+        made("K = 3.0\ndef part(x):\n    return K * x\n")
+    )
+    assert kernel_of(made("def deep(x):\n    return x\ndef part(x):\n    return deep(x)\n")) != kernel_of(
+        made("def deep(x):\n    return -x\ndef part(x):\n    return deep(x)\n")
+    )
+
+
+def test_what_numba_compiles_in_place_of_a_function_counts():
+    from symtop.core import jit
+
+    labels = {part.label.rpartition(":")[2] for part in jit.code_of(jit.fused)}
+    assert {"fused", "_fused", "_fma"} <= labels
+    plain = {part.label.rpartition(":")[2] for part in Code().reached("kernel", jit.fused)}
+    assert plain == {"kernel", "fused"}  # the control
+
+
+def test_a_kernel_is_the_same_to_a_profiler():
+    def made(constant):
+        def kernel(x):
+            return x + constant
+
+        return kernel
+
+    plain = digest(by_file(jit.code_of(made(1.0))))
+    watching = cProfile.Profile()
+    watching.enable()
+    try:
+        numba.njit(made(2.0))(1.0)
+    finally:
+        watching.disable()
+    cleared = not made(1.0).__code__.co_flags & inspect.CO_OPTIMIZED  # by numba, for all that share the code
+    assert cleared is (sys.version_info < (3, 12))
+    assert digest(by_file(jit.code_of(made(1.0)))) == plain
+
+
+def test_the_walk_of_a_kernel_takes_less_than_a_millisecond():
+    march = symtop.integrator("gauss-12").solvers["attitude"].loop.march
+    times = []
+    for _ in range(20):
+        begin = time.perf_counter()
+        digest(by_file(jit.code_of(march)))
+        times.append(time.perf_counter() - begin)
+    assert min(times) < 1e-3
+
+
+def test_the_cache_keeps_what_was_used_last(tmp_path):
+    for age, name in enumerate(("a", "b", "c", "d")):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "kernel.nbc").write_bytes(b"\0" * 1000)
+        used = time.time() - age * 2 * files.DAY
+        os.utime(folder, (used, used))
+    old = time.time() - (files.UNUSED + 1) * files.DAY
+    os.utime(tmp_path / "a", (old, old))
+    files.touch(tmp_path / "d")  # it was used last, now
+    files.prune(tmp_path, 2500)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["b", "d"]
+    files.prune(tmp_path, 100)
+    assert not list(tmp_path.iterdir())
+    files.prune(tmp_path / "nothing", 100)
+
+
+def test_versions_of_packages_are_reasons():
+    assert code_hash.packages("numpy", "no-such-package") == {
+        "package numpy": importlib.metadata.version("numpy"),
+        "package no-such-package": "absent",
+    }
+    assert code_hash.packages()["package python"] == ".".join(map(str, sys.version_info[:2]))

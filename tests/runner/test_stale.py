@@ -1,0 +1,285 @@
+"""A number is stale if what it was made of is edited, and no other is; `--status --why` says by which edit."""
+
+import contextlib
+import dataclasses
+import importlib
+import json
+import linecache
+import shutil
+import sys
+from types import FunctionType
+
+import pytest
+from symtop_studies.reduction import commutation
+
+import symtop
+from symtop.core import code_hash, jit
+from symtop.core.code_hash import PACKAGE
+from symtop.methods.framework import registry
+from symtop.methods.framework.loop import inside
+from symtop.methods.framework.registry import is_built_in
+from symtop.report import style
+from symtop.runner import fingerprint, run as runner
+from symtop.runner.run import drawing_digest
+from symtop.runner.study import Case
+from tests.commands import PROBE, ended, symtop as symtop_command
+
+
+@contextlib.contextmanager
+def edited(place):
+    """Let a function ``module:name`` have one more constant, which no instruction uses; all is looked at anew."""
+    module, _, name = place.partition(":")
+    function = importlib.import_module(module)
+    for part in name.split("."):
+        function = getattr(function, part)
+    function = getattr(function, "py_func", getattr(function, "__wrapped__", function))
+    assert isinstance(function, FunctionType)
+    before = function.__code__
+    function.__code__ = before.replace(co_consts=(*before.co_consts, "edited"))
+    forget()
+    try:
+        yield
+    finally:
+        function.__code__ = before
+        forget()
+
+
+def forget():
+    fingerprint._known.clear()
+    fingerprint._code.cache_clear()
+
+
+def stale_after(place, study):
+    """Integrators of a study's cases whose digest changes with an edit."""
+    cases = study.cases(True)
+    before = fingerprint.digests(study, cases)
+    with edited(place):
+        after = fingerprint.digests(study, cases)
+    assert before == fingerprint.digests(study, cases)
+    return {case.integrator for case, one, two in zip(cases, before, after, strict=True) if one != two}
+
+
+def of_everyone():
+    """The probe with every integrator of the registry."""
+    cases = [Case("goldstein", name, {}) for name in symtop.integrators()]
+    return dataclasses.replace(runner.load(str(PROBE)), cases=lambda quick: cases)
+
+
+GAUSS = {f"gauss-{order}" for order in (2, 4, 6, 8, 10, 12)}
+COLLECTIVE = {f"collective-gauss-{order}" for order in (2, 4, 6)}
+SCIPY = {"rk45", "dop853", "lsoda", "radau"}
+STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear"}
+METHODS = "symtop.methods"
+
+
+@pytest.mark.parametrize(
+    ("place", "stale"),
+    [
+        (f"{METHODS}.runge_kutta.gauss:solve_stages", GAUSS),
+        (f"{METHODS}.lagrangian.galerkin:increment", {"galerkin-simpson"}),
+        (f"{METHODS}.lagrangian.discrete_lagrangian:increment", STRAIGHT),
+        (f"{METHODS}.library.scipy_ivp:compiled_field", SCIPY),
+        (f"{METHODS}.runge_kutta.explicit:weighted", {"rk4", "rk45-compiled"}),
+        (f"{METHODS}.splitting.reversible:march", {"stormer-verlet-reversible"}),
+        (f"{METHODS}.lie_group.generalised_alpha:turn", {"generalised-alpha"}),
+        (f"{METHODS}.taylor.heyoka:propagate", {"taylor", "taylor-longdouble", "taylor-quad"}),
+        ("symtop.cli.common:as_text", set()),
+        ("symtop.report.page:write", set()),
+        ("symtop.measure.accuracy:error_row", set()),
+    ],
+)
+def test_an_edited_kernel_makes_the_cases_that_use_it_stale_and_no_others(place, stale):
+    """In a study that runs every integrator and compares with no reference."""
+    assert {name for name in stale_after(place, of_everyone()) if is_built_in(name)} == stale
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "symtop.model.top:SymmetricTop.potential", "symtop.run.simulation:simulate",
+        "symtop.model.exact.constants:all_constants",
+        "symtop.methods.framework.calling:solve",
+    ],
+)  # fmt: skip
+def test_an_edit_of_what_all_cases_reach_makes_all_stale(place):
+    assert stale_after(place, of_everyone()) == set(symtop.integrators())
+
+
+def test_measure_code_and_the_reference_make_the_cases_of_their_study_stale():
+    convergence = runner.load("convergence")
+    every = {case.integrator for case in convergence.cases(True)}
+    for place in ("symtop.run.reference.truth:reference", "symtop.measure.accuracy:error_row"):
+        assert stale_after(place, convergence) == every, place
+    for place in ("symtop_studies.convergence.figures:pictures", "symtop.measure.step_map:step_map"):
+        assert stale_after(place, convergence) == set(), place
+
+
+@pytest.mark.parametrize(
+    ("place", "again"),
+    [
+        ("symtop_studies.work_precision.leads:winners", True), ("symtop_studies.work_precision.words:sentences", True),
+        ("symtop.measure.datasets:_dense", True), ("symtop.cli.common:as_text", False),
+        ("symtop_studies.drift.words:verdict", False),
+    ],
+)  # fmt: skip
+def test_findings_are_made_again_when_what_draws_or_judges_them_is_edited(place, again):
+    study = runner.load("work_precision")
+    before = drawing_digest(study, style.save)
+    with edited(place):
+        assert (drawing_digest(study, style.save) != before) is again
+    assert drawing_digest(study, style.save) == before
+
+
+def test_coefficients_and_the_numbers_of_a_scene_count():
+    study, case = of_everyone(), Case("goldstein", "chin-4a", {})
+    method, place = symtop.integrator("chin-4a"), symtop.scene("goldstein")
+    before = fingerprint.reasons(study, case)
+    solver = method.solvers["axis"]
+    kicks = solver.rule.rule.kick
+    changed = dataclasses.replace(
+        solver.rule, rule=solver.rule.rule._replace(kick=(kicks[0] * (1.0 + 1e-15), *kicks[1:]))
+    )
+    other = dataclasses.replace(method, solvers={"axis": dataclasses.replace(solver, rule=changed)})
+    symtop.register(other, replace=True)
+    try:
+        after = fingerprint.reasons(study, case)
+    finally:
+        symtop.register(method, replace=True)
+    assert "integrator chin-4a" in code_hash.changes(before, after)
+    assert fingerprint.made_of("scene", dataclasses.replace(place, horizon=9.0)) != fingerprint.made_of("scene", place)
+    assert fingerprint.made_of("scene", dataclasses.replace(place, purpose="-")) == fingerprint.made_of("scene", place)
+
+
+def test_a_case_depends_on_the_integrators_that_its_study_says_it_runs():
+    reduction = runner.load("reduction")
+    twins = next(case for case in reduction.cases(True) if case.settings["part"] == "twins")
+    assert fingerprint.used(reduction, twins) == sorted(["exact", twins.integrator, f"{twins.integrator}-unreduced"])
+    silent = dataclasses.replace(reduction, uses=None)
+    assert fingerprint.used(silent, twins) == sorted(["exact", twins.integrator])
+    several = Case("goldstein", "together", {"integrators": ["rk4[axis]", "strang[axis]"]})
+    assert fingerprint.used(silent, several) == ["exact", "rk4", "strang"]
+    starred = Case("goldstein", "*", {})
+    assert fingerprint.used(of_everyone(), starred) == sorted(symtop.integrators())
+
+
+def test_all_digests_of_all_studies_are_the_same_whatever_the_process_has_run():
+    """Values that calls have left in modules are state and count for nothing."""
+    studies = [runner.load(name) for name in ("convergence", "population", "notebook")]
+    grids = [study.cases(True)[:20] for study in studies]
+    before = [fingerprint.digests(study, grid) for study, grid in zip(studies, grids, strict=True)]
+    symtop.simulate("spheroid", "strang", step_size=0.01)
+    symtop.reference("cusp", [0.0, 1.0])
+    symtop.ensemble(symtop.population(5, seed=1), "rk4", step_size=0.01, horizon=0.1, samples=3)
+    studies[0].measure(grids[0][0])
+    forget()
+    assert [fingerprint.digests(study, grid) for study, grid in zip(studies, grids, strict=True)] == before
+
+
+def test_a_function_counts_alike_before_and_after_a_kernel_registers_it():
+    def part(x):
+        return 2.0 * x
+
+    before = jit.code().reasons("part", part)
+    jit.register_jitable(part)
+    assert jit.code().reasons("part", part) == before
+    assert jit.code_of(part)[1].values != jit.code().reached("part", part)[1].values  # the control: kernels see it
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["convergence", "drift", "stability", "reduction", "truth", "oscillators", "notebook"])
+def test_no_case_runs_an_integrator_that_it_is_not_said_to_depend_on(name, monkeypatch):
+    """Every quick case is measured with a registry that notes who is run."""
+    study, ran = runner.load(name), set()
+
+    def noting(method):
+        def solver(chart):
+            def solve(top, start, plan):
+                ran.add(method.name)
+                return method.solvers[chart](top, start, plan)
+
+            solve.solve = inside(method.solvers[chart])  # a long run steps the loop itself
+            return solve
+
+        return dataclasses.replace(method, solvers={chart: solver(chart) for chart in method.solvers})
+
+    cases = study.cases(True)[::7]
+    allowed = {case.label: set(fingerprint.used(study, case)) for case in cases}
+    known = registry.integrators()
+    rules = {n: m for n, m in known.items() if commutation.rule_of(m) is not None}  # told by the type of their solver
+    monkeypatch.setattr(registry, "_registry", {n: m if n in rules else noting(m) for n, m in known.items()})
+    for case in cases:
+        ran.clear()
+        study.measure(case)
+        assert ran <= allowed[case.label], case
+
+
+def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
+    script = tmp_path / "counted.py"
+    text = PROBE.read_text()
+    digests = set()
+    for version in (
+        text,
+        text.replace('"Energy."', '"Another caption."'),
+        text.replace("samples=51", "samples=STEPS").replace("METHODS = (", "STEPS = 51\nMETHODS = ("),
+        text.replace("samples=51", "samples=STEPS").replace("METHODS = (", "STEPS = 52\nMETHODS = ("),
+        text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(51)\n",
+        text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(53)\n",
+        text.replace("samples=51", "samples=cached()") + "\n\n@functools.cache\ndef cached():\n    return 51\n",
+        text.replace("samples=51", "samples=cached()") + "\n\n@functools.cache\ndef cached():\n    return 53\n",
+        text.replace("samples=51", "samples=Few().count()")
+        + "\n\nclass Few:\n    def count(self):\n        return 51\n",
+        text.replace("samples=51", "samples=Few().count()")
+        + "\n\nclass Few:\n    def count(self):\n        return 53\n",
+    ):
+        script.write_text("import functools\n" + version)
+        sys.modules.pop("symtop_study_counted", None)
+        linecache.checkcache()
+        importlib.invalidate_caches()
+        shutil.rmtree(tmp_path / "__pycache__", ignore_errors=True)
+        study = runner.load(str(script))
+        digests.add(fingerprint.digests(study, study.cases(True))[0])
+    assert len(digests) == 9  # the caption alone changes nothing
+
+
+PLUGIN = """
+import pathlib, sys
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import symtop
+from coeffs import W
+
+symtop.register(symtop.runge_kutta("bad-of-a-user", ((), (0.5,)), W, order=2))
+"""
+
+
+@pytest.mark.slow
+def test_an_edit_of_each_family_is_named_by_status_and_is_all_that_is_computed(tmp_path):
+    """Through the command line, in a copy of the package, with a study and a plug-in of a user's own."""
+    for name in ("symtop", "studies"):
+        shutil.copytree(PACKAGE.parent / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(PROBE, tmp_path / "probe.py")
+    (tmp_path / "plug.py").write_text(PLUGIN)
+    (tmp_path / "coeffs.py").write_text("W = (0.0, 1.0)\n")
+    words = ["study", tmp_path / "probe.py", "--plugin", tmp_path / "plug.py", "--results", tmp_path / "r"]
+
+    def command(*more):
+        code, out, err = ended(symtop_command(*words, *more, cwd=tmp_path, PYTHONPATH=tmp_path))
+        assert code == 0, err
+        return out
+
+    assert "14 of 14 cases computed" in command()
+    package = tmp_path / "symtop"
+    edits = [
+        (package / "methods/runge_kutta/gauss.py", "\n", "\n# a comment\n", None, set()),
+        (tmp_path / "coeffs.py", "(0.0, 1.0)", "(0.5, 0.5)", "integrator bad-of-a-user", {"bad-of-a-user"}),
+        (package / "methods/runge_kutta/dormand_prince.py", "\n", "\n", None, set()),
+        (tmp_path / "probe.py", "samples=51", "samples=53", "code probe.py", "all"),
+    ]
+    for file, before, after, why, stale in edits:
+        text = file.read_text()
+        assert before in text
+        file.write_text(text.replace(before, after, 1))
+        rows = json.loads(command("--status", "--why", "--json"))["probe"]
+        some = {row["integrator"] for row in rows} if stale == "all" else stale
+        assert {row["integrator"] for row in rows if row["state"] == "stale"} == some, file
+        assert all(row["why"] == [why] for row in rows if row["state"] == "stale"), rows
+        assert f"{sum(row['state'] == 'stale' for row in rows)} of 14 cases computed" in command()

@@ -1,0 +1,249 @@
+"""The drift study: behaviours, histories, losses of phase and what it costs to keep it, and windows of many runs."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import xarray as xr
+from symtop_studies.drift import behaviours, figures, growth, messages, study, tables
+from symtop_studies.drift.phase_loss import phase_loss
+from symtop_studies.drift.runs import gauges_of, members, run_history, side_by_side
+from symtop_studies.drift.study import TOLERANCE, cases
+from symtop_studies.drift.tables import ROUNDINGS
+from symtop_studies.drift.variants import charts_table
+
+import symtop
+from symtop.judging.claims.constants import KEPT, Constant
+from symtop.measure.conservation import CONSTANTS, Changed
+from symtop.methods.framework.lanes import LEAST
+from symtop.methods.framework.registry import integrator
+from symtop.model.scenes import scene
+from symtop.run.long_run import QUANTITIES, long_run
+from symtop.run.trajectory import Trajectory
+
+
+@pytest.mark.parametrize(
+    ("sizes", "exponents", "interval", "word"),
+    [
+        ((1e-13, 2e-13), (0.5, 1.0), 0.1, "kept"),
+        ((1e-4, 1e-4), (0.0, 0.1), 0.1, "bounded"),
+        ((1e-4, 1e-4), (0.0, 0.1), 0.6, "growing"),  # the interval does not exclude a walk
+        ((1e-4, 1e-4), (0.0, 1.0), 0.1, "drift"),  # the worse of two scenes
+        ((1e-12, 1e-13), (0.5, 0.5), 0.1, "random walk"),
+    ],
+)
+def test_the_behaviour_of_a_quantity_is_that_on_its_worst_scene(sizes, exponents, interval, word):
+    cell = xr.Dataset({
+        "outcome": ("scene", ["ok", "ok"]),
+        "energy_largest": ("scene", list(sizes)),
+        "energy_exponent": ("scene", list(exponents)),
+        "energy_exponent_interval": ("scene", [interval] * 2),
+    })  # fmt: skip
+    assert tables.worst_behaviour(cell, "energy") == word
+    assert tables.worst_behaviour(cell.assign(outcome=("scene", ["ok", "left_chart"])), "energy") == "failed"
+
+
+def test_adaptive_methods_drift_at_one_tolerance():
+    """One value for all of them, except for those that have a default of their own and keep it."""
+    asked = [case for case in cases(quick=False) if case.group == tables.HISTORIES]
+    given = {case.settings["tolerance"] for case in asked if "tolerance" in case.settings}
+    assert given == {TOLERANCE}
+    for case in asked:
+        method = symtop.integrator(case.integrator)
+        assert len(method.charts()) == 1, case
+        own = method.adaptive and method.default_tolerance is not None
+        assert ("tolerance" in case.settings) == (method.adaptive and not own), case
+    assert {"rk4[angles]", "rk4[axis]", "strang[attitude]"} <= {case.integrator for case in asked}
+
+
+def test_a_history_says_with_what_it_ran():
+    on = symtop.scene("spheroid")
+    short = {"horizon": 20.0 * on.nutation_period, "samples": 101}
+    step = run_history(on, symtop.integrator("rk4[axis]"), step_size=on.nutation_period / 50.0, **short)
+    loose = run_history(on, symtop.integrator("rk45-compiled[angles]"), tolerance=1e-5, **short)
+    default = run_history(on, symtop.integrator("taylor[axis]"), **short)
+    assert [float(one["steps_a_nutation"]) for one in (step, loose)] == pytest.approx([50.0, math.nan], nan_ok=True)
+    assert [float(one["tolerance"]) for one in (loose, default)] == [
+        1e-5,
+        symtop.integrator("taylor").default_tolerance,
+    ]
+    assert [float(one["own_tolerance"]) for one in (step, loose, default)] == [0.0, 0.0, 1.0]
+    assert float(step["p_phi_largest"]) == 0.0
+    other = run_history(on, symtop.integrator("rk4[angles]"), step_size=on.nutation_period / 50.0, **short)
+    assert float(other["p_phi_largest"]) > 1e-9
+
+
+def test_the_same_run_has_one_behaviour_in_every_study():
+    """kahan-li-6 changes the energy by 9e-13 of the spin's and has an exponent of 0: an error of the step, bounded."""
+    for size, exponent, interval in ((9e-12, 0.0, 0.001), (1e-15, 0.9, 0.1), (1e-4, 1.0, 0.1), (1e-4, 0.0, 0.01)):
+        measured = {"energy_largest": size, "energy_exponent": exponent, "energy_exponent_interval": interval}
+        columns = {"outcome": ("scene", ["ok"]), **{name: ("scene", [value]) for name, value in measured.items()}}
+        cell = xr.Dataset(columns, coords={"scene": ["spheroid"]})
+        grain = symtop.scene("spheroid").energy_grain
+        changed = Changed(size, 0.0, 1.0, 0.0, exponent, interval, "")
+        ledger = Constant(changed, 0.0, KEPT * grain, grain)
+        assert tables.worst_behaviour(cell, "energy") == ledger.kind
+
+
+def test_the_shift_of_the_mean_energy_is_relative_to_its_band():
+    means = xr.DataArray([[0.0, 1e-5, 3e-5, np.nan]], dims=("variant", "window"))
+    cells = xr.Dataset({"energy_mean": means.copy(data=[[0.0, 4e-5, 1e-6, np.nan]]),
+                        "energy_largest": means + 5e-5, "energy_least": means - 5e-5})  # fmt: skip
+    assert messages.strayed(cells) == pytest.approx((0.01, 0.4))
+
+
+def test_a_change_of_law_is_found_in_a_run_and_an_oscillation_that_switches_on_is_none(monkeypatch):
+    where = symtop.scene("spheroid")
+    time = np.linspace(0.0, 5000.0 * where.nutation_period, 4001)
+    planted = {"energy": 1e-9 + 1e-9 * (time / time[-1] / 0.1) ** 2, "p_phi": np.tanh(time), "p_psi": 1e-9 * time}
+    run = Trajectory(time, theta=time, p_theta=time, steps=1)
+    monkeypatch.setattr(growth, "integrate", lambda *_, **__: run)
+    monkeypatch.setattr(growth, "residuals", lambda *_: planted)
+    found = growth.history(where, symtop.integrator("rk4"))
+    assert float(found["energy_change"]) == pytest.approx(0.1 * time[-1], rel=0.5)
+    assert float(found["energy_after"]) == pytest.approx(2.0, abs=0.3)
+    assert str(found["p_psi_law"].item()) == "linear"
+    assert str(found["p_phi_law"].item()) == "bounded"
+    assert np.isnan(float(found["p_phi_change"]))
+    assert np.isnan(float(found["p_psi_change"]))
+
+
+def test_a_phase_is_steady_only_if_its_intervals_allow_it_and_faster_only_on_every_scene():
+    powers = {
+        "strang": (1.0, 1.0),
+        "rk4": (2.09, 1.90),
+        "taylor": (1.94, 2.03),
+        "mixed": (1.0, 1.6),
+        "exact": (0.2, 0.1),
+    }
+    sizes = {"strang": 1.0, "rk4": 1.0, "taylor": 7e-10, "mixed": 1e-3, "exact": 1e-15}
+    data = xr.Dataset(
+        {
+            "phase_exponent": (("variant", "scene"), list(powers.values())),
+            "phase_exponent_interval": (("variant", "scene"), np.full((5, 2), 0.15)),
+            "phase_largest": (("variant", "scene"), [[size] * 2 for size in sizes.values()]),
+        },
+        coords={"variant": list(powers), "scene": ["spheroid", "goldstein"]},
+    )
+    assert {word: [one.row for one in group] for word, group in behaviours.phases(data).items()} == {
+        behaviours.STEADY: ["strang"], behaviours.FASTER: ["rk4", "taylor"], behaviours.UNCLEAR: ["mixed"],
+    }  # fmt: skip
+
+
+def test_a_chart_matters_only_where_the_change_is_above_rounding_and_twice_as_large():
+    names = ["rk4[angles]", "rk4[axis]", "strang[axis]", "strang[attitude]"]
+
+    def compared(*changes):
+        columns = {"p_phi_largest": [*changes, 1e-15, 1e-15], "energy_largest": [1e-15] * 4, "p_psi_largest": [0.0] * 4}
+        columns = {key: (("scene", "variant"), [values]) for key, values in (columns | {"outcome": ["ok"] * 4}).items()}
+        return charts_table(xr.Dataset(columns, coords={"scene": ["spheroid"], "variant": names}))
+
+    (table,) = compared(1.5e-4, 0.0)
+    assert list(table.rows) == [["p_phi", "rk4", "1.5e-04", "exactly 0", ""]]
+    assert compared(1.5e-4, 1.2e-4) == compared(1e-14, 0.0) == []
+
+
+NAMES = ["strang[axis]", "gauss-4[axis]", "rk4[axis]", "rk4[angles]", "radau[angles]"]
+SIZES = {"energy": [1e-4, 1e-15, 1e-3, 1e-2, 1e-6], "p_phi": [0.0, 0.0, 0.0, 1e-5, 1e-6], "p_psi": [0.0] * 5}
+SLOPES = {"energy": [0.0, 0.5, 1.0, 1.0, 0.0], "p_phi": [0.0, 0.0, 0.0, 1.0, 1.0], "p_psi": [0.0] * 5}
+PHASE = [[1.0, 1.04], [0.4, 1.5], [2.0, 1.9], [2.0, 2.2], [1.0, 2.0]]  # by variant and scene
+
+
+@pytest.fixture
+def histories():
+    """Five variants on two scenes: two hold everything, one loses the energy, one that and p_phi, one p_phi."""
+    both = {
+        f"{one}_{part}": np.repeat(np.array(values, float)[:, None], 2, axis=1)
+        for one in CONSTANTS
+        for part, values in (("largest", SIZES[one]), ("exponent", SLOPES[one]), ("exponent_interval", [0.01] * 5))
+    }
+    both |= {"phase_exponent": np.array(PHASE), "phase_exponent_interval": np.full((5, 2), 0.01)}
+    both |= {"nutations": np.full((5, 2), 100.0), "steps_a_nutation": np.full((5, 2), 118.0)}
+    both |= {"tolerance": np.full((5, 2), np.nan), "own_tolerance": np.zeros((5, 2))}
+    data = xr.Dataset(
+        {key: (("variant", "scene"), values) for key, values in both.items()},
+        coords={"variant": NAMES, "scene": ["spheroid", "goldstein"]},
+    )
+    times = np.broadcast_to(np.linspace(0.0, 1.0, 3), (5, 2, 3))
+    return data.assign(
+        outcome=(("variant", "scene"), np.full((5, 2), "ok")), sample_time=(("variant", "scene", "sample"), times)
+    )
+
+
+def test_rows_are_grouped_by_the_constants_that_they_lose(histories):
+    groups = messages.lost(histories)
+    assert groups == {
+        (): ["gauss-4[axis]", "strang[axis]"],
+        ("energy", "p_phi"): ["rk4[angles]"],
+        ("energy",): ["rk4[axis]"],
+        ("p_phi",): ["radau[angles]"],
+    }
+    ended = histories.assign(outcome=histories["outcome"].where(histories["variant"] != "strang[axis]", "left_chart"))
+    assert messages.lost(ended)[CONSTANTS] == ["strang[axis]"]
+
+
+def test_growth_as_time_is_told_from_faster_growth():
+    slopes = np.array([0.91, 1.0, 1.09, 0.88, 1.12, 2.0])
+    assert messages.as_time(slopes).tolist() == [True, True, True, False, False, False]
+    assert messages.faster(slopes).tolist() == [False, False, False, False, True, True]
+
+
+def test_phases_are_grouped_by_what_the_energy_does(histories):
+    groups = messages.by_energy(histories)
+    assert sorted(groups["bounded"]) == [1.0, 1.0, 1.04, 2.0]
+    assert sorted(groups["lost"]) == [1.9, 2.0, 2.0, 2.2]
+
+
+def loss(length=2500.0, paid=100.0, exponent=1.0):
+    return xr.Dataset({"measured": length, "evaluations": paid, "exponent": exponent, "predicted": length})
+
+
+def test_the_law_of_a_method_of_order_two_needs_the_square_root_of_the_length():
+    law = figures.keeping("stormer-verlet[angles]", loss())
+    assert law.work(2500.0) == pytest.approx(100.0)
+    assert law.work(10_000.0) == pytest.approx(200.0)
+    steeper = figures.keeping("stormer-verlet[angles]", loss(exponent=2.0))  # a drifting energy
+    assert steeper.work(10_000.0) == pytest.approx(400.0)
+
+
+def test_the_law_foretells_the_work_of_a_run_that_lasts_four_times_as_long():
+    scene, verlet = symtop.scene("spheroid"), integrator("stormer-verlet[angles]")
+    short, long = (phase_loss(scene, verlet, 100.0, target) for target in (300.0, 1200.0))
+    law = figures.keeping(verlet.name, short)
+    assert law.power == pytest.approx(0.5, abs=0.05)
+    assert float(long["measured"]) > 3.0 * float(short["measured"])
+    assert law.work(float(long["measured"])) == pytest.approx(float(long["evaluations"]), rel=0.05)
+    rule = float(short["evaluations"]) / float(short["steps"])
+    assert rule == pytest.approx(1.0, abs=0.01)  # one force evaluation a step
+
+
+PER_NUTATION = 1000.37
+PARTS = ("least", "largest", "mean")
+
+
+@pytest.mark.parametrize("compensated", [True, False])
+@pytest.mark.parametrize("name", ["midpoint[angles]", "cayley[axis]"])
+def test_each_has_the_bits_of_a_long_run(name, compensated):
+    method, scenes = integrator(name), members(scene("spheroid"), 6)  # enough for lanes
+    gauges = gauges_of(scenes, method, PER_NUTATION)
+    ends, seen = side_by_side(scenes, gauges, method, 20_000, PER_NUTATION, compensated=compensated)
+    for i, one in ((0, scenes[0]), (5, scenes[5])):
+        h = one.nutation_period / PER_NUTATION
+        alone = long_run(one, method, steps=20_000, step_size=h, compensated=compensated, quiet=True)
+        np.testing.assert_array_equal(ends, alone["steps"])
+        for quantity in QUANTITIES:
+            for k, part in enumerate(PARTS):
+                np.testing.assert_array_equal(seen[quantity][i, :, k], alone[f"{quantity}_{part}"])
+    others = [seen["modified_energy"][i] for i in range(6)]
+    assert not any(np.array_equal(one, other) for one, other in pairwise(others))  # each is a run of its own
+
+
+def test_the_ordinary_ensemble_goes_in_lanes():
+    """Fewer members, or another sum, would run one after another, 8 times slower."""
+    ensembles = [case for case in study.cases(False) if case.group == ROUNDINGS]
+    assert len(ensembles) == 4
+    for case in ensembles:
+        row = integrator(case.integrator)
+        assert case.settings["count"] >= LEAST
+        assert row.solvers[row.charts()[0]].in_lanes
