@@ -34,7 +34,8 @@ def main() -> None:
         peers, missing = load(tuple(options.only))
         for sentence in missing:
             print(sentence)
-        data = columns.described(measure(peers, options.scenes), own=columns.read(Path(__file__).parent / columns.FILE))
+        own = columns.read(Path(__file__).parent / "columns.tsv")
+        data = columns.described(measure(peers, options.scenes), own=own)
         data = netcdf.describe(data, STUDY.title, question=STUDY.question)
         netcdf.write(data, file)
         many = together.measure(SOLVERS if any(peer.package == DIFFRAX for peer in peers) else ())

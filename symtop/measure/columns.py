@@ -1,8 +1,8 @@
 """Long names, units and flags of the columns of stored datasets, as CF has them; each column is declared once.
 
 What several datasets have is declared here, errors in `symtop.measure.errors.ERRORS`, variables of a trajectory in
-`symtop.core.netcdf.VARIABLES`. Columns of one study stand beside it in ``columns.tsv``, five cells a line, separated by
-tabs:
+`symtop.core.netcdf.VARIABLES`. Columns of one study stand beside it in ``columns.tsv``, or NAME.tsv beside a study of
+one's own in NAME.py, five cells a line, separated by tabs:
 
     variable        its name, or group/name: without a group, of every group of the study that does not have its own
     units           in SI, "1" of a pure number, none of text; seconds of a machine are seconds in any scene
@@ -22,7 +22,7 @@ from symtop.core import netcdf
 from symtop.core.errors import SymtopError
 from symtop.measure.errors import ERRORS
 
-FILE, CELLS = "columns.tsv", 4  # behind the name
+CELLS = 4  # behind the name
 ANY: dict[str, tuple[str, ...]] = {
     "scene": ("name of the scene",),
     "variant": ("name of the variant: a method in one chart, method[chart]",),
@@ -57,10 +57,10 @@ class Column(NamedTuple):
     flags: dict[int, str]
 
 
-def read(file: Path) -> dict[str, Column]:
-    """The table in a file, empty if there is no such file; SymtopError for a line that declares no column, or again."""
+def read(file: Path | None) -> dict[str, Column]:
+    """The table in a file, empty without one; SymtopError for a line that declares no column, or one again."""
     table: dict[str, Column] = {}
-    lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
+    lines = [] if file is None else file.read_text(encoding="utf-8").splitlines()
     for place, line in enumerate(lines[1:], 2):
         name, *cells = line.split("\t")
         column = _column(cells)

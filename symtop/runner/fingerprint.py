@@ -65,13 +65,12 @@ def digests(study: Study, cases: Iterable[Case]) -> list[str]:
     return [code_hash.digest(reasons(study, case)) for case in cases]
 
 
-def drawing_digest(study: Study, script: Path, *drawing: Any) -> str:
-    """Hash of what makes a study's figures, tables and sentences, and of the files beside its script that they fill."""
+def drawing_digest(study: Study, beside: Iterable[Path | None], *drawing: Any) -> str:
+    """Hash of what makes a study's facts, figures and tables, and of the files beside it that they fill."""
     shown = (
-        study.pictures, study.verdict, study.tables, study.charts, study.opening,
+        study.facts, study.pictures, study.tables, study.charts, study.verdict, study.opening,
         study.title, study.question, study.how_to_read,
     )  # fmt: skip
-    files = (file for kind in ("*.md", "*.tsv") for file in sorted(script.parent.glob(kind)))
-    beside = {f"file {file.name}": code_hash.file_hash(file) for file in files}
     code = _code().reasons("drawing", shown, drawing)
-    return code_hash.digest(code | beside | code_hash.packages("matplotlib"))
+    texts = {f"file {file.name}": code_hash.hashed(file.read_text(encoding="utf-8")) for file in beside if file}
+    return code_hash.digest(code | texts | code_hash.packages("matplotlib"))

@@ -24,11 +24,12 @@ from symtop.model.scenes import scenes
 from symtop.run import plugins
 from symtop.runner import fingerprint, manifest, store
 from symtop.runner.cases import StudyCases
+from symtop.runner.findings import findings_of
 from symtop.runner.pool import Pool, prepare
-from symtop.runner.scripts import file_of, folder, load, names
-from symtop.runner.study import Case, Save, Study, findings_of
+from symtop.runner.scripts import columns_of, file_of, folder, load, names, page_of
+from symtop.runner.study import Case, Save, Study
 
-__all__ = ["findings_of", "folder", "load", "names", "run", "start"]
+__all__ = ["findings_of", "folder", "load", "names", "page_of", "run", "start"]
 
 Findings = dict[str, Any]
 
@@ -116,7 +117,8 @@ def analyse_stored(
 
 def drawing_digest(study: Study, save: Save | None) -> str:
     """Hash of what combines, draws and judges."""
-    return fingerprint.drawing_digest(study, file_of(study.name), combine, columns.described, save)
+    beside = page_of(study.name), columns_of(study.name)
+    return fingerprint.drawing_digest(study, beside, combine, columns.described, findings_of, save)
 
 
 def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> Findings:
@@ -129,14 +131,17 @@ def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> 
         combined = cases.combined()
         places = [catalogue.get(case.scene) for case in cases.cases.values()]
         units = "SI" if all(place is not None and place.units == "SI" for place in places) else ""
-        combined = columns.described(combined, units, columns.read(file_of(study.name).parent / columns.FILE))
+        combined = columns.described(combined, units, columns.read(columns_of(study.name)))
         combined = netcdf.describe(combined, study.title, units=units, question=study.question)
         netcdf.write(combined, dataset)
         store.forget(results, study, cases.cases)
-        findings = findings_of(study, combined, results, save, failures=cases.failures, cases=len(cases.cases))
-        findings["quick"] = quick
+        findings = findings_of(
+            study, combined, results, save, failures=cases.failures, cases=len(cases.cases), quick=quick,
+            page=page_of(study.name),
+        )  # fmt: skip
         netcdf.write_json(words, findings)
         if not cases.failures and made_of:
             pictures = [results / "figures" / picture["file"] for picture in findings["pictures"]]
-            manifest.note(results, study.name, made_of, [dataset, words, *pictures, *cases.cases])
+            tables = [results / "tables" / table["file"] for table in findings["tables"] if "file" in table]
+            manifest.note(results, study.name, made_of, [dataset, words, *pictures, *tables, *cases.cases])
     return findings

@@ -58,6 +58,21 @@ def file_of(name: str) -> Path:
     return _elsewhere.get(name) or folder() / one_of("study", name, names()) / "study.py"
 
 
+def page_of(name: str) -> Path | None:
+    """The template of a study's page: page.md beside study.py, NAME.md beside any other script; None without one."""
+    return _beside(file_of(name), "page.md")
+
+
+def columns_of(name: str) -> Path | None:
+    """The table of a study's columns, columns.tsv or NAME.tsv, likewise."""
+    return _beside(file_of(name), "columns.tsv")
+
+
+def _beside(script: Path, name: str) -> Path | None:
+    file = script.with_name(name) if script.stem == "study" else script.with_suffix(Path(name).suffix)
+    return file if file.is_file() else None
+
+
 def _module(file: Path) -> ModuleType:
     if file.parent.parent == folder():
         return importlib.import_module(f"{install().__name__}.{file.parent.name}.{file.stem}")

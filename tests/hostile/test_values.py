@@ -61,6 +61,11 @@ MORE = {
         {**dict.fromkeys(("mass", "at_centre", "axial"), NOT_POSITIVE), "distance": NOT_FINITE, "gravity": NOT_FINITE},
     ),
     "errors": (symtop.errors, {"run": RUN}, {"run": NOT_DATA, "scene": UNKNOWN[1:]}),
+    "errors of a table": (
+        lambda time, theta: symtop.errors({"time": time, "theta": theta}, "spheroid"),
+        {"time": [0.0, 0.5], "theta": [0.4, 0.4]},
+        {"time": ["x", [0.0, 10**400], [0.0, -(10**400)]], "theta": ["x", [10**400, 0.4], [0.4, math.inf, 1.0]]},
+    ),
     "recommend": (
         symtop.recommend,
         {"scene": "spheroid", "accuracy": 1e-2, "horizon": 0.1},
@@ -97,8 +102,14 @@ MORE = {
         {"target": lambda f, t, y, h: y, "quick": True},
         {
             "form": [value for value in UNKNOWN[1:] if value], "chart": UNKNOWN, "scene": UNKNOWN,
-            "order": NOT_WHOLE[1:], "energy": UNKNOWN[1:],
+            "order": NOT_WHOLE[1:], "energy": [*UNKNOWN[1:], np.array([1.0, 2.0])],
+            "conserves": ["energy", np.array(1.0), np.array([1.0]), np.array(["x"]), [10**400], {"x": 1}, 3],
         },
+    ),
+    "judge of nothing": (
+        symtop.judge,
+        {"target": "no-such-file.py:step", "form": "ode", "conserves": ["energy"], "energy": "kept", "quick": True},
+        {"chart": UNKNOWN, "order": NOT_WHOLE[1:], "symplectic": ["x", 2, np.array([True, False])]},
     ),
 }  # fmt: skip
 BAD = [

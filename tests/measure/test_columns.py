@@ -11,13 +11,13 @@ from symtop.core import netcdf
 from symtop.core.errors import SymtopError
 from symtop.measure import columns
 from symtop.measure.errors import ERRORS, QUANTITIES
-from symtop.runner.scripts import folder, names
+from symtop.runner.scripts import columns_of, names
 from tests.core.test_conventions import lacking
 
 UNITS = {"1", "rad", "rad s-1", "s", "s-1", "s-2", "kg m2 s-2", "kg m2 s-1"}
 ROOT = Path(__file__).resolve().parents[2]
-PEERS = columns.read(ROOT / "benchmarks" / "peers" / columns.FILE)
-OWN = {name: columns.read(folder() / name / columns.FILE) for name in names()}
+PEERS = columns.read(ROOT / "benchmarks" / "peers" / "columns.tsv")
+OWN = {name: columns.read(columns_of(name)) for name in names()}
 ENTRIES = {"any": columns.ANY, "errors": columns.ERROR_TABLE} | {
     study: {name: column.entry for name, column in own.items()} for study, own in (OWN | {"peers": PEERS}).items()
 }
@@ -57,18 +57,18 @@ def test_a_study_of_ones_own_keeps_its_names_or_declares_them_beside_it(tmp_path
     given = {"long_name": "a gap", "units": "m"}
     data = netcdf.describe(columns.described(table_of(gap=given, energy=given)), "Mine")
     assert data["gap"].attrs == data["energy"].attrs == given
-    file = tmp_path / columns.FILE
+    file = tmp_path / "columns.tsv"
     file.write_text("variable\tunits\twithout_units\tflags\tlong_name\naxis\tm\t\t\tlength of the axle\n")
     mine = columns.described(table_of(axis=given), "SI", columns.read(file))
     assert mine["axis"].attrs == {"long_name": "length of the axle", "units": "m"}
-    assert columns.read(tmp_path / "none.tsv") == {}
+    assert columns.read(None) == {}
 
 
 @pytest.mark.parametrize(
     "line", ["gap\tm", "gap\t\t\t\t", "gap\tm\t\tyes\ta gap", "gap\tm\t\t\ta gap\ngap\tm\t\t\tagain", ""]
 )
 def test_a_line_that_declares_no_column_is_refused(tmp_path, line):
-    file = tmp_path / columns.FILE
+    file = tmp_path / "columns.tsv"
     file.write_text(f"variable\tunits\twithout_units\tflags\tlong_name\n{line}\n")
     with pytest.raises(SymtopError, match=f"line {len(line.splitlines() or [line]) + 1} must be .* not '"):
         columns.read(file)
