@@ -36,7 +36,11 @@ ANY: dict[str, tuple[str, ...]] = {
     "spread": ("spread of the samples of a time: (median - minimum) / minimum", "1"),
     "first_call": ("time of the first call, with compilation", "s"),
     "sample_time": ("time of a sample since the start", "s", "1"),
-    "message": ("what a run that raised an exception said",),
+    "seconds_spread": ("spread of the samples of a time: (median - smallest) / smallest", "1"),
+    "exact_seconds": ("time of the exact motion, the smallest of its samples", "s"),
+    "steps_per_nutation": ("steps in a nutation", "1"),
+    "reached": ("was the target met? or why not",),
+    "message": ("why a run could not be made",),
     "made_of": ("digest of all that the numbers of a cell depend on",),
 }
 ERROR_TABLE = {
