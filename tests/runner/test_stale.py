@@ -79,7 +79,7 @@ METHODS = "symtop.methods"
         (f"{METHODS}.lagrangian.galerkin:increment", {"galerkin-simpson"}),
         (f"{METHODS}.lagrangian.discrete_lagrangian:increment", STRAIGHT),
         (f"{METHODS}.library.scipy_ivp:compiled_field", SCIPY),
-        (f"{METHODS}.runge_kutta.explicit:weighted", {"rk4", "rk45-compiled"}),
+        (f"{METHODS}.runge_kutta.explicit:weighted", {"rk4", "rk45-compiled", "tsit5", "dop853-compiled", "vern9"}),
         (f"{METHODS}.splitting.reversible:march", {"stormer-verlet-reversible"}),
         (f"{METHODS}.lie_group.generalised_alpha:turn", {"generalised-alpha"}),
         (f"{METHODS}.taylor.heyoka:propagate", {"taylor", "taylor-longdouble", "taylor-quad"}),
@@ -271,7 +271,7 @@ def test_an_edit_of_each_family_is_named_by_status_and_is_all_that_is_computed(t
     edits = [
         (package / "methods/runge_kutta/gauss.py", "\n", "\n# a comment\n", None, set()),
         (tmp_path / "coeffs.py", "(0.0, 1.0)", "(0.5, 0.5)", "integrator bad-of-a-user", {"bad-of-a-user"}),
-        (package / "methods/runge_kutta/dormand_prince.py", "\n", "\n", None, set()),
+        (package / "methods/runge_kutta/pairs.py", "\n", "\n", None, set()),
         (tmp_path / "probe.py", "samples=51", "samples=53", "code probe.py", "all"),
     ]
     for file, before, after, why, stale in edits:
