@@ -46,7 +46,7 @@ def costs(data: xr.Dataset, target: float) -> dict[str, float]:
 def made_for_it(name: str) -> bool:
     """Does a method need this top's own equations?"""
     method = split_name(name)[0]
-    return method in integrators() and getattr(integrator(name), "needs", "") in ("this-top", "solution")
+    return method in integrators() and integrator(name).needs in ("this-top", "solution")
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:

@@ -3,19 +3,16 @@
 A few methods on a few scenes, each at settings from coarse to fine: the largest errors of a run, its force evaluations,
 and the seconds that it takes. A method runs in the angles or the axis chart, and again in the attitude chart for the
 error of the attitude, which the axis chart does not show. The closed form, which needs no integrator, is timed beside
-them: set up and evaluated once.
+them.
 """
-
-import math
 
 import numpy as np
 import xarray as xr
 
 from symtop.measure.accuracy import error_table
 from symtop.measure.settings import ladder
-from symtop.measure.timing import bare_run, timings
+from symtop.measure.sweep import timed_rows
 from symtop.methods.framework.registry import Integrator, integrator, integrators
-from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.scenes import Scene, scene
 from symtop.runner.study import REFERENCE, Case, Study
 
@@ -34,7 +31,6 @@ LENGTHS = (10.0, 100.0)  # nutations
 QUANTITIES = ("axis", "attitude", "energy", "p_phi")
 KEPT = ("step_size", "tolerance", "force_evaluations", "seconds", *QUANTITIES, "axis_bound")
 SETTINGS, MOST_STEPS = 14, 1e6
-BATCHES, BATCH = 7, 0.001  # of a timing; seconds
 
 
 def cases(quick: bool) -> list[Case]:
@@ -47,34 +43,22 @@ def cases(quick: bool) -> list[Case]:
 
 def measure(case: Case) -> xr.Dataset:
     """Errors, work and seconds over ``nutations`` and ``setting``."""
-    on, count = scene(case.scene), case.settings["settings"]
-    if case.integrator == REFERENCE:
-        parts = [evaluation(on, length) for length in case.settings["lengths"]]
-    else:
-        parts = [runs(on, integrator(case.integrator), length, count) for length in case.settings["lengths"]]
-    return xr.concat(parts, xr.DataArray(list(case.settings["lengths"]), dims="nutations", name="nutations"))
+    lengths, count = case.settings["lengths"], case.settings["settings"]
+    parts = [runs(scene(case.scene), integrator(case.integrator), length, count) for length in lengths]
+    return xr.concat(parts, xr.DataArray(list(lengths), dims="nutations", name="nutations"))
 
 
 def runs(on: Scene, variant: Integrator, length: float, count: int) -> xr.Dataset:
-    """A method's runs over so many nutations; those that ended `ok` are timed."""
+    """A method's runs over so many nutations; those that ended `ok` are timed. The closed form has nothing to set."""
     horizon, (chart,) = length * on.nutation_period, variant.charts()
     settings = ladder(variant, on, horizon, count, MOST_STEPS)
     table = error_table(on, variant, settings, horizon, observe="attitude" if chart == "attitude" else "axis")
-    if chart == "attitude":  # the axis chart has the rest
-        table = table.assign({name: table[name].where(False) for name in ("axis", "energy", "p_phi")})
-    good = [bool(outcome == "ok") for outcome in table["outcome"].values]
-    calls = [bare_run(on, variant, chart, setting, horizon) for setting, ok in zip(settings, good, strict=True) if ok]
-    taken = iter(timings(calls, BATCHES, BATCH, patience=0.5))
-    seconds = [next(taken).best if ok else math.nan for ok in good]
-    return table.assign(seconds=("setting", seconds))[list(KEPT)]
-
-
-def evaluation(on: Scene, length: float) -> xr.Dataset:
-    """The closed form, set up and evaluated at the end of the run."""
-    times = np.array([length * on.nutation_period])
-    table = error_table(on, integrator(REFERENCE), [math.nan], float(times[0]), observe="attitude")
-    (taken,) = timings([lambda: ClosedForm(on.top, on.start).axis(times)], 5, BATCH)
-    return table.assign(seconds=("setting", [taken.best]))[list(KEPT)]
+    if chart == "attitude" and variant.method != REFERENCE:  # the axis chart has the rest
+        table = table.assign({name: table[name] * np.nan for name in ("axis", "energy", "p_phi")})
+    outcomes = zip(settings, table["outcome"].values, strict=True)
+    rows = [{"setting_value": setting, "outcome": outcome, "seconds": np.nan} for setting, outcome in outcomes]
+    timed_rows([(on, variant, horizon, rows)])
+    return table.assign(seconds=("setting", [one["seconds"] for one in rows]))[list(KEPT)]
 
 
 STUDY = Study(
