@@ -27,6 +27,7 @@ EXECUTION = {
 @click.argument("scene", shell_complete=completing("scenes"))
 @click.argument("integrator", shell_complete=completing("integrators"))
 @click.option("--step-size", type=float, help="Step of a fixed-step method.")
+@common.per_nutation_option
 @click.option("--tolerance", type=float, help="Tolerance of an adaptive method.")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
 @click.option("--samples", type=int, default=501, show_default=True, help="Number of samples in the output.")
@@ -59,6 +60,7 @@ def run(
         from symtop.run.reference.truth import reference
         from symtop.run.simulation import simulate
 
+        settings["step_size"] = common.step_of(scene, settings)
         data = simulate(scene, integrator, guard=warn if guard else False, **settings)
         if output is not None:
             netcdf.write(data, output)
@@ -98,11 +100,12 @@ def run(
 @click.argument("integrator", shell_complete=completing("integrators"))
 @click.option("--steps", type=float, default=1e9, show_default=True, help="Number of steps.")
 @click.option("--step-size", type=float, help="Step; a thousandth of a nutation period by default.")
+@common.per_nutation_option
 @click.option("--checkpoint", type=File(), help="File to resume from; symtop's own by default.")
 @click.option("--output", type=File(), help="Write the windows to this netCDF file.")
 @common.plugin_option
 def long(
-    scene: str, integrator: str, steps: float, step_size: float | None, checkpoint: str | None, output: str | None
+    scene: str, integrator: str, steps: float, checkpoint: str | None, output: str | None, **settings: Any
 ) -> None:
     """Run one INTEGRATOR on one SCENE for very many steps, in little memory.
 
@@ -117,7 +120,7 @@ def long(
         from symtop.model import scenes
         from symtop.run.long_run import PER_NUTATION, long_run
 
-    period = scenes.scene(scene).nutation_period
+    period, step_size = scenes.scene(scene).nutation_period, common.step_of(scene, settings)
     if step_size is None and period == math.inf:
         raise SymtopError(f"{scene} has no nutation to take a step from: give --step-size")
     h = period / PER_NUTATION if step_size is None else step_size
