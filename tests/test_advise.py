@@ -163,9 +163,9 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
     few(monkeypatch, 5)
     real, ended = settings.search, []
 
-    def search(scene, method, accuracy, quantity, horizon, *rest):
+    def search(scene, method, accuracy, quantity, horizon, *rest, **limits):
         if horizon < 60.0 or len(ended) >= 3:
-            return real(scene, method, accuracy, quantity, horizon, *rest)
+            return real(scene, method, accuracy, quantity, horizon, *rest, **limits)
         ended.append(method.name)
         return settings.STOPPED
 

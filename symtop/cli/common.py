@@ -27,6 +27,7 @@ from symtop.core.errors import (
     file_path,
     positive,
 )
+from symtop.core.progress import telling
 from symtop.core.signals import INTERRUPTED, told_apart
 
 LONGEST_NAME = 80  # characters of the name of a file that are shown
@@ -36,6 +37,7 @@ NAMES = {  # what the shell completes: the module and its function
     "integrators": ("symtop.methods.framework.registry", "integrators"),
     "variants": ("symtop.methods.framework.registry", "variants"),
 }  # fmt: skip
+SILENT = ("explore",)  # commands that work until they are ended
 PLUGINS = "symtop.plugins"  # in the context of a command: plug-ins were given
 
 
@@ -100,6 +102,15 @@ results_option = click.option(
 
 class Group(click.Group):
     """Prints an error as one sentence that names options, and exits with code 2; 130 after Ctrl-C."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command of a line; from here on it says now and then that it works."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if not ctx.resilient_parsing and name not in SILENT:
+            ctx.with_resource(telling(str(name)))
+        return name, command, rest
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""

@@ -2,6 +2,7 @@
 
 import math
 import sys
+import time
 from collections import Counter
 from typing import Any
 
@@ -12,6 +13,7 @@ from symtop.cli.common import File, as_text, check_outputs, completing, say, say
 from symtop.core.errors import SymtopError, whole
 from symtop.core.progress import ticking
 
+FEW = 100_000  # steps that are timed before a long run
 SAME = 0.01  # relative difference of the step used from --step-size that is printed
 COMPARED = 100_000  # tops whose errors are shown, the first of the population: those of a million take 1 GB
 
@@ -125,6 +127,16 @@ def long(
         raise SymtopError(f"{scene} has no nutation to take a step from: give --step-size")
     h = period / PER_NUTATION if step_size is None else step_size
     count = whole("steps", steps, 1)
+    if count > FEW:
+        with ticking("timing some steps"):
+            took = 0.0
+            for few in (1000, FEW):  # the first of them compiles
+                began = time.monotonic()
+                long_run(scene, integrator, steps=few, step_size=h, quiet=True)
+                took = (time.monotonic() - began) * count / FEW
+        if took > 10.0:
+            said = f"{took:.2g} s" if took < 100.0 else f"{took / 60.0:.2g} min"
+            warn(f"{count:.3g} steps take about {said}")
     try:
         data = long_run(scene, integrator, steps=count, step_size=h, checkpoint=checkpoint or True, output=output)
     except KeyboardInterrupt:
