@@ -53,8 +53,9 @@ def faults(name, figure) -> list[str]:
 @pytest.mark.parametrize("name", runner.names())
 def test_every_figure_can_be_read_in_print(name, quick_results):
     data = netcdf.read_any(quick_results / f"{name}.nc")
-    drawn = [one for one in runner.load(name).pictures(data) if not hasattr(one.figure, "suffix")]
-    assert drawn
+    study = runner.load(name)
+    drawn = [one for one in study.pictures(data) if not hasattr(one.figure, "suffix")]
+    assert drawn or study.facts(data)["busy"]  # times of a busy machine are not drawn
     assert {one.name: faults(name, one.figure) for one in drawn} == {one.name: [] for one in drawn}
     assert all(one.figure.get_figwidth() <= style.WIDTH for one in drawn)
     assert all(one.figure.get_figheight() <= 10.0 for one in drawn)  # inches: a page
