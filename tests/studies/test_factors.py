@@ -29,6 +29,7 @@ import symtop
 from symtop.measure import settings
 from symtop.measure.datasets import combine
 from symtop.methods.framework.equations import FORMULATIONS
+from symtop.report.formats import number
 from symtop.runner.study import Case
 from tests.templates import checked
 
@@ -187,7 +188,7 @@ def test_where_nothing_was_timed_nothing_is_said(quiet):
 
 def test_the_page_is_rendered_with_numbers_and_without(quiet, tmp_path):
     text = checked("factors", quiet, tmp_path)
-    assert f"becomes {facts.facts(quiet)['whole']:.0f} times faster" in text
+    assert f"becomes {number(facts.facts(quiet)['whole'], 3)} times faster" in text
     assert "busy" not in text
 
 
