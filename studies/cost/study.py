@@ -1,0 +1,134 @@
+"""Which method is the cheapest at the accuracy I need, with what I have?
+
+One ladder of settings (`ladder`), one model of cost, force evaluations times their price plus the call (`prices`), one
+ranking with intervals (`ranking`). In the first round every variant, a method in one chart, climbs the ladder on the
+tops of two populations and the named scenes (`tops`) over ten nutations, and five processes time an evaluation. In the
+second the variants that come within `WITHIN` of the cheapest of their class climb it over a thousand, variants whose
+price is noisy are timed again, and cells of the phase diagram that were predicted are run (`far`).
+"""
+
+import numpy as np
+import xarray as xr
+
+from symtop.methods.framework.registry import Integrator, integrator, variants
+from symtop.runner.study import Case, Study
+
+from . import facts, far, figures, page
+from .ladder import table
+from .prices import PROCESSES, measured, prices
+from .tops import named, tops_of
+
+SEED = 1
+SHORT, LONG, TOPS, PRICES, FAR, CHECKS = "short", "long", "tops", "prices", "far", "checks"  # groups of cases
+FULL = {
+    SHORT: {"strata": 2400, "natural": 1200, "seed": SEED, "nutations": 10.0, "budget": 1e4, "guarded": 120},
+    LONG: {"strata": 300, "natural": 200, "seed": SEED, "nutations": 1000.0, "budget": 5e5, "guarded": 0},
+}
+QUICK = {
+    SHORT: {"strata": 120, "natural": 60, "seed": SEED, "nutations": 10.0, "budget": 6e3, "guarded": 8},
+    LONG: {"strata": 24, "natural": 16, "seed": SEED, "nutations": 100.0, "budget": 3e4, "guarded": 0},
+}
+FAR_FULL, FAR_QUICK = ({"members": members, "levels": levels, "steps": steps, "budget": budget, "seed": SEED}
+                       for members, levels, steps, budget in ((16, 13, 1.2e6, 2.5e6), (4, 10, 1e5, 2e5)))  # fmt: skip
+CHECKED = {False: 3e7, True: 2e6}  # force evaluations of one run of a check, by quick
+LEFT_OUT = {  # methods, by the reason
+    "the same maps in three coordinates, at two to three times the time": (
+        "midpoint-unreduced", "trapezoidal-unreduced",
+    ),
+    "the same steps as taylor in slower arithmetic, which meets smaller errors": ("taylor-longdouble", "taylor-quad"),
+    "a step of any size is the motion itself, so that no step is too coarse": ("exact-discrete",),
+}  # fmt: skip
+
+
+def compiled_variants() -> list[Integrator]:
+    """Every compiled variant with a step or a tolerance, but those that are left out."""
+    left = {name for names in LEFT_OUT.values() for name in names}
+    return [
+        variant
+        for variant in variants()
+        if variant.implementation == "compiled" and variant.control is not None and variant.method not in left
+    ]
+
+
+def has_twin(variant: Integrator) -> bool:
+    """Is it the attitude chart of a method that steps the same axis in the axis chart?"""
+    return variant.charts() == ("attitude",) and "axis" in integrator(variant.method).charts()
+
+
+def timing(names: list[str], first: int, *, quick: bool) -> list[Case]:
+    """One case for each process that times the variants, numbered from `first`."""
+    asked = {"integrators": names, "rounds": 3 if quick else 4, "batch": 0.0005 if quick else 0.002}
+    processes = 3 if quick and first else PROCESSES
+    return [Case(f"process-{first + k:02d}", "together", asked, timed=True, group=PRICES) for k in range(processes)]
+
+
+def grid(*, quick: bool = False) -> list[Case]:
+    """Every variant over ten nutations, the tops themselves, the prices, and the candidates of the phase diagram."""
+    asked, names = QUICK if quick else FULL, [variant.name for variant in compiled_variants()]
+    return [
+        *(Case("tops", name, asked[SHORT], group=SHORT) for name in names),
+        *(Case(span, "exact", asked[span], group=TOPS) for span in (SHORT, LONG)),
+        *timing(names, 0, quick=quick),
+        *(Case("natural", name, FAR_QUICK if quick else FAR_FULL, group=FAR) for name in far.candidates()),
+    ]
+
+
+def follow_up(data: xr.DataTree) -> list[Case]:
+    """The long runs of those that may win, the prices that were noisy, and the checks of the phase diagram."""
+    quick = facts.members(data, SHORT) < 1000
+    asked = (QUICK if quick else FULL)[LONG]
+    again = prices(data).marked
+    return [
+        *(Case("tops", name, asked, group=LONG) for name in facts.contenders(data)),
+        *(timing(again, PROCESSES, quick=quick) if again else []),
+        *(Case("natural", f"check-{place:02d}", settings, group=CHECKS)
+          for place, settings in enumerate(far.chosen(data, CHECKED[quick]))),
+    ]  # fmt: skip
+
+
+def measure(case: Case) -> xr.Dataset:
+    """The table of a variant, of the tops, of the prices, or of the phase diagram."""
+    asked = case.settings
+    if case.group == PRICES:
+        return measured(asked["integrators"], asked["rounds"], asked["batch"])
+    if case.group == CHECKS:
+        return far.check(asked)
+    if case.group == FAR:
+        tops = far.tops_of(asked["members"], asked["seed"])
+        return far.ladder(integrator(case.integrator), tops, asked["levels"], asked["steps"], asked["budget"])
+    drawn = tops_of(asked["strata"], asked["natural"], asked["seed"], asked["nutations"])
+    if case.group == TOPS:
+        return about_tops(drawn).assign(nutations=asked["nutations"])
+    row = integrator(case.integrator)
+    return table(row, drawn, asked["budget"], twin=has_twin(row), guarded=asked["guarded"]).assign(
+        nutations=asked["nutations"]
+    )
+
+
+def about_tops(tops) -> xr.Dataset:  # type: ignore[no-untyped-def]
+    """What the closed form knows of the tops: kind, width of the nutation and regime."""
+    return xr.Dataset(
+        {
+            "kind_place": ("member", tops.kinds.astype(float)),
+            "width": ("member", tops.width),
+            "regime": (("member", "number"), tops.regime),
+            "known": ("member", tops.known.astype(float)),
+            "scene_name": ("named", np.array(list(named()))),
+        }
+    )
+
+
+STUDY = Study(
+    name="cost",
+    title="Cost",
+    question="Which method is the cheapest at the accuracy I need, with what I have?",
+    how_to_read=page.HOW_TO_READ,
+    cases=lambda quick: grid(quick=quick),
+    measure=measure,
+    pictures=figures.pictures,
+    tables=page.tables,
+    verdict=page.sentences,
+    follow_up=follow_up,
+    charts=page.charts,
+    opening=page.opening,
+)
