@@ -2,6 +2,6 @@
 
 # of the report; others follow
 ORDER = (
-    "population", "truth", "convergence", "work_precision", "factors", "drift", "stability", "claims", "reduction",
-    "phase_diagram", "oscillators", "notebook",
-)  # fmt: skip
+    "cost", "truth", "convergence", "factors", "drift", "stability", "claims", "reduction", "oscillators", "notebook",
+)
+FORMER = dict.fromkeys(("population", "work_precision", "phase_diagram"), "cost")  # names that studies had

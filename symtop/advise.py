@@ -1,8 +1,7 @@
 """`recommend`: the cheapest integrator, with its step or tolerance, that meets an accuracy on a scene.
 
-    1. Candidates. A stored population study counts on how many of the random tops nearest to this one a method was
-       the cheapest or nearly so; a stored work-precision study lists the methods that were cheapest on the nearest
-       scene. The distance is that of four dimensionless numbers which fix the motion of the axis
+    1. Candidates. A stored study of cost counts on how many of the random tops nearest to this one a method was the
+       cheapest or nearly so. The distance is that of four dimensionless numbers which fix the motion of the axis
        (`symtop.measure.ranking`). Without a stored study every compiled method is a candidate.
     2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
        (`symtop.measure.settings`). The error is measured against the closed form, its target is lowered by the law of
@@ -28,15 +27,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-import xarray as xr
-
-from symtop.core import netcdf
 from symtop.core.errors import SymtopError, one_of, positive
-from symtop.measure import ranking, settings
+from symtop.measure import settings
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import FREQUENCIES
-from symtop.measure.ranking import STORED, Near, distances, nearest, regime
+from symtop.measure.ranking import STORED, Near, nearest
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import Integrator, integrator, integrators, is_built_in, split_name
 from symtop.model import scenes
@@ -44,8 +39,7 @@ from symtop.model.scenes import Scene, horizon_of
 from symtop.run.guard import MOST_STEPS
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
-STORED_STUDY = "work_precision.nc"
-CANDIDATES = 8  # methods of the stored studies that are tried
+CANDIDATES = 8  # methods of the stored study that are tried
 FINALISTS = 3  # methods that are run to the whole horizon
 TOO_DEAR = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
 CONFIDENCE = {
@@ -120,9 +114,8 @@ def recommend(
 
     `accuracy` is the largest error of `quantity` over the run: radians for ``axis``, ``attitude`` and ``theta``, and
     relative for others, energy and momenta by the scales of `symtop.errors`. `horizon` is the scene's own by default.
-    `results` is a folder with a stored ``work_precision.nc``, and ``population.nc`` if it is there; without it every
-    compiled method is tried. Raises SymtopError for arguments that are out of range. It runs what it recommends, which
-    takes from 0.1 s to half a minute.
+    `results` is a folder with a stored ``cost.nc``; without it every compiled method is tried. Raises SymtopError for
+    arguments that are out of range. It runs what it recommends, which takes from 0.1 s to half a minute.
     """
     scene = scenes.scene(scene)
     accuracy = positive("accuracy", accuracy)
@@ -130,15 +123,14 @@ def recommend(
     if quantity in settings.ANGLES and accuracy >= math.pi:
         raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}", "accuracy")
     horizon = scene.horizon if horizon is None else horizon_of(horizon)
-    data = None if results is None else _stored(Path(results) / STORED_STUDY)
+    near = None if results is None else nearest(Path(results) / STORED, scene, quantity, accuracy, horizon)
     limit = settings.judgeable(scene, quantity, horizon)
     question = _Question(scene, accuracy, quantity, horizon)
     if accuracy < limit:
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(question, [], (), source)
-    near = None if results is None else nearest(Path(results) / STORED, scene, quantity, accuracy, horizon)
-    guesses, source = _candidates(question, data, near)
-    source += f" ({Path(results) / STORED_STUDY})" if results is not None else ""
+    guesses, source = _candidates(question, near)
+    source += f" ({Path(results) / STORED})" if results is not None else ""
     trials: list[_Trial] = []
     fails: dict[str, list[str]] = {}
     patience = math.inf
@@ -170,20 +162,6 @@ def recommend(
     return _advice(question, ranked, sentences, source, near)
 
 
-def _stored(file: Path) -> xr.Dataset:
-    """The dataset of the work-precision study; refused with a sentence if it is not there or cannot be read."""
-    if not file.is_file():
-        raise SymtopError(f"results holds no {file.name}: {str(file.parent)!r}; run symtop study work_precision first")
-    remedy = "run symtop study work_precision --fresh"
-    try:
-        data = netcdf.read(file)
-    except SymtopError as error:
-        raise SymtopError(f"{file} cannot be read ({error.__cause__}); {remedy}") from error
-    if missing := [name for name in ("variant", *ranking.NEEDS) if name not in data]:
-        raise SymtopError(f"{file} is of an older version, without {', '.join(missing)}; {remedy}")
-    return data
-
-
 def _usable(quantity: str) -> list[str]:
     """What can be recommended: compiled methods with a step or a tolerance, in each chart that shows the quantity.
 
@@ -202,43 +180,22 @@ def _same(variant: str, usable: Sequence[str]) -> str | None:
     return next((name for name in (variant, *usable) if name in usable and split_name(name)[0] == method), None)
 
 
-def _candidates(
-    question: _Question, data: xr.Dataset | None, near: Near | None = None
-) -> tuple[dict[str, float | None], str]:
+def _candidates(question: _Question, near: Near | None) -> tuple[dict[str, float | None], str]:
     """Names of methods to try, each with a first guess of its setting, and a phrase on their origin."""
-    scene, accuracy, quantity, horizon = question
+    scene, _, quantity, _ = question
     usable = _usable(quantity)
     everyone: dict[str, float | None] = dict.fromkeys(usable)
-    if data is None or quantity not in data:
+    if near is None:
         return everyone, f"tried all {len(everyone)} compiled methods (without a stored study)"
-    catalogue = scenes.scenes()
-    stored = {name: catalogue[name] for name in map(str, data["scene"].values) if name in catalogue}
-    if not stored:
-        return everyone, f"tried all {len(everyone)} compiled methods (the stored study holds no known scene)"
-    numbers = regime(scene)
-    closest = min(stored, key=lambda name: float(distances(regime(stored[name])[np.newaxis], numbers)[0]))
-    column = int(np.argmin(np.abs(np.log(data["horizon"].values / max(horizon / scene.nutation_period, 1e-3)))))
-    cell = data.sel(scene=closest).isel(horizon=column)
-    served = [_same(name, usable) for name, count in near.served.items() if count] if near is not None else []
-    often = dict.fromkeys(filter(None, served))  # the methods that served most of the nearest tops first
-    scale = scene.nutation_period / stored[closest].nutation_period
-    cheapest: dict[str, float | None] = {}
-    stored_as = "axis" if quantity == "attitude" else quantity  # the study runs what shows the axis
-    for place in ranking.cheapest(cell, accuracy, stored_as):
-        name = _same(place.integrator, usable)
-        if name is not None and name not in cheapest:
-            run = cell.sel(variant=place.integrator).isel(setting=place.setting)
-            step, fixed = float(run["step_size"]), bool(np.isfinite(run["step_size"]))
-            scaled = step * scale if math.isfinite(scale) and scale > 0.0 else step
-            cheapest[name] = scaled if fixed else float(run["tolerance"])
-    chosen = {name: cheapest.get(name) for name in [*often, *cheapest][:CANDIDATES]}
+    chosen: dict[str, float | None] = {}
+    for variant, count in near.served.items():
+        name = _same(variant, usable)
+        if name is not None and name not in chosen and count and len(chosen) < CANDIDATES:
+            setting = near.settings[variant]
+            chosen[name] = scene.nutation_period / setting if integrator(name).fixed_step else setting
     if not chosen:
-        return everyone, f"tried all {len(everyone)} compiled methods (none met it on {closest}, the nearest scene)"
-    count = sum(name in often for name in chosen)
-    words = [f"{count} methods that served the {near.tops} nearest random tops most often"] if near and count else []
-    if len(chosen) > count:
-        words.append(f"{len(chosen) - count} methods that are cheapest on {closest}, the nearest stored scene")
-    return chosen, f"tried the {' and '.join(words)}"
+        return everyone, f"tried all {len(everyone)} compiled methods (none served the nearest random tops)"
+    return chosen, f"tried the {len(chosen)} methods that served the {near.tops} nearest random tops most often"
 
 
 def _try(question: _Question, method: Integrator, guess: float | None, patience: float) -> "_Trial | str":

@@ -34,8 +34,8 @@ GENERAL = "any body"  # every class but this-top and solution
 CLASSES = (*(name for name in NEEDS if name != "solution"), GENERAL)
 THIS_TOP = ("this-top", "solution")
 SECONDS, EVALUATIONS = "seconds", "evaluations"
-WITHIN = 4.0  # times the least cost of a class over ten nutations: who comes as close runs over a thousand
-OFTEN = 0.02  # of the tops
+WITHIN = 3.0  # times the least cost of a class over ten nutations: who comes as close runs over a thousand
+OFTEN = 0.05  # of the tops
 FINE = 50.0  # steps a nutation that look like enough
 
 
@@ -157,7 +157,7 @@ def contenders(data: xr.DataTree) -> list[str]:
     for quantity in ("axis", "attitude"):
         for target in targets(data):
             for tops in POPULATIONS:
-                for needs in CLASSES[:-1]:
+                for needs in CLASSES[:-1] if quantity == "axis" else (GENERAL, "this-top"):
                     taken = costs(data, Cell("short", quantity, target, tops, needs))
                     best = taken.values.min(axis=0, initial=np.inf)
                     near = (taken.values <= WITHIN * best) & np.isfinite(taken.values)
@@ -166,7 +166,7 @@ def contenders(data: xr.DataTree) -> list[str]:
     return [str(name) for name in data["short"]["variant"].values if str(name) in names]
 
 
-# ---- winners -----------------------------------------------------------------------------------------------------------
+# ---- winners ---------------------------------------------------------------------------------------------------------
 
 
 def cells(data: xr.DataTree, quantity: str = "axis", tops: str = NATURAL, needs: str = GENERAL) -> Iterator[Cell]:
@@ -178,7 +178,9 @@ def cells(data: xr.DataTree, quantity: str = "axis", tops: str = NATURAL, needs:
 
 def winners(data: xr.DataTree) -> list[dict[str, Any]]:
     """Every cell of the axis: population, class, horizon, target; the safe choice and the contest in hindsight."""
-    return [winner(data, cell) for tops in POPULATIONS for needs in CLASSES for cell in cells(data, "axis", tops, needs)]
+    return [
+        winner(data, cell) for tops in POPULATIONS for needs in CLASSES for cell in cells(data, "axis", tops, needs)
+    ]
 
 
 def winner(data: xr.DataTree, cell: Cell) -> dict[str, Any]:

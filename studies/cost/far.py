@@ -425,7 +425,9 @@ def checks(data: xr.DataTree) -> list[Check]:
         for rank, contender in enumerate(map(str, one["contender"].values)):
             runs = runs_of(data, contender)
             for side in range(2):
-                level = int(np.argmin(np.abs(np.log(runs["setting_value"].values / float(one["setting_value"][rank, side])))))
+                level = int(
+                    np.argmin(np.abs(np.log(runs["setting_value"].values / float(one["setting_value"][rank, side]))))
+                )
                 told = runs["error"].sel(quantity=quantity).isel(setting=level).sel(horizon=horizon, method="nearest")
                 pair = measured_errors[rank, side], told.values[: measured_errors.shape[2]]
                 ratios.append(np.where((pair[0] < 1.0) & (pair[1] < 1.0), pair[0] / pair[1], np.nan))

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from symtop.methods.framework.registry import integrator, split_name
 from symtop.report import style
-from symtop.report.style import LEAST_TEXT, few_ticks, grid, headline, look, number, panels
+from symtop.report.style import LEAST_TEXT, RAISED, few_ticks, grid, headline, panels
 from symtop.runner.study import Picture
 
 from . import facts, far
@@ -40,8 +40,11 @@ FAMILIES = {
     "taylor": "Taylor series",
 }  # fmt: skip
 TITLES = {
-    "axis": "axis: angle between\n(rad)", "energy": "energy: relative change", "shape": "shape: distance to the\ntrue orbit",
+    "axis": "axis: angle between\nat one time (rad)", "energy": "energy:\nrelative change", "shape": "shape: distance to the\ntrue "
+    "orbit",
 }  # fmt: skip
+SHADES = {"splitting": style.GREENS, "runge-kutta": style.ORANGES, "taylor": style.BLACKS,
+          "discrete-lagrangian": style.BLUES}  # fmt: skip
 SILENT_OF = ("rk4[axis]", "strang[axis]", "midpoint[angles]")
 
 
@@ -54,6 +57,11 @@ def pictures(data: xr.DataTree) -> list[Picture]:
 def power(target: float) -> str:
     """A target as a power of ten."""
     return f"$10^{{{np.log10(target):.0f}}}$"
+
+
+def raised(target: float) -> str:
+    """The same in a title."""
+    return f"10{str(round(np.log10(target))).translate(RAISED)}"
 
 
 def span(data: xr.DataTree, horizon: str = "short", tops: str = NATURAL) -> str:
@@ -82,12 +90,13 @@ def draw_accuracy(data: xr.DataTree) -> Picture:
              ylabel="axis error that 95 % of the tops keep (rad)")  # fmt: skip
     style.legend_below(figure, axes)
     best = {target: facts.safest(data, Cell("short", "axis", target, NATURAL)) for target in facts.targets(data)}
-    told = [f"{method(one[0].name)} to {number(target)}" for target, (one, _) in best.items()
+    told = [f"{method(one[0].name)} to {raised(target)}" for target, (one, _) in best.items()
             if one and math.isfinite(one[0].seconds)]  # fmt: skip
     headline(figure, f"The fastest safe choice for any body changes with the error: {', '.join(told)} rad")
     return Picture(
         "accuracy", figure,
-        f"Seconds of a run at the one setting with which {SAFE:.0%} of {span(data)} keep the axis error; left and low is "
+        f"Seconds of a run at the one setting with which {SAFE:.0%} of {span(data)} keep the axis error; left and low "
+        "is "
         "good. Bands: 95 % of a bootstrap over tops and prices. A line ends where the budget of a run or rounding ends "
         "it. Grey: needs this top's own equations. Method[chart]; the chart is the axis where none is named.",
         "Log-log plot of axis error against the time of a safe run, a line a method.",
@@ -128,8 +137,10 @@ def draw_classes(data: xr.DataTree) -> Picture:
     headline(figure, "What you can supply decides how fast a safe run is: the cheapest method of each class")
     return Picture(
         "classes", figure,
-        f"The cheapest method of each class of needs at the one setting with which {SAFE:.0%} of the tops keep the axis "
-        f"error: {span(data)} (named), and strata. Bars: 95 % of a bootstrap over tops and prices; ~: the lead is inside "
+        f"The cheapest method of each class of needs at the one setting with which {SAFE:.0%} of the tops keep the "
+        "axis "
+        f"error: {span(data)} (named), and strata. Bars: 95 % of a bootstrap over tops and prices; ~: the lead is "
+        "inside "
         "them. Grey: this-top, methods made of this very top's equations, for no other body.",
         "Dots of the time of the cheapest method of each class, a panel for each error.",
         lead="By what you can supply",
@@ -142,7 +153,9 @@ def draw_run_lengths(data: xr.DataTree) -> Picture:
     each = {target: facts.costs(data, Cell("short", "axis", target, NATURAL), EVALUATIONS) for target in targets}
     order: list[str] = []
     for target in targets:
-        order += [one.name for one in facts.contest(data, Cell("short", "axis", target, NATURAL), EVALUATIONS).standings[:2]]
+        order += [
+            one.name for one in facts.contest(data, Cell("short", "axis", target, NATURAL), EVALUATIONS).standings[:2]
+        ]
     rows = list(dict.fromkeys([*order, "rk4[axis]", "strang[axis]", "dop853-compiled-fixed[axis]"]))[:NAMED]
     figure, axes = grid(len(targets), 2, ("force evaluations of a run", "share of tops solved"), height=2.3, sharex=True,
                         sharey=True)  # fmt: skip
@@ -166,14 +179,16 @@ def draw_run_lengths(data: xr.DataTree) -> Picture:
     few_ticks(*axes, most=5)
     style.legend_below(figure, axes)
     first = [facts.contest(data, Cell("short", "axis", target, NATURAL), EVALUATIONS).first for target in targets]
-    told = [f"{method(one.name)} on {percent(one.share)} to {number(target)}"
+    told = [f"{method(one.name)} on {percent(one.share)} to {raised(target)}"
             for target, one in zip(targets, first, strict=True) if one]  # fmt: skip
     headline(figure, f"Fewest force evaluations for any body: {', '.join(told)} rad")
     return Picture(
         "run-lengths-evaluations", figure,
         f"Share of {span(data)} on which a method has met the axis error within so many force evaluations, at the step "
-        "or tolerance that suits the top (hindsight). Further left needs fewer; a line that ends higher solves more tops "
-        f"within {float(np.nanmax(data['short']['budget'].values)) / facts.nutations(data, 'short'):,.0f} evaluations a "
+        "or tolerance that suits the top (hindsight). Further left needs fewer; a line that ends higher solves more "
+        "tops "
+        f"within {float(np.nanmax(data['short']['budget'].values)) / facts.nutations(data, 'short'):,.0f} evaluations "
+        "a "
         "nutation. An evaluation has no price here: a stage, a kick and a derivative of a series count alike.",
         f"Empirical distribution functions of the cost, one panel for each axis error, {len(rows)} lines with a name.",
     )  # fmt: skip
@@ -193,10 +208,8 @@ def draw_silent(data: xr.DataTree) -> Picture | None:
                  for key in ("wrong", "silent", "dropped")}  # fmt: skip
         axis.imshow(share["silent"], cmap="Oranges", vmin=0.0, vmax=0.6, aspect="auto")
         for (k, s), silent in np.ndenumerate(share["silent"]):
-            if share["dropped"][k, s] > 0.5:
-                label = "-"
-            else:
-                label = f"{100 * silent:.0f}\n/{100 * share['wrong'][k, s]:.0f}"
+            known = f"{100 * silent:.0f}\n/{100 * share['wrong'][k, s]:.0f}"
+            label = "-" if share["dropped"][k, s] > HALF else known
             axis.text(s, k, label, ha="center", va="center", fontsize=LEAST_TEXT - 0.5,
                       color="white" if silent > 0.4 else "black")  # fmt: skip
         axis.set(title=name, xticks=range(there.size), xticklabels=[f"{one.setting[s]:.3g}" for s in there],
@@ -208,13 +221,20 @@ def draw_silent(data: xr.DataTree) -> Picture | None:
     at = int(np.argmin(np.abs(one.setting - 69.92)))
     shares = one.silent[at] / np.maximum(one.drawn, 1.0)
     hard = int(np.argmax(shares[:-1]))
-    headline(figure, f"Wrong runs without a sign are near the separatrix: at {one.setting[at]:.2g} steps {method(names[0])} is "
-             f"silent on {percent(shares[hard])} of {KINDS[hard]} tops, {percent(shares[KINDS.index(NATURAL)])} of natural ones")
+    headline(
+        figure,
+        f"Wrong runs without a sign are near the separatrix: at {one.setting[at]:.2g} steps {method(names[0])} is "
+        f"silent on {percent(shares[hard])} of {KINDS[hard]} tops, {percent(shares[KINDS.index(NATURAL)])} of natural "
+        "ones",
+    )
     return Picture(
         "silent", figure,
-        f"Per cent of the tops of a kind whose run is silent / wrong. Wrong: axis off by more than {WRONG:g} rad within "
-        f"{facts.nutations(data, 'short'):g} nutations. Silent: wrong, though it ends well and keeps energy and momenta to "
-        f"{KEPT:.0%}. A dash: more than half of the tops were dropped for the budget. The strata are chosen to hold what "
+        f"Per cent of the tops of a kind whose run is silent / wrong. Wrong: axis off by more than {WRONG:g} rad "
+        "within "
+        f"{facts.nutations(data, 'short'):g} nutations. Silent: wrong, though it ends well and keeps energy and "
+        "momenta to "
+        f"{KEPT:.0%}. A dash: more than half of the tops were dropped for the budget. The strata are chosen to hold "
+        "what "
         "is hard; natural tops are drawn from plain distributions.",
         "Heat maps of the share of silent failures by kind of top and steps a nutation, a panel a method.",
         lead="How often a run is wrong without a sign",
@@ -232,7 +252,7 @@ def draw_map(data: xr.DataTree) -> Picture:
     groups: dict[str, list[str]] = {}
     for name, _ in area.most_common():
         groups.setdefault(name if name in spoken else integrator(name).family, []).append(name)
-    colors = {name: np.array(to_rgb(_color(group, rows, groups))) for name, rows in groups.items() for group in [name]}
+    colors = _colors(groups)
     figure, axes = panels(1, len(far.QUANTITIES), height=3.6, sharex=True, sharey=True)
     told = []
     for axis, (quantity, panel) in zip(axes[0], each.items(), strict=True):
@@ -252,13 +272,18 @@ def draw_map(data: xr.DataTree) -> Picture:
     ]  # fmt: skip
     figure.legend(handles=keys, loc="outside lower center", ncols=2, frameon=False)
     count, members = len(each["axis"].names), data["far"].sizes["member"]
-    share = sum(panel.predicted.sum() for panel in each.values()) / sum((panel.winner >= 0).sum() for panel in each.values())
+    share = sum(panel.predicted.sum() for panel in each.values()) / sum(
+        (panel.winner >= 0).sum() for panel in each.values()
+    )
     headline(figure, f"Cheapest for any body over the most errors and run lengths: {', '.join(told)}")
     return Picture(
         "map", figure,
-        f"The cheapest of {count} methods for an allowed error up to a run length: medians over {members} natural tops, "
-        "each method at the step or tolerance that suits a cell; no method made for this top takes part. Pale and hatched "
-        f"cells, {share:.0%}, were not run: they are predicted from the measured growth of the winner's own runs, and some "
+        f"The cheapest of {count} methods for an allowed error up to a run length: medians over {members} natural "
+        "tops, "
+        "each method at the step or tolerance that suits a cell; no method made for this top takes part. Pale and "
+        "hatched "
+        f"cells, {share:.0%}, were not run: they are predicted from the measured growth of the winner's own runs, and "
+        "some "
         "of them are checked at 10⁵ and 10⁶ nutations. Shape is the distance of height and vertical velocity from the "
         "true orbit, whatever the delay.",
         "Three maps of the cheapest method over run length and allowed error: axis, energy and shape.",
@@ -266,11 +291,16 @@ def draw_map(data: xr.DataTree) -> Picture:
     )  # fmt: skip
 
 
-def _color(group: str, variants: list[str], groups: dict[str, list[str]]) -> Any:
-    """That of the variant with the most cells; paler if one of the same family has a colour of its own."""
-    kin = {integrator(name).family for name in groups if "[" in name and name != group}
-    shade = np.array(to_rgb(look(variants[0]).color))
-    return shade if group in variants or integrator(variants[0]).family not in kin else 0.45 + 0.55 * shade
+def _colors(groups: dict[str, list[str]]) -> dict[str, Any]:
+    """A colour for each group: of a family the base colour first, then its darkest shade, then the others."""
+    used: Counter[str] = Counter()
+    colors = {}
+    for name in sorted(groups, key=lambda name: "[" not in name):
+        family = integrator(groups[name][0]).family
+        base, *others = (np.array(to_rgb(shade)) for shade in SHADES[family])
+        colors[name] = [base, *sorted(others, key=lambda shade: shade.sum())][used[family] % (1 + len(others))]
+        used[family] += 1
+    return colors
 
 
 def _panel(axis: Any, panel: far.Diagram, groups: dict[str, list[str]], painted: dict[str, Any]) -> None:

@@ -274,7 +274,10 @@ def guarded_runs(variant: Integrator, tops: Tops, done: Climb, guarded: int) -> 
     """What the guard foretells, what is watched and what is measured, for the first members; (LEVELS, guarded)."""
     (chart,) = variant.charts()
     seen = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured", "whole")}
-    each = [np.flatnonzero(tops.known & part) for part in (tops.kinds < KINDS.index(NATURAL), tops.kinds == KINDS.index(NATURAL))]
+    each = [
+        np.flatnonzero(tops.known & part)
+        for part in (tops.kinds < KINDS.index(NATURAL), tops.kinds == KINDS.index(NATURAL))
+    ]
     chosen = np.concatenate([each[0][: guarded // 2], each[1][: guarded // 2]])
     for place, (top, start) in enumerate(tops.members(chosen)):
         member = chosen[place]

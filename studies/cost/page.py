@@ -28,20 +28,26 @@ KNOWN = (
     "srkn-14-6[axis]", "midpoint[angles]", "stormer-verlet[angles]",
 )  # fmt: skip
 HOW_TO_READ = (
-    "A variant is a method in one chart. Cost is force evaluations times the price of one, plus one call. Safe: the one "
-    f"setting, in steps a nutation or a tolerance, with which {SAFE:.0%} of the tops meet the error, and what it costs. "
+    "A variant is a method in one chart. Cost is force evaluations times the price of one, plus one call. Safe: the "
+    "one "
+    f"setting, in steps a nutation or a tolerance, with which {SAFE:.0%} of the tops meet the error, and what it "
+    "costs. "
     "In hindsight: the best setting for each top; a variant wins on a top if all others of its class cost at least "
-    f"{TIE:g} times as much. Classes say what a method needs: {'; '.join(f'{name}: {NEEDS[name]}' for name in CLASSES[:-1])}. "
+    f"{TIE:g} times as much. Classes say what a method needs: "
+    f"{'; '.join(f'{name}: {NEEDS[name]}' for name in CLASSES[:-1])}. "
     "Any body: all of these but this-top. Brackets hold 95 % of a bootstrap over the tops and the prices. ~ marks a "
-    "lead that is inside them, * a variant whose price was too noisy to rank it. Not within the budget is no failure of "
+    "lead that is inside them, * a variant whose price was too noisy to rank it. Not within the budget is no failure "
+    "of "
     "a method: its runs were not allowed to take longer."
 )
 
 
 def seconds(value: float) -> str:
     """A time with two digits."""
-    return f"{1e6 * value:.2g} us" if value < 9.95e-5 else f"{1e6 * value:.0f} us" if value < 9.995e-4 else (
-        f"{1e3 * value:.2g} ms" if value < 0.0995 else f"{1e3 * value:.0f} ms")  # fmt: skip
+    if not math.isfinite(value):
+        return "over the budget"
+    unit, scale = ("us", 1e6) if value < 9.95e-4 else ("ms", 1e3)
+    return f"{float(f'{scale * value:.2g}'):g} {unit}"
 
 
 def percent(value: float) -> str:
@@ -155,7 +161,8 @@ def guard_sentence(found: Facts) -> str:
         return ""
     return (
         "The guard compares a trial piece of the run with the closed form, which only a body with a known solution "
-        f"allows. It warned of {total['wrong_warned'][0]:,} of {total['wrong'][0]:,} wrong runs that its trial does not "
+        f"allows. It warned of {total['wrong_warned'][0]:,} of {total['wrong'][0]:,} wrong runs that its trial does "
+        "not "
         f"cover whole (and of {total['wrong_warned'][1]:,} of {total['wrong'][1]:,} that it repeats whole), of "
         f"{sum(total['between_warned']):,} of {sum(total['between']):,} runs between {EXPECTED:g} and {WRONG:g} rad, "
         f"and of {sum(total['right_warned']):,} of {sum(total['right']):,} right ones."
@@ -188,7 +195,8 @@ def prices_sentence(found: Facts) -> str:
     """Which prices were too noisy, and heyoka's beside symtop's call of it."""
     marked = f"{len(found['marked'])} of {found['variants']} prices" if found["marked"] else "No price"
     heyoka = (
-        f" heyoka is priced as its own propagate_until; with dense output it takes {found['sampled']:.2f} times as long."
+        f" heyoka is priced as its own propagate_until; with dense output it takes {found['sampled']:.2f} times as "
+        "long."
         if math.isfinite(found["sampled"])
         else ""
     )
@@ -261,7 +269,9 @@ def ties_table(data: xr.DataTree) -> Table:
         for tie in TIES:
             level = solved < tie * (1.0 + 1e-12) * solved.min(axis=0, initial=np.inf)
             won = (level & (level.sum(axis=0) == 1)).mean(axis=1) if solved.size else np.zeros(1)
-            line.append(f"{method(taken.names[int(won.argmax())])} {percent(float(won.max()))}" if won.any() else "level")
+            line.append(
+                f"{method(taken.names[int(won.argmax())])} {percent(float(won.max()))}" if won.any() else "level"
+            )
         lines.append(line)
     header = ["axis error (rad)", *(f"level within {tie:g}" for tie in TIES)]
     return Table("Wins for any body by what counts as a tie, natural tops, ten nutations", header, lines)
@@ -293,7 +303,8 @@ def silent_table(data: xr.DataTree) -> Table:
                       for k in range(len(KINDS) - 1)]  # fmt: skip
             lines.append([name, f"{one.setting[at]:.3g}", *(" / ".join(part) for part in shares)])
     title = (
-        f"Wrong (axis off by more than {WRONG:g} rad) / silent (wrong, ended well, energy and momenta kept to {KEPT:.0%}) "
+        f"Wrong (axis off by more than {WRONG:g} rad) / silent (wrong, ended well, energy and momenta kept to "
+        f"{KEPT:.0%}) "
         f"/ dropped (over the budget), of all tops of a kind, over {facts.nutations(data, 'short'):g} nutations"
     )
     return Table(title, ["variant", "steps a nutation", *KINDS[:-1]], lines)
@@ -365,8 +376,10 @@ def opening(data: xr.DataTree) -> Opening:
     title = f"Safe settings: {SAFE:.0%} of natural tops keep the axis error over {nutations:g} nutations"
     said = [
         *sentences(data)[:2],
-        "This very top has a closed form (exact), which needs no integrator. Methods are compared for bodies without "
-        "one; what was made for this top stands in a line of its own.",
+        (
+            "This very top has a closed form (exact), which needs no integrator. Methods are compared for bodies without "
+            "one; what was made for this top stands in a line of its own."
+        ),
         silent_sentence(data),
         "For your own scene and accuracy: symtop recommend SCENE --accuracy 1e-6.",
     ]
@@ -388,7 +401,9 @@ def charts(data: xr.DataTree) -> list[Chart]:
                 series = []
                 for name in map(str, group["variant"].values):
                     one = group.sel(variant=name)
-                    work, error = (one[key].transpose("level", "named").values[:, place] for key in ("scene_work", "scene_error"))
+                    work, error = (
+                        one[key].transpose("level", "named").values[:, place] for key in ("scene_work", "scene_error")
+                    )
                     good = np.isfinite(work) & np.isfinite(error) & (error > 0.0)
                     settings, x = one["setting"].values[good], work[good]
                     if cost == "seconds":

@@ -30,6 +30,7 @@ import functools
 import json
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -177,7 +178,8 @@ def spread_of(values: Array) -> Array:
 def combined(price: Array) -> tuple[Array, Array, Array]:
     """Medians, relative errors and spreads (variants, tolerances) of slopes (processes, variants, tolerances)."""
     good = np.where(price >= FLOOR, price, np.nan)
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # variants that a batch has not timed
         middle = np.nanmedian(good, axis=0)
         common = np.nanmedian(good / middle, axis=(1, 2), keepdims=True)  # of a process that is slower at everything
         level = good / common
@@ -201,7 +203,8 @@ def prices(data: xr.DataTree) -> Prices:
         return np.stack([parts[batch][row] for row, batch in enumerate(best)])
 
     price, error = chosen([middle for middle, *_ in each]), chosen([np.median(error, axis=1) for _, error, _ in each])
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
         call = chosen([np.nanmedian(batch["call"].values, axis=0) for batch in batches])
         ratio = group["sampled"].values / group["price"].sel(priced_at=TOLERANCE, method="nearest").values
     spread = np.array([spreads[batch, row] for row, batch in enumerate(best)])

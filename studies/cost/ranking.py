@@ -9,7 +9,7 @@
 
 A hit that a finer setting misses is luck and no hit. Intervals hold the draw of the tops and the prices: a bootstrap
 draws tops with replacement and each variant's price from a log-normal distribution of its relative error. The setting
-that serves `SAFE` of n tops is an order statistic: of resampled tops it is that of a rank drawn from Beta(k, n - k + 1),
+that serves `SAFE` of n tops is an order statistic: of resampled tops it is that of a rank from Beta(k, n - k + 1),
 k = SAFE n, the same for all variants, because the hard tops are hard for all of them. A lead is called if `SURE` of the
 draws have it. Sources: Efron and Tibshirani, An Introduction to the Bootstrap (1993); run-length distributions: Hoos
 and Stuetzle, J. Autom. Reasoning 24 (2000) 421.

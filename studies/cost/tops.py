@@ -220,8 +220,9 @@ def natural(members: int, seed: int) -> Array:
 
 def named() -> dict[str, Array]:
     """The nine numbers of each scene of the catalogue that has a nutation and repeats no other."""
-    return {name: np.array(flat(one.top, one.start))
-            for name in grid_scenes(LEFT_OUT) if math.isfinite((one := scenes.scene(name)).nutation_period)}  # fmt: skip
+    each = {name: scenes.scene(name) for name in grid_scenes(LEFT_OUT)}
+    chosen = {name: one for name, one in each.items() if math.isfinite(one.nutation_period)}
+    return {name: np.array(flat(one.top, one.start)) for name, one in chosen.items()}
 
 
 @functools.lru_cache(maxsize=3)
