@@ -40,8 +40,8 @@ FAMILIES = {
     "taylor": "Taylor series",
 }  # fmt: skip
 TITLES = {
-    "axis": "axis: angle between\nat one time (rad)", "energy": "energy:\nrelative change", "shape": "shape: distance to the\ntrue "
-    "orbit",
+    "axis": "axis: angle between\nat one time (rad)", "energy": "energy:\nrelative change",
+    "shape": "shape: distance\nto the true orbit",
 }  # fmt: skip
 SHADES = {"splitting": style.GREENS, "runge-kutta": style.ORANGES, "taylor": style.BLACKS,
           "discrete-lagrangian": style.BLUES}  # fmt: skip
@@ -86,8 +86,8 @@ def draw_accuracy(data: xr.DataTree) -> Picture:
         axis.plot(1e6 * x, y, lw=1.0 if own else 1.6, zorder=2 if own else 3, **style_of,
                   label=f"{method(name)} (made for this top)" if own else method(name))  # fmt: skip
         axis.hlines(y, 1e6 * low, 1e6 * high, color=style_of["color"], lw=3.0, alpha=0.35, zorder=2)
-    axis.set(xscale="log", yscale="log", ylim=(2e-13, 5e-3), xlabel="time of a safe run: evaluations × price + call (µs)",
-             ylabel="axis error that 95 % of the tops keep (rad)")  # fmt: skip
+    axis.set(xscale="log", yscale="log", ylim=(2e-13, 5e-3), ylabel="axis error that 95 % of the tops keep (rad)")
+    axis.set_xlabel("time of a safe run: evaluations × price + call (µs)")
     style.legend_below(figure, axes)
     best = {target: facts.safest(data, Cell("short", "axis", target, NATURAL)) for target in facts.targets(data)}
     told = [f"{method(one[0].name)} to {raised(target)}" for target, (one, _) in best.items()
@@ -157,8 +157,8 @@ def draw_run_lengths(data: xr.DataTree) -> Picture:
             one.name for one in facts.contest(data, Cell("short", "axis", target, NATURAL), EVALUATIONS).standings[:2]
         ]
     rows = list(dict.fromkeys([*order, "rk4[axis]", "strang[axis]", "dop853-compiled-fixed[axis]"]))[:NAMED]
-    figure, axes = grid(len(targets), 2, ("force evaluations of a run", "share of tops solved"), height=2.3, sharex=True,
-                        sharey=True)  # fmt: skip
+    labels = "force evaluations of a run", "share of tops solved"
+    figure, axes = grid(len(targets), 2, labels, height=2.3, sharex=True, sharey=True)
     ends = [np.quantile(part, LATEST) for taken in each.values() for name in rows if name in taken.names
             if (part := taken.values[taken.names.index(name)])[np.isfinite(part)].size
             and np.isfinite(part := part[np.isfinite(part)]).any()]  # fmt: skip

@@ -377,8 +377,8 @@ def opening(data: xr.DataTree) -> Opening:
     said = [
         *sentences(data)[:2],
         (
-            "This very top has a closed form (exact), which needs no integrator. Methods are compared for bodies without "
-            "one; what was made for this top stands in a line of its own."
+            "This very top has a closed form (exact), which needs no integrator. Methods are compared for bodies "
+            "without one; what was made for this top stands in a line of its own."
         ),
         silent_sentence(data),
         "For your own scene and accuracy: symtop recommend SCENE --accuracy 1e-6.",

@@ -49,7 +49,8 @@ from symtop.run.ensemble.population import population
 from .tops import FIRST
 
 PROCESSES = 5
-ENOUGH = 4  # of them
+ENOUGH = 3  # of them; a quick pass starts no more
+BATCHES = "first", "again"  # of processes: those that time every variant, and those that time the noisy ones again
 FINE = 5  # FIRST 2^FINE steps a nutation
 TOLERANCES = tuple(10.0**-decade for decade in range(2, 16, 2))
 TOLERANCE = 1e-8  # of variants whose order is the same at all
@@ -194,7 +195,9 @@ def prices(data: xr.DataTree) -> Prices:
     """The prices of a dataset: for each variant those of the quieter five processes."""
     group = data["prices"].to_dataset().transpose("scene", "variant", "priced_at")
     names = [str(name) for name in group["variant"].values]
-    batches = [group.isel(scene=slice(first, first + PROCESSES)) for first in range(0, group.sizes["scene"], PROCESSES)]
+    of_batch = [str(name).partition("-")[0] for name in group["scene"].values]
+    places = [[k for k, one in enumerate(of_batch) if one == batch] for batch in BATCHES]
+    batches = [group.isel(scene=chosen) for chosen in places if chosen]
     each = [combined(batch["price"].values) for batch in batches]
     spreads = np.stack([np.median(spread, axis=1) for *_, spread in each])  # (batches, variants)
     best = np.argmin(np.where(np.isnan(spreads), np.inf, spreads), axis=0)

@@ -15,7 +15,7 @@ from symtop.runner.study import Case, Study
 
 from . import facts, far, figures, page
 from .ladder import table
-from .prices import PROCESSES, measured, prices
+from .prices import BATCHES, ENOUGH, PROCESSES, measured, prices
 from .tops import named, tops_of
 
 SEED = 1
@@ -55,11 +55,11 @@ def has_twin(variant: Integrator) -> bool:
     return variant.charts() == ("attitude",) and "axis" in integrator(variant.method).charts()
 
 
-def timing(names: list[str], first: int, *, quick: bool) -> list[Case]:
-    """One case for each process that times the variants, numbered from `first`."""
-    asked = {"integrators": names, "rounds": 3 if quick else 4, "batch": 0.0005 if quick else 0.002}
-    processes = 3 if quick and first else PROCESSES
-    return [Case(f"process-{first + k:02d}", "together", asked, timed=True, group=PRICES) for k in range(processes)]
+def timing(names: list[str], batch: str, *, quick: bool) -> list[Case]:
+    """One case for each process of a batch that times the variants."""
+    asked = {"integrators": names, "rounds": 2 if quick else 4, "batch": 0.0005 if quick else 0.002}
+    processes = range(ENOUGH if quick else PROCESSES)
+    return [Case(f"{batch}-{k}", "together", asked, timed=True, group=PRICES) for k in processes]
 
 
 def grid(*, quick: bool = False) -> list[Case]:
@@ -68,7 +68,7 @@ def grid(*, quick: bool = False) -> list[Case]:
     return [
         *(Case("tops", name, asked[SHORT], group=SHORT) for name in names),
         *(Case(span, "exact", asked[span], group=TOPS) for span in (SHORT, LONG)),
-        *timing(names, 0, quick=quick),
+        *timing(names, BATCHES[0], quick=quick),
         *(Case("natural", name, FAR_QUICK if quick else FAR_FULL, group=FAR) for name in far.candidates()),
     ]
 
@@ -80,7 +80,7 @@ def follow_up(data: xr.DataTree) -> list[Case]:
     again = prices(data).marked
     return [
         *(Case("tops", name, asked, group=LONG) for name in facts.contenders(data)),
-        *(timing(again, PROCESSES, quick=quick) if again else []),
+        *(timing(again, BATCHES[1], quick=quick) if again else []),
         *(Case("natural", f"check-{place:02d}", settings, group=CHECKS)
           for place, settings in enumerate(far.chosen(data, CHECKED[quick]))),
     ]  # fmt: skip
