@@ -114,7 +114,7 @@ def built_in() -> list[Integrator]:
         Integrator(
             name="extrapolation", family="runge-kutta", control="tolerance",
             summary="Gragg-Bulirsch-Stoer extrapolation of variable order and step, compiled",
-            solvers={chart: solver(chart, Extrapolation()) for chart in FORMULATIONS},
+            solvers={chart: solver(form, Extrapolation()) for chart, form in FORMULATIONS.items()},
             explicit=True, symplectic=False, symmetric=False, conserves=frozenset(), least_tolerance=LEAST_TOLERANCE,
             reference="bulirsch-stoer-1966 hairer-norsett-wanner-1993", needs="derivative", general=True,
         )

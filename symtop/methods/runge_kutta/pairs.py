@@ -120,12 +120,11 @@ def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, toleran
 
 
 @functools.cache
-def loop(chart: str, pair: Any) -> AdaptiveLoop:  # noqa: C901
-    """The loop in one chart as `adaptive` takes it, compiled when it is first used; it counts force evaluations.
+def loop(form: Any, pair: Any) -> AdaptiveLoop:  # noqa: C901
+    """The loop on the equations of a `Formulation`, compiled when it is first used; it counts force evaluations.
 
-    The place is (state, memory, time, step).
+    The place is (state, memory, time, step). `observe` sees the memory and the step that a sample lies in.
     """
-    form: Any = FORMULATIONS[chart]  # whose parts compile
     field, ended, observe, prepare, size = form.field, form.ended, form.observe, form.prepare.numbers, form.prepare.size
     sample = as_it_steps if form.present is None else form.present.sample
     register_jitable(observe)
@@ -162,7 +161,7 @@ def loop(chart: str, pair: Any) -> AdaptiveLoop:  # noqa: C901
             while seen < len(times) and times[seen] <= t:
                 place_then = between(par, before, state, memory, h, (times[seen] - start) / h)
                 store(states, seen, sample(par, times[seen], place_then))
-                momenta[seen, 0], momenta[seen, 1] = observe(par, 0.0, place_then, nothing, 0.0)
+                momenta[seen, 0], momenta[seen, 1] = observe(par, memory, place_then, nothing, h)
                 seen += 1
             outcome = ended(state)
             for m in range(size):
@@ -179,12 +178,11 @@ def loop(chart: str, pair: Any) -> AdaptiveLoop:  # noqa: C901
     return compiled
 
 
-def solver(chart: str, pair: Any) -> Adaptive:
-    """A solver of the registry in one chart."""
-    form: Any = FORMULATIONS[chart]
+def solver(form: Any, pair: Any) -> Adaptive:
+    """A solver of the registry on the equations of a `Formulation`."""
     size, shown = form.prepare.size, form.prepare.size if form.present is None else form.present.size
     clock = size * (1 + pair.method(form.field).rows)
-    return Adaptive(lambda _: loop(chart, pair), shown, clock + 2, clock, EVALUATIONS, BLOCK, check=form.prepare.check)
+    return Adaptive(lambda _: loop(form, pair), shown, clock + 2, clock, EVALUATIONS, BLOCK, check=form.prepare.check)
 
 
 @register_jitable
@@ -200,7 +198,7 @@ def _forget(slopes: Any, i: int, slope: Any) -> None:
     """Slopes that nobody reads again."""
 
 
-def _sum(weights: Sequence[float]) -> Any:
+def summed(weights: Sequence[float]) -> Any:
     """``(place, made, h)`` to place + h sum_j w_j k_j, term by term, of a tuple of slopes."""
     used = tuple(float(weight) if weight else None for weight in weights)
 
@@ -218,7 +216,7 @@ def _stages(field: Callable[..., Any], rows: Sequence[Row], keep: Callable[..., 
             return (first,)
 
         return register_jitable(alone)
-    before, place, last = _stages(field, rows[:-1], keep), _sum(rows[-1]), len(rows)
+    before, place, last = _stages(field, rows[:-1], keep), summed(rows[-1]), len(rows)
 
     def stages(par, state, first, slopes, h):  # type: ignore[no-untyped-def]
         made = before(par, state, first, slopes, h)
@@ -243,8 +241,8 @@ class Pair(NamedTuple):
         """What `loop` steps by: attempts, their error, and samples."""
         table, dense = self.table, self.table.dense
         keep = store if dense else _forget
-        stages, total = _stages(field, table.a, keep), _sum(table.b)
-        error, third, cost = _sum(table.error), _sum(table.third), len(table.a) + 1
+        stages, total = _stages(field, table.a, keep), summed(table.b)
+        error, third, cost = summed(table.error), summed(table.third), len(table.a) + 1
         two = bool(self.table.third)
 
         @register_jitable
@@ -275,7 +273,9 @@ class Pair(NamedTuple):
 
     def adaptive(self) -> Integrator:
         """The pair with a tolerance."""
-        return self._integrator(self.name, {chart: solver(chart, self) for chart in FORMULATIONS}, "tolerance")
+        return self._integrator(
+            self.name, {chart: solver(form, self) for chart, form in FORMULATIONS.items()}, "tolerance"
+        )
 
     def fixed(self) -> Integrator:
         """The table of the higher order with a step."""
@@ -337,7 +337,7 @@ def fixed_loop(chart: str, pair: Pair) -> Loop:
     """The loop with fixed steps in one chart; the rule is the table as a `Tableau`, for whoever wants to see it."""
     form = FORMULATIONS[chart]
     field, ended_at, rows = form.field, form.ended, pair.table.a[: len(pair.table.b) - 1]
-    stages, total, cost = _stages(field, rows, _forget), _sum(pair.table.b), len(pair.table.b)
+    stages, total, cost = _stages(field, rows, _forget), summed(pair.table.b), len(pair.table.b)
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
         return 0.0
