@@ -10,10 +10,9 @@ from click.testing import CliRunner
 
 import symtop
 from symtop import advise
-from symtop.advise import regime
 from symtop.cli.main import main
 from symtop.measure import settings
-from symtop.measure.ranking import Near
+from symtop.measure.ranking import Near, regime
 from symtop.methods.framework.registry import methods
 
 
@@ -155,7 +154,7 @@ def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_wi
 
 
 def test_a_variant_that_the_nearest_random_tops_were_not_run_with_is_counted_by_its_method():
-    near = Near({"rk4[axis]": 40, "strang[axis]": 7, "stormer-verlet[angles]": 0}, 50, "axis", 1e-6, 10.0)
+    near = Near({"rk4[axis]": 40, "strang[axis]": 7, "stormer-verlet[angles]": 0}, 50, "axis", 1e-6, 10.0, {})
     assert advise._same("rk4[axis]", advise._usable("attitude")) == "rk4[angles]"
     assert advise._same("stormer-verlet", list(near.served)) == "stormer-verlet[angles]"
     assert advise._same("gauss-4[axis]", list(near.served)) is None
@@ -171,8 +170,9 @@ def test_nothing_is_said_of_random_tops_without_results(monkeypatch):
 
 
 def test_an_older_study_is_refused_with_a_remedy(tmp_path):
-    xr.Dataset({"seconds": ("setting", [1.0])}).to_netcdf(tmp_path / "work_precision.nc")
-    with pytest.raises(symtop.SymtopError, match=r"older version, without .*control.*--fresh"):
+    tree = xr.DataTree.from_dict({"short": xr.Dataset({"cost": ("x", [1.0])})})
+    tree.to_netcdf(tmp_path / "cost.nc", engine="netcdf4")
+    with pytest.raises(symtop.SymtopError, match=r"older version, without .*nutations.*--fresh"):
         symtop.recommend("spheroid", accuracy=1e-3, results=tmp_path)
 
 
@@ -212,7 +212,7 @@ def test_a_run_to_the_end_at_the_references_limit_is_not_called_extrapolated(mon
         ({"accuracy": 4.0}, "below pi"),
         ({"accuracy": 1e-6, "quantity": "axes"}, "axis"),
         ({"accuracy": 1e-6, "horizon": -1.0}, "horizon"),
-        ({"accuracy": 1e-6, "results": "/nowhere"}, "work_precision"),
+        ({"accuracy": 1e-6, "results": "/nowhere"}, "symtop study cost first"),
     ],
 )
 def test_bad_questions_get_a_sentence(arguments, word):
@@ -232,14 +232,14 @@ def test_the_command_prints_and_refuses(tmp_path, monkeypatch):
 def test_the_answer_does_not_depend_on_the_working_directory(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "results").mkdir()
-    (tmp_path / "results" / "work_precision.nc").write_text("no dataset")
+    (tmp_path / "results" / "cost.nc").write_text("no dataset")
     few(monkeypatch, 1)
     assert symtop.recommend("spheroid", accuracy=1e-3).integrator == "strang"
     command = CliRunner().invoke(
         main, ["recommend", "spheroid", "--accuracy", "1e-3"]
     )  # the command says what it reads
     assert command.exit_code == 2
-    assert "work_precision.nc cannot be read" in command.output
+    assert "cost.nc cannot be read" in command.output
 
 
 def test_a_regime_does_not_depend_on_units():

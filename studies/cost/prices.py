@@ -121,8 +121,9 @@ def timed(names: list[str], rounds: int, batch: float) -> dict[str, Any]:
     taken = timings([call for pair in each.values() for call, _ in pair], rounds, batch, warm=True)
     answers = []
     for (key, ((_, few), (_, most))), short, long in zip(each.items(), taken[::2], taken[1::2], strict=True):
-        price = (long.best - short.best) / (most - few)
-        answers.append((*key, price, short.best - few * price))
+        if most > few:  # a run that fails early has no slope
+            price = (long.best - short.best) / (most - few)
+            answers.append((*key, price, short.best - few * price))
     return {"slopes": answers}
 
 
@@ -138,7 +139,7 @@ def measured(names: list[str], rounds: int, batch: float) -> xr.Dataset:
     """
     question = json.dumps({"names": names, "rounds": rounds, "batch": batch})
     command = [sys.executable, "-c", START]
-    done = subprocess.run(command, input=question, capture_output=True, text=True, check=True)  # noqa: S603
+    done = subprocess.run(command, input=question, stdout=subprocess.PIPE, text=True, check=True)  # noqa: S603
     slopes = json.loads(done.stdout.splitlines()[-1])["slopes"]
     price, call = (np.full((len(names), len(TOLERANCES)), np.nan) for _ in range(2))
     sampled = np.full(len(names), np.nan)
@@ -167,7 +168,12 @@ class Prices(NamedTuple):
         """Price and call at each tolerance, interpolated in logarithms; NaN is a variant with a step."""
         row, x = self.names.index(name), -np.log(TOLERANCES)
         at = np.where(np.isfinite(tolerances), -np.log(np.where(tolerances > 0.0, tolerances, 1.0)), x[-1])
-        return np.exp(np.interp(at, x, np.log(self.price[row]))), np.interp(at, x, self.call[row])
+        known = np.isfinite(self.price[row])  # of a run that fails at a loose tolerance there is none
+        if not known.any():
+            return np.full(at.shape, np.nan), np.full(at.shape, np.nan)
+        return np.exp(np.interp(at, x[known], np.log(self.price[row, known]))), np.interp(
+            at, x[known], self.call[row, known]
+        )
 
 
 def spread_of(values: Array) -> Array:
@@ -190,6 +196,11 @@ def combined(price: Array) -> tuple[Array, Array, Array]:
         return np.nanmedian(level, axis=0), error, spread
 
 
+def quiet_median(values: Array) -> Array:
+    """The median over tolerances of what was timed; infinite where nothing was."""
+    return np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.inf for row in values])
+
+
 @of_one_dataset
 def prices(data: xr.DataTree) -> Prices:
     """The prices of a dataset: for each variant those of the quieter five processes."""
@@ -199,18 +210,18 @@ def prices(data: xr.DataTree) -> Prices:
     places = [[k for k, one in enumerate(of_batch) if one == batch] for batch in BATCHES]
     batches = [group.isel(scene=chosen) for chosen in places if chosen]
     each = [combined(batch["price"].values) for batch in batches]
-    spreads = np.stack([np.median(spread, axis=1) for *_, spread in each])  # (batches, variants)
-    best = np.argmin(np.where(np.isnan(spreads), np.inf, spreads), axis=0)
+    spreads = np.stack([quiet_median(spread) for *_, spread in each])  # (batches, variants)
+    best = np.argmin(spreads, axis=0)
 
     def chosen(parts: list[Array]) -> Array:
         return np.stack([parts[batch][row] for row, batch in enumerate(best)])
 
-    price, error = chosen([middle for middle, *_ in each]), chosen([np.median(error, axis=1) for _, error, _ in each])
+    price, error = chosen([middle for middle, *_ in each]), chosen([quiet_median(error) for _, error, _ in each])
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         call = chosen([np.nanmedian(batch["call"].values, axis=0) for batch in batches])
         ratio = group["sampled"].values / group["price"].sel(priced_at=TOLERANCE, method="nearest").values
     spread = np.array([spreads[batch, row] for row, batch in enumerate(best)])
     marked = [name for name, one in zip(names, spread, strict=True) if not one <= NOISY]
-    return Prices(names, price, call, np.where(np.isfinite(error), error, 1.0), spread, marked,
+    return Prices(names, price, call, np.minimum(error, 1.0), spread, marked,
                   float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else np.nan)  # fmt: skip

@@ -21,8 +21,8 @@ from .tops import named, tops_of
 SEED = 1
 SHORT, LONG, TOPS, PRICES, FAR, CHECKS = "short", "long", "tops", "prices", "far", "checks"  # groups of cases
 FULL = {
-    SHORT: {"strata": 2400, "natural": 1200, "seed": SEED, "nutations": 10.0, "budget": 1e4, "guarded": 120},
-    LONG: {"strata": 300, "natural": 200, "seed": SEED, "nutations": 1000.0, "budget": 5e5, "guarded": 0},
+    SHORT: {"strata": 1500, "natural": 900, "seed": SEED, "nutations": 10.0, "budget": 1e4, "guarded": 120},
+    LONG: {"strata": 250, "natural": 160, "seed": SEED, "nutations": 1000.0, "budget": 5e5, "guarded": 0},
 }
 QUICK = {
     SHORT: {"strata": 120, "natural": 60, "seed": SEED, "nutations": 10.0, "budget": 6e3, "guarded": 8},

@@ -19,19 +19,21 @@ from symtop.runner.study import Case, Table
 from tests.browser import FAINT, Browser
 
 FEW = (
-    "midpoint[angles]", "stormer-verlet[angles]", "takahashi-imada[axis]", "rk4[axis]", "rk45-compiled[angles]",
-    "taylor[axis]", "rk45[angles]",
+    "midpoint[angles]", "stormer-verlet[angles]", "takahashi-imada[axis]", "rk4[axis]", "rk45-compiled[axis]",
+    "taylor[axis]", "series[axis]",
 )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    """A small work-precision study, its findings and the page."""
+    """A small study of cost, its findings and the page."""
     folder = tmp_path_factory.mktemp("results")
-    study = runner.load("work_precision")
+    study = runner.load("cost")
 
     def cases(_):
-        return [Case("spheroid", name, {"periods": [10.0, 20.0], "budget": 1e4}) for name in FEW]
+        few = [one for one in study.cases(True) if one.group in {"tops", "prices"} or one.integrator in FEW]
+        return [replace(one, settings={**one.settings, "integrators": [*FEW]}) if one.group == "prices" else one
+                for one in few]  # fmt: skip
 
     def pictures(data):  # two of them open the report
         for place, picture in enumerate(study.pictures(data)):
@@ -120,7 +122,7 @@ def test_a_link_into_a_fold_opens_it(browser):
 def test_the_contents_follow_the_reader(browser):
     browser.resize(1280, 900)
     here = "document.querySelector('nav a[aria-current]')?.hash"
-    for name in ("provenance", "measured", "work_precision"):
+    for name in ("provenance", "measured", "cost"):
         browser.evaluate(f"location.hash = '{name}'")
         browser.wait_for(f"{here} === '#{name}'")
     browser.evaluate("scrollTo(0, 0)")
@@ -200,7 +202,7 @@ def test_it_paints_within_a_second_and_is_small(browser, results):
 def test_figures_that_declare_it_open_the_page_in_their_order(browser, results):
     leads = browser.evaluate("[...document.querySelectorAll('.leads span')].map(one => one.textContent)")
     assert leads == ["Lead 1", "Lead 3"]
-    findings = json.loads((results / "work_precision.json").read_text(encoding="utf-8"))
+    findings = json.loads((results / "cost.json").read_text(encoding="utf-8"))
     shown = [picture["file"] for picture in findings["pictures"] if picture["lead"]]
     assert (
         browser.evaluate("[...document.querySelectorAll('.leads img')].map(one => one.src.split('/').pop())") == shown
@@ -209,10 +211,10 @@ def test_figures_that_declare_it_open_the_page_in_their_order(browser, results):
 
 def test_the_page_can_be_sent_alone_and_can_do_without_leads(results, tmp_path):
     shutil.copytree(results / "figures", tmp_path / "figures")
-    findings = json.loads((results / "work_precision.json").read_text(encoding="utf-8"))
+    findings = json.loads((results / "cost.json").read_text(encoding="utf-8"))
     for picture in findings["pictures"]:
         picture.pop("lead")  # as findings of an older version
-    (tmp_path / "work_precision.json").write_text(json.dumps(findings), encoding="utf-8")
+    (tmp_path / "cost.json").write_text(json.dumps(findings), encoding="utf-8")
     text = page.write(tmp_path, embed=True).read_text(encoding="utf-8")
     assert text.count("data:image/png;base64,") == len(findings["pictures"])
     assert 'src="figures/' not in text
@@ -247,8 +249,8 @@ def test_pointing_at_a_run_shows_what_it_was(browser, results):
     browser.resize(1280, 900)
     tip = browser.evaluate(POINT % (0, 0))
     name, error = re.fullmatch(r"(\S+) \(\S+\): .*error (\S+)", tip).groups()
-    cell = xr.load_dataset(results / "work_precision.nc").sel(scene="spheroid", variant=name).isel(horizon=0)
-    assert any(f"{value:.1e}" == error for value in cell["axis"].values)
+    runs = netcdf.read_any(results / "cost.nc")["short"].to_dataset().sel(variant=name)["scene_error"].values
+    assert any(f"{value:.1e}" == error for value in runs.ravel())
     assert browser.evaluate(POINT % (0, 100_000)) == ""  # far from every run: nothing
 
 
@@ -262,9 +264,9 @@ def test_the_filter_and_the_choice_change_what_is_drawn(browser):
     browser.click(".chart input[value='runge-kutta']")
     assert browser.evaluate(count) == everything
     before = browser.evaluate("document.querySelector('.chart svg').innerHTML")
-    browser.set(".chart select", "spheroid, over 40 nutation periods")
+    browser.set(".chart select", "spheroid, 100 nutations")
     assert browser.evaluate("document.querySelector('.chart svg').innerHTML") != before
-    browser.set(".chart select", "spheroid, over 10 nutation periods")
+    browser.set(".chart select", "spheroid, 10 nutations")
     assert browser.evaluate("document.querySelector('.chart svg').innerHTML") == before
 
 
@@ -278,8 +280,8 @@ def test_the_first_screen_answers_the_question(browser):
 
 
 def test_words_follow_from_the_stored_data_and_from_nothing_else(results):
-    study, stored = runner.load("work_precision"), xr.load_dataset(results / "work_precision.nc")
-    findings = json.loads((results / "work_precision.json").read_text(encoding="utf-8"))
+    study, stored = runner.load("cost"), netcdf.read_any(results / "cost.nc")
+    findings = json.loads((results / "cost.json").read_text(encoding="utf-8"))
     text = html.unescape((results / "report.html").read_text(encoding="utf-8"))
     twin = (results / "report.md").read_text(encoding="utf-8")
     assert findings["verdict"] == study.verdict(stored)
@@ -287,7 +289,8 @@ def test_words_follow_from_the_stored_data_and_from_nothing_else(results):
     for sentence in [*findings["verdict"], *findings["opening"]["sentences"]]:
         assert sentence in text
         assert sentence in twin
-    slower = stored.assign(seconds=2.0 * stored["seconds"])
+    slower = stored.copy()
+    slower["prices"] = xr.DataTree(stored["prices"].to_dataset().assign(price=2.0 * stored["prices"]["price"]))
     assert study.verdict(slower) != findings["verdict"]  # the sentences read the data, they do not remember it
 
 
