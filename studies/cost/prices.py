@@ -19,8 +19,8 @@ slopes would be an outlier: a short run that was disturbed makes a slope too sma
     error    standard error of a median over n processes, 1.25 s/sqrt(n), times Student's 2.78/1.96 for five; s from the
              quartiles, at least `GRAIN`
 
-Variants with a spread above `NOISY`, or with fewer than `ENOUGH` slopes, are timed by five more processes; the quieter
-five count. One that is noisy then is marked and never ranked first.
+Variants with a spread above `NOISY`, or with fewer than `ENOUGH` slopes, are timed by five more processes, in the
+company of some quiet ones; the quieter five count. One that is noisy then is marked and never ranked first.
 
 heyoka is timed as its own `propagate_until`, with nothing of symtop around it. The solver of `taylor[axis]`, which
 samples by dense output, is timed in the same rounds, and the ratio is a table.
@@ -50,6 +50,7 @@ from .tops import FIRST
 
 PROCESSES = 5
 ENOUGH = 3  # of them; a quick pass starts no more
+COMPANY = 8  # variants whose slopes have a common factor; with fewer it would hide their own noise
 BATCHES = "first", "again"  # of processes: those that time every variant, and those that time the noisy ones again
 FINE = 5  # FIRST 2^FINE steps a nutation
 TOLERANCES = tuple(10.0**-decade for decade in range(2, 16, 2))
@@ -189,6 +190,8 @@ def combined(price: Array) -> tuple[Array, Array, Array]:
         warnings.simplefilter("ignore")  # variants that a batch has not timed
         middle = np.nanmedian(good, axis=0)
         common = np.nanmedian(good / middle, axis=(1, 2), keepdims=True)  # of a process that is slower at everything
+        if np.isfinite(middle).any(axis=1).sum() < COMPANY:
+            common = np.ones_like(common)
         level = good / common
         spread = spread_of(level)
         count = np.maximum(np.isfinite(level).sum(axis=0), 1)

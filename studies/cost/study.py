@@ -15,7 +15,7 @@ from symtop.runner.study import Case, Study
 
 from . import facts, far, figures, page
 from .ladder import table
-from .prices import BATCHES, ENOUGH, PROCESSES, measured, prices
+from .prices import BATCHES, COMPANY, ENOUGH, PROCESSES, measured, prices
 from .tops import named, tops_of
 
 SEED = 1
@@ -77,7 +77,9 @@ def follow_up(data: xr.DataTree) -> list[Case]:
     """The long runs of those that may win, the prices that were noisy, and the checks of the phase diagram."""
     quick = facts.members(data, SHORT) < 1000
     asked = (QUICK if quick else FULL)[LONG]
-    again = prices(data).marked
+    known = prices(data)
+    quiet = [name for name in known.names if name not in known.marked]
+    again = [*known.marked, *quiet[:: max(len(quiet) // COMPANY, 1)]] if known.marked else []
     return [
         *(Case("tops", name, asked, group=LONG) for name in facts.contenders(data)),
         *(timing(again, BATCHES[1], quick=quick) if again else []),

@@ -180,11 +180,14 @@ def test_a_price_is_the_median_and_slow_or_negative_slopes_do_not_move_it():
 
 def test_a_process_that_is_slower_at_everything_is_no_spread():
     quiet = np.array([[5e-9, 6e-9, 7e-9]] * 5)
+    quiet, names = np.tile(quiet, 4), "abcdefghijkl"
     together = quiet * np.array([1.0, 1.3, 1.1, 0.8, 1.0])[:, np.newaxis]
     apart = quiet * np.random.default_rng(1).uniform(0.7, 1.3, quiet.shape)
-    assert pricing.prices(tree_of(together)).marked == []
-    assert pricing.prices(tree_of(together)).spread.max() < 0.01
-    assert pricing.prices(tree_of(apart)).marked  # the control
+    assert pricing.prices(tree_of(together, names)).marked == []
+    assert pricing.prices(tree_of(together, names)).spread.max() < 0.01
+    assert pricing.prices(tree_of(apart, names)).marked  # the control
+    few = tree_of(together[:, :3])  # of so few a common factor would be their own noise
+    assert pricing.prices(few).marked == ["a", "b", "c"]
 
 
 def test_a_noisy_price_is_measured_again_and_marked_if_it_stays():
