@@ -12,10 +12,11 @@ import pytest
 import xarray as xr
 
 import symtop
+from symtop.core import netcdf
 from symtop.methods.framework.registry import split_name
 from symtop.report import markdown, page, style
 from symtop.runner import run as runner
-from symtop.runner.study import Case, Table
+from symtop.runner.study import Table
 from tests.browser import FAINT, Browser
 
 FEW = (
@@ -32,8 +33,8 @@ def results(tmp_path_factory):
 
     def cases(_):
         few = [one for one in study.cases(True) if one.group in {"tops", "prices"} or one.integrator in FEW]
-        return [replace(one, settings={**one.settings, "integrators": [*FEW]}) if one.group == "prices" else one
-                for one in few]  # fmt: skip
+        timed = {"integrators": [*FEW]}
+        return [dataclasses.replace(one, settings={**one.settings, **timed}) if one.timed else one for one in few]
 
     def pictures(data):  # two of them open the report
         for place, picture in enumerate(study.pictures(data)):

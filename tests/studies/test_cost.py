@@ -1,6 +1,7 @@
 """The study of cost: the ladder, prices, the ranking with its intervals, safe settings, and what its data say."""
 
 import math
+import timeit
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from symtop.measure.verdicts import barriers
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
+from symtop.runner.run import load
 
 INF, NAN = math.inf, math.nan
 EACH = ("strang[axis]", "midpoint[angles]", "stormer-verlet-reversible[angles]", "rk4[attitude]", "rk45-compiled[axis]")
@@ -135,9 +137,9 @@ def test_a_safe_setting_serves_95_of_100_tops():
 
 
 def test_hindsight_and_safe_may_have_other_winners():
-    """A step that suits most tops and fails on one in ten, against one that costs a little more on all of them."""
+    """A step that suits most tops and fails on one in five, against one that costs a little more on all of them."""
     met = np.full(200, 4.0)
-    met[::10] = 100.0
+    met[::5] = 100.0
     choices, called = safe([steps("spoilt", met), steps("even", np.full(200, 6.0))])
     assert called
     assert [one.name for one in choices] == ["even", "spoilt"]
@@ -204,8 +206,6 @@ def test_a_noisy_price_is_measured_again_and_marked_if_it_stays():
 
 def test_prices_of_fresh_processes_agree_with_a_run_timed_by_hand():
     """Evaluations times the price, plus the call, is the time of a run of another length."""
-    import timeit
-
     names = ["strang[axis]", "rk4[axis]"]
     each = xr.concat([pricing.measured(names, 3, 0.001) for _ in range(2)], "scene")
     for name in names:
@@ -387,8 +387,6 @@ def test_no_method_of_this_top_takes_part_in_a_contest_for_any_body():
 
 
 def test_the_old_names_answer_with_the_new_one():
-    from symtop.runner import load
-
     for name in ("population", "work_precision", "phase_diagram"):
         with pytest.raises(symtop.SymtopError, match="is now cost"):
             load(name)
