@@ -243,11 +243,17 @@ def ladder(variant: Integrator, tops: Tops, levels: int, steps: float, budget: f
     for (level, asked), shown in zip(wanted.items(), measured(variant, tops, list(wanted.values())), strict=True):
         values[level], reach[level] = asked.setting, asked.ends[-1]
         seen[:, level, : asked.ends.size], work[level] = shown
-    grain = EPSILON * np.maximum((np.abs(tops.energy) + np.abs(tops.numbers[:, 2])) / tops.energy_scale, 1.0)
+    grain = grain_of(tops)
     return predicted(seen, work, far, grain, drifts=drifts_of(variant)).assign(
         setting_value=("setting", values), reach=("setting", reach), chart=((), variant.charts()[0]),
         conserves_energy=((), float("energy" in (variant.conserves or ()))),
     )  # fmt: skip
+
+
+def grain_of(tops: Tops) -> Array:
+    """The rounding of the energy in one evaluation, over its scale, (n,)."""
+    size = (np.abs(tops.energy) + np.abs(tops.numbers[:, 2])) / tops.energy_scale
+    return np.asarray(EPSILON * np.maximum(size, 1.0))
 
 
 def predicted(seen: Array, work: Array, far: Array, grain: Array, *, drifts: bool) -> xr.Dataset:
