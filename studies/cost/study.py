@@ -31,18 +31,11 @@ QUICK = {
 FAR_FULL, FAR_QUICK = ({"members": members, "levels": levels, "steps": steps, "budget": budget, "seed": SEED}
                        for members, levels, steps, budget in ((16, 13, 1.2e6, 2.5e6), (4, 10, 1e5, 2e5)))  # fmt: skip
 CHECKED = {False: 3e7, True: 2e6}  # force evaluations of one run of a check, by quick
-LEFT_OUT = {  # methods, by the reason
-    "the same maps in three coordinates, at two to three times the time": (
-        "midpoint-unreduced", "trapezoidal-unreduced",
-    ),
-    "the same steps as taylor in slower arithmetic, which meets smaller errors": ("taylor-longdouble", "taylor-quad"),
-    "a step of any size is the motion itself, so that no step is too coarse": ("exact-discrete",),
-}  # fmt: skip
 
 
 def compiled_variants() -> list[Integrator]:
     """Every compiled variant with a step or a tolerance, but those that are left out."""
-    left = {name for names in LEFT_OUT.values() for name in names}
+    left = {name for names in page.LEFT_OUT.values() for name in names}
     return [
         variant
         for variant in variants()

@@ -156,7 +156,7 @@ def recommend(
         return
     if step_size is not None:
         raise SymtopError("--step-size belongs to --i-use; with --accuracy the step is what is found")
-    if results is None and (Path("results") / advise.STORED_STUDY).is_file():
+    if results is None and (Path("results") / advise.STORED).is_file():
         results = "results"
     with ticking("trying methods"):
         advice = advise.recommend(scene, accuracy=accuracy or 0.0, quantity=quantity, horizon=horizon, results=results)

@@ -133,10 +133,3 @@ def test_settings_of_the_first_round_are_values_of_json(name):
     study = runner.load(name)
     for case in [*study.grid(quick=True), *study.grid(), *study.grid(full=True)]:
         assert survives(dict(case.settings)), case
-
-
-def test_settings_of_the_second_round_are_values_of_json(timed):
-    study, results = timed
-    later = [case for case in StudyCases.stored(study, results, quick=False, full=False).cases.values() if case.timed]
-    assert later
-    assert all(survives(dict(case.settings)) for case in later)

@@ -1,5 +1,7 @@
 """Long runs: laws of growth predict horizons that were left out, the orbit's shape, the phase diagram and controls."""
 
+import json
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -169,6 +171,7 @@ def test_what_is_within_reach_is_measured_and_the_rest_predicted(data):
 
 def test_what_is_checked_was_predicted_and_a_prediction_that_fails_is_told(data):
     for one in runs.chosen(data, 3e6):
+        assert json.loads(json.dumps(one)) == one  # settings of a case
         panel = diagram(data, one["quantity"])
         at = panel.place(one["target"], one["horizon"])
         assert panel.predicted[at]
