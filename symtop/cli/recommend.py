@@ -147,6 +147,7 @@ def recommend(
     """
     with ticking("loading"):
         from symtop import advise
+        from symtop.measure.ranking import STORED
     if (accuracy is None) is (engine is None):
         both = "" if accuracy is None else ", not both"
         raise SymtopError(f"recommend takes one of --accuracy, for example 1e-6, and --i-use{both}")
@@ -156,7 +157,7 @@ def recommend(
         return
     if step_size is not None:
         raise SymtopError("--step-size belongs to --i-use; with --accuracy the step is what is found")
-    if results is None and (Path("results") / advise.STORED).is_file():
+    if results is None and (Path("results") / STORED).is_file():
         results = "results"
     with ticking("trying methods"):
         advice = advise.recommend(scene, accuracy=accuracy or 0.0, quantity=quantity, horizon=horizon, results=results)
