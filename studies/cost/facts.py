@@ -34,8 +34,8 @@ GENERAL = "any body"  # every class but this-top and solution
 CLASSES = (*(name for name in NEEDS if name != "solution"), GENERAL)
 THIS_TOP = ("this-top", "solution")
 SECONDS, EVALUATIONS = "seconds", "evaluations"
-WITHIN = 3.0  # times the least cost of a class over ten nutations: who comes as close runs over a thousand
-OFTEN = 0.05  # of the tops
+WITHIN = 2.5  # times the least cost of a class over ten nutations: who comes as close runs over a thousand
+OFTEN = 0.1  # of the tops
 FINE = 50.0  # steps a nutation that look like enough
 
 

@@ -367,7 +367,7 @@ def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
         for target in CHECKED_TARGETS:
             for horizon in CHECKED_AT:
                 at = panel.place(target, horizon)
-                if not panel.predicted[at] or not panel.ratio[at] >= TIE or not np.isfinite(panel.ratio[at]):
+                if not panel.predicted[at] or not np.isfinite(panel.ratio[at]):
                     continue
                 pair, settings, dearest = (int(panel.winner[at]), int(panel.second[at])), [], 0.0
                 for row in pair:
@@ -375,7 +375,8 @@ def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
                     fine = min(int(np.median(panel.levels[row][at])), one.sizes["setting"] - 1)
                     settings.append(one["setting_value"].values[[max(fine - 1, 0), fine]].tolist())
                     dearest = max(dearest, float(np.nanmax(one["work"].values[fine])) * horizon)
-                if dearest <= limit:
+                runs = [[panel.names[row] for row in pair], settings]
+                if dearest <= limit and all([one["integrators"], one["settings"]] != runs for one in asked):
                     asked.append({
                         "integrators": [panel.names[row] for row in pair], "quantity": quantity, "target": target,
                         "horizon": horizon, "settings": settings, "seed": data["far"].attrs.get("seed", 1),

@@ -23,7 +23,7 @@ from .page import method, percent
 from .ranking import SAFE, run_lengths
 from .tops import KINDS, NATURAL
 
-FAMILIAR = (  # of figure 1: methods that people know, with the side of the line on which the name stands
+FAMILIAR = (  # of figure 1: methods that people know
     "rk4[axis]", "rk45-compiled[axis]", "dop853-compiled[axis]", "dop853-compiled-fixed[axis]", "gauss-8[axis]",
     "stormer-verlet[angles]", "strang[axis]", "takahashi-imada[axis]", "srkn-14-6[axis]", "midpoint[angles]",
     "taylor[axis]", "series[axis]",
@@ -89,6 +89,8 @@ def draw_accuracy(data: xr.DataTree) -> Picture:
     axis.set(xscale="log", yscale="log", ylim=(2e-13, 5e-3), ylabel="axis error that 95 % of the tops keep (rad)")
     axis.set_xlabel("time of a safe run: evaluations × price + call (µs)")
     style.legend_below(figure, axes)
+    without = [method(name) for name in FAMILIAR if name in data["short"]["variant"].values and name not in lines]
+    beyond = f" Not within the budget at any of these errors: {', '.join(without)}." if without else ""
     best = {target: facts.safest(data, Cell("short", "axis", target, NATURAL)) for target in facts.targets(data)}
     told = [f"{method(one[0].name)} to {raised(target)}" for target, (one, _) in best.items()
             if one and math.isfinite(one[0].seconds)]  # fmt: skip
@@ -98,7 +100,8 @@ def draw_accuracy(data: xr.DataTree) -> Picture:
         f"Seconds of a run at the one setting with which {SAFE:.0%} of {span(data)} keep the axis error; left and low "
         "is "
         "good. Bands: 95 % of a bootstrap over tops and prices. A line ends where the budget of a run or rounding ends "
-        "it. Grey: needs this top's own equations. Method[chart]; the chart is the axis where none is named.",
+        "it. Grey: needs this top's own equations. Method[chart]; the chart is the axis where none is named."
+        f"{beyond}",
         "Log-log plot of axis error against the time of a safe run, a line a method.",
         lead="Speed against accuracy",
     )  # fmt: skip
@@ -127,7 +130,7 @@ def draw_classes(data: xr.DataTree) -> Picture:
                                   va="top", fontsize=LEAST_TEXT, color=color)  # fmt: skip
         axis.set(xscale="log", ylim=(len(classes) - 0.3, -0.5), yticks=range(len(classes)), yticklabels=classes,
                  xlabel="time of a safe run (µs)", title=f"to {power(target)} rad")  # fmt: skip
-        axis.margins(x=0.35)
+        axis.margins(x=0.5)
         axis.grid(visible=False, axis="y")
     axes[0, 0].plot([], [], "ko", label="natural tops")
     axes[0, 0].plot([], [], "ko", fillstyle="none", label="strata, as drawn")
@@ -309,7 +312,7 @@ def _panel(axis: Any, panel: far.Diagram, groups: dict[str, list[str]], painted:
     dx, dy = 0.5 * (x[1] - x[0]), 0.5 * (y[0] - y[1])
     colors = np.full((*panel.winner.shape, 3), to_rgb(UNREACHED))
     masks = [np.isin(panel.winner, [k for k, row in enumerate(panel.names) if row in rows]) for rows in groups.values()]
-    for mask, color in zip(masks, painted.values(), strict=True):
+    for mask, color in zip(masks, (painted[name] for name in groups), strict=True):
         colors[mask] = color
         colors[mask & panel.predicted] = PALE + (1.0 - PALE) * np.asarray(color)
     axis.imshow(colors, extent=(x[0] - dx, x[-1] + dx, y[-1] - dy, y[0] + dy), aspect="auto", interpolation="none")

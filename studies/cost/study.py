@@ -30,7 +30,7 @@ QUICK = {
 }
 FAR_FULL, FAR_QUICK = ({"members": members, "levels": levels, "steps": steps, "budget": budget, "seed": SEED}
                        for members, levels, steps, budget in ((16, 13, 1.2e6, 2.5e6), (4, 10, 1e5, 2e5)))  # fmt: skip
-CHECKED = {False: 3e7, True: 2e6}  # force evaluations of one run of a check, by quick
+CHECKED = {False: 6e7, True: 2e6}  # force evaluations of one run of a check, by quick
 
 
 def compiled_variants() -> list[Integrator]:
