@@ -57,7 +57,7 @@ TOLERANCES = tuple(10.0**-decade for decade in range(2, 16, 2))
 TOLERANCE = 1e-8  # of variants whose order is the same at all
 KIND, CLEAR = "slow", 0.3  # rad between a pole and the axis of the top that is timed
 DRAWN = 64  # tops that it is chosen from
-LENGTHS = (5, 50)  # nutations of the short run and of the long one
+LENGTHS = (0.1, 50.0)  # nutations of the short run, a few steps, which is nearly all call, and of the long one
 FLOOR = 1e-9  # seconds: the dozen multiplications of two cross products take as long at four a cycle
 NOISY, GRAIN = 0.10, 0.02
 OUTER = 1.35  # standard deviations between the quartiles of a normal distribution
@@ -84,19 +84,19 @@ def tolerances_of(variant: Integrator) -> tuple[float, ...]:
     return TOLERANCES if not variant.fixed_step and variant.order is None else (TOLERANCE,)
 
 
-def run_of(variant: Integrator, tolerance: float, nutations: int, *, own: bool = True) -> Call:
+def run_of(variant: Integrator, tolerance: float, nutations: float, *, own: bool = True) -> Call:
     """The bare run of the top over so many nutations, of heyoka by its `own` loop."""
     if own and variant.inner_loop == "heyoka":
         return bare_heyoka(variant.charts()[0], tolerance, nutations)
     (chart,), (top, start, period) = variant.charts(), _top()
-    solver, steps = variant.solvers[chart], round(nutations * FIRST * 2.0**FINE)
+    solver, steps = variant.solvers[chart], max(round(nutations * FIRST * 2.0**FINE), 2)
     plan = Plan.steps(period * (nutations / steps), np.array([steps // 2, steps]))
     if not variant.fixed_step:
         plan = Plan.until(np.array([0.5, 1.0]) * nutations * period, tolerance)
     return lambda: solver(top, start, plan), float(solver(top, start, plan).force_evaluations)
 
 
-def bare_heyoka(chart: str, tolerance: float, nutations: int) -> Call:
+def bare_heyoka(chart: str, tolerance: float, nutations: float) -> Call:
     """heyoka's integrator on the same equations, top and times."""
     from symtop.methods.taylor.heyoka import start_numbers, stepper
 
@@ -183,8 +183,8 @@ def spread_of(values: Array) -> Array:
     return np.where(np.isfinite(values).sum(axis=0) >= ENOUGH, (high - low) / middle, np.inf)
 
 
-def combined(price: Array) -> tuple[Array, Array, Array]:
-    """Medians, relative errors and spreads (variants, tolerances) of slopes (processes, variants, tolerances)."""
+def combined(price: Array, call: Array) -> tuple[Array, Array, Array, Array]:
+    """Prices, calls, relative errors and spreads (variants, tolerances) of (processes, variants, tolerances)."""
     good = np.where(price >= FLOOR, price, np.nan)
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # variants that a batch has not timed
@@ -196,7 +196,7 @@ def combined(price: Array) -> tuple[Array, Array, Array]:
         spread = spread_of(level)
         count = np.maximum(np.isfinite(level).sum(axis=0), 1)
         error = MEDIAN * STUDENT * np.maximum(spread / OUTER, GRAIN) / np.sqrt(count)
-        return np.nanmedian(level, axis=0), error, spread
+        return np.nanmedian(level, axis=0), np.nanmedian(call / common, axis=0), error, spread
 
 
 def quiet_median(values: Array) -> Array:
@@ -212,17 +212,16 @@ def prices(data: xr.DataTree) -> Prices:
     of_batch = [str(name).partition("-")[0] for name in group["scene"].values]
     places = [[k for k, one in enumerate(of_batch) if one == batch] for batch in BATCHES]
     batches = [group.isel(scene=chosen) for chosen in places if chosen]
-    each = [combined(batch["price"].values) for batch in batches]
+    each = [combined(batch["price"].values, batch["call"].values) for batch in batches]
     spreads = np.stack([quiet_median(spread) for *_, spread in each])  # (batches, variants)
     best = np.argmin(spreads, axis=0)
 
     def chosen(parts: list[Array]) -> Array:
         return np.stack([parts[batch][row] for row, batch in enumerate(best)])
 
-    price, error = chosen([middle for middle, *_ in each]), chosen([quiet_median(error) for _, error, _ in each])
-    with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        call = chosen([np.nanmedian(batch["call"].values, axis=0) for batch in batches])
+    price, error = chosen([middle for middle, *_ in each]), chosen([quiet_median(error) for *_, error, _ in each])
+    call = chosen([rest for _, rest, *_ in each])
+    with np.errstate(all="ignore"):
         ratio = group["sampled"].values / group["price"].sel(priced_at=TOLERANCE, method="nearest").values
     spread = np.array([spreads[batch, row] for row, batch in enumerate(best)])
     marked = [name for name, one in zip(names, spread, strict=True) if not one <= NOISY]
