@@ -59,12 +59,13 @@ KIND, CLEAR = "slow", 0.3  # rad between a pole and the axis of the top that is 
 DRAWN = 64  # tops that it is chosen from
 LENGTHS = (0.1, 50.0)  # nutations of the short run, a few steps, which is nearly all call, and of the long one
 FLOOR = 1e-9  # seconds: the dozen multiplications of two cross products take as long at four a cycle
-NOISY, GRAIN = 0.10, 0.02
+NOISY = 0.10
+GRAIN = 0.04  # two runs, with and without company on the machine, differ by that where their processes do not
 OUTER = 1.35  # standard deviations between the quartiles of a normal distribution
 MEDIAN, STUDENT = 1.25, 2.78 / 1.96
 HEYOKA, SAMPLED = "taylor[axis]", "with dense output"
 Call = tuple[Callable[[], object], float]  # with its number of force evaluations
-START = "from symtop.runner import scripts; scripts.install(); from symtop_studies.cost import prices; prices.answer()"
+START = "from symtop.runner import scripts; scripts.install(); from symtop_studies.cost import prices; prices.{}()"
 
 
 @functools.cache
@@ -139,7 +140,7 @@ def measured(names: list[str], rounds: int, batch: float) -> xr.Dataset:
     ``sampled`` is the price of `taylor[axis]` with dense output.
     """
     question = json.dumps({"names": names, "rounds": rounds, "batch": batch})
-    command = [sys.executable, "-c", START]
+    command = [sys.executable, "-c", START.format(answer.__name__)]  # named, so that a case depends on its code
     done = subprocess.run(command, input=question, stdout=subprocess.PIPE, text=True, check=True)  # noqa: S603
     slopes = json.loads(done.stdout.splitlines()[-1])["slopes"]
     price, call = (np.full((len(names), len(TOLERANCES)), np.nan) for _ in range(2))
