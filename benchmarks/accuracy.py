@@ -65,7 +65,7 @@ class Examined(NamedTuple):
 def short(top: SymmetricTop, start: Angles) -> tuple[Array, int]:
     """The constants without the last resort, interpreted, and their status."""
     out = [0.0] * at.SIZE
-    status = constants.motion_constants(*flat(top, start), out)
+    status = constants.motion_constants(flat(top, start), out)
     return np.array(out), status
 
 

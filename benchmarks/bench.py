@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import ensemble, kernels, lanes, measured, startup, targets, truth, twin, whole_run
-from symtop.runner import store
+from symtop.core import netcdf
 from symtop.runner.study import Table
 
 
@@ -148,7 +148,7 @@ def main() -> None:
         "targets": {"accuracy": options.accuracy, "methods": [row._asdict() for row in reached]},
     }
     content = findings(rows, started, forms, reached, items, one_step, many, together, options.accuracy, facts)
-    store.write_json(target, content | numbers)
+    netcdf.write_json(target, content | numbers)
     print(f"written to {target}")
 
 

@@ -20,8 +20,8 @@ import numpy as np
 
 import symtop
 from symtop.core.parallel import cores
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import members_of
+from symtop.methods.framework.loop import FixedStep
 from symtop.run.ensemble import inputs as reading
 from symtop.run.ensemble.chunks import Job, nutation_periods, schedule
 

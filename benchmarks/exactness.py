@@ -19,11 +19,10 @@ from typing import Any
 import numpy as np
 
 import symtop
-from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.loop import Loop, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop, inside, kernel_loop
 from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian import exact_discrete
-from symtop.methods.lagrangian.oscillators import exact_map
+from symtop.methods.lagrangian.oscillators import numbers as exact_map
 from symtop.methods.vectors import accumulate_plainly
 from symtop.model import charts
 from symtop.model.exact.digits import PreciseForm

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import symtop
 from benchmarks import twin
 from symtop.measure.timing import Timing, timings
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import methods
 
 SCENE = "spheroid"

@@ -25,9 +25,8 @@ import symtop
 from benchmarks import kernels, twin
 from symtop.core.parallel import in_threads
 from symtop.measure.timing import timings
-from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.lanes import W
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import W, members_of
+from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.taylor import heyoka
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForms

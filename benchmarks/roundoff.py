@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 import symtop
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.run.long_run import PER_NUTATION, chart_of, long_run, windows
 from symtop.run.modified_energy import modified_energy
 

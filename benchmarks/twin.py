@@ -18,13 +18,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian import discrete_lagrangian, exact_discrete, galerkin, unreduced
 from symtop.methods.lie_group import energy_momentum, generalised_alpha, runge_kutta, variational
 from symtop.methods.runge_kutta import collective_gauss, explicit, gauss, kahan, pairs
 from symtop.methods.splitting import angles, space
-from symtop.methods.taylor import series
+from symtop.methods.taylor import series, series_general
 from symtop.methods.taylor.series import DEFAULT_ORDER
 from symtop.model.charts import CHARTS
 from symtop.model.scenes import Scene
@@ -72,25 +72,25 @@ FAMILIES: dict[Callable[..., Any], tuple[str, str]] = {
     space.march_attitude: ("splitting_space", "ATTITUDE"),
     **{loop: ("runge_kutta", chart.upper()) for chart, loop in explicit.LOOPS.items()},
     **{pairs.fixed_loop(chart, pair): ("runge_kutta", chart.upper()) for pair in pairs.PAIRS for chart in CHARTS},
-    **{pairs.fixed_loop(chart, pair): ("runge_kutta", chart.upper()) for pair in pairs.PAIRS for chart in CHARTS},
     exact_discrete.march_axis: ("exact_discrete", ""),
     exact_discrete.march_attitude: ("exact_discrete", ""),
     series.march_axis(DEFAULT_ORDER): ("series", ""),
     series.march_attitude(DEFAULT_ORDER): ("series", "ATTITUDE"),
+    **{series_general.loop(chart): ("series_general", chart.upper()) for chart in series_general.CHARTS},
     gauss.march_axis: ("gauss", "AXIS"),
     gauss.march_frame: ("gauss", "FRAME"),
     kahan.march_axis: ("kahan", ""),
     kahan.march_frame: ("kahan", "FRAME"),
     runge_kutta.march: ("lie_group", "RUNGE_KUTTA"),
-    variational.march: ("lie_group", "VARIATIONAL"),
+    **dict.fromkeys(variational.MARCH.values(), ("lie_group", "VARIATIONAL")),
     energy_momentum.march: ("lie_group", "ENERGY_MOMENTUM"),
     generalised_alpha.march: ("lie_group", "ALPHA"),
     collective_gauss.march: ("lie_group", "COLLECTIVE"),
 }
 # maps between the variables that are stepped and those that are shown, once a run
 SHOWN: dict[Callable[..., Any], tuple[Callable[..., Any], Callable[..., Any]]] = {
-    space.march_axis: (space.enter_axis, space.present_axis),
-    space.march_attitude: (space.enter_attitude, space.present_attitude),
+    space.march_axis: (space.AXIS.enter, space.AXIS.present),
+    space.march_attitude: (space.ATTITUDE.enter, space.ATTITUDE.present),
     exact_discrete.march_axis: (exact_discrete.enter, exact_discrete.present_axis),
     exact_discrete.march_attitude: (exact_discrete.enter, exact_discrete.present_attitude),
     series.march_attitude(DEFAULT_ORDER): (lambda _par, _rule, state, _h: state, series.present),
@@ -143,7 +143,8 @@ class Twin:
         self._march.restype = ctypes.c_long
         pointer = ctypes.c_void_p
         self._march.argtypes = [pointer, pointer, pointer, ctypes.c_double, ctypes.c_long, pointer]
-        self._par, self._rule = np.array(numbers(kernel.par)), np.array(numbers(kernel.rule))
+        rule = kernel.rule if kernel.march is not collective_gauss.march else (*kernel.rule[:2], kernel.rule.shares)
+        self._par, self._rule = np.array(numbers(kernel.par)), np.array(numbers(rule))
         start = kernel.state if self._enter is None else self._enter(kernel.par, kernel.rule, kernel.state, kernel.h)
         self._start = np.array(start)
 

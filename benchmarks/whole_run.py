@@ -14,7 +14,7 @@ from symtop.core import netcdf
 from symtop.core.lazy_kernel import LAZY
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import methods
 from symtop.model.scenes import closed_form
 from symtop.run.guard import warning

@@ -12,6 +12,9 @@ ROOT = DOCS.parent
 sys.path[:0] = [str(ROOT), str(DOCS)]
 
 import symtop  # noqa: E402  (of this tree)
+from symtop.runner import scripts  # noqa: E402
+
+scripts.install()  # theory pages show modules of studies, too
 
 project = "symtop"
 author = "The symtop authors"

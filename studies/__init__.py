@@ -2,6 +2,15 @@
 
 # of the report; others follow
 ORDER = (
-    "cost", "truth", "convergence", "factors", "drift", "stability", "claims", "reduction", "oscillators", "notebook",
+    "cost",
+    "truth",
+    "convergence",
+    "factors",
+    "drift",
+    "stability",
+    "claims",
+    "reduction",
+    "oscillators",
+    "notebook",
 )
 FORMER = dict.fromkeys(("population", "work_precision", "phase_diagram"), "cost")  # names that studies had

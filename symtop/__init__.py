@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from symtop.measure.sweep import sweep as sweep
     from symtop.methods.framework.angles import chart_outcome as chart_outcome, on_angles as on_angles
     from symtop.methods.framework.equations import field as field
-    from symtop.methods.framework.fixed_step import FixedStep as FixedStep
-    from symtop.methods.framework.loop import kernel_loop as kernel_loop
+    from symtop.methods.framework.loop import FixedStep as FixedStep, kernel_loop as kernel_loop
     from symtop.methods.framework.plan import Plan as Plan, Run as Run
     from symtop.methods.framework.registry import (
         Integrator as Integrator,
@@ -46,7 +45,7 @@ if TYPE_CHECKING:
     from symtop.run.simulation import simulate as simulate
     from symtop.runner.study import Case as Case, Picture as Picture, Study as Study, Table as Table
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 _NAMES = {  # by the module that holds them
     "advise": "Advice recommend",
@@ -56,8 +55,7 @@ _NAMES = {  # by the module that holds them
     "methods.lagrangian.discrete_lagrangian": "discrete_lagrangian",
     "methods.framework.angles": "chart_outcome on_angles",
     "methods.framework.equations": "field",
-    "methods.framework.fixed_step": "FixedStep",
-    "methods.framework.loop": "kernel_loop",
+    "methods.framework.loop": "FixedStep kernel_loop",
     "methods.framework.plan": "Plan Run",
     "methods.framework.registry": "Integrator citation integrator integrators register",
     "methods.framework.space": "on_attitude on_axis",

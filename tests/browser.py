@@ -226,30 +226,26 @@ class Browser:
 
     def point(self, selector: str, across: float, down: float) -> None:
         """Click with the mouse at two shares of an element's width and height."""
-        box = self.evaluate(f"document.querySelector({selector!r}).getBoundingClientRect().toJSON()")
-        place = {"x": box["x"] + across * box["width"], "y": box["y"] + down * box["height"]}
-        for kind, buttons in (("mousePressed", 1), ("mouseReleased", 0)):
-            self._send("Input.dispatchMouseEvent", type=kind, button="left", buttons=buttons, clickCount=1, **place)
+        self._mouse(selector, across, down, 0.0, 0.0)
 
     def drag(self, selector: str, right: float, down: float) -> None:
         """Press the mouse in the middle of an element, move it, and let go."""
+        self._mouse(selector, 0.5, 0.5, right, down)
+
+    def _mouse(self, selector: str, across: float, low: float, right: float, down: float) -> None:
         box = self.evaluate(f"document.querySelector({selector!r}).getBoundingClientRect().toJSON()")
-        x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+        x, y = box["x"] + across * box["width"], box["y"] + low * box["height"]
         for kind, share in (("mousePressed", 0.0), ("mouseMoved", 0.5), ("mouseMoved", 1.0), ("mouseReleased", 1.0)):
             place = {"x": x + share * right, "y": y + share * down}
             self._send("Input.dispatchMouseEvent", type=kind, button="left", buttons=1, clickCount=1, **place)
 
     def screenshot(self, path: Path, *, whole: bool = False) -> Path:
         """Save what is in the window, or the whole page, as a PNG."""
-        found = self._send("Page.captureScreenshot", format="png", captureBeyondViewport=whole, **self._clip(whole))
+        size = self._send("Page.getLayoutMetrics")["cssContentSize"] if whole else {}
+        clip = {"clip": {"x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1}} if size else {}
+        found = self._send("Page.captureScreenshot", format="png", captureBeyondViewport=whole, **clip)
         path.write_bytes(base64.b64decode(found["data"]))
         return path
-
-    def _clip(self, whole: bool) -> dict[str, Any]:
-        if not whole:
-            return {}
-        size = self._send("Page.getLayoutMetrics")["cssContentSize"]
-        return {"clip": {"x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1}}
 
     def outside(self) -> list[str]:
         """What the page asked of other machines: anything but files, data and this one."""

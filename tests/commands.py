@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import xarray as xr
@@ -13,6 +14,7 @@ from symtop.core import netcdf
 from symtop.runner import store
 
 PROBE = Path(__file__).parent / "probe.py"
+ROOT = Path(__file__).resolve().parents[1]
 
 
 def symtop(*words: object, cwd: Path | None = None, **environment: object) -> subprocess.Popen:
@@ -27,6 +29,20 @@ def symtop(*words: object, cwd: Path | None = None, **environment: object) -> su
         start_new_session=True,
         env={**os.environ, **{name: str(value) for name, value in environment.items()}},
     )
+
+
+def customized(folder: Path, text: str) -> Callable[..., subprocess.CompletedProcess]:
+    """A function that runs symtop, or Python code, in a tree of processes whose `sitecustomize` is this text."""
+    (folder / "custom").mkdir()
+    (folder / "custom" / "sitecustomize.py").write_text(text)
+    paths = [str(folder / "custom"), str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+
+    def run(*arguments: object, python: str | None = None) -> subprocess.CompletedProcess:
+        command = [sys.executable, "-c", python] if python else [sys.executable, "-m", "symtop", *map(str, arguments)]
+        return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+    return run
 
 
 def stop(process: subprocess.Popen) -> None:

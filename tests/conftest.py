@@ -32,7 +32,8 @@ from symtop.methods.framework import registry
 from symtop.model import scenes
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.runner import plugins, scripts
+from symtop.run import plugins
+from symtop.runner import scripts
 
 scripts.install()  # tests import `symtop_studies`
 
@@ -116,17 +117,11 @@ def truth() -> dict:
 def random_scenes(count: int, seed: int) -> list[Scene]:
     """Ordinary tops in ordinary motion, away from the poles."""
     draw = random.Random(seed)
+    ranges = (0.4, 2.6), (-math.pi, math.pi), (-math.pi, math.pi), (-1.0, 1.0), (-2.0, 2.0), (-6.0, 6.0)
     drawn = []
     for k in range(count):
         I1 = draw.uniform(0.3, 4.0)
         top = SymmetricTop(I1, draw.uniform(0.2, 1.9) * I1, draw.uniform(-3.0, 6.0))
-        start = Angles(
-            theta=draw.uniform(0.4, 2.6),
-            phi=draw.uniform(-math.pi, math.pi),
-            psi=draw.uniform(-math.pi, math.pi),
-            theta_dot=draw.uniform(-1.0, 1.0),
-            phi_dot=draw.uniform(-2.0, 2.0),
-            psi_dot=draw.uniform(-6.0, 6.0),
-        )
+        start = Angles(*(draw.uniform(*between) for between in ranges))
         drawn.append(Scene(f"random-{k}", top, start, 5.0))
     return drawn

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import xarray as xr
 
 from symtop.core import netcdf
+from symtop.measure.datasets import differences
 from symtop.runner import store
-from symtop.runner.check import differences
 from tests.commands import ended, leftovers, symtop
 
 PATIENCE = 2400.0  # seconds for an undisturbed run

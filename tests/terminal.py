@@ -1,8 +1,5 @@
 """Commands on a terminal of 80 x 24: what they print, how long they take, and how long they are silent.
 
-python tests/terminal.py            every command of the README that ends by itself, cold (nothing compiled), then warm
-python tests/terminal.py recommend  those whose first word that is
-
 A silence is the longest time between two characters, the start of the process and its end included.
 """
 
@@ -11,19 +8,13 @@ import os
 import pty
 import re
 import select
-import shlex
 import struct
 import subprocess
 import sys
-import tempfile
 import termios
 import time
 from itertools import pairwise
-from pathlib import Path
 from typing import NamedTuple
-
-README = Path(__file__).resolve().parents[1] / "README.md"
-ENDLESS = {"explore", "judge", "long", "study"}  # ends with Ctrl-C, needs a file of one's own, or takes minutes
 
 
 class Recording(NamedTuple):
@@ -76,26 +67,3 @@ def recorded(words: list[str], limit: float = 300.0, **environment: str) -> Reco
     code = process.wait()
     ended = time.monotonic()
     return Recording(said.decode(errors="replace"), code, ended - began, max(silence, ended - last), drawings)
-
-
-def commands() -> list[list[str]]:
-    """The commands of the README that end by themselves."""
-    lines = [line for block in re.findall(r"```sh(?: slow)?\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
-             for line in block.splitlines()]  # fmt: skip
-    every = [shlex.split(line, comments=True) for line in lines if line.startswith("symtop ")]
-    return [words[1:] for words in every if words[1] not in ENDLESS]
-
-
-if __name__ == "__main__":
-    chosen = [words for words in commands() if not sys.argv[1:] or words[0] in sys.argv[1:]]
-    with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)
-        for words in chosen:
-            for kind in ("cold", "warm"):
-                if kind == "cold":
-                    cache = tempfile.mkdtemp(dir=folder)
-                shown = recorded(words, SYMTOP_CACHE=cache)
-                told = f"{shown.seconds:.1f} s, silent {shown.silence:.1f} s at most, {shown.widest} columns"
-                print(f"--- symtop {shlex.join(words)} ({kind}): exit {shown.code}, {told}")
-                if kind == "warm":
-                    print(re.sub(r"[^\n]*\r(?!\n)", "", shown.text).strip())

@@ -12,7 +12,7 @@ import symtop
 from symtop import advise
 from symtop.cli.main import main
 from symtop.measure import settings
-from symtop.measure.ranking import Near, regime
+from symtop.measure.ranking import regime
 from symtop.methods.framework.registry import methods
 
 
@@ -153,22 +153,6 @@ def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_wi
     assert run.attrs["integrator"] == advice.integrator
 
 
-def test_a_variant_that_the_nearest_random_tops_were_not_run_with_is_counted_by_its_method():
-    near = Near({"rk4[axis]": 40, "strang[axis]": 7, "stormer-verlet[angles]": 0}, 50, "axis", 1e-6, 10.0, {})
-    assert advise._same("rk4[axis]", advise._usable("attitude")) == "rk4[angles]"
-    assert advise._same("stormer-verlet", list(near.served)) == "stormer-verlet[angles]"
-    assert advise._same("gauss-4[axis]", list(near.served)) is None
-    assert "on 40 of the 50 nearest random tops" in near.words("rk4[axis]")
-    assert "on 0 of the 50" in near.words("stormer-verlet[angles]")  # and it says so
-
-
-def test_nothing_is_said_of_random_tops_without_results(monkeypatch):
-    few(monkeypatch, 1)
-    advice = symtop.recommend("spheroid", accuracy=1e-3, horizon=20.0)
-    assert advice.nearest == ""
-    assert "random" not in str(advice)
-
-
 def test_an_older_study_is_refused_with_a_remedy(tmp_path):
     tree = xr.DataTree.from_dict({"short": xr.Dataset({"cost": ("x", [1.0])})})
     tree.to_netcdf(tmp_path / "cost.nc", engine="netcdf4")
@@ -195,29 +179,9 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
     assert "not to the end (stopped by rounding" in " ".join(advice.fails)
 
 
-def test_a_run_to_the_end_at_the_references_limit_is_not_called_extrapolated(monkeypatch):
-    few(monkeypatch, 1)
-    real = settings.attempt
-    monkeypatch.setattr(settings, "attempt", lambda *question: real(*question)._replace(bound=0.99e-4))
-    advice = symtop.recommend("spheroid", accuracy=1e-4, horizon=20.0)
-    assert advice.confidence == "at the reference's limit"
-    assert "measured to the end" in advice.reason
-
-
-@pytest.mark.parametrize(
-    ("arguments", "word"),
-    [
-        ({"accuracy": 0.0}, "accuracy"),
-        ({"accuracy": math.nan}, "accuracy"),
-        ({"accuracy": 4.0}, "below pi"),
-        ({"accuracy": 1e-6, "quantity": "axes"}, "axis"),
-        ({"accuracy": 1e-6, "horizon": -1.0}, "horizon"),
-        ({"accuracy": 1e-6, "results": "/nowhere"}, "symtop study cost first"),
-    ],
-)
-def test_bad_questions_get_a_sentence(arguments, word):
-    with pytest.raises(symtop.SymtopError, match=word):
-        symtop.recommend("spheroid", **arguments)
+def test_a_folder_without_a_study_is_refused():
+    with pytest.raises(symtop.SymtopError, match="symtop study cost first"):
+        symtop.recommend("spheroid", accuracy=1e-6, results="/nowhere")
 
 
 def test_the_command_prints_and_refuses(tmp_path, monkeypatch):
@@ -235,9 +199,7 @@ def test_the_answer_does_not_depend_on_the_working_directory(tmp_path, monkeypat
     (tmp_path / "results" / "cost.nc").write_text("no dataset")
     few(monkeypatch, 1)
     assert symtop.recommend("spheroid", accuracy=1e-3).integrator == "strang"
-    command = CliRunner().invoke(
-        main, ["recommend", "spheroid", "--accuracy", "1e-3"]
-    )  # the command says what it reads
+    command = CliRunner().invoke(main, ["recommend", "spheroid", "--accuracy", "1e-3"])  # it says what it reads
     assert command.exit_code == 2
     assert "cost.nc cannot be read" in command.output
 
@@ -245,9 +207,8 @@ def test_the_answer_does_not_depend_on_the_working_directory(tmp_path, monkeypat
 def test_a_regime_does_not_depend_on_units():
     scene = symtop.scene("goldstein")
     top, start, scale = scene.top, scene.start, 7.0
-    faster = symtop.Angles(
-        start.theta, 0.0, 0.0, *(scale * rate for rate in (start.theta_dot, start.phi_dot, start.psi_dot))
-    )
+    rates = (scale * rate for rate in (start.theta_dot, start.phi_dot, start.psi_dot))
+    faster = symtop.Angles(start.theta, 0.0, 0.0, *rates)
     bigger = symtop.SymmetricTop(3.0 * top.I1, 3.0 * top.I3, 3.0 * scale**2 * top.mgl)
     same = symtop.Scene("same", bigger, faster, 1.0)
     np.testing.assert_allclose(regime(same), regime(scene), rtol=1e-9, atol=1e-9)
@@ -258,12 +219,8 @@ def random_scene(rng, number):
     """A top of any shape and regime: slow and fast spin, hanging and standing, falling and precessing."""
     I3 = math.exp(rng.uniform(math.log(0.1), math.log(1.9)))
     top = symtop.SymmetricTop(1.0, I3, rng.choice([-1.0, 1.0]) * math.exp(rng.uniform(-1.0, 2.0)))
-    start = symtop.Angles(
-        theta=rng.uniform(0.2, 2.9),
-        theta_dot=rng.gauss(0.0, 1.0),
-        phi_dot=rng.gauss(0.0, 2.0),
-        psi_dot=rng.gauss(0.0, 8.0),
-    )
+    theta, rates = rng.uniform(0.2, 2.9), [rng.gauss(0.0, spread) for spread in (1.0, 2.0, 8.0)]
+    start = symtop.Angles(theta, 0.0, 0.0, *rates)
     scene = symtop.Scene(f"random-{number}", top, start, 1.0)
     return symtop.Scene(f"random-{number}", top, start, rng.uniform(5.0, 20.0) * min(scene.nutation_period, 10.0))
 
@@ -285,18 +242,21 @@ def test_thirty_random_tops():
             assert good or advice.confidence != "checked", advice
             met.append(good)
             if number % 12 == 0:
-                searches = [
-                    settings.search(scene, method, accuracy, "axis", scene.horizon, patience=2e6)
-                    for method in methods().values()
-                    if method.implementation == "compiled"
-                    and method.control is not None
-                    and method.name != "taylor-quad"
-                ]
-                best = min(
-                    settings.seconds(scene, one, "axis", scene.horizon)
-                    for one in searches
-                    if isinstance(one, settings.Met)
-                )
+                rivals = [one for one in methods().values() if one.implementation == "compiled" and one.control]
+                tried = [settings.search(scene, one, accuracy, "axis", scene.horizon, patience=2e6) for one in rivals]
+                met_by = [one for one in tried if isinstance(one, settings.Met)]
+                best = min(settings.seconds(scene, one, "axis", scene.horizon) for one in met_by)
                 ratios.append(advice.seconds / best)
     assert np.mean(met) >= 0.97
     assert np.median(ratios) <= 2.0
+
+
+def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
+    usable = advise._usable("axis", ("derivative", "kicks"))
+    assert {symtop.integrator(name).needs for name in usable} == {"derivative", "kicks"}
+    assert set(usable) < set(advise._usable("axis"))
+    advice = symtop.recommend("spheroid", accuracy=1e-6, horizon=4.0, needs="expression")
+    assert symtop.integrator(advice.integrator).needs == "expression"
+    assert "it needs f as a formula (expression)" in advice.reason
+    with pytest.raises(symtop.SymtopError, match="needs 'luck' is unknown"):
+        symtop.recommend("spheroid", accuracy=1e-6, needs=["luck"])

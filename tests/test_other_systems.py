@@ -5,16 +5,11 @@ symtop runs on Windows; it shows that none of them is needed.
 """
 
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
-from tests.commands import PROBE
+from tests.commands import PROBE, customized
 
-ROOT = Path(__file__).resolve().parent.parent
 POORER = """
 import multiprocessing, multiprocessing.context, os, signal, sys
 sys.modules["fcntl"] = None
@@ -30,16 +25,7 @@ multiprocessing.get_all_start_methods = lambda: ["spawn"]
 
 @pytest.fixture
 def poorer(tmp_path):
-    (tmp_path / "poorer").mkdir()
-    (tmp_path / "poorer" / "sitecustomize.py").write_text(POORER)
-    paths = [str(tmp_path / "poorer"), str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
-
-    def run(*arguments, python=None):
-        command = [sys.executable, "-c", python] if python else [sys.executable, "-m", "symtop", *map(str, arguments)]
-        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-
-    return run
+    return customized(tmp_path, POORER)
 
 
 def test_they_are_gone(poorer):

@@ -18,7 +18,7 @@ def test_every_public_name_is_there_and_in_the_block_for_checkers():
 def test_no_function_has_the_name_of_a_package_beside_it():
     places = {entry.name for entry in pkgutil.iter_modules(symtop.__path__)}
     assert not places & set(symtop.__all__)
-    for package in ("base", "model", "methods", "run", "measure", "judging"):
+    for package in ("core", "model", "methods", "run", "measure", "judging"):
         module = importlib.import_module(f"symtop.{package}")
         for entry in pkgutil.iter_modules(module.__path__):
             assert isinstance(importlib.import_module(f"symtop.{package}.{entry.name}"), types.ModuleType)

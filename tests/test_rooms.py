@@ -1,9 +1,9 @@
-"""The rooms of the package: which may import which, read from every import statement and from every string.
+"""The rooms of the package: which may import which, read from every import statement.
 
 `ORDER` is the rule. A module imports modules of its own row's room and of the rows below; two rooms in one row do not
 import each other. Statements inside functions count as well as those at the top, and so do those under TYPE_CHECKING,
 except in circles: what only a type checker reads cannot go round in one. ``from symtop import __version__`` is allowed
-everywhere. Strings that name a module count, too.
+everywhere.
 """
 
 import ast
@@ -33,11 +33,6 @@ ORDER = (  # from the ground up
 )
 FLOOR = {room: floor for floor, row in enumerate(ORDER) for room in row}
 STRANGERS = {"methods": {"xarray", "matplotlib"}}  # packages that a room does not import
-NAMED = {  # strings that name a module above on purpose
-    "symtop": "the lazy table of the public names",
-    "symtop.runner.scripts": "loads studies by the name of their package",
-    "symtop.runner.manifest": "hashes the files of the studies, which it does not import",
-}
 
 
 class Arrow(NamedTuple):
@@ -147,27 +142,6 @@ def strangers(modules: dict[str, Module]) -> list[str]:
     ]
 
 
-def strings(modules: dict[str, Module]) -> list[str]:
-    """Strings of the package, docstrings aside, that are the dotted name of a module above."""
-    complaints = []
-    for module in modules.values():
-        if module.room == "studies" or module.name in NAMED or module.room not in FLOOR:
-            continue
-        above = {name for name, other in modules.items() if FLOOR.get(other.room, 99) > FLOOR[module.room]} - {"symtop"}
-        above |= {name.removeprefix("symtop.") for name in above if name.count(".") > 1}
-        named = ((text, line) for text, line in _literals(module.tree) if text.strip(".") in above)
-        complaints += [f"{module.name}:{line} names {text!r}" for text, line in named]
-    return sorted(set(complaints))
-
-
-def _literals(tree: ast.Module) -> Iterator[tuple[str, int]]:
-    """Strings and their lines, without docstrings."""
-    prose = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in prose:
-            yield node.value, node.lineno
-
-
 def in_the_root(modules: dict[str, Module]) -> list[str]:
     """Modules that lie in the root of symtop and not in a room."""
     files = [module.path for name, module in modules.items() if name.split(".")[0] == "symtop"]
@@ -181,7 +155,7 @@ def house() -> dict[str, Module]:
     return read(ROOT)
 
 
-@pytest.mark.parametrize("rule", [upward, circles, strangers, strings])
+@pytest.mark.parametrize("rule", [upward, circles, strangers])
 def test_the_package_holds_the_rule(rule):
     assert rule(house()) == []
 
@@ -217,7 +191,6 @@ def small(tmp_path):
         "symtop/model/hint.py": "import typing\nif typing.TYPE_CHECKING:\n    from symtop.model.hinted import x\n",
         "symtop/model/hinted.py": "import symtop.model.hint\n",
         "symtop/methods/kernel.py": "def show():\n    import matplotlib.pyplot\n",
-        "symtop/run/hidden.py": '"""report.page"""\nHOME = "report.page"\nWORD = "report"\n',
         "symtop/judging/__init__.py": "",
         "symtop/runner/beside.py": "import symtop.judging\n",
         "symtop/report/page.py": "from symtop_studies.drift import study\n",
@@ -249,5 +222,4 @@ def test_a_circle_of_files_is_reported(small):
 
 def test_other_faults_are_reported(small):
     assert strangers(small) == ["symtop.methods.kernel:2 imports matplotlib.pyplot"]
-    assert strings(small) == ["symtop.run.hidden:2 names 'report.page'"]
     assert in_the_root(small) == ["__init__", "extra"]

@@ -50,15 +50,8 @@ def lines(tmp_path, text):
     options = ["--strict", "--ignore-missing-imports", "--no-error-summary", "--follow-imports=silent"]
     places = ["--config-file", os.devnull, "--cache-dir", str(ROOT / ".mypy_cache"), str(script)]
     words = [sys.executable, "-m", "mypy", *options, *places]
-    done = subprocess.run(
-        words,
-        cwd=tmp_path,
-        env={**os.environ, "MYPYPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    home = {**os.environ, "MYPYPATH": str(ROOT)}
+    done = subprocess.run(words, cwd=tmp_path, env=home, capture_output=True, text=True, timeout=300, check=False)
     return done.stdout.splitlines(), done.stderr
 
 

@@ -4,29 +4,19 @@ A `sitecustomize` hides the package from a whole tree of processes, the workers 
 """
 
 import json
-import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
+from tests.commands import customized
+
 HIDING = "import sys\nsys.modules['heyoka'] = None  # an import fails, and `find_spec` finds nothing\n"
 
 
 @pytest.fixture
 def hidden(tmp_path):
-    (tmp_path / "hiding").mkdir()
-    (tmp_path / "hiding" / "sitecustomize.py").write_text(HIDING)
-    paths = [str(tmp_path / "hiding"), str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
-
-    def run(*arguments, python=None):
-        command = [sys.executable, "-c", python] if python else [sys.executable, "-m", "symtop", *arguments]
-        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-
-    return run
+    return customized(tmp_path, HIDING)
 
 
 def test_heyoka_is_hidden(hidden):

@@ -10,7 +10,7 @@ from benchmarks.engines import ADAPTERS, load
 from benchmarks.engines.measure import row
 from benchmarks.engines.study import NAME, findings
 from benchmarks.measured import circumstances, sentence
-from symtop.runner import store
+from symtop.core import netcdf
 
 
 def main() -> None:
@@ -23,7 +23,7 @@ def main() -> None:
     file = options.results / f"{NAME}.json"
     settings, missing = load(tuple(options.only))
     facts, rows = circumstances(), [row(setting) for setting in settings]
-    if options.add and (stored := store.read_json(file)):
+    if options.add and (stored := netcdf.read_json(file)):
         anew = {(made["engine"], made["version"]) for made in rows}
         rows = [made for made in stored["rows"] if (made["engine"], made["version"]) not in anew] + rows
         missing = [*stored["missing"], *missing]
@@ -33,7 +33,7 @@ def main() -> None:
         known += [made["version"]] if made["version"] not in known else []
     measured = sentence(facts, "make engines", {engine: " and ".join(known) for engine, known in versions.items()})
     said = findings(rows, missing, measured)
-    store.write_json(file, said)
+    netcdf.write_json(file, said)
     for line in (*said["verdict"], *said["failures"]):
         print(line)
 

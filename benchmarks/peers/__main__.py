@@ -13,7 +13,7 @@ from benchmarks.peers.study import STUDY, measured
 from benchmarks.peers.summary import lines
 from symtop.core import netcdf
 from symtop.report import style
-from symtop.runner import analyse, store
+from symtop.runner import run as runner
 
 
 def main() -> None:
@@ -26,7 +26,7 @@ def main() -> None:
     options = parser.parse_args()
     file, told = options.results / "peers.nc", options.results / "peers.json"
     if options.redraw:
-        data, stored = netcdf.read(file), store.read_json(told) or {}
+        data, stored = netcdf.read(file), netcdf.read_json(told) or {}
         many = [together.Row(**row) for row in stored.get("together", [])]
         missing = stored.get("failures", [])
     else:
@@ -36,13 +36,13 @@ def main() -> None:
         data = netcdf.describe(measure(peers, options.scenes), STUDY.title, question=STUDY.question)
         netcdf.write(data, file)
         many = together.measure(SOLVERS if any(peer.package == DIFFRAX for peer in peers) else ())
-    findings = analyse.findings_of(
+    findings = runner.findings_of(
         STUDY, data, options.results, style.publish, failures=missing, cases=data["seconds"].count().item()
     )
     if many:
         findings["tables"].append(together.table(many)._asdict())
         findings["verdict"] = [*findings["verdict"], *together.verdict(many)]
-    store.write_json(told, findings | {"measured": measured(data), "together": [row._asdict() for row in many]})
+    netcdf.write_json(told, findings | {"measured": measured(data), "together": [row._asdict() for row in many]})
     print("\n".join([*lines(data), "", *together.lines(many)]))
 
 

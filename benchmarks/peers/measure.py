@@ -27,7 +27,7 @@ from benchmarks.peers import Peer, own
 from benchmarks.peers.common import Inner, Library, axes_of
 from symtop.core.numbers import EPSILON
 from symtop.measure.accuracy import SAMPLES
-from symtop.measure.settings import seek, step_ladder
+from symtop.measure.settings import ladder as settings, seek
 from symtop.measure.timing import timings
 from symtop.methods.framework.registry import Integrator, methods
 from symtop.model import charts
@@ -86,7 +86,7 @@ def accuracy(scene: Scene, method: Integrator, setting: float) -> Point:
 def ladder(scene: Scene, method: Integrator) -> list[float]:
     """Settings from coarse to fine."""
     if method.fixed_step:
-        return step_ladder(method, scene, PERIODS * scene.nutation_period, RUNGS, most=1e5)
+        return settings(method, scene, PERIODS * scene.nutation_period, RUNGS, most=1e5)
     return [float(value) for value in np.geomspace(1e-3, 1.0001 * max(method.least_tolerance, 1e-15), RUNGS)]
 
 

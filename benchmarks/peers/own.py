@@ -12,7 +12,7 @@ import numpy as np
 import symtop
 from benchmarks.peers.common import Inner
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.taylor import heyoka

@@ -18,7 +18,7 @@ import numpy as np
 import symtop
 from benchmarks import lanes
 from benchmarks.peers.adapters import diffrax as adapter
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.space import on_axis
 from symtop.model import charts

@@ -1,4 +1,4 @@
-/* Vectors in space, as symtop/methods/engines/loop.py has them, and the rotations of symtop/methods/lie_group/loop.py. */
+/* Vectors in space, as symtop/methods/engines/engines.py has them, and the rotations of symtop/methods/lie_group/loop.py. */
 
 typedef struct { double x, y, z; } Vector;
 typedef struct { double w, x, y, z; } Quaternion;

@@ -141,7 +141,7 @@ The median of the largest axis error, method by method, at the same number of st
 ```python
 import numpy as np
 
-from symtop.measure.spread import largest, member_errors
+from symtop.report.spread import largest, member_errors
 
 for name in ("stormer-verlet", "strang", "takahashi-imada", "rk4[axis]", "gauss-4[axis]"):
     runs = symtop.ensemble(tops, name, per_nutation=100, nutations=10, samples=41, quiet=True)

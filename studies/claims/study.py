@@ -1,11 +1,11 @@
 """Is every declared property of every integrator true?"""
 
 import xarray as xr
+from symtop_studies.grid import grid_scenes
 
 from symtop.judging.battery import judge
 from symtop.methods.framework.registry import integrator, integrators
 from symtop.model.scenes import scene
-from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
 from . import figures, words

@@ -3,12 +3,12 @@
 import math
 
 import xarray as xr
+from symtop_studies.grid import grid_scenes
 
 from symtop.measure.order_table import observable, order_table
-from symtop.measure.settings import step_ladder, tolerance_ladder
+from symtop.measure.settings import ladder
 from symtop.methods.framework.registry import integrator, variants
 from symtop.model.scenes import TAGS, scene
-from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
 from . import figures, tables, words
@@ -37,14 +37,10 @@ def on_scene(name: str, quick: bool) -> list[Case]:
     on, grid = scene(name), []
     horizon = min(on.horizon, math.inf if name == WHOLE else NUTATIONS * on.nutation_period)
     for variant in variants():
-        if variant.exact_steps:
-            continue  # no step is more accurate than another
-        if variant.fixed_step:
-            settings = step_ladder(variant, on, horizon, *((8, 1e5) if quick else (17, MOST_STEPS)))
-        elif variant.adaptive:
-            settings = tolerance_ladder(variant, 5 if quick else 13)
-        else:
-            continue  # a formula has nothing to set
+        if variant.exact_steps or variant.control is None:
+            continue  # no step is more accurate than another, or there is nothing to set
+        count = (8 if quick else 17) if variant.fixed_step else 5 if quick else 13
+        settings = ladder(variant, on, horizon, count, 1e5 if quick else MOST_STEPS)
         chosen = {"horizon": horizon, "settings": settings, "dense": not quick}
         if name == WHOLE and variant.method in tables.NAMED:
             chosen["history"] = HISTORY[quick]

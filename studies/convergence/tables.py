@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from symtop_studies.memoize import of_one_dataset
 
-from symtop.core.memoize import of_one_dataset
 from symtop.core.numbers import EPSILON
 from symtop.measure.conservation import residuals
 from symtop.measure.order import LARGEST_ERROR, Fit, order_verdict, power_law

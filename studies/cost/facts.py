@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from symtop_studies.memoize import of_one_dataset
 
-from symtop.core.memoize import of_one_dataset
 from symtop.methods.framework.registry import NEEDS
 from symtop.model.charts import Array
 from symtop.run.ensemble.population import STRATA

@@ -24,8 +24,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from symtop_studies.memoize import of_one_dataset
 
-from symtop.core.memoize import of_one_dataset
 from symtop.core.numbers import EPSILON, GOLDEN
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator, integrator, variants

@@ -38,8 +38,8 @@ from numpy.typing import NDArray
 from symtop.measure.settings import FLAT, LEAST_STEPS, NEAR_ROUNDING, TARGETS
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.fixed_step import inside
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import members_of
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import DIMENSIONS, Array

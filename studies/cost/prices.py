@@ -36,8 +36,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from symtop_studies.memoize import of_one_dataset
 
-from symtop.core.memoize import of_one_dataset
 from symtop.measure.timing import timings
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator, integrator

@@ -31,16 +31,16 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from symtop_studies.grid import grid_scenes
 
 from symtop.core.numbers import EPSILON, GOLDEN, TINY
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import members_of
 from symtop.model import charts, scenes
 from symtop.model.charts import Array, axis_of, space_energy
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import NUMBERS, Angles, SymmetricTop, effective_potential, flat
 from symtop.run.ensemble.population import STRATA, population
 from symtop.run.reference.truth import ROUNDING
-from symtop.runner.grid import grid_scenes
 
 FIRST = 1.0925  # steps a nutation of the coarsest run
 SAMPLES = 12
@@ -67,7 +67,7 @@ class Body(NamedTuple):
 
 
 class Shown(Protocol):
-    """What n runs have shown, such as `symtop.methods.framework.many.Many`."""
+    """What n runs have shown, such as `symtop.methods.framework.lanes.Many`."""
 
     @property
     def states(self) -> Array:

@@ -5,11 +5,11 @@ from collections.abc import Iterable
 
 import xarray as xr
 from symtop_studies.drift.runs import rounding, run_history, windows
+from symtop_studies.grid import grid_scenes, grid_variants
 
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.scenes import TAGS, Scene, scene
 from symtop.run.long_run import PER_NUTATION
-from symtop.runner.grid import grid_scenes, grid_variants
 from symtop.runner.study import Case, Study
 
 from . import figures, words

@@ -7,10 +7,10 @@ time is measured, in interleaved rounds. A factor's effect is the ratio of two t
 import math
 
 import xarray as xr
+from symtop_studies.grid import grid_scenes
 
 from symtop.methods.framework.registry import integrators
 from symtop.model.scenes import TAGS, scene
-from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
 from . import figures, words

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from symtop.model.charts import Array, axis_from_quaternion, transverse_from_quaternion
+from symtop.model.charts import Array, axis_from_quaternion
 from symtop.report.style import BLACK, BLUE, GREEN, GREY, VERMILLION
 
 TRIAD = (VERMILLION, GREEN, BLUE)  # body axes 1, 2 and 3
@@ -25,6 +25,12 @@ def sphere(axis: Any, label: str = "") -> None:
     axis.set_box_aspect((1.0, 1.0, 1.0), zoom=1.15)
     axis.set_axis_off()
     axis.view_init(elev=22.0, azim=-55.0)
+
+
+def transverse_from_quaternion(quaternion: Array) -> Array:
+    """The first column of the rotation matrix, a body-fixed axis across the top's, shape (..., 3)."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    return np.stack([w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)], axis=-1)
 
 
 def columns_of(quaternion: Array) -> Array:

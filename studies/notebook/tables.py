@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from symtop_studies.grid import grid_variants
 
 from symtop.measure.conservation import residuals
 from symtop.methods.framework.registry import integrator
@@ -19,7 +20,6 @@ from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.run.modified_energy import modified_energy
 from symtop.run.simulation import integrate
-from symtop.runner.grid import grid_variants
 
 from .derivations import easy_way, energies, hard_way, nutation_cubic, six_variables, with_alpha
 

@@ -25,7 +25,7 @@ import numpy as np
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.angles import accelerations, with_rates
 from symtop.methods.framework.loop import March, Marks, kernel_loop
-from symtop.methods.lagrangian.quadrature import RULES, quadrature
+from symtop.methods.lagrangian.discrete_lagrangian import RULES, quadrature
 from symtop.methods.lagrangian.unreduced import begin, observe, unreduced_step, with_momenta
 from symtop.methods.library.scipy_ivp import integrated
 from symtop.model.charts import Array
@@ -75,7 +75,7 @@ march = kernel_loop(begin, increment, observe)
 def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Marks) -> March:
     """States (theta, phi, psi, p_theta, p_phi, p_psi) after the numbers of steps in `marks`, shape (samples, 6).
 
-    `rule` is a name of `quadrature.RULES`. SymtopError for a start at a pole.
+    `rule` is a name of `discrete_lagrangian.RULES`. SymtopError for a start at a pole.
     """
     free, state = with_momenta(scene.top, scene.start)
     return march(DampedTop(*free, *friction), quadrature(*RULES[rule][:2])[0], state, h, marks)

@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.loop import kernel_loop
-from symtop.methods.lagrangian.quadrature import RULES, quadrature
+from symtop.methods.lagrangian.discrete_lagrangian import RULES, quadrature
 from symtop.model.charts import Array
 
 ONE_SIDED = "force-at-one-end"  # the midpoint rule with the whole force in F_d^-, a negative control of order 1

@@ -22,11 +22,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lagrangian.discrete_lagrangian import rule_of
-from symtop.methods.lagrangian.galerkin import is_galerkin
-from symtop.methods.lagrangian.quadrature import Quadrature
+from symtop.methods.lagrangian import galerkin
+from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, rule_of
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 
@@ -88,6 +88,12 @@ def routhian_galerkin_step(scene: Scene) -> Step:
         return d, -h * (V0 + 4.0 * Vm + slope(d)) / 6.0
 
     return step
+
+
+def is_galerkin(method: Integrator) -> bool:
+    """Is it `galerkin-simpson`, whatever its name?"""
+    solver = inside(method.solvers.get("angles"))
+    return solver is not None and solver.loop is galerkin.march
 
 
 def reduced_first(scene: Scene, method: Integrator) -> Step | None:

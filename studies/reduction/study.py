@@ -9,11 +9,11 @@ rules to stop differ as well: it shows that both are one map, and not what elimi
 import math
 
 import xarray as xr
+from symtop_studies.grid import grid_scenes
 
 from symtop.measure.settings import ladder
 from symtop.methods.framework.registry import integrator, methods
 from symtop.model.scenes import TAGS, scene
-from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
 from . import figures, tables, words

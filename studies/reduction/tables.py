@@ -15,7 +15,7 @@ from symtop.core.errors import SymtopError
 from symtop.measure.accuracy import as_table, error_table
 from symtop.measure.order import LARGEST_ERROR, power_law
 from symtop.measure.timing import bare_run, timings
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import SMALLEST_FIRST, Integrator, integrator, integrators
 from symtop.methods.lagrangian import unreduced
 from symtop.methods.lagrangian.discrete_lagrangian import rule_of

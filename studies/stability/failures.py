@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import OUTCOMES, Array, Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model import charts

@@ -34,7 +34,7 @@ class Judged(NamedTuple):
     axis_error: Array  # rad, largest over the run; NaN if it ended early
 
     @classmethod
-    def begun(cls, scenes: int, settings: int) -> "Judged":
+    def empty(cls, scenes: int, settings: int) -> "Judged":
         """Room for so many."""
         return cls(np.zeros((scenes, settings), np.uint8), np.full((scenes, settings), math.nan))
 
@@ -80,7 +80,7 @@ def judge_runs(
     says nothing of it has ended there. The error of an inaccurate run is the first, counted from its end, that is too
     large; that of the settings `followed` (n,) is the largest.
     """
-    judged = Judged.begun(*outcome.shape)
+    judged = Judged.empty(*outcome.shape)
     counts = np.isfinite(phases).sum(axis=1)
     runs = np.ascontiguousarray(states), np.ascontiguousarray(momenta), np.ascontiguousarray(outcome)
     _kernel()(*truth, phases, counts, followed, *runs, *judged)

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model import charts, scenes
@@ -183,7 +183,7 @@ class _Descent:
         self.followed[slice(None) if followed is None else list(followed)] = True
         checks = np.linspace(0, m - 1, CHECKED).round().astype(int)
         self.of_all = frozenset(np.union1d(np.flatnonzero(self.followed), checks).tolist())  # where all scenes are run
-        self.judged, self.made = Judged.begun(n, m), np.zeros((n, m), dtype=bool)
+        self.judged, self.made = Judged.empty(n, m), np.zeros((n, m), dtype=bool)
         self.factor = SETTLED_STEPS if method.fixed_step else SETTLED_TOLERANCES
         self.since, self.accurate = np.full(n, math.nan), np.zeros(n, dtype=np.int64)  # how long a scene has been so
         self.settled, self.refuted, self.checks = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), 0

@@ -15,7 +15,7 @@ import numpy as np
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.methods.framework.angles import on_angles
 from symtop.methods.lagrangian import discrete_lagrangian
-from symtop.methods.lagrangian.quadrature import Quadrature
+from symtop.methods.lagrangian.discrete_lagrangian import Quadrature
 from symtop.model import top as model
 from symtop.model.scenes import Scene
 

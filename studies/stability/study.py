@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import xarray as xr
+from symtop_studies.grid import grid_variants
 
-from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.scenes import added_scenes
-from symtop.runner.grid import grid_variants
 from symtop.runner.study import Case, Study
 
 from . import figures, words

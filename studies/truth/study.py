@@ -6,10 +6,10 @@ digits; and values that others have published are computed anew.
 """
 
 import xarray as xr
+from symtop_studies.grid import grid_scenes
 
 from symtop.model.scenes import scene
 from symtop.run.reference.independent_checks import have_heyoka
-from symtop.runner.grid import grid_scenes
 from symtop.runner.study import Case, Study
 
 from . import figures, words

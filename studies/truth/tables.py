@@ -10,7 +10,7 @@ import xarray as xr
 from symtop.core.multiprecision import context
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
-from symtop.run.reference.independent_checks import flown, integrate, iterated, precise_form
+from symtop.run.reference.independent_checks import integrate, integrate_with_checks, iterate_map, precise_form
 from symtop.run.reference.truth import PRECISIONS, judged_integration, reference
 
 # name: precision, chart
@@ -43,7 +43,7 @@ def source_errors(scene: Scene, source: str, horizons: list[float]) -> xr.Datase
         times = horizon - min(scene.nutation_period, 0.9 * horizon) * np.linspace(0.0, 0.93, PROBES)[::-1]
         claims, bound = chart == "attitude" and precision in PRECISIONS, np.nan
         start = time.perf_counter()
-        run = flown(scene, times, precision) if claims and precision != "closed-form" else None
+        run = integrate_with_checks(scene, times, precision) if claims and precision != "closed-form" else None
         path = axes(scene, times, precision, chart) if run is None else run.axes
         columns[SECONDS].append(time.perf_counter() - start if run is None else run.seconds)
         distances = (distance(axis, true_axis(scene, float(t))) for axis, t in zip(path, times, strict=True))
@@ -60,7 +60,7 @@ def axes(scene: Scene, times: charts.Array, precision: str, chart: str) -> Any:
     if precision == "closed-form":
         return closed_form(scene).axis(times)
     if precision == "discrete-map":
-        return charts.axis_from_quaternion(iterated(scene, times)[0])
+        return charts.axis_from_quaternion(iterate_map(scene, times)[0])
     states, _ = integrate(scene, times, precision, chart)
     return states[:, :3] if chart == "axis" else charts.axis_from_quaternion(states[:, :4])
 

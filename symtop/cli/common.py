@@ -2,6 +2,8 @@
 
 import contextlib
 import errno
+import functools
+import importlib
 import json
 import math
 import shutil
@@ -9,7 +11,7 @@ import sys
 import tempfile
 import textwrap
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -21,12 +23,17 @@ from symtop.core.signals import INTERRUPTED, told_apart
 
 LONGEST_NAME = 80  # characters of the name of a file that are shown
 ENDINGS = {"figure": (".png", ".svg", ".pdf"), "card": (".html", ".htm"), "badge": (".svg",)}  # by option
+NAMES = {  # what the shell completes: the module and its function
+    "scenes": ("symtop.model.scenes", "scenes"), "studies": ("symtop.runner.scripts", "names"),
+    "integrators": ("symtop.methods.framework.registry", "integrators"),
+    "variants": ("symtop.methods.framework.registry", "variants"),
+}  # fmt: skip
 PLUGINS = "symtop.plugins"  # in the context of a command: plug-ins were given
 
 
 def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]) -> None:
     if files and not ctx.resilient_parsing:  # as shell completion parses
-        from symtop.runner import plugins
+        from symtop.run import plugins
 
         ctx.meta[PLUGINS] = True
         for file in files:
@@ -50,21 +57,13 @@ def separated(_: click.Context, __: click.Parameter, names: str | None) -> list[
 
 def completing(kind: str) -> Callable[[click.Context, click.Parameter, str], list[str]]:
     """Shell completion of the names of all scenes, integrators or studies; after a bracket, of variants, rk4[axis]."""
-    return lambda _, __, prefix: [name for name in _names(kind, prefix) if name.startswith(prefix)]
 
+    def complete(_: click.Context, __: click.Parameter, prefix: str) -> list[str]:
+        module, function = NAMES["variants" if "[" in prefix and kind == "integrators" else kind]
+        entries = getattr(importlib.import_module(module), function)()
+        return [name for name in (getattr(one, "name", one) for one in entries) if name.startswith(prefix)]
 
-def _names(kind: str, prefix: str) -> Iterable[str]:
-    if kind == "scenes":
-        from symtop.model.scenes import scenes
-
-        return scenes()
-    if kind == "studies":
-        from symtop.runner import scripts
-
-        return scripts.names()
-    from symtop.methods.framework import registry
-
-    return [variant.name for variant in registry.variants()] if "[" in prefix else registry.integrators()
+    return complete
 
 
 plugin_option = click.option(
@@ -79,10 +78,7 @@ results_option = click.option(
 
 
 class Group(click.Group):
-    """Prints a SymtopError, or a file that cannot be used, as one sentence and exits with code 2; 130 after Ctrl-C.
-
-    A sentence names options in the place of arguments. A SymtopWarning is a line like those of the commands.
-    """
+    """Prints an error as one sentence that names options, and exits with code 2; 130 after Ctrl-C."""
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
@@ -109,9 +105,8 @@ class Group(click.Group):
 def _in_options(error: SymtopError, command: click.Command | None) -> str:
     """An error's sentence with the options of a command, and what helps where a scene or an integrator is unknown."""
     parameters = command.params if command is not None else []
-    sentence = error.renamed(
-        {str(one.name): max(one.opts, key=len) for one in parameters if isinstance(one, click.Option)}
-    )
+    options = [one for one in parameters if isinstance(one, click.Option)]
+    sentence = error.renamed({str(one.name): max(one.opts, key=len) for one in options})
     if not isinstance(error, UnknownNameError) or error.parameters[0] not in ("scene", "integrator"):
         return sentence
     from symtop.methods.framework.registry import integrators, split_name
@@ -130,15 +125,10 @@ def _in_options(error: SymtopError, command: click.Command | None) -> str:
 def _warnings_as_lines() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.simplefilter("always", SymtopWarning)
-        others = warnings.showwarning
-
-        def show(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
-            if issubclass(category, SymtopWarning):
-                warn(str(message))
-            else:
-                others(message, category, *rest, **more)
-
-        warnings.showwarning = show
+        others: Any = warnings.showwarning
+        warnings.showwarning = lambda message, category, *rest: (
+            warn(str(message)) if issubclass(category, SymtopWarning) else others(message, category, *rest)
+        )
         yield
 
 
@@ -173,17 +163,8 @@ def fitted(text: str, stream: TextIO | None) -> str:
 
 def filled(text: str) -> str:
     """The text in lines that fit the terminal."""
-    width = terminal_width()
-    return "\n".join(
-        textwrap.fill(
-            line,
-            width,
-            break_on_hyphens=False,
-            break_long_words=False,
-            subsequent_indent=" " * (2 + 2 * (line[:1] == " ")),
-        )
-        for line in text.splitlines()
-    )
+    fill = functools.partial(textwrap.fill, width=terminal_width(), break_on_hyphens=False, break_long_words=False)
+    return "\n".join(fill(line, subsequent_indent=" " * (2 + 2 * (line[:1] == " "))) for line in text.splitlines())
 
 
 def say_written(*files: str | None, err: bool = False) -> None:
@@ -193,31 +174,25 @@ def say_written(*files: str | None, err: bool = False) -> None:
 
 
 def check_outputs(**files: str | None) -> None:
-    """Refuse, before a run, what cannot be written; `files` by the names of their options.
-
-    An ending says what a file is, its folder is there, what it replaces is an earlier result, and no two are the same.
-    """
+    """Refuse, before a run, endings, folders and files that cannot be written; `files` by the names of options."""
     options = dict[Path, str]()
     for name, file in files.items():
         if file is None:
             continue
-        option, endings = f"--{name}", ENDINGS.get(name, ())
-        if endings and Path(file).suffix.lower() not in endings:
+        option, endings, path = f"--{name}", ENDINGS.get(name, ()), Path(file).absolute()
+        if endings and path.suffix.lower() not in endings:
             raise SymtopError(f"{option} must be a file that ends in {' or '.join(endings)}, not {file!r}")
-        if not (file and Path(file).absolute().parent.is_dir()):
+        if not (file and path.parent.is_dir()):
             raise SymtopError(f"{option} must be a file in a folder that is there, not {file!r}")
-        path = file_path(option, file).absolute()
-        if path.is_dir():
+        if file_path(option, file).is_dir():
             raise SymtopError(f"{option} must be a file, not the folder {file!r}")
         if name == "output":
             check_replaceable(path)
         try:
-            with tempfile.TemporaryFile(dir=path.parent):
-                pass
+            tempfile.TemporaryFile(dir=path.parent).close()
         except OSError as error:
             raise SymtopError(f"cannot write {file}: {error.strerror or error}") from error
-        other = options.setdefault(path.resolve(), option)
-        if other != option:
+        if (other := options.setdefault(path.resolve(), option)) != option:
             raise SymtopError(f"{other} and {option} must be two files, not both {file!r}")
 
 
@@ -241,8 +216,6 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], width: int | Non
 
 def facts(pairs: dict[str, str], width: int) -> str:
     """Names and values, one a line; long values are broken and indented."""
-    left = max(map(len, pairs)) + 2
-    return "\n".join(
-        textwrap.fill(value, width, initial_indent=name.ljust(left), subsequent_indent=" " * left)
-        for name, value in pairs.items()
-    )
+    formatter = click.HelpFormatter(width=width)
+    formatter.write_dl(list(pairs.items()))
+    return formatter.getvalue().rstrip()

@@ -46,17 +46,16 @@ def examine(results: Path) -> list[Finding]:
     from tqdm import tqdm
 
     findings = []
-    with beating(tqdm(total=len(CHECKS), desc="checking", unit="check", disable=None, leave=False)) as bar:
-        for topic, check in CHECKS.items():
+    with beating(tqdm(CHECKS.items(), desc="checking", unit="check", disable=None, leave=False)) as bar:
+        for topic, check in bar:
             try:
                 findings += check(results)
             except Exception as error:  # noqa: BLE001  (one check that fails must not hide the others)
                 findings.append(Finding(topic, words_of(error), False, "report this with all of this page"))
-            bar.update()
     return findings
 
 
-def _machine() -> list[Finding]:
+def _machine(_: Path) -> list[Finding]:
     from symtop.runner import scripts
 
     python = f"{platform.python_version()} at {sys.executable}, {platform.system()} {platform.machine()}"
@@ -69,21 +68,17 @@ def _machine() -> list[Finding]:
     ]
 
 
-def _packages() -> list[Finding]:
-    """Every requirement of symtop's metadata that applies to this machine, and whether its version is in range.
-
-    A requirement of an extra may be absent; one that is installed must be in range too.
-    """
+def _packages(_: Path) -> list[Finding]:
+    """Every requirement that applies to this machine, and whether its version is in range; one of an extra may lack."""
     from packaging.requirements import Requirement
 
     extras = importlib.metadata.metadata("symtop").get_all("Provides-Extra") or []
     findings = []
     for requirement in map(Requirement, importlib.metadata.requires("symtop") or []):
         marker, requirement.marker = requirement.marker, None
-        applies = [marker is None or marker.evaluate({"extra": extra}) for extra in ("", *extras)]
-        if not any(applies):
+        required, *optional = (marker is None or marker.evaluate({"extra": extra}) for extra in ("", *extras))
+        if not (required or any(optional)):
             continue  # for another system or another Python
-        required = applies[0]
         try:
             result = importlib.metadata.version(requirement.name)
             healthy = requirement.specifier.contains(result, prereleases=True)
@@ -95,7 +90,7 @@ def _packages() -> list[Finding]:
     return findings
 
 
-def _heyoka() -> list[Finding]:
+def _heyoka(_: Path) -> list[Finding]:
     """The precisions that this build of heyoka has."""
     if importlib.util.find_spec("heyoka") is None:
         advice = "heyoka has wheels for Linux only; elsewhere try conda-forge. The closed form works without it"
@@ -116,7 +111,7 @@ def _heyoka() -> list[Finding]:
     return findings
 
 
-def _caches() -> list[Finding]:
+def _caches(_: Path) -> list[Finding]:
     root, yesterday = cache_root(), time.time() - DAY
     findings = [_writable("cache", root, "set SYMTOP_CACHE to a folder that can be written")]
     for name, kind, remedy in (("kernels", "kernel", "compiled again"), ("reference", "file", "computed again")):
@@ -147,10 +142,8 @@ def _writable(topic: str, folder: Path, advice: str) -> Finding:
     return Finding(topic, f"{folder}, {_bytes(free)} free", free > LEAST_SPACE, f"make room, or {advice}")
 
 
-def _self_check() -> list[Finding]:
+def _self_check(_: Path) -> list[Finding]:
     """Published values, and three ways to compute one motion, against each other."""
-    import numpy as np
-
     from symtop.measure.published import published_values
     from symtop.run.simulation import simulate
 
@@ -161,38 +154,31 @@ def _self_check() -> list[Finding]:
     result = f"{len(values) - len(missed)} of {len(values)} reproduced{': not ' + '; '.join(missed) if missed else ''}"
     findings = [Finding("published values", result, not missed, wrong)]
     exact = simulate("spheroid", "exact", samples=41)
-    runs: list[tuple[str, float | None, float]] = [("midpoint", 1e-3, MIDPOINT_GAP)]
-    runs += [("taylor", None, TAYLOR_GAP)] if importlib.util.find_spec("heyoka") else []
-    for name, step, allowed in runs:
+    for name, step, allowed in (("midpoint", 1e-3, MIDPOINT_GAP), ("taylor", None, TAYLOR_GAP)):
+        if name == "taylor" and importlib.util.find_spec("heyoka") is None:
+            continue
         data = simulate("spheroid", name, step_size=step, samples=41, observe="attitude", guard=False)
-        gap = float(np.max(np.abs(data["axis"].values - exact["axis"].values)))
+        gap = float(abs(data["axis"] - exact["axis"]).max())
         result = f"{gap:.1e} rad from the truth on spheroid (allowed {allowed:g})"
         findings.append(Finding(name, result, gap <= allowed, wrong))
     return [*findings, Finding("self-check", f"{time.perf_counter() - began:.1f} s")]
 
 
 def _bytes(size: float) -> str:
-    for unit in ("B", "kB", "MB"):
-        if size < 1000.0:
-            return f"{size:.0f} {unit}"
-        size /= 1000.0
-    return f"{size:.1f} GB"
+    power = min(math.floor(math.log10(max(size, 1.0))) // 3, 3)
+    return f"{size / 1000.0**power:.{power // 3}f} {('B', 'kB', 'MB', 'GB')[power]}"
 
 
 CHECKS: dict[str, Callable[[Path], list[Finding]]] = {
-    "machine": lambda _: _machine(),
-    "packages": lambda _: _packages(),
-    "heyoka": lambda _: _heyoka(),
-    "caches": lambda _: _caches(),
-    "results": _results,
-    "self-check": lambda _: _self_check(),
-}
+    "machine": _machine, "packages": _packages, "heyoka": _heyoka, "caches": _caches, "results": _results,
+    "self-check": _self_check,
+}  # fmt: skip
 SCENE = "goldstein"
 PERIODS = 0.02  # of a nutation: the length of a run that compiles
 
 
-def _run(task: tuple[str, str]) -> str:
-    """Make the run of a variant alone or in an ensemble, or those of the truth; returns why it could not be done."""
+def _run(name: str) -> str:
+    """Compile what a variant runs alone and in an ensemble, or the truth without a name; returns why it could not."""
     from symtop.core.lazy_kernel import LAZY
     from symtop.methods.framework.registry import integrator
     from symtop.model.scenes import scene
@@ -200,37 +186,31 @@ def _run(task: tuple[str, str]) -> str:
     from symtop.run.reference.truth import reference
     from symtop.run.simulation import simulate
 
-    (kind, name), period = task, scene(SCENE).nutation_period
+    span = PERIODS * scene(SCENE).nutation_period
     try:
-        if kind == "truth":
+        if not name:
             for kernel in LAZY:
                 kernel.compile()
-            run = simulate(SCENE, "strang", step_size=period / 100.0, horizon=period, samples=3)
+            run = simulate(SCENE, "strang", step_size=span / 2, horizon=50 * span, samples=3)
             reference(SCENE, run["time"].values)
             return ""
-        variant, span = integrator(name), PERIODS * period
-        (chart,) = variant.charts()
-        setting: dict[str, Any] = {
-            **variant.setting(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance)).kwargs()
-        }
-        observe = "attitude" if chart == "angles" else chart
-        if kind == "alone":
-            simulate(SCENE, name, **setting, horizon=span, samples=2, observe=observe)
-        else:
-            tops = [SCENE] * 2
-            ensemble(tops, name, **setting, horizon=span, samples=2, observe=observe, threads=1, quiet=True)
+        variant = integrator(name)
+        setting = variant.setting(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance)).kwargs()
+        observe = "attitude" if variant.charts() == ("angles",) else variant.charts()[0]
+        options: dict[str, Any] = {**setting, "observe": observe, "horizon": span, "samples": 2}
+        simulate(SCENE, name, **options)
+        ensemble([SCENE] * 2, name, **options, threads=1, quiet=True)
     except Exception as error:  # noqa: BLE001  (one that fails must not keep the others from being compiled)
-        return f"{name or kind}: {words_of(error)}"
+        return f"{name or 'truth'}: {words_of(error)}"
     return ""
 
 
-def tasks() -> list[tuple[str, str]]:
-    """Every run that compiles something: its kind, and the variant ``method[chart]``."""
+def variants() -> list[str]:
+    """Every variant, ``method[chart]``, that compiles something."""
     from symtop.methods.framework.registry import integrators
 
     compiled = [method for method in integrators().values() if method.implementation in {"compiled", "heyoka"}]
-    names = [f"{method.name}[{chart}]" for method in compiled for chart in method.charts()]
-    return [("truth", ""), *(("alone", name) for name in names), *(("together", name) for name in names)]
+    return [f"{method.name}[{chart}]" for method in compiled for chart in method.charts()]
 
 
 def kernels() -> int:
@@ -242,16 +222,14 @@ def compile_all(jobs: int | None = None) -> tuple[int, list[str]]:
     """Compile what is not on disk; returns how many kernels came to the cache, and which runs could not be done."""
     from tqdm import tqdm
 
-    from symtop.core.parallel import context, cores
+    from symtop.core.parallel import OneThreadEach, cores
 
-    before, todo = kernels(), tasks()
-    bar = tqdm(desc="compiling", total=len(todo), unit="run", disable=None, leave=False)
-    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), context()) as pool, beating(bar):
-        reasons = []
-        for reason in pool.map(_run, todo):
-            reasons.append(reason)
-            bar.update()
-    return kernels() - before, list(filter(None, reasons))
+    before, names = kernels(), ["", *variants()]
+    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), OneThreadEach()) as pool:
+        runs = pool.map(_run, names)
+        with beating(tqdm(runs, "compiling", len(names), unit="run", disable=None, leave=False)) as bar:
+            reasons = list(filter(None, bar))
+    return kernels() - before, reasons
 
 
 @click.command(short_help="Check the installation; say what to do about faults.")

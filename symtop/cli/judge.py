@@ -1,22 +1,15 @@
-"""``symtop claims`` and ``symtop judge``: what an integrator claims, measured; one of symtop's or anybody's."""
+"""``symtop claims``, ``judge`` and ``recommend``: what integrators claim, measured, and which of them to use."""
 
+import dataclasses
 import sys
+from pathlib import Path
 from typing import Any
 
 import click
 
-from symtop.cli.common import (
-    File,
-    as_text,
-    check_outputs,
-    completing,
-    json_option,
-    plugin_option,
-    say,
-    say_written,
-    separated,
-    terminal_width,
-)  # fmt: skip
+from symtop.cli import common
+from symtop.cli.common import File, as_text, check_outputs, completing, json_option, plugin_option, say, say_written
+from symtop.core.errors import SymtopError
 from symtop.core.progress import ticking
 
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
@@ -32,7 +25,7 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 @click.option("--symmetric/--not-symmetric", default=None, help="Claim that a step of -h undoes one of h, or not.")
 @click.option("--explicit/--implicit", default=None, help="Claim that it solves no equations, or that it does.")
 @click.option(
-    "--conserves", metavar="NAMES", callback=separated,
+    "--conserves", metavar="NAMES", callback=common.separated,
     help="Claim constants: energy, p_phi, p_psi, axis_length, with commas.",
 )  # fmt: skip
 @click.option("--energy", type=click.Choice(["kept", "bounded"]), help="Claim what becomes of the energy.")
@@ -55,7 +48,7 @@ def judge(
     my.py:solver    an instance of a solver of diffrax
     ./my.so         void step(double *y, double h, const double *par, long n)
     "./engine -x"   a program: a line of numbers in, states out
-    run.csv         a trajectory without a method: time and states (see symtop.judging.trajectory)
+    run.csv         a trajectory without a method: time and states (see symtop.judging.judge_step)
 
     Without a claim it says what the method is. The exit code is 1 if a claim is refuted.
 
@@ -65,15 +58,13 @@ def judge(
     symtop judge "./my_engine --top" --form program --quick
     symtop judge run.csv --scene spheroid --conserves p_phi
     """
-    from symtop.judging import text_report
-    from symtop.judging.findings import Finding
+    from symtop.judging import findings
     from symtop.judging.judge_step import judge as judged
-    from symtop.judging.sandbox import About
 
-    def tell(event: About | Finding) -> None:
-        if isinstance(event, About):
-            click.echo(text_report.heading(event._asdict(), scene))
-        elif line := text_report.line(event, terminal_width()):
+    def tell(event: Any) -> None:
+        if isinstance(event, findings.About):
+            click.echo(findings.heading(event, scene))
+        elif line := findings.line(event, common.terminal_width()):
             click.echo(line)
 
     check_outputs(output=output, card=card, badge=badge)
@@ -81,7 +72,7 @@ def judge(
     if as_json:
         click.echo(as_text([finding.plain() for finding in ledger.findings]))
     else:
-        click.echo(text_report.summary(ledger.findings, ledger.implied))
+        click.echo(findings.summary(ledger.findings, ledger.implied))
     if output is not None:
         from symtop.core import netcdf
 
@@ -128,8 +119,59 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
             about = {"integrator": ledger.integrator, "scene": chosen.name}
             entries += [{**about, **finding.plain()} for finding in ledger.findings]
         else:
-            say("\n".join(ledger.sentences()))
+            say("\n".join(finding.sentence(ledger.integrator) for finding in ledger.findings))
     if as_json:
         click.echo(as_text(entries))
     if refuted:
+        sys.exit(1)
+
+
+@click.command(short_help="Find the cheapest integrator for an accuracy.")
+@click.argument("scene", shell_complete=completing("scenes"))
+@click.option("--accuracy", type=float, help="The largest error you accept, for example 1e-6; rad of an angle.")
+@click.option("--i-use", "engine", help="A physics engine, for example mujoco: what its settings make of the scene.")
+@click.option("--step-size", type=float, help="Of the engine; 1/240 by default.")
+@click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")
+@click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
+@click.option("--results", type=File(file_okay=False), help="Folder of a stored study; results by default.")
+@click.option("--needs", default="", help="What methods may need, for example derivative,kicks; anything by default.")
+@plugin_option
+@json_option
+def recommend(
+    scene: str, accuracy: float | None, engine: str | None, step_size: float | None, quantity: str,
+    horizon: float | None, results: str | None, needs: str, as_json: bool,
+) -> None:  # fmt: skip
+    """Find the cheapest integrator and step that meet an accuracy on a SCENE.
+
+    The exit code is 1 if none does.
+
+    \b
+    symtop recommend spheroid --accuracy 1e-6
+    symtop recommend spheroid --accuracy 1e-6 --needs derivative,kicks
+    symtop recommend goldstein --accuracy 1e-3 --quantity attitude --horizon 1e4
+    symtop recommend mine --plugin my_scene.py --accuracy 1e-9
+    symtop recommend goldstein --i-use mujoco --step-size 0.002
+    """
+    with ticking("loading"):
+        from symtop import advise
+        from symtop.measure.ranking import STORED
+    if (accuracy is None) is (engine is None):
+        both = "" if accuracy is None else ", not both"
+        raise SymtopError(f"recommend takes one of --accuracy, for example 1e-6, and --i-use{both}")
+    if engine is not None:
+        step = {} if step_size is None else {"step_size": step_size}
+        outcome = advise.i_use(engine, scene, horizon=horizon, **step)
+        click.echo(as_text(dataclasses.asdict(outcome)) if as_json else str(outcome))
+        return
+    if step_size is not None:
+        raise SymtopError("--step-size belongs to --i-use; with --accuracy the step is what is found")
+    if results is None and (Path("results") / STORED).is_file():
+        results = "results"
+    with ticking("trying methods"):
+        advice = advise.recommend(
+            scene, accuracy=accuracy or 0.0, quantity=quantity, horizon=horizon, results=results,
+            needs=[need for need in needs.replace(" ", "").split(",") if need],
+        )  # fmt: skip
+    click.echo(as_text(dataclasses.asdict(advice))) if as_json else say(str(advice))
+    if advice.integrator is None:
         sys.exit(1)

@@ -1,13 +1,15 @@
-"""``symtop integrators`` and ``symtop scenes``: the lists, and one entry in full."""
+"""``symtop integrators``, ``scenes`` and ``cite``: the lists, one entry in full, and the sources."""
 
 import contextlib
 import math
 import textwrap
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from symtop.cli.common import as_text, completing, facts, json_option, plugin_option, table, terminal_width
+from symtop import __version__
+from symtop.cli.common import File, as_text, completing, facts, json_option, plugin_option, table, terminal_width
 from symtop.core.errors import SymtopError
 from symtop.report import tables
 
@@ -18,6 +20,13 @@ if TYPE_CHECKING:
 wide_option = click.option("--wide", is_flag=True, help="Every column, however wide the table becomes.")
 Record = dict[str, Any]  # what is shown of one entry, by column
 FLAGS = "e explicit, i implicit, s symplectic, t symmetric in time, - not so, ? not known"
+PACKAGE = f"""\
+@software{{symtop,
+  author = {{{{The symtop authors}}}},
+  title = {{symtop: integrators compared on the heavy symmetric top}},
+  version = {{{__version__}}},
+  license = {{BSD-3-Clause}},
+}}"""
 
 
 def _list(records: list[Record], short: list[Record], note: str, wide: bool, as_json: bool) -> None:
@@ -56,22 +65,21 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, eng
     records: list[Record] = [method.record() for method in methods]
     if markdown and not as_json:
         click.echo(tables.table(*tables.columns(records)))
-        return
-    if name is not None and (as_json or not wide):
+    elif name is not None and (as_json or not wide):
         described = _described(methods[0])
-        click.echo(as_text([described]) if as_json else _integrator_page(described, terminal_width()))
-        return
-    short: list[Record] = [
-        {
-            "name": method.name, "order": str(method.order or "?"), "flags": _flags(method),
-            "needs": method.needs or "?", "summary": method.summary,
-        }
-        for method in methods
-    ]  # fmt: skip
-    needs = "; ".join(f"{name}, {words}" for name, words in registry.NEEDS.items())
-    note = f"flags: {FLAGS}. needs, the weakest thing that suffices: {needs}."
-    note += " One in full: symtop integrators NAME; in one chart: NAME[CHART]."
-    _list(records, short, note, wide, as_json)
+        click.echo(as_text([described]) if as_json else _integrator_page(described))
+    else:
+        short: list[Record] = [
+            {
+                "name": method.name, "order": str(method.order or "?"), "flags": _flags(method),
+                "needs": method.needs or "?", "summary": method.summary,
+            }
+            for method in methods
+        ]  # fmt: skip
+        needs = "; ".join(f"{name}, {words}" for name, words in registry.NEEDS.items())
+        note = f"flags: {FLAGS}. needs, the weakest thing that suffices: {needs}."
+        note += " One in full: symtop integrators NAME; in one chart: NAME[CHART]."
+        _list(records, short, note, wide, as_json)
 
 
 def _flags(method: "Integrator") -> str:
@@ -91,14 +99,14 @@ def _described(method: "Integrator") -> Record:
     return described | {"source": method.reference or "none named"} | ({"about": method.about} if method.about else {})
 
 
-def _integrator_page(described: Record, width: int) -> str:
+def _integrator_page(described: Record) -> str:
     from symtop.methods.framework.registry import citation
 
-    lines = {key: value for key, value in described.items() if key not in ("name", "summary", "about")}
-    paragraphs = [f"{described['name']}: {described['summary']}", *described.get("about", "").split("\n\n")]
-    parts = [*(textwrap.fill(text, width) for text in paragraphs if text), facts(lines, width)]
+    name, summary, about = (described.pop(key, "") for key in ("name", "summary", "about"))
+    paragraphs = filter(None, (f"{name}: {summary}", *about.split("\n\n")))
+    parts = [*(textwrap.fill(text, terminal_width()) for text in paragraphs), facts(described, terminal_width())]
     with contextlib.suppress(SymtopError):  # a method of the user's own may name a source that is not known here
-        parts.append(citation(described["name"]))
+        parts.append(citation(name))
     return "\n\n".join(parts)
 
 
@@ -119,7 +127,7 @@ def scenes(name: str | None, wide: bool, as_json: bool) -> None:
     chosen = [catalogue.scene(name)] if name is not None else list(catalogue.scenes().values())
     if name is not None and (as_json or not wide):
         numbers = _numbers(chosen[0])
-        click.echo(as_text([numbers]) if as_json else _scene_page(numbers, terminal_width()))
+        click.echo(as_text([numbers]) if as_json else _scene_page(numbers))
         return
     records: list[Record] = [scene.record() for scene in chosen]
     keys = {"name": "name", "horizon": "horizon (s)", "nutation": "nutation period (s)", "purpose": "purpose"}
@@ -141,13 +149,40 @@ def _numbers(scene: "Scene") -> Record:
     }
 
 
-def _scene_page(numbers: Record, width: int) -> str:
-    low, high = numbers["theta"]
-    lines = {
-        name: ", ".join(f"{key}={value:.10g}" for key, value in numbers[name].items())
-        for name in ("top", "start", "momenta")
-    }
+def _scene_page(numbers: Record) -> str:
+    name, purpose, (low, high) = (numbers.pop(key) for key in ("name", "purpose", "theta"))
+    parts = {key: numbers.pop(key) for key in ("top", "start", "momenta")}
+    lines = {key: ", ".join(f"{name}={value:.10g}" for name, value in part.items()) for key, part in parts.items()}
     lines["theta"] = f"from {low:.6g} to {high:.6g} rad ({math.degrees(low):.4g} to {math.degrees(high):.4g} degrees)"
-    lines |= {name: value for name, value in numbers.items() if name not in ("name", "purpose", *lines)}
-    title = f"{numbers['name']}: {numbers['purpose']}" if numbers["purpose"] else numbers["name"]
-    return f"{textwrap.fill(title, width)}\n\n{facts(lines, width)}"
+    title = textwrap.fill(f"{name}: {purpose}" if purpose else name, terminal_width())
+    return f"{title}\n\n{facts(lines | numbers, terminal_width())}"
+
+
+@click.command(short_help="BibTeX of the package and of what a dataset used.")
+@click.argument("files", nargs=-1, type=File(exists=True, dir_okay=False, path_type=Path))
+def cite(files: tuple[Path, ...]) -> None:
+    """Print BibTeX of symtop and of the sources of the integrators in the datasets FILES (netCDF).
+
+    \b
+    symtop cite
+    symtop cite results/cost.nc run.nc
+    """
+    from symtop.core import netcdf
+    from symtop.methods.framework.registry import bibliography, citation_keys, integrator
+
+    names: list[str] = []
+    for group in (group for file in files for group in netcdf.groups(netcdf.read_any(file)).values()):
+        for name in {"variant", "integrator"} & group.variables.keys():  # files of version 0.2 have the latter
+            names += map(str, group[name].values.ravel())
+        if "integrator" in group.attrs:
+            names.append(str(group.attrs["integrator"]))
+    sources: dict[str, list[str]] = {}
+    for name in dict.fromkeys(names):
+        sources[name] = []
+        with contextlib.suppress(SymtopError):  # not registered here
+            sources[name] = citation_keys(integrator(name))
+    keys = dict.fromkeys(key for found in sources.values() for key in found)
+    for text in [PACKAGE, *(bibliography()[key] for key in keys)]:
+        click.echo(text + "\n")
+    if unknown := [name for name, found in sources.items() if not found]:
+        click.echo(f"symtop: no source is known of {', '.join(unknown)}", err=True)

@@ -10,7 +10,7 @@ import sys
 import click
 
 from symtop import __version__
-from symtop.cli import doctor, judge, lists, recommend, results, runs, study
+from symtop.cli import doctor, judge, lists, runs, study
 from symtop.cli.common import Group, warn
 from symtop.core import files
 
@@ -35,6 +35,6 @@ def main() -> None:
 
 for command in (
     lists.integrators, lists.scenes, runs.run, runs.long, runs.ensemble, runs.explore, judge.claims, judge.judge,
-    recommend.recommend, study.study, results.report, results.archive, results.cite, doctor.doctor,
+    judge.recommend, study.study, study.report, study.archive, lists.cite, doctor.doctor,
 ):  # fmt: skip
     main.add_command(command)

@@ -7,19 +7,8 @@ from typing import Any
 
 import click
 
-from symtop.cli.common import (
-    File,
-    as_text,
-    check_outputs,
-    completing,
-    json_option,
-    plugin_option,
-    say,
-    say_written,
-    separated,
-    table,
-    warn,
-)  # fmt: skip
+from symtop.cli import common
+from symtop.cli.common import File, as_text, check_outputs, completing, say, say_written, separated, table, warn
 from symtop.core.errors import SymtopError, whole
 from symtop.core.progress import ticking
 
@@ -46,8 +35,8 @@ EXECUTION = {
 @click.option("--guard/--no-guard", default=True, help="Warn before the run if a large error is expected.")
 @click.option("--output", type=File(), help="Write the run to this netCDF file.")
 @click.option("--figure", type=File(), help="Draw the run and its errors: .png, .svg or .pdf.")
-@plugin_option
-@json_option
+@common.plugin_option
+@common.json_option
 def run(
     scene: str, integrator: str, guard: bool, output: str | None, figure: str | None, as_json: bool, **settings: Any
 ) -> None:
@@ -111,7 +100,7 @@ def run(
 @click.option("--step-size", type=float, help="Step; a thousandth of a nutation period by default.")
 @click.option("--checkpoint", type=File(), help="File to resume from; symtop's own by default.")
 @click.option("--output", type=File(), help="Write the windows to this netCDF file.")
-@plugin_option
+@common.plugin_option
 def long(
     scene: str, integrator: str, steps: float, step_size: float | None, checkpoint: str | None, output: str | None
 ) -> None:
@@ -168,8 +157,8 @@ def long(
 @click.option("--scheduler", metavar="ADDRESS", help="Run on this dask cluster.")
 @click.option("--output", "-o", type=File(), help="Stream the runs to this netCDF file.")
 @click.option("--figure", type=File(), help="Draw quantiles of the errors over time: .png, .svg or .pdf.")
-@plugin_option
-@json_option
+@common.plugin_option
+@common.json_option
 def ensemble(
     integrator: str, members: int, seed: int, kind: str, variables: list[str] | None, output: str | None,
     figure: str | None, as_json: bool, **settings: Any,
@@ -186,7 +175,7 @@ def ensemble(
     check_outputs(output=output, figure=figure)
     whole("members", members, 1)  # which is n in Python
     with ticking("drawing tops"):
-        from symtop.measure.spread import LEVELS, QUANTITIES, largest, member_errors, spread
+        from symtop.report.spread import LEVELS, QUANTITIES, largest, member_errors, spread
         from symtop.run.ensemble import ensemble as runs
         from symtop.run.ensemble.population import population
 
@@ -226,7 +215,7 @@ def ensemble(
 @click.command(short_help="Open the explorer: one run in a browser, with sliders.")
 @click.option("--port", type=int, default=0, help="Port to listen on; a free one by default.")
 @click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
-@plugin_option
+@common.plugin_option
 def explore(port: int, no_browser: bool) -> None:
     """Show one run beside the exact motion in a browser, with sliders for the top, the start and the step."""
     import webbrowser

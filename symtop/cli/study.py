@@ -1,7 +1,6 @@
-"""``symtop study``: run studies, show the state of their cases, or compute some again and compare."""
+"""``symtop study``, ``report`` and ``archive``: studies, the page of all findings, and the bundle of all data."""
 
 import sys
-import time
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -9,17 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from symtop.cli.common import (
-    PLUGINS,
-    as_text,
-    completing,
-    filled,
-    json_option,
-    plugin_option,
-    results_option,
-    separated,
-    warn,
-)  # fmt: skip
+from symtop.cli import common
+from symtop.cli.common import File, as_text, completing, json_option, plugin_option, results_option, separated
 from symtop.core.errors import SymtopError, positive
 from symtop.core.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
 from symtop.report.sentences import abridged, counted
@@ -35,9 +25,7 @@ MOST_SENTENCES = 3  # of the findings of a study that has run
 @click.command(short_help="Run studies: datasets, figures and findings.")
 @click.argument("names", nargs=-1, shell_complete=completing("studies"))
 @click.option("--all", "every", is_flag=True, help="Run every study.")
-@click.option(
-    "--quick", is_flag=True, help="Coarse grids, a few seconds a study, into the folder quick of the results."
-)
+@click.option("--quick", is_flag=True, help="Coarse grids, some seconds a study, into the folder quick of the results.")
 @click.option("--full", is_flag=True, help="The longest grid, for the studies that have one.")
 @click.option("--fresh", is_flag=True, help="Compute every case again; with --check, compare every case.")
 @click.option("--status", is_flag=True, help="Print the state of every case; compute nothing.")
@@ -81,16 +69,6 @@ def study(
     if limit is not None:
         positive("limit", limit)
     folder = Path(results, *filter(None, ("quick" * grid["quick"], "only" * bool(only))))
-    whole = every and not (only or status or check or click.get_current_context().meta.get(PLUGINS))
-    if whole and not fresh and not scheduler:
-        from symtop.runner import manifest
-
-        began = time.monotonic()
-        up_to_date = manifest.all_findings(folder.resolve(), grid)
-        if up_to_date is not None:
-            took = {"computed": 0, "seconds": time.monotonic() - began}
-            _end([_summary(findings | took, folder, as_json) for findings in up_to_date], folder, as_json)
-            return
     studies = choose(names, every=every, only=only or (), quick=grid["quick"])
     if status:
         sys.exit(show_status(studies, folder, why, as_json, grid))
@@ -101,18 +79,15 @@ def study(
             if check:
                 code = check_all(pool, studies, folder, as_json, grid, everything=fresh)
             else:
-                code = run_all(pool, studies, folder, as_json, grid, fresh=fresh, limit=limit, whole=whole)
+                code = run_all(pool, studies, folder, as_json, grid, fresh=fresh, limit=limit)
     except (KeyboardInterrupt, TerminatedError) as stop:
         word, code = ("interrupted", INTERRUPTED) if isinstance(stop, KeyboardInterrupt) else ("terminated", TERMINATED)
-        warn(f"{word}; what was computed is kept, and the same command goes on from there")
+        common.warn(f"{word}; what was computed is kept, and the same command goes on from there")
     sys.exit(code)
 
 
 def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick: bool = False) -> "list[Study]":
-    """The studies of those names, each once, or all of them; of some integrators alone if `only` names them.
-
-    Of several studies those that have no case of these integrators are left out, with a warning.
-    """
+    """The studies of those names, each once, or all; of the integrators in `only` alone, where they have such cases."""
     from symtop.methods.framework.registry import integrator
     from symtop.runner import scripts
 
@@ -134,28 +109,25 @@ def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick
     if not remaining:
         raise reasons[0]
     for reason in reasons:
-        warn(f"{reason}; it is left out")
+        common.warn(f"{reason}; it is left out")
     return remaining
 
 
 def run_all(
-    pool: "Pool", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], *, fresh: bool,
-    limit: float | None, whole: bool,
-) -> int:  # fmt: skip
+    pool: "Pool", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], **options: Any
+) -> int:
     """Bring studies up to date, each concluded while the next one is computed; 1 if cases failed."""
     from symtop.report import style
-    from symtop.runner import manifest
 
-    made_of = manifest.all_made_of(grid) if whole else ""  # before an edit of the code may change it
     save = style.sketch if grid["quick"] else style.publish  # quick figures are to look at, not to print
-    options = {"fresh": fresh, "limit": limit, "save": save, "beside": len(studies) > 1, **grid}
+    options |= {"save": save, "beside": len(studies) > 1, **grid}
     ended = _in_order(pool, studies, results, options)
     summaries = [_summary(findings, results, as_json) for findings in ended]
-    failed = any(summary["failures"] for summary in summaries)
-    if whole and not failed:
-        manifest.note_all(results.resolve(), [study.name for study in studies], made_of)
-    _end(summaries, results, as_json)
-    return 1 if failed else 0
+    if as_json:
+        click.echo(as_text(summaries))
+    elif summaries:
+        click.echo(f"next: symtop report --results {results}, one page of all findings")
+    return 1 if any(summary["failures"] for summary in summaries) else 0
 
 
 def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -197,73 +169,103 @@ def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict
 def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str, Any]:
     """The summary of a study's findings, which are printed but for JSON: its first sentences, and where the rest is."""
     verdict, name = findings["verdict"], findings["study"]
-    if not isinstance(verdict, list) or not all(isinstance(sentence, str) for sentence in verdict):
-        from symtop.runner.study import sentences  # xarray: half a second
-
-        sentences(name, lambda: verdict)  # refuses what older versions have stored
     summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "verdict")}
     summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
     if not as_json:
         drawn = counted(summary["figures"], "figure")
         click.echo("{study}: {computed} of {cases} cases computed, {drawn}".format(drawn=drawn, **summary))
-        for sentence in verdict[:MOST_SENTENCES]:
-            click.echo(filled(f"  - {sentence}"))
         left = len(verdict) - MOST_SENTENCES
         more = f"{counted(left, 'more finding')} in {name}.json" if left > 0 else ""
         pictures = f"figures {results / 'figures' / name}-*" if findings["pictures"] else ""
-        click.echo(filled(f"  dataset {results / name}.nc"))
-        if pictures or more:
-            click.echo(filled(f"  {', '.join(filter(None, (pictures, more)))}"))
+        rest = ", ".join(filter(None, (pictures, more)))
+        for line in (*(f"- {sentence}" for sentence in verdict[:MOST_SENTENCES]), f"dataset {results / name}.nc", rest):
+            if line:
+                click.echo(common.filled(f"  {line}"))
     for failure in findings["failures"]:
         click.echo(f"  {failure}", err=True)
     return summary
 
 
-def _end(summaries: Sequence[dict[str, Any]], results: Path, as_json: bool) -> None:
-    """Print what to do next, or all summaries as JSON."""
-    if as_json:
-        click.echo(as_text(summaries))
-    elif summaries:
-        click.echo(f"next: symtop report --results {results}, one page of all findings")
-
-
 def show_status(studies: "list[Study]", results: Path, why: bool, as_json: bool, grid: dict[str, bool]) -> int:
     """Print the state of every case, and with `why` the reason; 1 if some have failed."""
-    from symtop.runner import status
+    from symtop.runner import cases
 
-    states = {study.name: status.status(study, results, why=why, **grid) for study in studies}
-    if as_json:
-        click.echo(as_text(states))
+    states = {study.name: cases.status(study, results, why=why, **grid) for study in studies}
     for name, rows in {} if as_json else states.items():
         counts = Counter(row["state"] for row in rows)
-        click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in status.STATES if counts[state]))
+        click.echo(f"{name}: " + ", ".join(f"{counts[state]} {state}" for state in cases.STATES if counts[state]))
         groups: dict[str, list[dict[str, Any]]] = {}  # cases that share a line
         for row in rows:
-            if row["state"] != status.DONE:
+            if row["state"] != cases.DONE:
                 reasons = filter(None, (row["state"], row["message"] or ", ".join(row.get("why", []))))
                 groups.setdefault(": ".join(reasons), []).append(row)
         for reason, group in groups.items():
             count = f"{len(group)} " if why else ""
             methods, scenes = (list(dict.fromkeys(row[key] for row in group)) for key in ("integrator", "scene"))
             line = f"  {count}{reason}: {abridged(methods, MOST_NAMED)} on {abridged(scenes, MOST_NAMED)}"
-            click.echo(filled(line))
-    return 1 if any(row["state"] == status.FAILED for rows in states.values() for row in rows) else 0
+            click.echo(common.filled(line))
+    if as_json:
+        click.echo(as_text(states))
+    return 1 if any(row["state"] == cases.FAILED for rows in states.values() for row in rows) else 0
 
 
 def check_all(
     pool: "Pool", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], *, everything: bool
 ) -> int:
     """Compute stored cases again and compare; 1 if anything is different."""
-    from symtop.runner import check
+    from symtop.runner.cases import check
 
-    checks = [check.check(study, results, pool, everything=everything, **grid) for study in studies]
-    if not any(entry.stored for entry in checks):
+    checks = [check(study, results, pool, everything=everything, **grid) for study in studies]
+    if not any(entry["stored"] for entry in checks):
         names = ", ".join(study.name for study in studies)
         raise SymtopError(f"no case of {names} is up to date in {results}; run it first")
     if as_json:
-        click.echo(as_text([entry._asdict() for entry in checks]))
+        click.echo(as_text(checks))
     for entry in [] if as_json else checks:
-        click.echo(f"{entry.study}: {entry.compared} of {entry.stored} cases computed again, {entry.verdict()}")
-        for difference in entry.differences:
+        count = len(entry["differences"])
+        verdict = f"{count} differences" if count else "the same to the last bit, times aside"
+        click.echo("{study}: {compared} of {stored} cases computed again, {verdict}".format(verdict=verdict, **entry))
+        for difference in entry["differences"]:
             click.echo(f"  {difference}", err=True)
-    return 1 if any(entry.differences for entry in checks) else 0
+    return 1 if any(entry["differences"] for entry in checks) else 0
+
+
+@click.command(short_help="Gather the findings of all studies into one page.")
+@click.option("--embed", is_flag=True, help="Put the figures into the page, for sending it alone.")
+@results_option
+@plugin_option
+def report(results: str, embed: bool) -> None:
+    """Gather the findings of all studies into one page beside its figures.
+
+    If the folder holds no findings and its folder ``quick`` does, the page is made of those of ``quick``. A page that
+    is up to date is not written again.
+    """
+    from symtop.report.sources import report_hash
+    from symtop.runner import manifest
+
+    folder = Path(results)
+    if not any(folder.glob("*.json")) and any((folder / "quick").glob("*.json")):
+        common.warn(f"{folder} holds no findings; the report is made of those in {folder / 'quick'}")
+        folder /= "quick"
+    made_of = report_hash(folder, embed=embed)
+    if not click.get_current_context().meta.get(common.PLUGINS) and manifest.is_current(folder, manifest.PAGE, made_of):
+        click.echo(f"report: {folder / manifest.PAGE} (up to date)")
+        return
+    from symtop.report import page
+
+    click.echo(f"report: {page.write(folder, embed=embed)}")
+
+
+@click.command(short_help="Bundle all results for a repository of data.")
+@click.option("--output", type=File(dir_okay=False), help="The zip to write; in the results folder by default.")
+@results_option
+@plugin_option
+def archive(results: str, output: str | None) -> None:
+    """Bundle datasets, findings and report with versions, machine, a description of every variable, and a test set.
+
+    The test set holds the states of all scenes at ten times to 30 digits, for checking other programs.
+    """
+    from symtop.report.archive import bundle
+
+    made = bundle(Path(results), None if output is None else Path(output))
+    click.echo(f"archive: {made} ({made.stat().st_size / 1e6:.1f} MB)")

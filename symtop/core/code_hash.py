@@ -7,16 +7,13 @@
 The digest of a mapping is the hash of all of it; two mappings are compared label by label, which says *why* a stored
 number is stale. Cases of studies, cached kernels and references, checkpoints and figures are all identified this way.
 
-`Code` goes from object to object: from a function to its instructions, constants, names and defaults, to what it closes
-over, to the globals that it names, with attributes of modules among them, and to what it imports when it runs; from a
-class to its methods and bases; from an instance to its class and attributes. Comments, docstrings, line numbers and
-places of files are no part of code. What counts less:
-
-    by name       functions that look up what they are given (`by_name`), whose answers are counted by themselves;
-                  `PLUMBING`, which moves numbers without making any; libraries, with their version (`packages`)
-    not at all    lists, dicts and sets under a module's lower-case names, which are the state of a process; fields of a
-                  dataclass with the metadata ``words``, which are only shown
-    as a whole    a file of a known package that a constant names by its path
+`Code` goes from a function to its instructions, constants, names and defaults, to what it closes over, to the globals
+that it names, attributes of modules among them, and to what it imports when it runs; from a class to its methods and
+bases; from an instance to its class and attributes. Comments, docstrings and line numbers are no part of code. By name
+alone count functions that look up what they are given (`by_name`), `PLUMBING`, which moves numbers without making any,
+and libraries, with their version (`packages`). Lists, dicts and sets under a module's lower-case names, the state of a
+process, do not count, nor fields of a dataclass with the metadata ``words``; a file of a known package that a constant
+names by its path counts as a whole.
 """
 
 import contextlib
@@ -100,10 +97,8 @@ def packages(*names: str) -> Reasons:
 
 
 PACKAGE = Path(__file__).resolve().parent.parent
-PLUMBING = frozenset(
-    Path(__file__).with_name(f"{name}.py").resolve()
-    for name in ("cluster", "code_hash", "errors", "files", "memoize", "netcdf", "parallel", "progress", "signals")
-)
+_PLUMBING = ("code_hash", "errors", "files", "netcdf", "parallel", "progress", "signals")
+PLUMBING = frozenset([PACKAGE / "run" / "cluster.py", *(PACKAGE / "core" / f"{name}.py" for name in _PLUMBING)])
 roots: dict[str, Path] = {PACKAGE.name: PACKAGE}  # name of a known package: its folder
 
 
@@ -115,9 +110,7 @@ def add_root(name: str, folder: Path) -> None:
             cached.cache_clear()
 
 
-@functools.cache
-def _path(name: str) -> Path:
-    return Path(name).resolve()
+_path = functools.cache(lambda name: Path(name).resolve())
 
 
 @functools.cache
@@ -132,10 +125,13 @@ def is_library(package: str) -> bool:
     """Does a top-level package count by name and version: one of Python's own, or one that is installed?"""
     if package in roots:
         return False
-    module = sys.modules.get(package)
-    places = [getattr(module, "__file__", None), *getattr(module, "__path__", ())]
-    installed = any({"site-packages", "dist-packages"} & {*Path(place).parts} for place in places if place)
-    return installed or package in sys.stdlib_module_names or package in sys.builtin_module_names
+    with contextlib.suppress(ImportError, ValueError):
+        module = sys.modules.get(package) or importlib.util.find_spec(package)
+        places = [getattr(module, name, None) for name in ("__file__", "origin")]
+        places += [*(getattr(module, "__path__", None) or getattr(module, "submodule_search_locations", None) or ())]
+        if any({"site-packages", "dist-packages"} & {*Path(place).parts} for place in places if place):
+            return True
+    return package in sys.stdlib_module_names or package in sys.builtin_module_names
 
 
 def _of_library(module: str | None) -> bool:
@@ -146,6 +142,7 @@ Parts = Callable[[Any], Iterable[Any]]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 STATE = (list, dict, set)  # under a module's lower-case name
+PLAIN = (type(None), bool, int, float, complex, str, bytes, np.generic)
 _IMPORT = dis.opmap["IMPORT_NAME"]
 _by_name: set[Callable[..., Any]] = set()
 _CONTAINERS: tuple[tuple[Any, Parts], ...] = (
@@ -203,10 +200,11 @@ class Code:
     def reached(self, label: str, *things: object) -> list[Part]:
         """The parts that things lead to, the first of them, under that label, the things themselves."""
         reached: dict[int, Part] = {}
-        ahead = [self._filled(Part(label, "", things), lambda: self._add_all(things))]
+        ahead = [Part(label, "", things)]
+        self._open += ahead
         while self._open:
-            part = self._open.pop()
-            self._filled(part, functools.partial(self._look_into, part.thing))
+            self._at, self._held = self._open.pop(), {}
+            self._look_into(self._at.thing)
         while ahead:
             part = ahead.pop()
             reached[id(part)] = part
@@ -217,13 +215,10 @@ class Code:
         """Hashes of things and of all that they lead to, by file; values that no file holds have that label."""
         return by_file(self.reached(label, *things))
 
-    def _filled(self, part: Part, add: Callable[[], None]) -> Part:
-        self._at, self._held = part, {}
-        add()
-        return part
-
-    def _look_into(self, thing: object) -> None:
-        if isinstance(thing, FunctionType):
+    def _look_into(self, thing: Any) -> None:
+        if not self._at.file:
+            self._add_all(thing)
+        elif isinstance(thing, FunctionType):
             self._add_code(thing)
         elif isinstance(thing, type):
             own = ((name, getattr(part, "__func__", part)) for name, part in sorted(vars(thing).items()))
@@ -252,7 +247,7 @@ class Code:
             self._add(thing)
 
     def _add(self, thing: Any) -> None:
-        if isinstance(thing, (type(None), bool, int, float, complex, str, bytes, np.generic)):
+        if isinstance(thing, PLAIN):
             self._note(repr(thing))
             return
         if not isinstance(thing, (FunctionType, type, ModuleType)):  # compiled by numba, or cached
@@ -321,14 +316,10 @@ class Code:
         for name, value in named(function):
             if callable(value) or isinstance(value, ModuleType):
                 self._add(value)
+            elif isinstance(value, PLAIN):
+                self._note(f"{name} = {value!r}")
             elif not (isinstance(value, STATE) and name == name.lower()):
-                self._add_constant(file, name, value)
-
-    def _add_constant(self, file: str, name: str, value: object) -> None:
-        if isinstance(value, (type(None), bool, int, float, complex, str, bytes, np.generic)):
-            self._note(f"{name} = {value!r}")
-        else:
-            self._lead_to("constant", name, file, value)
+                self._lead_to("constant", name, file, value)
 
 
 def by_file(parts: Iterable[Part]) -> Reasons:
@@ -391,32 +382,16 @@ def _imports(code: CodeType, package: str) -> Iterator[tuple[str, object]]:
         return
     steps = [step for step in dis.get_instructions(code) if step.opname != "EXTENDED_ARG"]
     for level, names, step in zip(steps, steps[1:], steps[2:], strict=False):
-        if step.opname == "IMPORT_NAME":
-            module = importlib.util.resolve_name("." * level.argval + step.argval, package)
-            if not _is_installed(module):
-                yield from _imported(module, names.argval or ())
-
-
-def _is_installed(module: str) -> bool:
-    """Does a module belong to a library, which is not imported only to see that?"""
-    top = module.partition(".")[0]
-    if top in sys.modules or top in sys.stdlib_module_names:
-        return is_library(top)
-    try:
-        spec = importlib.util.find_spec(top)
-    except (ImportError, ValueError):
-        return False
-    return spec is not None and "site-packages" in str(spec.origin or spec.submodule_search_locations)
-
-
-def _imported(module: str, names: Iterable[str]) -> Iterator[tuple[str, object]]:
-    try:
-        whole = importlib.import_module(module)
-        for name in names:
-            given = hasattr(whole, name)
-            yield f"{module}.{name}", getattr(whole, name) if given else importlib.import_module(f"{module}.{name}")
-    except ImportError:  # of an optional package
-        yield module, "absent"
-    else:
-        if not names:
-            yield module, whole
+        if step.opname != "IMPORT_NAME":
+            continue
+        name = importlib.util.resolve_name("." * level.argval + step.argval, package)
+        if _of_library(name):
+            continue
+        try:
+            module = importlib.import_module(name)
+            for part in names.argval or ():
+                if not hasattr(module, part):
+                    importlib.import_module(f"{name}.{part}")
+            yield from [(f"{name}.{part}", getattr(module, part)) for part in names.argval or ()] or [(name, module)]
+        except ImportError:  # of an optional package
+            yield name, "absent"

@@ -1,8 +1,7 @@
 """Errors of the user and errors of other people's code, each as one sentence.
 
-The checks of arguments (`positive`, `whole`, `one_of`, ...) raise a `SymtopError` that names the argument, its value
-and what is allowed. Within `foreign_code`, around a call of a plug-in's solver or a user's study, whatever is raised
-becomes a SymtopError, errors beside `Exception` included; Ctrl-C and SIGTERM pass.
+Within `foreign_code`, around a call of a plug-in's solver or a user's study, whatever is raised becomes a SymtopError,
+errors beside `Exception` included; Ctrl-C and SIGTERM pass.
 """
 
 import contextlib
@@ -43,9 +42,7 @@ class SymtopError(ValueError):
 class UnknownNameError(SymtopError):
     """A name, `value`, that is none of those that are known."""
 
-    def __init__(self, sentence: object = "", *parameters: str, value: object = None) -> None:
-        super().__init__(sentence, *parameters)
-        self.value = value
+    value: object = None
 
 
 class SymtopWarning(UserWarning):
@@ -62,30 +59,26 @@ def shown(value: object) -> str:
 
 def finite(name: str, value: object) -> float:
     """Return `value` as a float; refuse anything that is not one finite real number."""
+    number = math.nan
     # float() would read a number in them
-    if isinstance(value, (bool, str, bytes, bytearray)) or type(value).__name__ == "MaskedConstant":
-        raise SymtopError(f"{name} must be a finite number, not {shown(value)}", name)
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        raise SymtopError(f"{name} must be a finite number, not {shown(value)}", name) from None
+    if not isinstance(value, (bool, str, bytes, bytearray)) and type(value).__name__ != "MaskedConstant":
+        with contextlib.suppress(TypeError, ValueError, OverflowError):
+            number = value = float(value)  # type: ignore[arg-type]
     if not math.isfinite(number):
-        raise SymtopError(f"{name} must be a finite number, not {number!r}", name)
+        raise SymtopError(f"{name} must be a finite number, not {shown(value)}", name)
     return number
 
 
 def not_negative(name: str, value: object) -> float:
     """A finite number that is at least zero."""
-    number = finite(name, value)
-    if number < 0.0:
+    if (number := finite(name, value)) < 0.0:
         raise SymtopError(f"{name} must be at least 0, not {number!r}", name)
     return number
 
 
 def positive(name: str, value: object) -> float:
     """Return `value` as a float; refuse anything that is not finite and above zero."""
-    number = finite(name, value)
-    if number <= 0.0:
+    if (number := finite(name, value)) <= 0.0:
         raise SymtopError(f"{name} must be above zero, not {number!r}", name)
     return number
 
@@ -111,11 +104,8 @@ def file_path(name: str, value: object) -> Path:
     """Return a file's name as a path, ``~`` the user's folder; refuse what can name none. No disk is looked at."""
     if isinstance(value, (str, os.PathLike)):
         path = at_home(value)
-        if (
-            path.name
-            and "\0" not in str(path)
-            and all(len(part.encode(errors="replace")) <= LONGEST_PART for part in path.parts)
-        ):
+        longest = max(len(part.encode(errors="replace")) for part in (path.name, *path.parts))
+        if path.name and "\0" not in str(path) and longest <= LONGEST_PART:
             return path
     raise SymtopError(f"{name} must be the name of a file, not {shown(value)[:SHOWN]}", name)
 
@@ -145,13 +135,11 @@ def at_home(path: str | os.PathLike[str]) -> Path:
 
 def row(name: str, values: object) -> list[float]:
     """Return `values` as a list of finite floats; refuse anything that is not a row of them."""
-    try:
+    with contextlib.suppress(TypeError):  # nothing to go through, such as an array without dimensions
         entries = None if isinstance(values, (str, bytes, dict)) else list(values)  # type: ignore[call-overload]
-    except TypeError:  # nothing to go through, such as an array without dimensions
-        entries = None
-    if entries is None:
-        raise SymtopError(f"{name} must be a row of numbers, not {shown(values)}", name)
-    return [finite(f"an entry of {name}", value) for value in entries]
+        if entries is not None:
+            return [finite(f"an entry of {name}", value) for value in entries]
+    raise SymtopError(f"{name} must be a row of numbers, not {shown(values)}", name)
 
 
 def label(name: str, value: object) -> str:
@@ -169,10 +157,11 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     if isinstance(value, str) and value in known:
         return value
     near = difflib.get_close_matches(value, known, n=3, cutoff=0.5) if isinstance(value, str) else []
-    hint = (
-        f"did you mean {' or '.join(near)}?" if near else f"known: {', '.join(known[:12])}{' ...' * (len(known) > 12)}"
-    )
-    raise UnknownNameError(f"{name} {shown(value)} is unknown; {hint}", name, value=value)
+    names = ", ".join(known[:12]) + " ..." * (len(known) > 12)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"known: {names}"
+    error = UnknownNameError(f"{name} {shown(value)} is unknown; {hint}", name)
+    error.value = value
+    raise error
 
 
 LONGEST = 300  # characters of an error's message that are shown
@@ -189,11 +178,11 @@ def words_of(error: BaseException) -> str:
 
 
 @contextlib.contextmanager
-def foreign_code(what: str) -> Iterator[None]:
-    """Within it, whatever is raised becomes a SymtopError: `what` failed, and how. A SymtopError passes as it is."""
+def foreign_code(what: str, kind: type[SymtopError] = SymtopError) -> Iterator[None]:
+    """Within it, whatever is raised becomes an error of that kind: `what` failed, and how. One of that kind passes."""
     try:
         yield
     except BaseException as error:
-        if isinstance(error, SymtopError) or is_of_user(error):
+        if isinstance(error, kind) or is_of_user(error):
             raise
-        raise SymtopError(f"{what} failed: {words_of(error)}") from error
+        raise kind(f"{what} failed: {error if isinstance(error, SymtopError) else words_of(error)}") from error

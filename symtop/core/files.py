@@ -1,8 +1,8 @@
 """Files: the cache of what can be made again, locks, and Python files that a user names.
 
 The cache holds compiled kernels, references and checkpoints of long runs. Every use of an entry sets its time of
-modification, at most once a day. An entry that nobody used for `UNUSED` days is removed, and then the entries used
-longest ago until the folder is small enough. Another process may be doing the same.
+modification, at most once a day. Entries that nobody used for `UNUSED` days are removed, and those used longest ago
+until the folder is small enough. Another process may be doing the same.
 """
 
 import contextlib
@@ -14,7 +14,6 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator
-from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 from typing import TextIO
@@ -44,13 +43,12 @@ on_cold: list[Callable[[], object]] = [_tell]  # called when a kernel is not in 
 
 def cache_root() -> Path:
     """The folder for everything symtop caches: ``$SYMTOP_CACHE`` or ``symtop`` in the user's cache folder."""
-    environment = os.environ
-    return _root(*(environment.get(name) for name in ("SYMTOP_CACHE", "XDG_CACHE_HOME", "HOME", "USERPROFILE")))
+    return _root(*map(os.environ.get, ("SYMTOP_CACHE", "XDG_CACHE_HOME", "HOME", "USERPROFILE")))
 
 
 @functools.lru_cache(maxsize=16)
 def _root(chosen: str | None, caches: str | None, *_homes: str | None) -> Path:
-    """The folder in these surroundings, which `Path.home` reads as well: 60 us, and each new start asks four times."""
+    """The folder in these surroundings, of which `Path.home` reads the last; each new start asks four times."""
     return Path(chosen) if chosen else Path(caches or Path.home() / ".cache") / "symtop"
 
 
@@ -100,18 +98,6 @@ def lock_path(path: Path) -> Path:
     return path.with_name(f".{path.stem}.lock")
 
 
-def _taken(file: int, *, wait: bool) -> bool:
-    """Take the lock; False if somebody else holds it."""
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except BlockingIOError:
-        return False
-    except OSError as error:
-        if error.errno not in NO_LOCKS:
-            raise
-    return True
-
-
 @contextlib.contextmanager
 def locked(path: Path, *, wait: bool) -> Iterator[bool]:
     """Hold a file's lock, so that nobody else computes it; yields False if somebody else holds it and `wait` is false.
@@ -129,9 +115,14 @@ def locked(path: Path, *, wait: bool) -> Iterator[bool]:
         except OSError as error:
             raise SymtopError(f"cannot write {lock}: {error.strerror or error}") from error
         with file:
-            if not _taken(file.fileno(), wait=wait):
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            except BlockingIOError:
                 yield False
                 return
+            except OSError as error:
+                if error.errno not in NO_LOCKS:
+                    raise
             if os.fstat(file.fileno()).st_nlink == 0:  # its holder removed it while we waited
                 continue
             os.utime(file.fileno())  # since when it is held
@@ -144,20 +135,10 @@ def locked(path: Path, *, wait: bool) -> Iterator[bool]:
 
 def python_file(path: str | Path, name: str, wanted: str) -> Path:
     """A file by its path; SymtopError that argument `name` must be what is `wanted` if it is not there."""
-    try:
-        file = at_home(path).resolve()
-        if file.is_file():
+    with contextlib.suppress(OSError, ValueError):  # a name that is too long, or holds a null character
+        if (file := at_home(path).resolve()).is_file():
             return file
-    except (OSError, ValueError):  # a name that is too long, or holds a null character
-        pass
     raise SymtopError(f"{name} must be {wanted}, not {str(path)!r}", name)
-
-
-class _Reader(SourceFileLoader):
-    """Leaves nothing beside what it loads: Python would write a ``__pycache__`` into the user's folder."""
-
-    def set_data(self, path: str, data: object, *, _mode: int = 0) -> None:
-        """Keep no bytecode."""
 
 
 def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
@@ -166,14 +147,16 @@ def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleTyp
         del sys.modules[stale]  # of another folder with the same name
     if file.suffix != ".py":
         raise SymtopError(f"{str(file)!r} cannot be loaded: its name must end in .py")
-    reader = _Reader(name, str(file))
-    spec = importlib.util.spec_from_file_location(name, file, loader=reader, submodule_search_locations=places)
-    assert spec is not None  # noqa: S101  (it has a loader)
+    spec = importlib.util.spec_from_file_location(name, file, submodule_search_locations=places)
+    assert spec is not None and spec.loader is not None  # noqa: PT018, S101  (its suffix has one)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # also because kernels are cached under the name of their module
+    usual, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # no ``__pycache__`` in the user's folder
     try:
-        reader.exec_module(module)
+        spec.loader.exec_module(module)
     except BaseException:
         sys.modules.pop(name)
         raise
+    finally:
+        sys.dont_write_bytecode = usual
     return module

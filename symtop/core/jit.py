@@ -3,20 +3,12 @@
 numba stamps a cached kernel with the file of the function itself and does not see edits in the files it calls, so that
 an old kernel can return old numbers in silence; and it compiles again what only moved down by a line. Here the folder
 of a kernel is named after a hash of everything it is compiled from (`symtop.core.code_hash`): instructions, constants
-and values of its functions, wherever they stand, and the versions of Python and numba. A kernel found on disk loads
-a hundred times sooner than it compiles.
+and values of its functions, wherever they stand, and the versions of Python and numba. The first time a process saves a
+kernel it removes those that nobody used for 30 days, and the oldest ones beyond `MOST_BYTES`.
 
-Each kernel has a folder of its own, about 100 kilobytes. Every use of it is noted, once a day. The first time a process
-saves a kernel it removes those that nobody used for 30 days, and the oldest ones beyond `MOST_BYTES`.
-
-Beside it stand the operations that numba lacks.
-
-    fused     a b + c with one rounding. A number on the grid of its last place plus a correction that hardly changes
-              from step to step is rounded the same way every time, a bias of up to half a unit in the last place; the
-              exact product has random digits below that grid, and added before the rounding they remove the bias.
-    tables    tuples, whose length a kernel is compiled for, or arrays of any length, multiplied by one instruction an
-              element: LLVM unrolls a loop over a tuple up to about 16 elements and copies the tuple in each pass
-              beyond.
+Beside it stands `fused`, a b + c with one rounding, which numba lacks. A number on the grid of its last place plus a
+correction that hardly changes from step to step is rounded the same way every time, a bias of up to half a unit in the
+last place; the exact product has random digits below that grid, and added before the rounding they remove the bias.
 """
 
 import contextlib
@@ -25,7 +17,6 @@ import gc
 import hashlib
 import pickle
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FunctionType
@@ -62,34 +53,29 @@ _stands_for: dict[int, list[object]] = {}  # id of a function: what numba compil
 _registered: set[Callable[..., Any]] = set()
 _known = [0]  # entries of numba's registry that `_stands_for` knows
 _pruned: list[Path] = []
-_collecting = threading.Lock()
-_compiling: list[bool] = []  # for each thread that does: did it find the collection of garbage on?
 
 overload(sincos, jit_options=INLINED, strict=False)(lambda *_: polynomials)
 
 
 @by_name
-def register_jitable(function: Function) -> Function:
-    """Let kernels call a plain function, inlined wherever they do.
+def register_jitable(function: Function, options: dict[str, Any] = INLINED) -> Function:
+    """Let kernels call a plain function, inlined wherever they do: LLVM would keep the larger ones as calls.
 
-    Left to itself LLVM keeps the larger ones, such as the drift of a splitting, as calls that pass their results
-    through memory: 1.3 times the time of a step. A function is registered once: numba would add another overload each
-    time, and what a kernel is made of would hang on how many loops a process has built before.
+    A function is registered once: numba would add another overload each time, and what a kernel is made of would hang
+    on how many loops a process has built before.
     """
     if function not in _registered:
         _registered.add(function)
-        _register(**INLINED)(function)
+        _register(**options)(function)
     return function
 
 
 def _register_parts() -> None:
-    """Register what modules without numba have marked so far, each function once."""
+    """Register what modules without numba have marked so far."""
     for function in inlined_parts:
         register_jitable(function)
     for function in shared_parts:
-        if function not in _registered:
-            _registered.add(function)
-            _register(**OPTIONS, **WITHIN)(function)
+        register_jitable(function, OPTIONS | WITHIN)
 
 
 def _overloads(function: FunctionType) -> Iterator[object]:
@@ -106,13 +92,13 @@ def _overloads(function: FunctionType) -> Iterator[object]:
 
 def code_of(thing: object) -> list[Part]:
     """What a kernel, or anything that holds kernels, is compiled from; the same whatever a process has run before."""
-    return code().reached("kernel", thing, OPTIONS, sys.version_info[:2], numba.__version__)
+    _register_parts()
+    return Code(_overloads).reached("kernel", thing, OPTIONS, sys.version_info[:2], numba.__version__)
 
 
 def code() -> Code:
-    """What looks for code, as numba compiles it."""
-    _register_parts()
-    return Code(_overloads)
+    """What looks for code, as numba compiles it; a function counts alike before and after a kernel registers it."""
+    return Code(lambda function: () if function in _registered else _overloads(function))
 
 
 class _Folder:
@@ -132,10 +118,9 @@ class _Folder:
 class _Index(IndexDataCacheFile):  # type: ignore[misc]
     """The index of a kernel and its files, each named after the signature whose code it holds.
 
-    numba counts them: two processes that save at the same time give two signatures one file, and from then on each
-    process that asks for one of them gets the code of the other. And it runs what it finds: a single byte that has
-    flipped on the disk ended the process (SIGSEGV, SIGILL) in one trial out of five. Here the code follows its hash,
-    and an index that cannot be read is empty.
+    numba counts them: two processes that save at the same time give two signatures one file, and each gets the code of
+    the other. And it runs what it finds, damaged bytes, too. Here the code follows its hash, and an index that cannot
+    be read is empty.
     """
 
     def save(self, key: Any, data: Any) -> None:
@@ -145,11 +130,9 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
         self._save_index(self._load_index() | {key: name})
 
     def _load_index(self) -> dict[Any, str]:
-        try:
-            index: dict[Any, str] = super()._load_index()
-        except Exception:  # noqa: BLE001  (a damaged pickle raises nearly anything)
-            return {}
-        return index
+        with contextlib.suppress(Exception):  # a damaged pickle raises nearly anything
+            return super()._load_index()  # type: ignore[no-any-return]
+        return {}
 
     def _save_data(self, name: str, data: Any) -> None:
         code = self._dump(data)
@@ -165,10 +148,7 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
-    """numba's cache of one kernel, in a folder whose name says all there is to know of it.
-
-    A cache on a full disk, or a damaged one, costs a compilation and not the run.
-    """
+    """numba's cache of one kernel in its folder; a full disk or a damaged cache costs a compilation and not the run."""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
         self._name, self._py_func = repr(function), function
@@ -182,41 +162,28 @@ class _Cache(FunctionCache):  # type: ignore[misc]
     def _index_key(self, signature: Any, codegen: Any) -> Any:
         return signature, codegen.magic_tuple()
 
+    def index(self) -> dict[Any, str]:
+        """The file of the code of each signature."""
+        return self._cache_file._load_index()
+
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        loaded = None
         try:
             loaded = super().load_overload(signature, target_context)
-            sound = loaded is None or tuple(loaded.signature.args) == tuple(signature)
+            if loaded is not None and tuple(loaded.signature.args) == tuple(signature):
+                return loaded
+            damaged = loaded is not None
         except Exception:  # noqa: BLE001  (a truncated pickle raises nearly anything)
-            sound = False
-        if loaded is None or not sound:
-            for tell in on_cold:
-                tell()
-        if sound:
-            return loaded
+            damaged = True
+        for tell in on_cold:
+            tell()
         with contextlib.suppress(Exception):
-            self.flush()  # begin anew: what is damaged, or another signature's, would stand in the way of saving, too
+            if damaged:  # begin anew: it would stand in the way of saving, too
+                self.flush()
         return None
 
     def save_overload(self, signature: Any, data: Any) -> None:
         with contextlib.suppress(OSError):
             super().save_overload(signature, data)
-
-
-@contextlib.contextmanager
-def _not_collecting() -> Iterator[None]:
-    """While any thread is in here, Python looks for no cyclic garbage."""
-    with _collecting:
-        _compiling.append(gc.isenabled())
-        gc.disable()
-    try:
-        yield
-    finally:
-        with _collecting:
-            first = _compiling[0]  # what the first thread found, whoever leaves
-            _compiling.pop()
-            if first and not _compiling:
-                gc.enable()
 
 
 def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
@@ -229,14 +196,13 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
 
     @functools.wraps(compiling)
     def compile_now(signature: Any) -> Any:
-        folder = getattr(kernel._cache, "_cache_path", None)
-        if folder is None or is_cached(kernel, signature):
-            with _not_collecting():
-                return compiling(signature)
         with global_compiler_lock, contextlib.ExitStack() as stack:
-            with contextlib.suppress(SymtopError):  # a cache that cannot be written costs time and no run
-                stack.enter_context(locked(Path(folder) / "code", wait=True))
-            stack.enter_context(_not_collecting())
+            if gc.isenabled():
+                stack.callback(gc.enable)
+                gc.disable()
+            if isinstance(kernel._cache, _Cache) and not is_cached(kernel, signature):
+                with contextlib.suppress(SymtopError):  # a cache that cannot be written costs time and no run
+                    stack.enter_context(locked(Path(kernel._cache._cache_path) / "code", wait=True))
             return compiling(signature)
 
     return compile_now
@@ -244,9 +210,8 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
 
 @by_name
 def compile_kernel(function: Callable[..., Any]) -> Any:
-    """``njit`` with the disk cache.
+    """``njit`` with the disk cache; division by zero gives infinity, as in C.
 
-    Division by zero gives infinity, as in C: the kernel's outcome says what became of it.
     A kernel with functions typed at a prompt, which have no source file, compiles without the cache. The constructor of
     a NamedTuple has none either, but follows from the fields, which are part of what the kernel is made of.
     """
@@ -267,9 +232,8 @@ def is_cached(kernel: Any, signature: Any) -> bool:
     """Is a kernel compiled for this signature, in memory or in the cache?"""
     if signature in kernel.overloads:
         return True
-    folder = getattr(kernel._cache, "_cache_file", None)
-    index = folder._load_index() if folder is not None else {}
-    return kernel._cache._index_key(signature, kernel.targetctx.codegen()) in index
+    cache = kernel._cache
+    return isinstance(cache, _Cache) and cache._index_key(signature, kernel.targetctx.codegen()) in cache.index()
 
 
 @intrinsic
@@ -303,17 +267,6 @@ def _two_product(a, b):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def _times(typing, values, by):  # type: ignore[no-untyped-def]
-    def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        result, factor = arguments
-        for i in range(len(values)):
-            result = builder.insert_value(result, builder.fmul(builder.extract_value(result, i), factor), i)
-        return result
-
-    return values(values, types.float64), emit
-
-
-@intrinsic
 def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
     """place + h w_0 terms_0 + h w_1 terms_1 + ... of tuples, in this order and without the terms whose weight is None.
 
@@ -332,45 +285,3 @@ def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
         return result
 
     return place(place, terms, weights, h), emit
-
-
-def times(values: Any, by: float) -> Any:
-    """A row of doubles, each multiplied by the number `by`: a new tuple, or the same array."""
-    if isinstance(values, tuple):
-        return tuple(value * by for value in values)
-    for i in range(len(values)):
-        values[i] = values[i] * by
-    return values
-
-
-def with_item(values: Any, i: int, value: float) -> Any:
-    """A row with number i replaced: a new tuple, or the same array."""
-    if isinstance(values, tuple):
-        return (*values[:i], value, *values[i + 1 :])
-    values[i] = value
-    return values
-
-
-@overload(times, jit_options=INLINED, strict=False)
-def _compiled_times(values: Any, by: float) -> Callable[..., Any]:
-    def tupled(values, by):  # type: ignore[no-untyped-def]
-        return _times(values, by)
-
-    def in_array(values, by):  # type: ignore[no-untyped-def]
-        for i in range(len(values)):
-            values[i] = values[i] * by
-        return values
-
-    return in_array if isinstance(values, types.Array) else tupled
-
-
-@overload(with_item, jit_options=INLINED, strict=False)
-def _compiled_with_item(values: Any, i: int, value: float) -> Callable[..., Any]:
-    def tupled(values, i, value):  # type: ignore[no-untyped-def]
-        return set_item(values, i, value)
-
-    def in_array(values, i, value):  # type: ignore[no-untyped-def]
-        values[i] = value
-        return values
-
-    return in_array if isinstance(values, types.Array) else tupled

@@ -1,13 +1,10 @@
 """Functions that are interpreted at first and compiled once that is worth its while.
 
-A process that needs a handful of numbers should neither import numba (0.3 s) nor compile (seconds). `LazyKernel` runs a
-plain function as it stands, adds up what that costs, and goes over to the compiled one
-
-    after `LOADING` seconds of interpreting     if the kernel is in the cache (`IMPORTING` more without numba),
-    after `patience` seconds of interpreting    if it has to be compiled: what compiling costs.
-
-No process spends more than twice what the better of both ways would have cost it. Results do not depend on the way: the
-function keeps the rules of `symtop.core.jit_functions`.
+A process that needs a handful of numbers should neither import numba nor compile. `LazyKernel` adds up what it
+interprets, and goes over to the compiled function after `LOADING` seconds if the kernel is in the cache (`IMPORTING`
+more without numba), or after `patience` seconds, what compiling costs, if it is not: no process spends more than twice
+what the better way would have cost it. Results do not depend on the way: the function keeps the rules of
+`symtop.core.jit_functions`.
 """
 
 import sys
@@ -16,8 +13,6 @@ from collections.abc import Callable
 from typing import Any
 
 LOADING, IMPORTING = 0.05, 0.3  # seconds: a kernel from the cache, numba
-
-
 LAZY: "list[LazyKernel]" = []  # of the modules that have been imported
 
 
@@ -54,7 +49,6 @@ class LazyKernel:
                 self.compiled = self._kernel
 
     def _is_cached(self) -> bool:
-        """Is the compiled function in the cache?"""
         if self._kernel is None:
             from numba.core import sigutils  # 0.3 s
 

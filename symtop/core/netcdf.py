@@ -71,29 +71,25 @@ CONVENTIONS = {"Conventions": "CF-1.11", "source": "symtop", "history": f"made b
 Tree = TypeVar("Tree", bound=xr.Dataset | xr.DataTree)
 
 LITTLE = 1_000_000  # with fewer free bytes a write error is reported as a full disk
-_DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")  # told in every file
-
-
 ROOT = Path(__file__).resolve().parents[2]
+_DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")  # told in every file
 
 
 def _revision() -> str:
     """The commit that the checkout is at, read from its git folder; "unknown" where there is none."""
-    try:
+    with contextlib.suppress(OSError, IndexError):
         folder = ROOT / ".git"
         if folder.is_file():  # of a second work tree: "gitdir: PATH"
             folder = ROOT / folder.read_text(encoding="utf-8").split(maxsplit=1)[1].strip()
-        commit = (folder / "HEAD").read_text(encoding="utf-8").strip()
-        if commit.startswith("ref: "):
-            branch = commit.removeprefix("ref: ")
+        commit = (folder / "HEAD").read_text(encoding="utf-8").split()[-1]
+        if commit.startswith("refs/"):  # a branch
             shared = folder / "commondir"
             folder = folder / shared.read_text(encoding="utf-8").strip() if shared.is_file() else folder
-            loose, packed = folder / branch, folder / "packed-refs"
+            loose, packed = folder / commit, folder / "packed-refs"
             lines = [] if loose.is_file() else packed.read_text(encoding="utf-8").splitlines()
-            commit = next((line.split()[0] for line in lines if line.endswith(f" {branch}")), "") or loose.read_text()
+            commit = next((line.split()[0] for line in lines if line.endswith(f" {commit}")), "") or loose.read_text()
         return commit[:12]
-    except (OSError, IndexError):
-        return "unknown"
+    return "unknown"
 
 
 def _has_changes() -> bool:
@@ -143,23 +139,20 @@ def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree
     `units` is that of the scene: "SI", or empty for a problem without units, where all but angles have the unit "1".
     """
     for group in groups(data).values():
-        for name, variable in group.variables.items():  # ``group[name]`` would make a DataArray, 6 us for each
+        for name, variable in group.variables.items():  # ``group[name]`` would make a DataArray
             variable.attrs.update(variable_attributes(str(name), units))
     data.attrs.update(attributes_of(title, **attributes))
     return data
 
 
 def attributes_of(title: str, **attributes: Any) -> dict[str, Any]:
-    """The attributes of a dataset: conventions, title, those given and provenance."""
-    plain = {key: _plain(value) for key, value in attributes.items()}
+    """The attributes of a dataset: conventions, title, those given, as strings or numbers, and provenance."""
+    plain = {
+        key: value if isinstance(value, (str, int, float)) and not isinstance(value, bool) else
+        json.dumps(value, sort_keys=True, default=str)
+        for key, value in attributes.items()
+    }  # fmt: skip
     return {**CONVENTIONS, "title": title, **plain, **provenance()}
-
-
-def _plain(value: Any) -> Any:
-    """Attributes of netCDF files are strings, numbers or lists of them."""
-    if type(value) in {str, float, int} or (isinstance(value, (str, int, float)) and not isinstance(value, bool)):
-        return value
-    return json.dumps(value, sort_keys=True, default=str)
 
 
 @contextlib.contextmanager
@@ -196,6 +189,25 @@ def sweep(path: Path) -> None:
         left.unlink(missing_ok=True)
 
 
+def write_text(path: Path, text: str) -> None:
+    """Replace a small text file in one move."""
+    with replacing(path) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Replace a JSON file in one move."""
+    write_text(path, json.dumps(content, indent=1, ensure_ascii=False, default=str) + "\n")
+
+
+def read_json(path: Path) -> Any:
+    """The content of a JSON file, or None if there is none or it is damaged."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
 def _encoding(data: xr.Dataset) -> dict[Any, dict[str, Any]]:
     """No fill value in coordinates; bytes compressed."""
     bare = {name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"}
@@ -203,34 +215,25 @@ def _encoding(data: xr.Dataset) -> dict[Any, dict[str, Any]]:
 
 
 def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
-    """Write a netCDF file so that it is whole or not there, whatever happens meanwhile; a tree as netCDF groups."""
-    with deferred(), replacing(path) as partial:
+    """Write a netCDF file so that it is whole or not there, whatever happens meanwhile; a tree as netCDF groups.
+
+    In a worker of dask, xarray asks the scheduler for a lock first, and waits for ever if that is gone. A file that is
+    being written has a name of its own, so that no lock is needed.
+    """
+    encoding: Any = {f"/{name}": _encoding(group) for name, group in groups(data).items()}
+    with deferred(), replacing(path) as partial, contextlib.ExitStack() as stack:
+        if "distributed" in sys.modules:
+            import dask
+
+            stack.enter_context(dask.config.set(scheduler="threads"))
         try:
-            parts = {f"/{name}": _encoding(group) for name, group in groups(data).items()}
-            with _one_thread, _no_lock_elsewhere():
-                data.to_netcdf(
-                    partial, engine="netcdf4", encoding=parts if isinstance(data, xr.DataTree) else parts["/"]
-                )
+            with _one_thread:
+                whole = encoding if isinstance(data, xr.DataTree) else encoding["/"]
+                data.to_netcdf(partial, engine="netcdf4", encoding=whole)
         except RuntimeError as error:  # the netCDF library's own word for a disk that is full
             full = shutil.disk_usage(partial.parent).free < LITTLE
             raise OSError(None, f"no room is left in {partial.parent}" if full else str(error)) from error
     return Path(path)
-
-
-@contextlib.contextmanager
-def _no_lock_elsewhere() -> Iterator[None]:
-    """In a worker of dask, xarray asks the scheduler for a lock before it writes, and waits for ever if that is gone.
-
-    The case that the worker computes would be locked as long, and nobody else could compute it. A file that is being
-    written has a name of its own, so that no lock is needed.
-    """
-    if "distributed" not in sys.modules:
-        yield
-        return
-    import dask
-
-    with dask.config.set(scheduler="threads"):
-        yield
 
 
 def alone() -> contextlib.AbstractContextManager[Any]:
@@ -285,12 +288,8 @@ def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:
     import netCDF4
 
     with _netcdf(path), contextlib.closing(netCDF4.Dataset(path, memory=Path(path).read_bytes())) as file:
-        parts = {group.path: xr.open_dataset(xr.backends.NetCDF4DataStore(group)).load() for group in _groups(file)}
+        parts, ahead = dict[str, xr.Dataset](), [file]
+        for group in ahead:
+            parts[group.path] = xr.open_dataset(xr.backends.NetCDF4DataStore(group)).load()
+            ahead += group.groups.values()
     return xr.DataTree.from_dict(parts) if len(parts) > 1 else parts["/"]
-
-
-def _groups(file: Any) -> Iterator[Any]:
-    """A group of a netCDF file and all below it."""
-    yield file
-    for child in file.groups.values():
-        yield from _groups(child)

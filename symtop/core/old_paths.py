@@ -1,8 +1,7 @@
 """Modules under the paths that they had in symtop 0.2, for one version: an import warns and names the new path.
 
 `old_paths.txt` has a line for each, ``old new``; an old package whose modules have left for several has no new path.
-The finder stands last in `sys.meta_path`, where only names come that nothing else finds, and the table is read when one
-of symtop does.
+It is read when a name of symtop is found nowhere else.
 """
 
 import importlib
@@ -30,9 +29,8 @@ class OldPaths:
     def find_spec(self, name: str, _path: object = None, _target: object = None) -> ModuleSpec | None:
         """A spec for an old path; None for every other name."""
         package, _, old = name.partition(".")
-        if package != "symtop" or old not in table():
-            return None
-        return ModuleSpec(name, self, is_package=not table()[old])  # type: ignore[arg-type]
+        known = package == "symtop" and old in table()
+        return ModuleSpec(name, self, is_package=not table()[old]) if known else None  # type: ignore[arg-type]
 
     def create_module(self, spec: ModuleSpec) -> ModuleType | None:
         """The module at the new path, with a warning; None, for an empty one, in the place of an old package."""

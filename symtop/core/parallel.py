@@ -1,12 +1,9 @@
 """Threads for functions that release Python's lock, and processes that each use one thread for linear algebra.
 
-A process a core with a thread a core in each makes as many threads as cores squared, and OpenBLAS spins while it waits:
-a least-squares fit that takes milliseconds with one thread takes a hundred times as long with two on two busy cores.
-The library reads its variable when it is loaded, so that it is set while a process starts; a user's own setting is
-kept.
+OpenBLAS spins while it waits: a least-squares fit takes a hundred times as long with two threads on two busy cores as
+with one. It reads its variable when it is loaded, so that it is set while a process starts; a user's own setting stays.
 """
 
-import multiprocessing
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
@@ -19,7 +16,7 @@ Piece = TypeVar("Piece")
 Result = TypeVar("Result")
 
 MOST_THREADS = 1024
-AHEAD = 2  # pieces a thread that are begun or done before they are asked for: what is waiting takes memory
+AHEAD = 2  # pieces for each thread that are computed before their turn: results that wait take memory
 _stop = threading.local()
 
 
@@ -37,13 +34,8 @@ def cores() -> int:
 
 def heed() -> None:
     """Raise `StoppedError` if the work was interrupted; for long pieces to call between their compiled calls."""
-    stopped = getattr(_stop, "stopped", None)
-    if stopped is not None and stopped.is_set():
+    if (stopped := getattr(_stop, "stopped", None)) is not None and stopped.is_set():
         raise StoppedError
-
-
-def _listen(stopped: threading.Event) -> None:
-    _stop.stopped = stopped
 
 
 def in_threads(work: Callable[[Piece], Result], pieces: Iterable[Piece], threads: int) -> Iterator[Result]:
@@ -56,7 +48,7 @@ def in_threads(work: Callable[[Piece], Result], pieces: Iterable[Piece], threads
         yield from map(work, pieces)
         return
     stopped = threading.Event()
-    pool = ThreadPoolExecutor(threads, initializer=_listen, initargs=(stopped,))
+    pool = ThreadPoolExecutor(threads, initializer=setattr, initargs=(_stop, "stopped", stopped))
     try:
         yield from in_order(pool, work, pieces, AHEAD * threads)
     except BaseException:
@@ -92,10 +84,7 @@ class OneThread(SpawnProcess):
                 del os.environ[name]
 
 
-class _Context(SpawnContext):
+class OneThreadEach(SpawnContext):
+    """What pools start such processes with."""
+
     Process: ClassVar[Any] = OneThread
-
-
-def context() -> multiprocessing.context.SpawnContext:
-    """What `concurrent.futures.ProcessPoolExecutor` starts such processes with."""
-    return _Context()

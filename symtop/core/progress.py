@@ -48,8 +48,7 @@ def beating(bar: Any) -> Iterator[Any]:
 def ticking(words: str) -> Iterator[None]:
     """Some words and the time since, on the standard error if that is a terminal, drawn each second until the end.
 
-    A process of its own draws them: a compiler that holds Python's lock, as heyoka's does for seconds, stops threads.
-    It ends when its standard input does, as at the end of this process.
+    A process of its own draws them, which ends with this one: a compiler that holds Python's lock stops threads.
     """
     if not is_terminal(sys.stderr):
         yield
@@ -62,3 +61,11 @@ def ticking(words: str) -> Iterator[None]:
             assert clock.stdin is not None  # noqa: S101
             clock.stdin.close()
             clock.wait()
+
+
+def progress_bar(words: str, *, quiet: bool, **options: Any) -> Any:
+    """A progress bar, or without a total the words alone, where somebody is watching."""
+    from tqdm import tqdm
+
+    options = options or {"total": 1, "bar_format": "{desc}"}
+    return tqdm(desc=words, disable=quiet or not is_terminal(sys.stderr), leave=False, **options)

@@ -1,17 +1,15 @@
 """Requests of the user, heard as exceptions of their own: to end (SIGTERM), and to interrupt (SIGINT).
 
-Partial files, workers and checkpoints are seen to. An exception of its own tells a request from what a plug-in raises.
-
-An exception may start between any two instructions, also between taking a lock and entering the block that gives it
-back. Where a library does so (xarray's lock of HDF5: one in twenty writes that were interrupted left it taken, and the
-next write waited for ever), a request is `deferred` until the library is done.
+An exception of its own tells a request from what a plug-in raises. It may start between any two instructions, also
+between taking a lock and entering the block that gives it back. Where a library does so (xarray's lock of HDF5: one in
+twenty writes that were interrupted left it taken, and the next write waited for ever), a request is `deferred` until
+the library is done.
 """
 
 import contextlib
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from types import FrameType
 from typing import Any
 
 INTERRUPTED, TERMINATED = 130, 143  # exit codes: 128 and the number of the signal, as shells have it
@@ -28,25 +26,29 @@ class InterruptedByUser(KeyboardInterrupt):
     """Somebody has pressed Ctrl-C; only this is raised for it while `told_apart`."""
 
 
-def _end(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+def _end(*_: object) -> None:
     raise TerminatedError
 
 
-def _interrupt(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+def _interrupt(*_: object) -> None:
     raise InterruptedByUser
 
 
+def _in_main_thread() -> bool:
+    return threading.current_thread() is threading.main_thread()
+
+
 @contextlib.contextmanager
-def _handling(number: int, usual: Any, handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+def _handling(number: int, usual: Any, handler: Callable[..., None]) -> Iterator[None]:
     """Handle a signal in the main thread; a handler that is there already, other than the usual one, stays."""
-    if threading.current_thread() is not threading.main_thread() or signal.getsignal(number) != usual:
-        yield
-        return
-    signal.signal(number, handler)
+    ours = _in_main_thread() and signal.getsignal(number) == usual
     try:
+        if ours:
+            signal.signal(number, handler)
         yield
     finally:
-        signal.signal(number, usual)
+        if ours:
+            signal.signal(number, usual)
 
 
 def ending_on_sigterm() -> contextlib.AbstractContextManager[None]:
@@ -66,10 +68,8 @@ def deferred() -> Iterator[None]:
     For calls of milliseconds: until one is over, Ctrl-C has no effect.
     """
     heard: list[int] = []
-    usual = {}
-    if threading.current_thread() is threading.main_thread():
-        usual = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-        usual = {number: handler for number, handler in usual.items() if callable(handler)}
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM) if _in_main_thread()}
+    usual = {number: handler for number, handler in handlers.items() if callable(handler)}
     try:
         for number in usual:
             signal.signal(number, lambda number, _frame: heard.append(number))
@@ -88,12 +88,11 @@ def at_most(seconds: float | None, *, processor: bool = True) -> Iterator[None]:
     It is raised again each second, for code that catches everything. Compiled code hears it when it returns; elsewhere,
     where the system has no such timer, and for None, there is no limit.
     """
-    main = threading.current_thread() is threading.main_thread()
-    if seconds is None or not main or not hasattr(signal, "setitimer"):
+    if seconds is None or not _in_main_thread() or not hasattr(signal, "setitimer"):
         yield
         return
 
-    def stop(number: int, frame: FrameType | None) -> None:  # noqa: ARG001
+    def stop(*_: object) -> None:
         raise TimeoutError(f"it was not done after {seconds:g} s")
 
     number, timer = (signal.SIGVTALRM, signal.ITIMER_VIRTUAL) if processor else (signal.SIGALRM, signal.ITIMER_REAL)

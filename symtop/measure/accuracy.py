@@ -26,6 +26,7 @@ SAMPLES = 1001
 DENSE = 5.0  # samples a nutation from which on their phases need no care
 GOLDEN_CLOSE = 0.01  # of a nutation: a stride this near to the golden section is one
 ENOUGH = {"compiled": 1e9, "python": 2e4}  # force evaluations of a run after which no finer setting is tried
+COUNTS = ("step_size", "tolerance", "steps", "force_evaluations", "newton_iterations", "outcome", "reached_time")
 
 
 def enough_samples(scene: Scene, horizon: float) -> int:
@@ -51,13 +52,17 @@ def error_table(
     enough = False
     for setting in settings:
         if enough:
-            rows.append(
-                dict.fromkeys(rows[-1], math.nan) | {"outcome": "not_run", "implementation": method.implementation}
-            )
+            rows.append(blank_row(method))
             continue
         rows.append(error_row(scene, method, setting, horizon, observe))
         enough = float(rows[-1]["force_evaluations"]) > ENOUGH[method.implementation]
     return as_table(rows)
+
+
+def blank_row(method: Integrator) -> dict[str, float | str]:
+    """The entries of a run that was not made."""
+    names = (*COUNTS, "implementation", *(name + end for name in QUANTITIES for end in ("", "_end", "_bound")))
+    return dict.fromkeys(names, math.nan) | {"outcome": "not_run", "implementation": method.implementation}
 
 
 def as_table(rows: Sequence[Mapping[str, float | str]]) -> xr.Dataset:
@@ -79,14 +84,11 @@ def error_row(
 
     `budget` is that of `simulate`.
     """
-    control: dict[str, Any] = method.setting(setting).kwargs()
-    run = integrate(
-        scene, method, **control, horizon=horizon, samples=enough_samples(scene, horizon),
-        observe=observe, budget=budget,
-    )  # fmt: skip
+    control: dict[str, Any] = {"horizon": horizon, "samples": enough_samples(scene, horizon), "observe": observe}
+    run = integrate(scene, method, budget=budget, **control | method.setting(setting).kwargs())
     truth = reference(scene, run.time, precision="closed-form")
     shown, failed = errors_against(scene, run, truth), run.outcome != "ok"
-    row: dict[str, float | str] = {name: getattr(run, name) for name in _COUNTS}
+    row: dict[str, float | str] = {name: getattr(run, name) for name in COUNTS}
     row["implementation"] = method.implementation
     for name in QUANTITIES:
         values = shown.get(name, np.array([math.nan]))
@@ -94,8 +96,3 @@ def error_row(
         row[f"{name}_end"] = math.nan if failed else float(values[-1])
         row[f"{name}_bound"] = float(np.max(error_bound(scene, run, truth, name)))
     return row | phase(scene, run, truth)._asdict() if phases else row
-
-
-_COUNTS = (
-    "step_size", "tolerance", "steps", "force_evaluations", "newton_iterations", "outcome", "reached_time"
-)  # fmt: skip

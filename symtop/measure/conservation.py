@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike
 from symtop.core.numbers import GOLDEN
 from symtop.measure.order import Fit, line, power_law, student
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan, Run
+from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
@@ -196,22 +196,19 @@ def from_increments(method: Integrator, scene: Scene, plan: Plan) -> Difference 
     marks = (middles[:, None] + np.arange(-REACH, REACH + 1)).ravel()
     again = Plan.steps(plan.step_size, np.unique(marks))
     run = solve(method, "angles", scene.top, scene.start, again, f" on {scene.name}")
-    return compared(scene, again, run, middles) if run.outcome == "ok" else None
-
-
-def compared(scene: Scene, plan: Plan, run: Run, middles: Array) -> Difference:
-    """The difference whose drift is larger, of a run that was sampled around `middles`."""
-    place = np.searchsorted(plan.marks, middles)
+    if run.outcome != "ok":
+        return None
+    place = np.searchsorted(again.marks, middles)
     around = run.states[place[:, None] + np.arange(-REACH, REACH + 1)]  # (places, 9, 4)
-    implied = dict(zip(("p_phi", "p_psi"), momenta_of(scene.top, around, plan.step_size), strict=True))
-    times, sizes = plan.times[place], {}
+    implied = dict(zip(("p_phi", "p_psi"), momenta_of(scene.top, around, again.step_size), strict=True))
+    times, sizes = again.times[place], {}
     for name, values in implied.items():
         reported = getattr(run, name)[place]
         apart, own = trend(times, (values - reported) / scene.momentum_scale), trend(times, values)
         hidden = abs(apart.rise) > max(LEAST, SHARE * abs(own.rise) / scene.momentum_scale)
         sizes[name] = abs(apart.rise) if hidden and abs(apart.slope) > SURE * apart.interval else 0.0
     name = max(sizes, key=lambda one: sizes[one])
-    return Difference(name, sizes[name], LEAST, f"more at the end of {int(plan.marks[-1])} steps than at their start")
+    return Difference(name, sizes[name], LEAST, f"more at the end of {int(again.marks[-1])} steps than at their start")
 
 
 def momenta_of(top: SymmetricTop, around: Array, h: float) -> tuple[Array, Array]:

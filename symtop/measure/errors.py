@@ -188,15 +188,35 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
             f"data must be a Dataset or a mapping with time and axis, quaternion or theta, not {type(data).__name__}"
         )
     time = _times(data)
-    variables: dict[str, Any] = {name: _values(data, name, time.size) for name in SHAPES if name in data}
-    if not set(ENOUGH) & set(variables):
+    columns: dict[str, Any] = {name: _numbers(name, data[name]) for name in SHAPES if name in data}
+    for name, values in columns.items():
+        if values.shape != (wanted := (time.size, *SHAPES[name])):
+            raise SymtopError(f"{name} must have the shape {wanted}, one row for each time, not {values.shape}")
+    if not set(ENOUGH) & set(columns):
         raise SymtopError("data must hold one of axis, quaternion, theta beside time, to show where the top is")
     for name in ("axis", "quaternion"):
-        if name in variables:
-            variables[name] = _unit(name, variables[name], time)
-    if "theta" in variables:
-        _inclined(variables["theta"], time)
-    return Trajectory(time, **variables)
+        if name in columns:
+            length = np.sqrt(np.sum(columns[name] ** 2, axis=-1))
+            if (off := np.abs(length - 1.0) > LENGTH).any():  # false where it is NaN
+                where = f"{length[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
+                raise SymtopError(f"{name} must be of length 1 within {LENGTH:g}, but its length is {where}")
+            columns[name] = columns[name] / length[:, None]
+    theta = columns.get("theta", np.zeros(1))
+    if (off := (theta < 0.0) | (theta > np.pi)).any():
+        where = f"{theta[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
+        raise SymtopError(f"theta must be radians from the vertical in [0, pi], but it is {where}")
+    return Trajectory(time, **columns)
+
+
+def _times(data: Mapping[Any, Any]) -> charts.Array:
+    if "time" not in data:
+        raise SymtopError("data must hold time, elapsed since the start of the scene; there is none")
+    time = _numbers("time", data["time"])
+    if time.ndim != 1 or time.size == 0:
+        raise SymtopError(f"time must be a row of numbers, not of shape {time.shape}")
+    if not np.isfinite(time).all() or time[0] < 0.0 or (np.diff(time) <= 0.0).any():
+        raise SymtopError("time must be finite, at least 0 and increase from sample to sample")
+    return time
 
 
 def completed(data: Trajectory) -> Trajectory:
@@ -215,51 +235,12 @@ def completed(data: Trajectory) -> Trajectory:
     return data._replace(axis=axis, quaternion=attitude, theta=theta)
 
 
-def _times(data: xr.Dataset | Mapping[str, Any]) -> charts.Array:
-    if "time" not in data:
-        raise SymtopError("data must hold time, elapsed since the start of the scene; there is none")
-    time = _numbers("time", data["time"])
-    if time.ndim != 1 or time.size == 0:
-        raise SymtopError(f"time must be a row of numbers, not of shape {time.shape}")
-    if not np.isfinite(time).all() or time[0] < 0.0 or (np.diff(time) <= 0.0).any():
-        raise SymtopError("time must be finite, at least 0 and increase from sample to sample")
-    return time
-
-
 def _numbers(name: str, values: Any) -> charts.Array:
     try:
         given = np.asarray(values)
         return given.astype(np.float64, casting="same_kind" if given.dtype.kind == "c" else "unsafe")
     except (TypeError, ValueError) as error:
         raise SymtopError(f"{name} must be an array of real numbers, not {type(values).__name__}") from error
-
-
-def _values(data: xr.Dataset | Mapping[str, Any], name: str, count: int) -> charts.Array:
-    values, wanted = _numbers(name, data[name]), (count, *SHAPES[name])
-    if values.shape != wanted:
-        raise SymtopError(f"{name} must have the shape {wanted}, one row for each time, not {values.shape}")
-    return values
-
-
-def _unit(name: str, values: charts.Array, time: charts.Array) -> charts.Array:
-    length = np.sqrt(np.sum(values * values, axis=-1))
-    off = np.abs(length - 1.0) > LENGTH  # false where it is NaN
-    if off.any():
-        k = int(np.argmax(off))
-        raise SymtopError(
-            f"{name} must be of length 1 within {LENGTH:g}, but its length is {length[k]:.6g} at t = {time[k]:.6g}"
-        )
-    unit: charts.Array = values / length[:, None]
-    return unit
-
-
-def _inclined(theta: charts.Array, time: charts.Array) -> None:
-    off = (theta < 0.0) | (theta > np.pi)
-    if off.any():
-        k = int(np.argmax(off))
-        raise SymtopError(
-            f"theta must be radians from the vertical in [0, pi], but it is {theta[k]:.6g} at t = {time[k]:.6g}"
-        )
 
 
 def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:

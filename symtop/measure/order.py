@@ -131,14 +131,15 @@ def order(
     used = np.isfinite(e) & (e > 10.0 * b) & (e < LARGEST_ERROR)
     used &= h * omega < LARGEST_PHASE * max(claim or 2, 2) / 2.0
     places = rank[used[rank]]
-    series = _series(h[places], e[places], b[places], 2 if symmetric else 1)
+    points = (values[places].tobytes() for values in (h, e, b))
+    series = _widest(*points, 2 if symmetric else 1)
     if series is None:
         if np.min(finest) > FLOOR * np.max(judged):
             return _unjudged(used, "the error does not fall to rounding as a power of the step")
         return _unjudged(used, "fewer than five points follow a power of the step before rounding")
     used = np.zeros(h.shape, dtype=bool)
-    used[places[series.window]] = True
-    return Fit(series.slope, series.interval, series.constant, used)
+    used[places[series[3]]] = True
+    return Fit(*series[:3], used)
 
 
 def _round_off(h: Array, e: Array) -> float:
@@ -177,23 +178,12 @@ def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> s
     return "confirmed" if off <= BESIDE else "undecided"
 
 
-class _Series(NamedTuple):
-    """The fitted series over points from fine to coarse."""
-
-    slope: float
-    interval: float
-    constant: float
-    window: slice
-
-
-def _series(h: Array, e: Array, b: Array, power: int) -> _Series | None:
-    """The fit to points from fine to coarse, over the widest window that the series describes; None without one."""
-    return _widest(h.tobytes(), e.tobytes(), b.tobytes(), power)
-
-
 @functools.lru_cache(maxsize=4096)  # the words, tables and figures of a study ask for the same 1,600
-def _widest(steps: bytes, errors: bytes, bounds: bytes, power: int) -> _Series | None:
-    """`_series` of the bytes of the points."""
+def _widest(steps: bytes, errors: bytes, bounds: bytes, power: int) -> tuple[float, float, float, slice] | None:
+    """Slope, interval and constant of the series over the widest window of points, fine to coarse, that it describes.
+
+    The window comes last; None without one.
+    """
     h, e, b = (np.frombuffer(values) for values in (steps, errors, bounds))
     first, last = 0, h.size
     while last - first >= LEAST:
@@ -208,7 +198,7 @@ def _widest(steps: bytes, errors: bytes, bounds: bytes, power: int) -> _Series |
         fitted, deviations, freedom = _regularised(columns, values, weights)
         interval = student(max(int(freedom), 1)) * float(deviations[1])
         if interval <= WIDEST and np.max(np.abs(columns[:, 2:] @ fitted[2:])) <= CORRECTION:
-            return _Series(float(fitted[1]), max(interval, RESOLVED), math.exp(float(fitted[0])), window)
+            return float(fitted[1]), max(interval, RESOLVED), math.exp(float(fitted[0])), window
         last -= 1
     return None
 

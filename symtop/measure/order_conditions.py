@@ -153,26 +153,6 @@ def logarithm(words: Words) -> Words:
     return total
 
 
-def step_of(
-    drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] = (), processor: float = 0.0,
-    most: int = LONGEST_WORD,
-) -> Words:  # fmt: skip
-    """The step with these coefficients, kick[0] first, as a series of words."""
-    t, v = element(most, t=1.0), element(most, v=1.0)
-    bent = commutator(v, commutator(v, t))
-    bends = gradient or [0.0] * len(kick)
-    step = exponential(element(most))
-    for place, (b, c) in enumerate(zip(kick, bends, strict=True)):
-        if b or c:
-            step = product(step, exponential([b * one + c * more for one, more in zip(v, bent, strict=True)]))
-        if place < len(drift):
-            step = product(step, exponential(element(most, t=drift[place])))
-    if processor:
-        ends = [exponential([sign * processor * row for row in commutator(t, v)]) for sign in (1.0, -1.0)]
-        step = product(product(ends[0], step), ends[1])
-    return step
-
-
 @functools.cache
 def vanishing(length: int) -> Array:
     """An orthonormal basis of the words' combinations of a length that are zero here, shape (2^length, rank).
@@ -180,38 +160,28 @@ def vanishing(length: int) -> Array:
     They are the brackets with more than one V beyond the number of T: by degrees in the momenta, a bracket takes one
     away, T has two of them and V none.
     """
-    parts = [_of(length, letters) for letters in range(length + 1)]
-    whole: Array = np.concatenate(parts, axis=1)
-    return whole
-
-
-def _brackets(length: int, letters: int) -> Array:
-    """Columns that span the vanishing combinations with so many V."""
-    if length < 4 or not 0 <= letters <= length:
-        return np.zeros((2**length, 0))
-    columns = [_spread(column, 0) for column in _of(length - 1, letters).T]
-    columns += [_spread(column, 1) for column in _of(length - 1, letters - 1).T]
-    if letters > length - letters + 1:
-        columns += [_nested(word, length) for word in range(2**length) if word.bit_count() == letters]
-    return np.stack(columns, axis=1) if columns else np.zeros((2**length, 0))
+    return np.concatenate([_vanishing(length, letters) for letters in range(length + 1)], axis=1)
 
 
 @functools.cache
-def _of(length: int, letters: int) -> Array:
-    """The same, orthonormal."""
-    spanning = _brackets(length, letters)
-    if not spanning.size:
-        return spanning
-    left, sizes, _ = np.linalg.svd(spanning, full_matrices=False)
-    basis: Array = left[:, sizes > RANK]
-    return basis
+def _vanishing(length: int, letters: int) -> Array:
+    """The same with so many V."""
+    columns: list[Array] = []
+    if length >= 4 and 0 <= letters <= length:
+        columns += [_spread(column, 0) for column in _vanishing(length - 1, letters).T]
+        columns += [_spread(column, 1) for column in _vanishing(length - 1, letters - 1).T]
+        if letters > length - letters + 1:
+            columns += [_nested(word, length) for word in range(2**length) if word.bit_count() == letters]
+    if not columns:
+        return np.zeros((2**length, 0))
+    left, sizes, _ = np.linalg.svd(np.stack(columns, axis=1), full_matrices=False)
+    return left[:, sizes > RANK]
 
 
 def _spread(column: Array, letter: int) -> Array:
     """[X, column] for the letter X."""
     one = np.eye(2)[letter]
-    bracket: Array = np.multiply.outer(one, column).ravel() - np.multiply.outer(column, one).ravel()
-    return bracket
+    return np.asarray(np.multiply.outer(one, column).ravel() - np.multiply.outer(column, one).ravel())
 
 
 def _nested(word: int, length: int) -> Array:
@@ -228,9 +198,20 @@ def splitting_conditions(
 ) -> Conditions:  # fmt: skip
     """What the conditions of a table are off by: the largest coefficient of each length that must vanish and does not.
 
-    `drift` and `kick` as in `symtop.composition`; ``gradient[i]`` and `processor` as there.
+    `drift`, `kick` (kick[0] comes first), `gradient` and `processor` are those of `symtop.composition`.
     """
-    defects = logarithm(step_of(drift, kick, gradient, processor, most))
+    t, v = element(most, t=1.0), element(most, v=1.0)
+    bent = commutator(v, commutator(v, t))
+    step = exponential(element(most))
+    for place, (b, c) in enumerate(zip(kick, gradient or [0.0] * len(kick), strict=True)):
+        if b or c:
+            step = product(step, exponential([b * one + c * more for one, more in zip(v, bent, strict=True)]))
+        if place < len(drift):
+            step = product(step, exponential(element(most, t=drift[place])))
+    if processor:
+        ends = [exponential([sign * processor * row for row in commutator(t, v)]) for sign in (1.0, -1.0)]
+        step = product(product(ends[0], step), ends[1])
+    defects = logarithm(step)
     defects[1] = defects[1] - 1.0
     rest = []
     for length, row in enumerate(defects[1:], start=1):

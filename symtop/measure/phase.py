@@ -137,20 +137,14 @@ def _steadied(t: Array, turn: Array, sine: Array) -> Array:
     """The lag without whole turns that it seems to make while the axis is next to a pole, where phi may jump by pi."""
     clear = sine > CLEAR * np.max(sine)
     guide = np.interp(t, t[clear], np.unwrap(turn[clear]))
-    steadied: Array = turn - 2.0 * math.pi * np.rint((turn - guide) / (2.0 * math.pi))
-    return steadied
+    return turn - 2.0 * math.pi * np.rint((turn - guide) / (2.0 * math.pi))
 
 
-def _slope(t: Array, values: Array, weights: Array) -> float:
-    """Weighted least-squares slope."""
+def _slope(t: Array, values: Array, bound: Array, weights: Array) -> tuple[float, float]:
+    """Weighted least-squares slope, and the largest one that values within a bound can have."""
     middle = t - np.average(t, weights=weights)
-    return float(np.sum(weights * middle * values) / np.sum(weights * middle * middle))
-
-
-def _doubt(t: Array, bound: Array, weights: Array) -> float:
-    """The largest slope that values within a bound can have."""
-    middle = np.abs(t - np.average(t, weights=weights))
-    return float(np.sum(weights * middle * bound) / np.sum(weights * middle * middle))
+    spread = np.sum(weights * middle * middle)
+    return float(np.sum(weights * middle * values) / spread), float(np.sum(weights * np.abs(middle) * bound) / spread)
 
 
 def phase(scene: Scene, run: Trajectory, truth: xr.Dataset) -> Phase:
@@ -163,17 +157,17 @@ def phase(scene: Scene, run: Trajectory, truth: xr.Dataset) -> Phase:
         parts = split(scene, run)
     # on a separatrix the whole run is the time scale, not `Scene.time_scale`: a rate is judged over what was seen
     period = scene.nutation_period if math.isfinite(scene.nutation_period) else float(t[-1])
-    omega, swings, even = 2.0 * math.pi / period, nutates(scene), np.ones(t.size)
+    omega, swings = 2.0 * math.pi / period, nutates(scene)
     mean_rate = form.phi_per_period / form.nutation_period if math.isfinite(form.nutation_period) else 0.0
     scale = max(abs(mean_rate), LEAST_RATE * omega)
     radius = 0.5 * abs(math.cos(form.theta_range[0]) - math.cos(form.theta_range[1]))
     grain = truth["axis_error_bound"].values + 4.0 * EPSILON
-    faster = _slope(t, parts.lag, even) if swings else 0.0
-    doubt = _doubt(t, grain / (radius * omega), even) + EPSILON if swings else 0.0
-    weights = sine * sine
-    turned = _slope(t, parts.turn, weights)
-    rounding = grain / sine + EPSILON * np.abs(truth["phi"].values)
-    turn_doubt = _doubt(t, rounding, weights) + abs(mean_rate) * (doubt + EPSILON)
+    faster, doubt = 0.0, 0.0
+    if swings:
+        faster, doubt = _slope(t, parts.lag, grain / (radius * omega), np.ones(t.size))
+        doubt += EPSILON
+    turned, turn_doubt = _slope(t, parts.turn, grain / sine + EPSILON * np.abs(truth["phi"].values), sine * sine)
+    turn_doubt += abs(mean_rate) * (doubt + EPSILON)
     return Phase(
         shape=float(np.max(parts.shape)),
         nutation_lag=omega * float(np.max(np.abs(parts.lag))) if swings else math.nan,

@@ -36,68 +36,42 @@ class Published(NamedTuple):
 
 def published_values() -> list[Published]:
     """All entries, each evaluated now."""
-    return [_simo_wong(), *_bruls_cardona_arnold(), *_woodhouse(), *_kinon_betsch(), *_hairer(), *_detest()]
-
-
-def _simo_wong() -> Published:
-    scene = find_scene("simo-wong")
+    scene, source = find_scene("simo-wong"), "Simo & Wong 1991; Krysl 2005"
     energy = scene.top.energy(scene.start)
-    source = "Simo & Wong 1991; Krysl 2005"
-    return Published(source, "energy of the fast top", 1269.975, energy, 1e-3, "printed", tests=START)
+    values = [Published(source, "energy of the fast top", 1269.975, energy, 1e-3, "printed", tests=START)]
 
-
-def _bruls_cardona_arnold() -> list[Published]:
+    source, remark = "Bruls, Cardona & Arnold 2012", "regression data of public codes, h = 2e-6"
     moved = reference("bruls-cardona-arnold", [1.0], "longdouble")["axis"].values[0] - np.array([0.0, 1.0, 0.0])
-    printed = (0.17334, -0.35991, -0.74849)
-    return [
-        Published(
-            "Bruls, Cardona & Arnold 2012", f"{name} displacement of the centre at t = 1", value, ours, 1e-5, "printed",
-            "regression data of public codes, h = 2e-6",
-        )
-        for name, value, ours in zip("xyz", printed, moved, strict=True)
-    ]  # fmt: skip
+    for name, value, ours in zip("xyz", (0.17334, -0.35991, -0.74849), moved, strict=True):
+        quantity = f"{name} displacement of the centre at t = 1"
+        values.append(Published(source, quantity, value, ours, 1e-5, "printed", remark))
 
-
-def _woodhouse() -> list[Published]:
-    scene, rows = find_scene("separatrix"), []
+    scene = find_scene("separatrix")
     g = math.sqrt(scene.top.mgl / scene.top.I1)
     for t in (1.0, 5.0):
-        exact = 1.0 / (1.0 + 1.0 / math.cosh(g * t))
+        quantity, exact = f"cos theta on the separatrix at t = {t:g}", 1.0 / (1.0 + 1.0 / math.cosh(g * t))
         ours = math.cos(float(closed_form(scene)(np.array([t])).theta[0]))
-        quantity = f"cos theta on the separatrix at t = {t:g}"
-        rows.append(Published("Woodhouse, problem 5.3", quantity, exact, ours, 1e-13, "formula"))
-    return rows
+        values.append(Published("Woodhouse, problem 5.3", quantity, exact, ours, 1e-13, "formula"))
 
-
-def _kinon_betsch() -> list[Published]:
-    scene = find_scene("kinon-betsch")
+    scene, source = find_scene("kinon-betsch"), "Kinon & Betsch"
     motion = closed_form(scene)(np.linspace(0.0, scene.horizon, 301))
-    return [
-        Published("Kinon & Betsch", "largest tilt (deg)", 60.0, math.degrees(motion.theta.max()), 1e-10, "consistency"),
-        Published("Kinon & Betsch", "precession rate", 10.0, float(motion.phi_dot.mean()), 1e-10, "consistency"),
-    ]  # fmt: skip
+    tilt, rate = math.degrees(motion.theta.max()), float(motion.phi_dot.mean())
+    values.append(Published(source, "largest tilt (deg)", 60.0, tilt, 1e-10, "consistency"))
+    values.append(Published(source, "precession rate", 10.0, rate, 1e-10, "consistency"))
 
+    scene, source = find_scene("hairer-lubich-wanner"), "Hairer, Lubich & Wanner, figure VII.5.3"
+    energy, vertical = scene.top.energy(scene.start), scene.top.momenta(scene.start).p_phi
+    values.append(Published(source, "energy", 1.72, energy, 1e-12, "consistency", tests=START))
+    values.append(Published(source, "vertical angular momentum", 1.04, vertical, 1e-12, "consistency", tests=START))
 
-def _hairer() -> list[Published]:
-    scene = find_scene("hairer-lubich-wanner")
-    momenta = scene.top.momenta(scene.start)
-    source = "Hairer, Lubich & Wanner, figure VII.5.3"
-    return [
-        Published(source, "energy", 1.72, scene.top.energy(scene.start), 1e-12, "consistency", tests=START),
-        Published(source, "vertical angular momentum", 1.04, momenta.p_phi, 1e-12, "consistency", tests=START),
-    ]
-
-
-def _detest() -> list[Published]:
-    """Euler's equations of DETEST B5, integrated by SciPy's DOP853 at its tightest tolerance."""
     from scipy.integrate import solve_ivp
 
-    done = solve_ivp(
+    done = solve_ivp(  # Euler's equations of DETEST B5, by SciPy's DOP853 at its tightest tolerance
         lambda _, y: (y[1] * y[2], -y[0] * y[2], -0.51 * y[0] * y[1]), (0.0, 20.0), (0.0, 1.0, 1.0),
         method="DOP853", rtol=3e-14, atol=1e-15,
     )  # fmt: skip
     source, printed = "Enright & Pryce 1987, DETEST B5", (-0.93965707987, -0.34211777540, 0.74141265962)
-    return [
+    return values + [
         Published(source, f"y{k + 1}(20)", value, float(done.y[k, -1]), 1e-11, "printed", REMARK, OTHER_BODY)
         for k, value in enumerate(printed)
     ]

@@ -11,6 +11,7 @@ which variants served it:
 """
 
 import math
+from collections.abc import Collection
 from pathlib import Path
 from typing import NamedTuple
 
@@ -47,10 +48,13 @@ class Near(NamedTuple):
         )
 
 
-def nearest(file: Path, scene: Scene, quantity: str, accuracy: float, horizon: float) -> Near | None:
+def nearest(
+    file: Path, scene: Scene, quantity: str, accuracy: float, horizon: float, needs: Collection[str] = ()
+) -> Near | None:
     """The variants that served the tops nearest to a scene; None where the study does not ask for the quantity.
 
-    The target and the horizon of the study are those nearest to `accuracy` and to `horizon` in logarithms. Raises
+    The target and the horizon of the study are those nearest to `accuracy` and to `horizon` in logarithms; `needs`
+    leaves out the variants that need something else, before the cheapest is found. Raises
     SymtopError for a file that is not there, is damaged or of an older version.
     """
     remedy = "run symtop study cost"
@@ -60,21 +64,24 @@ def nearest(file: Path, scene: Scene, quantity: str, accuracy: float, horizon: f
         data = netcdf.read_any(file)  # whole: a tree that is read lazily and closed has ended a process in HDF5
         tree = data if isinstance(data, xr.DataTree) else xr.DataTree(data)
         target = SHOWN_AS.get(quantity, quantity)
-        return _counted(tree, regime(scene), target, accuracy, horizon / scene.nutation_period)
+        return _counted(tree, scene, target, accuracy, horizon, needs)
     except KeyError as error:
         raise SymtopError(f"{file} is of an older version, without {error}; {remedy} --fresh") from error
     except (OSError, ValueError, RuntimeError) as error:
         raise SymtopError(f"{file} cannot be read ({error}); {remedy} --fresh") from error
 
 
-def _counted(data: xr.DataTree, numbers: np.ndarray, quantity: str, accuracy: float, nutations: float) -> Near | None:
+def _counted(
+    data: xr.DataTree, scene: Scene, quantity: str, accuracy: float, horizon: float, needs: Collection[str]
+) -> Near | None:
     groups = {name: data[name].to_dataset() for name in ("short", "long") if name in data}
     if not groups:
         raise KeyError("short")
     spans = {name: float(np.nanmax(group["nutations"].values)) for name, group in groups.items()}
-    nutations = nutations if math.isfinite(nutations) else 1e-3
-    span = min(spans, key=lambda name: abs(math.log(spans[name] / max(nutations, 1e-3))))
+    span = min(spans, key=lambda name: abs(math.log(spans[name] / max(horizon / scene.nutation_period, 1e-3))))
     group = groups[span].isel(scene=0)
+    if needs:
+        group = group.isel(variant=np.flatnonzero(np.isin(group["needs"].values, list(needs))))
     if quantity not in group["quantity"]:
         return None
     target = min(group["target"].values.tolist(), key=lambda value: abs(math.log(value / accuracy)))
@@ -84,7 +91,7 @@ def _counted(data: xr.DataTree, numbers: np.ndarray, quantity: str, accuracy: fl
     cost = asked["cost"].values * price["price"].values[:, np.newaxis] + price["call"].values[:, np.newaxis]
     rows = ~np.isnan(cost).all(axis=1)
     regimes = data["tops"].to_dataset()["regime"].sel(scene=span).transpose(..., "member", "number").values
-    far = distances(regimes.reshape(-1, 4)[: cost.shape[1]], numbers)
+    far = distances(regimes.reshape(-1, 4)[: cost.shape[1]], regime(scene))
     far[np.isnan(cost).all(axis=0) | ~np.isfinite(far)] = np.inf  # nothing was asked of them
     chosen = np.argsort(far, kind="stable")[: min(NEAREST, int(np.isfinite(far).sum()))]
     if not chosen.size:

@@ -80,30 +80,23 @@ def limits(scene: Scene, method: Integrator, horizon: float, quantity: str = "ax
     return 1.001 * least_tolerance(method), LOOSEST
 
 
-def step_ladder(method: Integrator, scene: Scene, horizon: float, count: int = 13, most: float = 4e6) -> list[float]:
-    """Steps from ten a nutation down to where the method meets round-off or `most` steps, evenly in the logarithm.
+def ladder(method: Integrator, scene: Scene, horizon: float, count: int = 9, most: float = 4e6) -> list[float]:
+    """`count` settings of a method, coarse to fine, evenly in the logarithm; NaN alone where there is nothing to set.
 
-    The finest step of a method of order p resolves a nutation about 10 * 10^(11/p) times; methods of high order, whose
-    steps have many stages, begin at five.
+    Steps go from ten a nutation down to where the method meets round-off or makes `most` steps, tolerances from 1e-2
+    to the least. The finest step of a method of order p resolves a nutation about 10 * 10^(11/p) times; methods of high
+    order, whose steps have many stages, begin at five.
     """
-    period = scene.time_scale(horizon)
-    power = method.order or 2
-    first = 10.37 if power <= 4 else 5.37  # nothing here may be commensurate with the nutation
-    decades = min(4.5, 11.0 / power + math.log10(10.37 / first), max(math.log10(most * period / horizon / first), 0.5))
-    return [period / (first * 10.0 ** (decades * k / (count - 1))) for k in range(count)]
-
-
-def tolerance_ladder(method: Integrator, count: int = 9) -> list[float]:
-    """Tolerances from 1e-2 down to the least, evenly in the logarithm."""
+    if method.fixed_step:
+        period, power = scene.time_scale(horizon), method.order or 2
+        first = 10.37 if power <= 4 else 5.37  # nothing here may be commensurate with the nutation
+        longest = max(math.log10(most * period / horizon / first), 0.5)
+        decades = min(4.5, 11.0 / power + math.log10(10.37 / first), longest)
+        return [period / (first * 10.0 ** (decades * k / (count - 1))) for k in range(count)]
+    if not method.adaptive:
+        return [math.nan]
     decades = -2.0 - math.log10(max(least_tolerance(method), 1e-18))
     return [10.0 ** (-2.0 - 0.999 * decades * k / (count - 1)) for k in range(count)]
-
-
-def ladder(method: Integrator, scene: Scene, horizon: float, count: int = 9, most: float = 4e6) -> list[float]:
-    """`count` settings of a method, coarse to fine; steps end at `most` of them."""
-    if method.fixed_step:
-        return step_ladder(method, scene, horizon, count, most)
-    return tolerance_ladder(method, count) if method.adaptive else [math.nan]
 
 
 def between(fine: float, low: float, coarse: float, high: float, goal: float) -> float:

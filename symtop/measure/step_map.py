@@ -23,9 +23,8 @@ Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1, VI.2, VII
 """
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -80,19 +79,17 @@ class StepMap:
         return np.concatenate([state[:-3], state[-3:] / self.unit])
 
     @property
-    def onward(self) -> Callable[[SymmetricTop, Angles, Sequence[float]], Run] | None:
-        """A run of steps of given lengths, each from the state where the last one ended, where a solver can do that.
+    def onward(self) -> Any:
+        """A solver's run of steps of given lengths (top, start, lengths), each from where the last one ended, or None.
 
         A start has |e| = 1 and |q| = 1, and cannot take up a state that has lost its length.
         """
-        run: Any = getattr(self.method.solvers[self.chart], "onward", None)
-        return cast("Callable[[SymmetricTop, Angles, Sequence[float]], Run] | None", run)
+        return getattr(self.method.solvers[self.chart], "onward", None)
 
     @property
-    def there_and_back(self) -> Callable[[SymmetricTop, Angles, float], Run] | None:
-        """A step, and one from its end with all rates reversed, where a solver can do that."""
-        run: Any = getattr(self.method.solvers[self.chart], "there_and_back", None)
-        return cast("Callable[[SymmetricTop, Angles, float], Run] | None", run)
+    def there_and_back(self) -> Any:
+        """A solver's step and one from its end with all rates reversed (top, start, step size), or None."""
+        return getattr(self.method.solvers[self.chart], "there_and_back", None)
 
     def image(self, z: Array, h: float | None = None) -> Array:
         """Y after one step from z."""
@@ -104,10 +101,9 @@ class StepMap:
 
     def at(self, start: Angles) -> Array:
         """Y of a start itself."""
-        if self.chart != "angles":
-            state = charts.space_state(self.chart, self.top, start)
-            return np.concatenate([state[:-3], state[-3:] / self.unit])
-        return self.point(start)
+        if self.chart == "angles":
+            return self.point(start)
+        return self.scaled(charts.space_state(self.chart, self.top, start), 0.0, 0.0)
 
     def point(self, start: Angles) -> Array:
         """z of a start."""

@@ -63,8 +63,8 @@ class Series(NamedTuple):
         return min(first - 1, self.resolved)
 
     @property
-    def seen(self) -> bool:
-        """Is the first term seen that is not the motion's? Else the order may be higher."""
+    def is_exact(self) -> bool:
+        """Is the order known, by a first term that is not the motion's? Else it may be higher."""
         return self.order < self.resolved
 
     def worst(self, power: int) -> float:
@@ -77,16 +77,16 @@ def step_series(step: StepMap, start: Angles, period: float) -> Series:
 
     Raises SymtopError if no step succeeds.
     """
-    exact, z, before = motion_from(step, start), step.point(start), step.at(start)
+    exact, z, before = closed_form(Scene("start", step.top, start, 1.0)), step.point(start), step.at(start)
+
+    def motion(h: float) -> Array:
+        return step.at(Angles(*(float(value[0]) for value in exact(np.array([h])))))
+
     return compared(
-        lambda h: aligned(step.chart, step.image(z, h), before), lambda h: aligned(step.chart, exact(h), before), period
+        lambda h: aligned(step.chart, step.image(z, h), before),
+        lambda h: aligned(step.chart, motion(h), before),
+        period,
     )
-
-
-def motion_from(step: StepMap, start: Angles) -> Callable[[float], Array]:
-    """Y of the true motion from a start, as a function of time."""
-    exact = closed_form(Scene("start", step.top, start, 1.0))
-    return lambda h: step.at(Angles(*(float(value[0]) for value in exact(np.array([h])))))
 
 
 def compared(image: Callable[[float], Array], motion: Callable[[float], Array], period: float) -> Series:
@@ -145,7 +145,10 @@ def _fitted(
     size = np.maximum(np.max(np.abs(true), axis=1), np.finfo(float).tiny)
     size[0] = 1.0
     moved = np.max(np.abs(finer[: power + 1] - terms), axis=1)
-    doubt = np.maximum(scatter * _amplification(power, backward=backward), moved)
+    weights = np.full(power + 1, 2.0 / NODES)
+    weights[0] = 1.0 / NODES
+    grown = np.sqrt((_to_powers(power, backward=backward) ** 2) @ weights)  # what a scatter of one makes of each power
+    doubt = np.maximum(scatter * grown, moved)
     return scatter, Series(width, np.max(np.abs(terms), axis=1) / size, doubt / size, backward)
 
 
@@ -178,11 +181,3 @@ def _to_powers(degree: int, *, backward: bool) -> Array:
     matrix = np.stack(columns, axis=1)
     matrix.flags.writeable = False
     return matrix
-
-
-def _amplification(degree: int, *, backward: bool) -> Array:
-    """What a scatter of one in the samples makes of each power."""
-    weights = np.full(degree + 1, 2.0 / NODES)
-    weights[0] = 1.0 / NODES
-    grown: Array = np.sqrt((_to_powers(degree, backward=backward) ** 2) @ weights)
-    return grown

@@ -8,7 +8,7 @@ its numbers depend on (`symtop.core.code_hash`), as the cases of a study are: wh
 import functools
 import math
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from symtop.core import code_hash, netcdf
 from symtop.core.errors import SymtopError, boolean, file_path, positive, row, whole
 from symtop.core.parallel import MOST_THREADS, cores, in_threads
 from symtop.core.progress import beating
-from symtop.measure.accuracy import as_table, enough_samples, error_row
+from symtop.measure.accuracy import as_table, blank_row, enough_samples, error_row
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.settings import ANGLES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
@@ -30,7 +30,6 @@ from symtop.run.simulation import chart_of, make_plan
 KEEP_EVERY = 5.0  # seconds between two writings of the file
 RAISED = "raised"  # outcome of a run whose integrator raised an exception
 MOST_NAMED = 4  # cells that a message lists
-COUNTS = ("steps", "force_evaluations", "newton_iterations")
 
 
 class _Cell(NamedTuple):
@@ -42,13 +41,6 @@ class _Cell(NamedTuple):
     horizon: float
     observe: str | None
     made_of: str
-
-
-class _Stored(NamedTuple):
-    """A cell of a file: the digest of what its numbers depend on, and its error table."""
-
-    made_of: str
-    table: xr.Dataset
 
 
 def sweep(
@@ -91,21 +83,21 @@ def sweep(
         for name, values in (("step_size", step_size), ("per_nutation", per_nutation), ("tolerance", tolerance))
         if values is not None
     }
-    asked = [_cell(one, method, given, horizon, observe) for one in chosen for method in methods]
-    file = None if path is None else file_path("path", path)
-    stored = {} if file is None else _stored(file)
+    grid = [[_cell(one, method, given, horizon, observe) for method in methods] for one in chosen]
+    asked = [cell for row in grid for cell in row]
     pairs = [(cell.scene.name, cell.method.name) for cell in asked]
+    file = None if path is None else file_path("path", path)
+    stored, done = _stored(file)
     if others := [f"{name} on {of}" for of, name in stored if (of, name) not in pairs]:
-        raise SymtopError(
-            f"path {str(file)!r} holds what was not asked for, {_few(others)}: ask for these as well, or name another "
-            "path"
-        )
-    done = {one.made_of: one.table for one in stored.values()}
-    rest = [cell for cell in asked if cell.made_of not in done or _raised(done[cell.made_of])]
+        few = ", ".join(others[:MOST_NAMED]) + (f" and {len(others) - MOST_NAMED} more" if others[MOST_NAMED:] else "")
+        must = "ask for these as well, or name another path"
+        raise SymtopError(f"path {str(file)!r} holds what was not asked for, {few}: {must}")
+    # what raised is tried again: the cause may have been of the moment
+    rest = [cell for cell in asked if cell.made_of not in done or RAISED in done[cell.made_of]["outcome"].values]
 
     def combined() -> xr.Dataset:
         size = max(len(cell.settings) for cell in asked)
-        tables = [[_padded(done.get(cell.made_of), cell, size) for cell in row] for row in _rows(asked, len(methods))]
+        tables = [[_padded(done.get(cell.made_of), cell, size) for cell in row] for row in grid]
         data = xr.concat([xr.concat(row, "variant") for row in tables], "scene")
         data = data.assign_coords(scene=[one.name for one in chosen], variant=[one.name for one in methods])
         data["chart"] = (
@@ -131,7 +123,7 @@ def sweep(
                 netcdf.write(combined(), file)
             raise
     data = combined()
-    if file is not None and (rest or pairs != [*stored]):  # in another order, the file would not be what is returned
+    if file is not None and (rest or pairs != stored):  # in another order, the file would not be what is returned
         netcdf.write(data, file)
     return data
 
@@ -162,11 +154,6 @@ def _settings(name: str, values: object) -> list[float]:
     return settings
 
 
-def _rows(cells: list[_Cell], width: int) -> Iterator[list[_Cell]]:
-    for begin in range(0, len(cells), width):
-        yield cells[begin : begin + width]
-
-
 def _cell(
     scene: Scene, method: Integrator, given: dict[str, list[float]], horizon: float | None, observe: str | None
 ) -> _Cell:
@@ -185,13 +172,9 @@ def _cell(
         settings = [math.nan]
     for value in settings:
         make_plan(scene, method, **method.setting(value).kwargs(), horizon=until, samples=enough_samples(scene, until))
-    return _Cell(scene, method, tuple(settings), until, observe, _made_of(scene, method, (settings, until, observe)))
-
-
-def _made_of(scene: Scene, method: Integrator, settings: object) -> str:
-    """The digest of all that the numbers of a cell depend on."""
-    code = _code().reasons("sweep", error_row, scene, method)
-    return code_hash.digest(code | code_hash.packages() | {"settings": repr(settings)})
+    made_of = _code().reasons("sweep", error_row, scene, method) | code_hash.packages()
+    digest = code_hash.digest(made_of | {"settings": repr((settings, until, observe))})
+    return _Cell(scene, method, tuple(settings), until, observe, digest)
 
 
 @functools.cache
@@ -203,31 +186,21 @@ def _code() -> code_hash.Code:
 
 def _table(cell: _Cell) -> xr.Dataset:
     """The error table of a cell; a run that raises is a row that says so."""
-    rows: list[dict[str, float | str] | None] = []
-    reasons = []
+    rows, reasons = [], []
     for setting in cell.settings:
-        reasons.append("")
         try:
-            rows.append(error_row(cell.scene, cell.method, setting, cell.horizon, cell.observe))
+            row, reason = error_row(cell.scene, cell.method, setting, cell.horizon, cell.observe), ""
         except SymtopError as error:
-            reasons[-1] = str(error)
-            rows.append(None)
-    blank = _blank(next((row for row in rows if row is not None), None), cell.method) | {"outcome": RAISED}
-    table = as_table([row or {**blank, **cell.method.setting(value).kwargs()}
-                      for row, value in zip(rows, cell.settings, strict=True)])  # fmt: skip
-    return table.assign(message=("setting", reasons))
-
-
-def _blank(row: dict[str, float | str] | None, method: Integrator) -> dict[str, float | str]:
-    """A row without numbers."""
-    names = [f"{name}{end}" for name in QUANTITIES for end in ("", "_end", "_bound")]
-    every = [*(row or [*COUNTS, "step_size", "tolerance", "outcome", "reached_time", "implementation", *names])]
-    return dict.fromkeys(every, math.nan) | {"outcome": "not_run", "implementation": method.implementation}
+            row, reason = blank_row(cell.method) | {"outcome": RAISED}, str(error)
+            row.update(cell.method.setting(setting).kwargs())
+        rows.append(row)
+        reasons.append(reason)
+    return as_table(rows).assign(message=("setting", reasons))
 
 
 def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
     """A cell of so many settings; what was not run has no numbers and no digest."""
-    blank = as_table([_blank(None, cell.method) | {"message": ""}] * size)
+    blank = as_table([blank_row(cell.method) | {"message": ""}] * size)
     if table is None:
         return blank.assign(made_of=((), ""))
     short = size - table.sizes["setting"]
@@ -235,36 +208,28 @@ def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
     return whole.assign(made_of=((), cell.made_of))
 
 
-def _stored(file: Path) -> dict[tuple[str, str], _Stored]:
-    """The cells of an earlier sweep by scene and integrator; SymtopError for a file that is no sweep's."""
-    if not file.exists():
-        return {}
+def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Dataset]]:
+    """Scenes and variants of an earlier sweep, and its error tables by their digests.
+
+    Raises SymtopError for a file that is no sweep's.
+    """
+    if file is None or not file.exists():
+        return [], {}
     data = netcdf.read(file)
     if "made_of" not in data:
         raise SymtopError(f"path must be a new file or that of a sweep, not {str(file)!r}")
     if "integrator" in data.coords:  # a file of version 0.2
         data = data.rename(integrator="variant")
-    cells = {}
+    pairs, tables = [], {}
     for s, scene in enumerate(data["scene"].values.tolist()):
         for i, name in enumerate(data["variant"].values.tolist()):
             cell = data.isel(scene=s, variant=i)
-            digest = str(cell["made_of"].values)
-            run = cell["outcome"].values != "not_run"
+            digest, run = str(cell["made_of"].values), cell["outcome"].values != "not_run"
             if digest and run.any():
                 own = cell.drop_vars(["scene", "variant", "made_of", "chart"], errors="ignore")
-                cells[scene, name] = _Stored(digest, own.isel(setting=np.flatnonzero(run)))
-    return cells
-
-
-def _raised(table: xr.Dataset) -> bool:
-    """Did a run raise an exception? It is tried again: the cause may have been of the moment."""
-    return bool((table["outcome"] == RAISED).any())
-
-
-def _few(names: list[str]) -> str:
-    """The first of some names, and how many more there are."""
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return ", ".join(names[:MOST_NAMED]) + more
+                pairs.append((scene, name))
+                tables[digest] = own.isel(setting=np.flatnonzero(run))
+    return pairs, tables
 
 
 def _described(data: xr.Dataset) -> xr.Dataset:

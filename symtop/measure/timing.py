@@ -8,16 +8,18 @@ time, and the ratio of two of them is less noisy than the ratio of two minima.
 """
 
 import math
+import os
 import random
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from concurrent.futures import Future
+from typing import Any, NamedTuple
 
 from symtop.methods.framework.plan import Run
-from symtop.methods.framework.registry import Integrator
+from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.exact import closed_form
-from symtop.model.scenes import Scene
+from symtop.model.scenes import Scene, scene
 from symtop.run.simulation import make_plan
 
 BATCH = 0.02  # seconds
@@ -111,3 +113,41 @@ def bare_run(
     plan, _ = make_plan(scene, method, **method.setting(setting).kwargs(), horizon=horizon, samples=samples)
     solve = method.solvers[chart]
     return lambda: solve(scene.top, scene.start, plan)
+
+
+SPAN = 0.03  # seconds of a worker in one turn
+TURNS = 7
+TRIES = 20  # to have all workers at once, the first time when they have to start
+DISTURBED = 1.05  # times as long as alone: beyond it timed cases run one after another
+
+
+def timed_turn() -> tuple[int, float, float, float]:
+    """Process, begin, end and mean seconds of short runs of a compiled method for `SPAN` seconds."""
+    run = bare_run(scene("spheroid"), integrator("strang"), "axis", 1e-3, 4.0)
+    run()  # its kernel may have to be compiled
+    begin, count = time.monotonic(), 0  # of the clock that all processes share
+    while (end := time.monotonic()) < begin + SPAN:
+        run()
+        count += 1
+    return os.getpid(), begin, end, (end - begin) / count
+
+
+def slowdown(submit: Callable[..., "Future[Any]"], size: int) -> float:
+    """How many times longer a run takes while `size` workers run; infinite if they never did at once.
+
+    Workers time the same run, one of them alone and all at once, in turns. Beside others it takes as long as alone
+    where cores share nothing that a run needs, and up to twice as long where two of them are threads of one core.
+    """
+
+    def at_once() -> list[tuple[int, float, float, float]]:
+        return [future.result() for future in [submit(timed_turn) for _ in range(size)]]
+
+    for _ in range(TRIES):
+        if len({process for process, *_ in at_once()}) == size:
+            break
+    ratios = []
+    for _ in range(TURNS):
+        alone, together = submit(timed_turn).result(), at_once()
+        if min(end for _, _, end, _ in together) - max(begin for _, begin, _, _ in together) > 0.5 * SPAN:
+            ratios.append(max(seconds for *_, seconds in together) / alone[-1])
+    return statistics.median(ratios) if ratios else math.inf

@@ -52,8 +52,7 @@ def solve3(a: Any, b: Any, c: Any, y: Any) -> Any:
 def accumulate(state: Any, low: Any, dstate: Any) -> Any:
     """(state + low) + dstate as a new pair of high and low parts; exact (Knuth's two-sum).
 
-    One loop for both tuples is too long for LLVM to unroll over the nine components of a frame; left as it is, it moves
-    both through memory at each of them: a step takes twice as long.
+    Two loops: one for both tuples is too long for LLVM to unroll over the nine components of a frame.
     """
     total = state
     for i in range(len(state)):
@@ -67,7 +66,7 @@ def accumulate(state: Any, low: Any, dstate: Any) -> Any:
 
 @register_jitable
 def accumulate_plainly(state: Any, low: Any, dstate: Any) -> Any:
-    """What everybody else's loop does: what a step rounds off is lost, if the kernel does not keep it. To compare."""
+    """Sums without compensation, as everybody else's loop has them: to compare."""
     for i in range(len(state)):
         state = set_item(state, i, state[i] + dstate[i])
     return state, low

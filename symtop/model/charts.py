@@ -17,8 +17,8 @@ Source: Marsden and Ratiu, Introduction to Mechanics and Symmetry, chapter 15.
 Distances are the angles of the smallest rotation, accurate for small angles: ``atan2(|a x b|, a.b)`` for
 axes, ``4 asin(|q - q'|/2)`` with the nearer sign for attitudes (2 acos has a floor of 1e-8).
 
-`readings`, `axes` and `continuous` are compiled passes over a few hundred states, several times as fast as NumPy. They
-do the operations of `View` and `unwrapped` in their order, to the same bits; those answer until the kernels are loaded.
+`readings`, `axes` and `continuous` are compiled passes over a few hundred states. They do the operations of `View` and
+`unwrapped` in their order, to the same bits; those answer until the kernels are loaded.
 """
 
 import math
@@ -86,28 +86,16 @@ def _stacked(components: tuple[Any, ...]) -> Array:
 
 
 def _parts(quaternions: Array) -> tuple[Array, Array, Array, Array]:
-    """w, x, y and z of quaternions (..., 4)."""
     return quaternions[..., 0], quaternions[..., 1], quaternions[..., 2], quaternions[..., 3]
-
-
-def _vectors(x: Array, y: Array, z: Array) -> Array:
-    """Vectors (..., 3) of their components, faster than by `np.stack`."""
-    vectors: Array = np.empty((*np.shape(x), 3), np.result_type(x))
-    vectors[..., 0], vectors[..., 1], vectors[..., 2] = x, y, z
-    return vectors
 
 
 def axis_from_quaternion(quaternion: Array) -> Array:
     """The third column of the rotation matrix, shape (..., 3)."""
     w, x, y, z = _parts(quaternion)
     right, back = x * z + w * y, y * z - w * x  # doubled by addition: quadruple precision has no 2.0
-    return _vectors(right + right, back + back, w * w - x * x - y * y + z * z)
-
-
-def transverse_from_quaternion(quaternion: Array) -> Array:
-    """The first column of the rotation matrix, a body-fixed axis across the top's, shape (..., 3)."""
-    w, x, y, z = _parts(quaternion)
-    return _vectors(w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
+    axis = np.empty((*np.shape(x), 3), np.result_type(x))  # faster than np.stack
+    axis[..., 0], axis[..., 1], axis[..., 2] = right + right, back + back, w * w - x * x - y * y + z * z
+    return axis
 
 
 def theta_from_axis(axis: Array) -> Array:
@@ -132,7 +120,7 @@ def unwrapped(angle: Array, guide: Array) -> Array:
     """Continuous angles from samples of them modulo 2 pi; both have the shape (..., n), a run along the last dimension.
 
     Between neighbouring samples the angle may turn many times: `guide`, the true motion, says how often, so that only
-    the *error* has to change by less than half a turn from sample to sample. It may grow to any size over the run.
+    the *error* has to change by less than half a turn from sample to sample.
     """
     lag = angle - guide
     step = lag[..., 1:] - lag[..., :-1]
@@ -144,8 +132,7 @@ def unwrapped(angle: Array, guide: Array) -> Array:
         step[...] = 0.0
         step[jumps] = rest - jump
         lag[..., 1:] += step.cumsum(axis=-1)
-    whole: Array = guide + (lag - 2.0 * np.pi * np.rint(lag[..., :1] / (2.0 * np.pi)))
-    return whole
+    return guide + (lag - 2.0 * np.pi * np.rint(lag[..., :1] / (2.0 * np.pi)))
 
 
 def rates_from_momentum(top: SymmetricTop, axis: Array, phi: Any, momentum: Array) -> tuple[Any, Any, Any]:
@@ -175,8 +162,7 @@ def axis_distance(first: Array, second: Array, low: Array | float = 0.0) -> Arra
     # by components, several times as fast as `np.cross` and sums of three for the few hundred axes of a guard
     cross = v * z - w * y, w * x - u * z, u * y - v * x
     sine = np.sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2])
-    angle: Array = np.arctan2(sine, a * x + b * y + c * z)
-    return angle
+    return np.arctan2(sine, a * x + b * y + c * z)
 
 
 def attitude_distance(first: Array, second: Array, low: Array | float = 0.0) -> Array:
@@ -190,11 +176,8 @@ def attitude_distance(first: Array, second: Array, low: Array | float = 0.0) -> 
 def space_energy(top: SymmetricTop, axis: Any, momentum: Any, p_psi: Any) -> Any:
     """Energy of space-frame states: |L|^2/2 I1 + p_psi^2 (1/I3 - 1/I1)/2 + mgl e_z; axis and momentum (..., 3)."""
     x, y, z = momentum[..., 0], momentum[..., 1], momentum[..., 2]
-    return (
-        (x * x + y * y + z * z) / (2.0 * top.I1)
-        + 0.5 * p_psi**2 * (1.0 / top.I3 - 1.0 / top.I1)
-        + top.mgl * axis[..., 2]
-    )
+    turning = (x * x + y * y + z * z) / (2.0 * top.I1)
+    return turning + 0.5 * p_psi**2 * (1.0 / top.I3 - 1.0 / top.I1) + top.mgl * axis[..., 2]
 
 
 def axis_of(chart: str, states: Any) -> Any:
@@ -214,9 +197,8 @@ def space_momenta(chart: str, states: Any) -> tuple[Any, Any]:
 class View:
     """States of one chart, shape (..., dimension), with the momenta p_phi and p_psi that the run showed, shape (...).
 
-    The momenta are needed for the energy alone.
-    Angles are as the chart has them: unbounded in `angles`, modulo a turn elsewhere (`charts.unwrapped` makes them
-    continuous). All quantities have the shape (...), or (..., 3) and (..., 4) for vectors and quaternions.
+    The momenta are for the energy alone. Angles are unbounded in `angles`, and modulo a turn elsewhere (`unwrapped`).
+    All quantities have the shape (...), or (..., 3) and (..., 4) for vectors and quaternions.
     """
 
     chart: str
@@ -292,12 +274,13 @@ class View:
 
 
 READING_SECONDS = 2e-5  # of NumPy beyond what the compiled function takes
+_NONE, _NO_ROOM = np.empty(0), np.empty((2, 0))
 
 
 def _read(
     states: Any, p_psi: Any, cosine: Any, sine: Any, twice: float, excess: float, mgl: float, axis: Any, seen: Any
 ) -> None:
-    """Axes (n, 3), and energies and p_theta in the two rows of `seen`, of states (n, 6 or 7)."""
+    """Axes (n, 3), and energies and p_theta in the two rows of `seen` if it has room, of states (n, 6 or 7)."""
     width = states.shape[1]
     for i in range(len(states)):
         if width == 7:
@@ -306,6 +289,8 @@ def _read(
             axis[i, 0], axis[i, 1], axis[i, 2] = right + right, back + back, w * w - x * x - y * y + z * z
         else:
             axis[i, 0], axis[i, 1], axis[i, 2] = states[i, 0], states[i, 1], states[i, 2]
+        if seen.shape[1] == 0:
+            continue
         a, b, c = states[i, width - 3], states[i, width - 2], states[i, width - 1]
         seen[0, i] = (a * a + b * b + c * c) / twice + 0.5 * (p_psi[i] * p_psi[i]) * excess + mgl * axis[i, 2]
         seen[1, i] = a * cosine[i] + b * sine[i]
@@ -319,17 +304,6 @@ _reader = LazyKernel(
 )
 
 
-def _turn(states: Any, axis: Any) -> None:
-    """Axes (n, 3) of states (n, 7)."""
-    for i in range(len(states)):
-        w, x, y, z = states[i, 0], states[i, 1], states[i, 2], states[i, 3]
-        right, back = x * z + w * y, y * z - w * x
-        axis[i, 0], axis[i, 1], axis[i, 2] = right + right, back + back, w * w - x * x - y * y + z * z
-
-
-_turner = LazyKernel(_turn, "(float64[:, ::1], float64[:, ::1])", patience=1.0)
-
-
 def _compilable(*arrays: Array) -> bool:
     """Are these what a compiled function takes: doubles in a row, which may be written to?"""
     return all(array.dtype == np.float64 and array.flags.carray for array in arrays)
@@ -337,11 +311,10 @@ def _compilable(*arrays: Array) -> bool:
 
 def axes(chart: str, states: Array) -> Array:
     """Unit vectors (n, 3) along the top's axis, of states (n, dimension)."""
-    if chart != "attitude" or not _compilable(states) or not _turner.ready(READING_SECONDS / 3.0):
-        seen: Array = axis_of(chart, states)
-        return seen
+    if chart != "attitude" or not _compilable(states) or not _reader.ready(READING_SECONDS / 3.0):
+        return np.asarray(axis_of(chart, states))
     axis = np.empty((len(states), 3))
-    _turner.compiled(states, axis)
+    _reader.compiled(states, _NONE, _NONE, _NONE, 1.0, 0.0, 0.0, axis, _NO_ROOM)
     return axis
 
 
@@ -363,7 +336,6 @@ UNWRAP_SECONDS = 1e-5  # of NumPy beyond what the compiled function takes, for a
 
 
 def _unwrap(angles: Any, guides: Any, out: Any) -> None:
-    """Continuous angles (rows, n)."""
     for j in range(len(angles)):
         first = angles[j, 0] - guides[j, 0]
         whole = TURN * np.rint(first / TURN)

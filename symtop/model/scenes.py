@@ -1,13 +1,12 @@
 """Scenes: one top, one start, one horizon, and what the scene is there to show.
 
-The horizon and all times are in the units of the top (seconds, if its parameters are SI). Where a start
-follows from a formula, the formula stands beside it.
+The horizon and all times are in the units of the top (seconds, if its parameters are SI).
 """
 
 import functools
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,8 +40,7 @@ NEXT_TO_POLE = 1e-9  # rad; V is not evaluated nearer to a pole, where it has a 
 def horizon_of(value: object) -> float:
     """A horizon; SymtopError for one that is not positive, or so short that a step of it is lost in its last place.
 
-    No parameter or rate is beyond 1e40 (`symtop.model.top`), so that nothing moves in 1e-100. LSODA's own loop, which
-    nothing can interrupt, never ended below 1e-200.
+    No rate is beyond 1e40, so that nothing moves in 1e-100. LSODA's own loop never ends below 1e-200.
     """
     horizon = positive("horizon", value)
     if horizon < SHORTEST:
@@ -54,9 +52,8 @@ def horizon_of(value: object) -> float:
 class Scene:
     """A top, its start and a horizon; `observes` names the smallest thing the scene is watched for.
 
-    ``nutation`` is theta alone, ``axis`` the direction of the axis, ``attitude`` the whole orientation. `units` is "SI"
-    if the parameters are in SI units, and decides the units in datasets. Studies leave out scenes by their `tags`, any
-    of `TAGS`.
+    ``nutation`` is theta alone, ``axis`` the direction of the axis, ``attitude`` the whole orientation. `units` decides
+    the units in datasets. Studies leave out scenes by their `tags`, any of `TAGS`.
     """
 
     name: str
@@ -95,10 +92,9 @@ class Scene:
     def energy_scale(self) -> float:
         """E0 - p_psi^2/2 I3 - min V, what energy errors are divided by: the energy of the nutation, spin excluded.
 
-        V is the effective potential of theta, so that this is the height of the reduced motion above its steady
-        precession; it bounds how far a wrong energy moves the turning points. A steady precession has none. There it is
-        I1 omega^2/2, the energy of a small nutation with an amplitude of one radian: a relative error of the energy is
-        then the square of the amplitude (rad) that it could pay for.
+        This height of the reduced motion above its steady precession bounds how far a wrong energy moves the turning
+        points. A steady precession has none. There it is I1 omega^2/2, the energy of a small nutation with an amplitude
+        of one radian: a relative error is then the square of the amplitude (rad) that it could pay for.
         """
         return _energy_scale(self.top, self.start)
 
@@ -115,14 +111,9 @@ class Scene:
 
     def record(self) -> dict[str, str]:
         """What tables show of this scene, by column."""
-        period = self.nutation_period
-        return {
-            "name": self.name,
-            "horizon (s)": f"{self.horizon:g}",
-            "nutation period (s)": f"{period:.6g}" if math.isfinite(period) else "infinite",
-            "observes": self.observes,
-            "purpose": self.purpose,
-        }
+        period = f"{self.nutation_period:.6g}" if math.isfinite(self.nutation_period) else "infinite"
+        times = {"horizon (s)": f"{self.horizon:g}", "nutation period (s)": period}
+        return {"name": self.name, **times, "observes": self.observes, "purpose": self.purpose}
 
 
 _nutation_period = functools.lru_cache(maxsize=256)(SymmetricTop.nutation_period)
@@ -155,42 +146,40 @@ def closed_form(scene: Scene) -> "ClosedForm":
     return _closed_form(scene.top, scene.start)
 
 
-def spinning(
-    spin: float, precession: float = 0.0, *, name: str = "", purpose: str = "", tags: Iterable[str] = ()
-) -> Scene:
+def spinning(spin: float, precession: float = 0.0) -> Scene:
     """The family over spin: I1 = 2, I3 = 1, mgl = 2, let go at theta = 0.8 with w3 = `spin` and a precession."""
     theta, w3, turn = 0.8, finite("spin", spin), finite("precession", precession)
     start = Angles(theta=theta, phi_dot=turn, psi_dot=w3 - turn * math.cos(theta))
-    words = purpose or f"let go at theta = {theta} with a spin of {w3:g}"
-    return Scene(name or f"spinning-{w3:.12g}", SymmetricTop(2.0, 1.0, 2.0), start, 20.0, words, tags=["family", *tags])
+    purpose = f"let go at theta = {theta} with a spin of {w3:g}"
+    return Scene(f"spinning-{w3:.12g}", SymmetricTop(2.0, 1.0, 2.0), start, 20.0, purpose, tags=["family"])
 
 
-def grazing(delta: float, *, name: str = "", purpose: str = "", tags: Iterable[str] = ()) -> Scene:
+def grazing(delta: float) -> Scene:
     """The family over the gap p_phi - p_psi = `delta`: a fall towards the upper pole that misses it by 1.1 delta.
 
-    I1 = I3 = mgl = p_psi = 1, p_phi = 1 + delta, theta = 1, theta' = -1.2; the horizon is one nutation. The axis passes
-    the pole at abs(theta') of about 1.2, so that the passage lasts about delta and turns phi by half a turn.
+    I1 = I3 = mgl = p_psi = 1, p_phi = 1 + delta, theta = 1, theta' = -1.2; the horizon is one nutation. The passage
+    lasts about delta and turns phi by half a turn.
     """
     gap, theta = finite("delta", delta), 1.0
     cosine = math.cos(theta)
     precession = (gap + 2.0 * math.sin(0.5 * theta) ** 2) / math.sin(theta) ** 2  # (p_phi - p_psi cos) / I1 sin^2
     start = Angles(theta=theta, theta_dot=-1.2, phi_dot=precession, psi_dot=1.0 - precession * cosine)
-    words = purpose or f"passes the upper pole with p_phi - p_psi = {gap:g}"
-    return Scene(name or f"grazing-{gap:.12g}", SymmetricTop(1.0, 1.0, 1.0), start, 4.22, words, tags=["family", *tags])
+    purpose = f"passes the upper pole with p_phi - p_psi = {gap:g}"
+    return Scene(f"grazing-{gap:.12g}", SymmetricTop(1.0, 1.0, 1.0), start, 4.22, purpose, tags=["family"])
 
 
-def sleeping(spin: float, tilt: float = 1e-3, *, name: str = "", purpose: str = "", tags: Iterable[str] = ()) -> Scene:
+def sleeping(spin: float, tilt: float = 1e-3) -> Scene:
     """The family of tops let go almost upright: I1 = I3 = mgl = 1, w3 = `spin`, theta = `tilt`.
 
     The upright top is stable for I3 w3 >= 2 sqrt(I1 mgl), here for spin >= 2; below, a tilt grows at the rate
     sqrt(4 - spin^2)/2 until the top lies at about acos(spin^2/2 - 1), rises again, and so on.
     """
     w3 = finite("spin", spin)
-    words, start = purpose or f"let go almost upright with a spin of {w3:g}", Angles(theta=tilt, psi_dot=w3)
-    return Scene(name or f"sleeping-{w3:.12g}", SymmetricTop(1.0, 1.0, 1.0), start, 60.0, words, tags=["family", *tags])
+    purpose, start = f"let go almost upright with a spin of {w3:g}", Angles(theta=tilt, psi_dot=w3)
+    return Scene(f"sleeping-{w3:.12g}", SymmetricTop(1.0, 1.0, 1.0), start, 60.0, purpose, tags=["family"])
 
 
-def steady(spin: float, *, name: str = "", purpose: str = "", tags: Iterable[str] = ()) -> Scene:
+def steady(spin: float) -> Scene:
     """The family of steady precessions: I1 = 2, I3 = 1, mgl = 2, theta = 60 degrees, w3 = `spin`, the slow branch.
 
     The rate is the smaller root of I1 Omega^2 cos(theta) - I3 w3 Omega + mgl = 0, which needs I3 w3 >= 2 sqrt 2 here.
@@ -199,26 +188,19 @@ def steady(spin: float, *, name: str = "", purpose: str = "", tags: Iterable[str
     momentum, weight = top.I3 * w3, top.I1 * math.cos(theta)
     room = momentum * momentum - 4.0 * weight * top.mgl
     if room < 0.0:
-        raise SymtopError(
-            f"spin must be at least {2.0 * math.sqrt(weight * top.mgl) / top.I3:.6g} to precess steadily, not {w3!r}"
-        )
+        least = 2.0 * math.sqrt(weight * top.mgl) / top.I3
+        raise SymtopError(f"spin must be at least {least:.6g} to precess steadily, not {w3!r}")
     precession = 2.0 * top.mgl / (momentum + math.sqrt(room))
     start = Angles(theta=theta, phi_dot=precession, psi_dot=w3 - precession * math.cos(theta))
-    return Scene(
-        name or f"steady-{w3:.12g}",
-        top,
-        start,
-        20.0,
-        purpose or f"steady precession at a spin of {w3:g}",
-        tags=["family", *tags],
-    )
+    return Scene(f"steady-{w3:.12g}", top, start, 20.0, f"steady precession at a spin of {w3:g}", tags=["family"])
+
+
+def _named(scene: Scene, name: str, purpose: str, *tags: str) -> Scene:
+    return replace(scene, name=name, purpose=purpose, tags=[*scene.tags, *tags])
 
 
 def _separatrix() -> Scene:
-    """Woodhouse, Introduction to Analytical Dynamics, problem 5.3: u = cos theta = 1/(1 + sech g t), g^2 = mgl/I1.
-
-    theta0 = pi/3, phi' = 2g/sqrt 3, psi' = (3 I1 - I3) g/(I3 sqrt 3).
-    """
+    """Woodhouse, Introduction to Analytical Dynamics, problem 5.3: u = cos theta = 1/(1 + sech g t), g^2 = mgl/I1."""
     top = SymmetricTop(2.0, 1.0, 2.0)
     g, root = math.sqrt(top.mgl / top.I1), math.sqrt(3.0)
     start = Angles(math.pi / 3.0, phi_dot=2.0 * g / root, psi_dot=(3.0 * top.I1 - top.I3) * g / (top.I3 * root))
@@ -257,12 +239,12 @@ def _catalogue() -> dict[str, Scene]:
         _goldstein("goldstein", 0.0, "the notebook's second top, released at rest (alpha = 1.4981)"),
         _goldstein("goldstein-falling", -_ALPHA_RATE, f"{printed} falling at first", "repeats"),
         _goldstein("goldstein-rising", _ALPHA_RATE, f"{printed} rising at first", "repeats"),
-        spinning(10.0, name="cusp", purpose="released from rest: the axis comes to rest again at each cusp",
-                 tags=["ordinary", "mild", "repeats"]),
-        spinning(10.0, -0.3, name="loop", purpose="started against its precession: the axis draws loops",
-                 tags=["ordinary", "mild"]),
-        spinning(10.0, 0.1, name="wave", purpose="started along its precession: the axis draws a wave",
-                 tags=["ordinary", "mild", "repeats"]),
+        _named(spinning(10.0), "cusp", "released from rest: the axis comes to rest again at each cusp",
+               "ordinary", "mild", "repeats"),
+        _named(spinning(10.0, -0.3), "loop", "started against its precession: the axis draws loops",
+               "ordinary", "mild"),
+        _named(spinning(10.0, 0.1), "wave", "started along its precession: the axis draws a wave",
+               "ordinary", "mild", "repeats"),
         Scene("fast", usual, Angles(theta=0.5, psi_dot=100.0), 8.0,
               "a very fast spin: 64 small nutations, gravity a perturbation of the free top", tags=["fast"]),
         Scene("steady", usual, Angles(theta=math.pi / 3.0, phi_dot=1.0, psi_dot=2.5), 20.0,
@@ -277,15 +259,14 @@ def _catalogue() -> dict[str, Scene]:
               Angles(theta=math.pi / 2, phi=math.pi, psi=math.pi / 2, phi_dot=-4.61538, psi_dot=150.0), 2.0,
               "a published benchmark that grazes the lower pole at 0.00004 degrees: no place for angles", units="SI",
               tags=["near_pole"]),
-        grazing(1e-3, name="grazing",
-                purpose="passes the upper pole at 0.06 degrees: a step in angles may jump over it",
-                tags=["near_pole", "repeats"]),
-        sleeping(2.5, name="sleeping", purpose="let go almost upright and fast enough to stay there (threshold 2)",
-                 tags=["near_pole", "unstable"]),
-        sleeping(1.9, name="sleeping-unstable", purpose="let go almost upright and too slow: it falls and rises again",
-                 tags=["near_pole", "unstable"]),
-        steady(20.0, name="steady-fast", purpose="steady precession of a fast top: a large step makes it nutate",
-               tags=["fast", "steady"]),
+        _named(grazing(1e-3), "grazing", "passes the upper pole at 0.06 degrees: a step in angles may jump over it",
+               "near_pole", "repeats"),
+        _named(sleeping(2.5), "sleeping", "let go almost upright and fast enough to stay there (threshold 2)",
+               "near_pole", "unstable"),
+        _named(sleeping(1.9), "sleeping-unstable", "let go almost upright and too slow: it falls and rises again",
+               "near_pole", "unstable"),
+        _named(steady(20.0), "steady-fast", "steady precession of a fast top: a large step makes it nutate",
+               "fast", "steady"),
         _separatrix(),
     ]
     # fmt: on
@@ -353,15 +334,11 @@ def start_energies(numbers: Array) -> Array:
     """Total energy of the starts, (n,)."""
     I1, I3, mgl, theta, _, _, theta_dot, phi_dot, psi_dot = numbers.T
     across = theta_dot**2 + (phi_dot * np.sin(theta)) ** 2
-    total: Array = 0.5 * I1 * across + 0.5 * I3 * (psi_dot + phi_dot * np.cos(theta)) ** 2 + mgl * np.cos(theta)
-    return total
+    return np.asarray(0.5 * I1 * across + 0.5 * I3 * (psi_dot + phi_dot * np.cos(theta)) ** 2 + mgl * np.cos(theta))
 
 
 def energy_scales(numbers: Array, theta_range: Array) -> Array:
-    """`Scene.energy_scale` of all, (n,); `theta_range` (n, 2) holds the turning points, rad.
-
-    The lowest place of V lies between the turning points and is found by bisection of its slope.
-    """
+    """`Scene.energy_scale` of all, (n,), by bisection of V' between the turning points, `theta_range` (n, 2) in rad."""
     I1, mgl = numbers[:, 0], numbers[:, 2]
     _, _, north, south = start_momenta(numbers)
     low, high = np.clip(theta_range.T, NEXT_TO_POLE, math.pi - NEXT_TO_POLE)
@@ -371,11 +348,8 @@ def energy_scales(numbers: Array, theta_range: Array) -> Array:
         low, high = np.where(falls, middle, low), np.where(falls, high, middle)
     lowest = 0.5 * (low + high)
     start = np.clip(numbers[:, 3], NEXT_TO_POLE, math.pi - NEXT_TO_POLE)
-    depth = (
-        0.5 * I1 * numbers[:, 6] ** 2
-        + effective_potential(start, north, south, I1, mgl)
-        - effective_potential(lowest, north, south, I1, mgl)
-    )
+    at_start, least = (effective_potential(theta, north, south, I1, mgl) for theta in (start, lowest))
+    depth = 0.5 * I1 * numbers[:, 6] ** 2 + at_start - least
     swing = 0.5 * np.maximum(effective_stiffness(lowest, north, south, I1, mgl), 0.0)
     rounding = STEADY * EPSILON * (np.abs(start_energies(numbers)) + np.abs(mgl))
     kinds = [depth > rounding, swing > rounding, np.abs(mgl) > rounding]

@@ -10,9 +10,8 @@ phi and psi are cyclic, so that ``p_psi = I3 (psi' + phi' cos theta)`` and
 
     V(theta) = (p_phi - p_psi cos theta)^2 / (2 I1 sin^2 theta) + mgl cos theta.
 
-The fraction cancels near a pole. With ``x = theta/2``, ``north = p_phi - p_psi`` (zero if the axis can
-pass theta = 0) and ``south = p_phi + p_psi`` (zero if it can pass theta = pi) it is a sum without
-subtraction, exact to rounding at both poles and free of branches:
+The fraction cancels near a pole. With ``x = theta/2``, ``north = p_phi - p_psi`` (zero if the axis can pass theta = 0)
+and ``south = p_phi + p_psi`` (zero if it can pass theta = pi) it is a sum without subtraction, exact to rounding:
 
     V      = F^2 / (8 I1) + mgl cos theta,      F    = north cot x + south tan x
     V'     = F F' / (4 I1) - mgl sin theta,     F'   = (south / cos^2 x - north / sin^2 x) / 2
@@ -23,11 +22,9 @@ A start may also be a quaternion with an angular velocity w in the body frame, w
 
     theta' = w1 cos psi - w2 sin psi,    phi' sin theta = w1 sin psi + w2 cos psi,    psi' = w3 - phi' cos theta.
 
-At a pole phi and psi are not told apart; psi is then chosen such that w1 sin psi + w2 cos psi vanishes, so that phi' is
-zero and the rates hold all of w.
-
-Units are any consistent set. Source: Goldstein, Classical Mechanics, sections 4.4, 4.9 and 5.7; the half-angle form
-is the partial-fraction split of ``(b - a u)/(1 - u^2)`` that Klein and Sommerfeld use.
+At a pole, where phi and psi are one angle, psi is chosen such that w1 sin psi + w2 cos psi vanishes: phi' is zero and
+the rates hold all of w. Units are any consistent set. Source: Goldstein, Classical Mechanics, sections 4.4, 4.9 and
+5.7; the half-angle form is the partial-fraction split of ``(b - a u)/(1 - u^2)`` that Klein and Sommerfeld use.
 """
 
 import functools
@@ -87,10 +84,7 @@ def _euler_angles(theta: float, total: float, difference: float, rates: Sequence
 
 @inlined
 def effective_force(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
-    """Return ``V'(theta)``, ``phi'`` and ``cos theta``: all that one kick of the reduced top needs.
-
-    Works on floats and on arrays, and compiles as it stands. Costs one sine and one cosine.
-    """
+    """Return ``V'(theta)``, ``phi'`` and ``cos theta``, on floats, on arrays or compiled: all that one kick needs."""
     return half_angle_force(np.sin(0.5 * theta), np.cos(0.5 * theta), north, south, I1, mgl)
 
 
@@ -107,12 +101,9 @@ def half_angle_force(sin_x: Any, cos_x: Any, north: Any, south: Any, I1: Any, mg
 @inlined
 def effective_stiffness(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
     """Return ``V''(theta)``; at a steady precession ``sqrt(V''/I1)`` is the nutation frequency."""
-    sin_x = np.sin(0.5 * theta)
-    cos_x = np.cos(0.5 * theta)
-    up = north / (sin_x * sin_x)
-    down = south / (cos_x * cos_x)
-    tilt = sin_x * cos_x
-    slope = 0.5 * (down - up)
+    sin_x, cos_x = np.sin(0.5 * theta), np.cos(0.5 * theta)
+    up, down = north / (sin_x * sin_x), south / (cos_x * cos_x)
+    tilt, slope = sin_x * cos_x, 0.5 * (down - up)
     bend = 0.5 * (down * sin_x / cos_x + up * cos_x / sin_x)
     return (slope * slope + tilt * (up + down) * bend) / (4.0 * I1) - mgl * (cos_x * cos_x - sin_x * sin_x)
 
@@ -120,8 +111,7 @@ def effective_stiffness(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -
 @inlined
 def effective_potential(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
     """Return ``V(theta)``, without the constant ``p_psi^2 / 2 I3``."""
-    sin_x = np.sin(0.5 * theta)
-    cos_x = np.cos(0.5 * theta)
+    sin_x, cos_x = np.sin(0.5 * theta), np.cos(0.5 * theta)
     lever = north * cos_x / sin_x + south * sin_x / cos_x
     return lever * lever / (8.0 * I1) + mgl * (cos_x * cos_x - sin_x * sin_x)
 
@@ -214,8 +204,8 @@ def flat(top: "SymmetricTop", at: Angles) -> tuple[float, ...]:
 def conserved(top: Any, at: Any) -> Momenta:
     """The conserved momenta of a state; compiles as it stands.
 
-    Products and no powers: Python's ``x**2`` is the power of the C library, which differs from the rounded product in
-    the last place for one double in a thousand, and compiled code forms the product.
+    Products and no powers: Python's ``x**2`` is the power of the C library, which differs in the last place for one
+    double in a thousand, and compiled code forms the product.
     """
     p_psi = top.I3 * (at.psi_dot + at.phi_dot * math.cos(at.theta))
     sin_x, cos_x = math.sin(0.5 * at.theta), math.cos(0.5 * at.theta)
@@ -229,9 +219,8 @@ def conserved(top: Any, at: Any) -> Momenta:
 class SymmetricTop:
     """A rigid body with a fixed point on its axis of symmetry.
 
-    `I1` is the moment of inertia across the axis and `I3` along it, both about the fixed point;
-    `mgl` is mass x gravity x distance of the centre of gravity from that point. ``mgl = 0`` is the free
-    top and ``mgl < 0`` the hanging one. No rigid body has ``I3 > 2 I1``.
+    `I1` is the moment of inertia across the axis and `I3` along it, both about the fixed point; `mgl` is mass x gravity
+    x distance of the centre of gravity from that point: 0 for the free top, below for the hanging one.
     """
 
     I1: float
@@ -243,9 +232,8 @@ class SymmetricTop:
         object.__setattr__(self, "I3", bounded("I3", positive("I3", self.I3), 1.0 / LARGEST))
         object.__setattr__(self, "mgl", bounded("mgl", self.mgl))
         if self.I3 > 2.0 * self.I1:
-            raise SymtopError(
-                f"I3 must be at most 2 I1 (no rigid body exceeds it), not {self.I3!r} with I1 = {self.I1!r}"
-            )
+            words = f"not {self.I3!r} with I1 = {self.I1!r}"
+            raise SymtopError(f"I3 must be at most 2 I1 (no rigid body exceeds it), {words}")
 
     @classmethod
     def from_spheroid(
@@ -254,10 +242,9 @@ class SymmetricTop:
     ) -> "SymmetricTop":  # fmt: skip
         """A solid spheroid; radii along and across its axis.
 
-        With ``pivot_distance=None`` this is the reading of the notebook that the project began with:
-        inertia about the *centre of gravity*, and the polar radius as the lever arm. With a distance
-        the body is hung by a point of its axis that far from its centre, and ``I1`` gains
-        ``mass * pivot_distance^2`` (Huygens-Steiner).
+        Without a `pivot_distance`, inertia is about the *centre of gravity* and the polar radius is the lever arm, as
+        in the notebook that the project began with. With one the body is hung by a point of its axis that far from its
+        centre, and ``I1`` gains ``mass * pivot_distance^2`` (Huygens-Steiner).
         """
         mass = positive("mass", mass)
         polar = positive("polar_radius", polar_radius)
@@ -286,9 +273,9 @@ class SymmetricTop:
         return cls(across + mass * arm * arm, axial, mass * not_negative("gravity", gravity) * arm)
 
     def spheroid_radii(self, mass: float) -> tuple[float, float]:
-        """Polar and equatorial radius of the solid spheroid that has this inertia about its centre.
+        """Polar and equatorial radius of the solid spheroid of `from_spheroid` without a pivot distance.
 
-        The way back of `from_spheroid` without a pivot distance. Raises SymtopError where there is no such body.
+        Raises SymtopError where there is no such body.
         """
         square = 5.0 * self.I3 / (2.0 * positive("mass", mass))
         rest = 5.0 * self.I1 / mass - square
@@ -326,10 +313,6 @@ class SymmetricTop:
         """The inclination at which these momenta precess steadily: the minimum of V."""
         return _steady_theta(self, momenta)
 
-    def _sleeps(self, through: float, mgl: float) -> bool:
-        """Is the pole that these momenta allow a minimum of V? `through` is 2 I3 w3 there."""
-        return through * through >= 16.0 * self.I1 * mgl
-
     def nutation_frequency(self, momenta: Momenta) -> float:
         """Angular frequency of small nutations about the steady precession with these momenta."""
         theta = self.steady_theta(momenta)
@@ -343,8 +326,7 @@ class SymmetricTop:
     def turning_cosines(self, at: Angles) -> tuple[float, float]:
         """The two values of cos(theta) between which this motion nutates, lower one first.
 
-        They are the roots in [-1, 1] of ``(1-u^2)(alpha - beta u) - (b - a u)^2`` to about 1e-14, or 1e-8 where
-        the two coincide; `symtop.model.exact.closed_form` has them to any precision.
+        The roots in [-1, 1] of ``(1-u^2)(alpha - beta u) - (b - a u)^2`` to 1e-14, or 1e-8 where the two coincide.
         """
         return turning_cosines(self, at)
 
@@ -367,9 +349,10 @@ def nutation_cubic(top: Any, at: Any) -> tuple[float, float, float, float]:
 @functools.lru_cache(maxsize=1024)
 def _steady_theta(top: SymmetricTop, momenta: Momenta) -> float:
     """The minimum of V, kept: the guard, the scale of the energy and the landmarks of a new start ask for one."""
-    if momenta.north == 0.0 and top._sleeps(momenta.south, top.mgl):
+    # a pole that these momenta allow is a minimum of V if (2 I3 w3)^2 >= 16 I1 mgl there
+    if momenta.north == 0.0 and momenta.south * momenta.south >= 16.0 * top.I1 * top.mgl:
         return 0.0
-    if momenta.south == 0.0 and top._sleeps(momenta.north, -top.mgl):
+    if momenta.south == 0.0 and momenta.north * momenta.north >= 16.0 * top.I1 * -top.mgl:
         return math.pi
     below, above = 1e-9, math.pi - 1e-9
     if top.potential_slope(below, momenta) >= 0.0:  # the minimum is closer to the pole than anyone can tell

@@ -17,9 +17,7 @@ import numpy as np
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home
-from symtop.judging.findings import Finding, claim_name
-from symtop.judging.judge_step import StepLedger
-from symtop.judging.text_report import description
+from symtop.judging.findings import Finding, StepLedger, claim_name, description
 from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels
 
 LEAST = 1e-17  # what is smaller is drawn here
@@ -36,7 +34,7 @@ def figures(ledger: StepLedger) -> tuple[Any, Any]:
     return first, second
 
 
-def _drawn(figure: Any) -> str:
+def _as_svg(figure: Any) -> str:
     """A figure as SVG, from its opening tag on."""
     drawn = io.StringIO()
     figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
@@ -108,7 +106,7 @@ def card(ledger: StepLedger, path: str | Path) -> Path:
         scene=ledger.scene,
         described=description(ledger.findings),
         badge=badge(ledger),
-        drawings=[_drawn(figure) for figure in figures(ledger)],
+        drawings=[_as_svg(figure) for figure in figures(ledger)],
         rows=[_row(one) for one in ledger.findings if one.declared or one.verdict != "inapplicable"],
     )
     return _written(text, path)

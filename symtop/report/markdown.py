@@ -38,13 +38,13 @@ def opening(study: Mapping[str, Any], titles: Mapping[str, str]) -> str:
     if not first:
         return ""
     answer = "\n".join(f"- {sentence}" for sentence in first["sentences"])
-    words = "\n".join(f"- {name}: {meaning}" for name, meaning in glossary(spoken(study)))
+    words = "\n".join(f"- {name}: {meaning}" for name, meaning in glossary(sentences(study)))
     parts = [f"## {first['question']}", answer, table(first["table"]["header"], first["table"]["rows"]), words]
     links = [f"[{words}](#{titles[name].lower().replace(' ', '-')})" for name, words in explanations(study, titles)]
     return "\n\n".join(filter(None, [*parts, f"More: {'; '.join(links)}."] if links else parts))
 
 
-def spoken(study: Mapping[str, Any]) -> str:
+def sentences(study: Mapping[str, Any]) -> str:
     """All words of a study's answer, with those of its table."""
     first = study["opening"]
     cells = [*first["table"]["header"], *(cell for row in first["table"]["rows"] for cell in row)]

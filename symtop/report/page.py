@@ -16,11 +16,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from symtop.core import netcdf
 from symtop.core.errors import SymtopError
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.report import markdown, method, tables
+from symtop.report.sources import report_files, report_hash
 from symtop.report.style import look
-from symtop.runner import manifest, plugins, run as runner, store
+from symtop.run import plugins
+from symtop.runner import manifest, run as runner
 
 WORDS = "report.md"
 TITLE = "Integrators on the heavy symmetric top"
@@ -35,6 +38,7 @@ ROWS = (
 )
 KINDS = {".png": "image/png", ".gif": "image/gif"}
 LONGEST_ANCHOR = 60  # letters
+MATHML = "http://www.w3.org/1998/Math/MathML"
 
 
 def prepared(chart: Mapping[str, Any]) -> str:
@@ -82,7 +86,7 @@ def gather(results: Path, *, embed: bool = False) -> list[dict[str, Any]]:
     studies, gathered = list(runner.names()), []
     others = sorted({file.stem for file in results.glob("*.json")} - set(studies))
     for name in [*studies, *others]:
-        findings = store.read_json(results / f"{name}.json")
+        findings = netcdf.read_json(results / f"{name}.json")
         if findings is None or (name in others and not (isinstance(findings, dict) and "pictures" in findings)):
             continue
         try:
@@ -137,7 +141,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
         loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    made_of, sources = manifest.report_hash(results, embed=embed), manifest.report_files(results)
+    made_of, sources = report_hash(results, embed=embed), report_files(results)
     studies = gather(results, embed=embed)
     _named(studies)
     titles = {study["study"]: study["title"] for study in studies}
@@ -155,10 +159,10 @@ def write(results: Path, *, embed: bool = False) -> Path:
         scripts=[(templates / name).read_text(encoding="utf-8") for name in ("page.js", "chart.js")],
         studies=studies,
         answer=first,
-        glossary=method.glossary(markdown.spoken(first)) if first else [],
+        glossary=method.glossary(markdown.sentences(first)) if first else [],
         leads=[(study, picture) for study in studies for picture in study["pictures"] if picture["lead"]],
         measured=measured,
-        mathml=lambda formula: convert(formula, display="block"),
+        mathml=lambda formula: convert(formula, display="block").replace(f' xmlns="{MATHML}"', ""),  # HTML needs none
         explanations=lambda study: markdown.explanations(study, titles),
         integrators=tables.columns([method.record() for method in integrators().values()]),
         provenance=facts,
@@ -166,9 +170,9 @@ def write(results: Path, *, embed: bool = False) -> Path:
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
     )
     target = results / manifest.PAGE
-    store.write_text(target, text)
+    netcdf.write_text(target, text)
     opening = ["# " + TITLE, INTRODUCTION, *(markdown.opening(study, titles) for study in studies), ROWS]
     opening.append(markdown.measured(measured))
-    store.write_text(results / WORDS, markdown.page(studies, opening, facts))
+    netcdf.write_text(results / WORDS, markdown.page(studies, opening, facts))
     manifest.note(results, manifest.PAGE, "" if plugins.loaded() else made_of, [target, results / WORDS, *sources])
     return target

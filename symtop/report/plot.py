@@ -13,10 +13,10 @@ import numpy as np
 import xarray as xr
 
 from symtop.core.errors import SymtopError, at_home, one_of
-from symtop.measure import spread
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES, errors
 from symtop.model.scenes import Scene
+from symtop.report import spread
 from symtop.report.style import (
     BLACK,
     BLUE,
@@ -188,7 +188,7 @@ def draw_ensemble(members: xr.Dataset, data: xr.Dataset, path: str | Path) -> No
 
 
 def _bands(axis: Any, members: xr.Dataset, data: xr.Dataset, quantity: str) -> None:
-    """Quantiles over members of an error against time, on one Axes, at places of `symtop.measure.spread.at_places`.
+    """Quantiles over members of an error against time, on one Axes, at places of `symtop.report.spread.at_places`.
 
     Errors beyond `MOST` are drawn there: angles do not exceed pi, and a quantile of runs that failed is named so. Where
     all members have as many steps a nutation, a sample at a whole nutation is one for all of them, and energy errors

@@ -17,7 +17,6 @@ Source: Hairer, Lubich, Wanner, Geometric Numerical Integration,
 sections I.5 and X.4 (stability, resonance); Arnold, Mathematical Methods of Classical Mechanics, appendix 7.
 """
 
-import functools
 import math
 from typing import NamedTuple
 
@@ -32,10 +31,10 @@ from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
 
 NUDGE = 1e-6  # rad: nonlinear terms are 1e-12 of the linear ones, rounding 1e-10
-SINGLE_NUDGE = 1e-3  # rad, of a method in single precision: rounding is 1e-4
-BEGUN = 4  # strides before those that are compared: a multistep method has begun by then
+SINGLE_NUDGE, SINGLE_EPSILON = 1e-3, 2.0**-23  # rad, of a method in single precision; the spacing of its numbers at 1
+WARM_UP = 4  # strides before those that are compared: a multistep method has its start behind it by then
 ROUNDING = 32.0 * EPSILON  # of an inclination after some steps, rad
-LEFT, LEFT_OUT = 2e-3, 5e-4  # of the difference that the recurrence may leave; of a method that leaves out a term: less
+RESIDUAL, RESIDUAL_WITHOUT_ORDER = 2e-3, 5e-4  # of the recurrence, relative; less of a method that leaves out a term
 STRIDE = 0.5  # rad of nutation between two places of a recurrence of `nutation_growth`
 SLOWEST = 1e-6  # growth of a step below which rounding adds up for a million of them
 LONG = 120  # strides that a difference is followed which obeys no recurrence of two terms
@@ -80,9 +79,6 @@ class Trace(NamedTuple):
 NO_TRACE = Trace(math.nan, math.nan, math.nan)
 
 
-_standing = functools.lru_cache(maxsize=256)(SymmetricTop.steady_theta)
-
-
 def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None) -> Trace:
     """The trace of the map of one step h at the method's fixed point next to the steady precession of these momenta.
 
@@ -90,7 +86,7 @@ def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None) 
     """
     top, momenta = scene.top, scene.top.momenta(scene.start)
     chart = chart or method.chart_for("axis")
-    theta, moved = _standing(top, momenta), math.inf
+    theta, moved = top.steady_theta(momenta), math.inf
     for _ in range(ROUNDS):
         if not 1e-3 < theta < math.pi - 1e-3:
             return NO_TRACE
@@ -132,44 +128,34 @@ class Growth(NamedTuple):
     size: float  # rad, of what the method adds to them: its own offset from the steady precession, and its rounding
 
 
-UNKNOWN = Growth(math.nan, 0.0)
-
-
 def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, frequency: float) -> Growth:
     """By what a method multiplies small nutations about the steady precession of these momenta in a step.
 
     It need not be symmetric. Two starts on both sides of the steady precession are stepped, and their difference obeys
-    delta_{k+1} = t delta_k - d delta_{k-1}: what both drift by in a step, `trace` takes for growth (0.6 % in a step of
-    1/17 nutation of `commutator-free-4`, which neither grows nor shrinks), and what is even in the distance cancels.
-    Beside a pole the difference is that of e_x + i e_y, and t and d are complex. Some steps of a fine h are one of the
-    recurrence, so that it turns by a good part of a radian; `frequency` is that of small nutations. Where the
-    difference does not obey it (a method with more roots than two, say), its size is followed for longer. Rounding
-    comes anew in every step and adds up, as a random walk, until what came first has grown by e.
+    delta_{k+1} = t delta_k - d delta_{k-1}: what both drift by in a step, which `trace` takes for growth, and what is
+    even in the distance cancels. Beside a pole the difference is that of e_x + i e_y, and t and d are complex. Some
+    steps of a fine h are one of the recurrence, so that it turns by a good part of a radian; `frequency` is that of
+    small nutations. Where the difference does not obey it (a method with more roots than two, say), its size is
+    followed for longer. Rounding of each step adds up, as a random walk, until that of the first has grown by e.
     """
-    stride = _stride(method, h, frequency)
+    stride = max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))  # steps
     runs, delta, off = _apart(method, scene, h, chart, NUDGE, stride)
+    nudge, rounding, places = NUDGE, EPSILON, runs[0].states[1:, :3]
     with np.errstate(over="ignore"):  # of a run that has blown up
-        single = chart != "angles" and bool(
-            (runs[0].states[:, :3].astype(np.float32) == runs[0].states[:, :3])[1:].all()
-        )
-    nudge, rounding = (SINGLE_NUDGE, float(np.finfo(np.float32).eps)) if single else (NUDGE, EPSILON)
+        single = chart != "angles" and bool((places.astype(np.float32) == places).all())
     if single:
+        nudge, rounding = SINGLE_NUDGE, SINGLE_EPSILON
         delta, off = _apart(method, scene, h, chart, nudge, stride)[1], 0.0
-    factor = _root(delta, LEFT if method.order else LEFT_OUT)
+    factor = _root(delta, RESIDUAL if method.order else RESIDUAL_WITHOUT_ORDER)
     if math.isnan(factor) and method.order:
         long = np.abs(_apart(method, scene, h, chart, nudge, stride, LONG)[1])
         third = long.size // 3
         with np.errstate(all="ignore"):
             factor = float(np.max(long[-third:]) / np.max(long[:third])) ** (1.0 / (2 * third))
     if not math.isfinite(factor):
-        return UNKNOWN
+        return Growth(math.nan, 0.0)
     factor **= 1.0 / stride
     return Growth(factor, off + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), SLOWEST)))
-
-
-def _stride(method: Integrator, h: float, frequency: float) -> int:
-    """Steps between two places of a recurrence."""
-    return max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))
 
 
 def _apart(
@@ -177,21 +163,21 @@ def _apart(
 ) -> tuple[list[Run], np.ndarray, float]:
     """Two runs at a distance of two nudges, half their difference every `stride` steps, how far off their middle is."""
     top, momenta = scene.top, scene.top.momenta(scene.start)
-    theta = _standing(top, momenta)
+    theta = top.steady_theta(momenta)
     beside = chart != "angles" and min(theta, math.pi - theta) < 10.0 * nudge
     if beside:
         tilt, spin = math.pi - nudge if theta > 1.0 else nudge, momenta.p_psi / top.I3
         pair = [Angles(tilt, phi, psi_dot=spin) for phi in (0.0, math.pi)]
     else:
         pair = [with_momenta(top, min(max(theta + side, nudge), math.pi - nudge), momenta) for side in (nudge, -nudge)]
-    runs = [few_steps(method, chart, top, at, h, (count + BEGUN) * stride) for at in pair]
+    runs = [few_steps(method, chart, top, at, h, (count + WARM_UP) * stride) for at in pair]
     with np.errstate(all="ignore"):
         if beside:
             one, other = (axis[:, 0] + 1j * axis[:, 1] for axis in (axis_of(chart, run.states) for run in runs))
         else:
             one, other = (np.asarray(View(chart, top, run.states).theta) for run in runs)
         off = 0.0 if beside else float(np.max(np.abs(0.5 * (one + other) - theta)))
-        return runs, 0.5 * (one - other)[BEGUN * stride :: stride], off
+        return runs, 0.5 * (one - other)[WARM_UP * stride :: stride], off
 
 
 def _root(delta: np.ndarray, left_over: float) -> float:

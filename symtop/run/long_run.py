@@ -2,12 +2,11 @@
 
 A run is cut into windows: logarithmic in time, `PER_DECADE` a decade, until they would be longer than `LONGEST`
 steps. In each, `SAMPLES` samples are taken at whole steps that the golden ratio scatters, so that no stride is
-commensurate with the nutation; of every quantity the least, the largest and the mean are kept, and the samples are
-thrown away. Between samples there is the compiled loop alone.
+commensurate with the nutation; of every quantity the least, the largest and the mean remain.
 
 After a window the position of the run, all that its next step depends on, can be written to a checkpoint: whole or not
-at all, at most every `SAVE` seconds, and on an interrupt. A run that finds its checkpoint goes on from there. Where
-windows end is fixed by the number of steps alone, so that a resumed run has the bits of one that was never stopped.
+at all, at most every `SAVE` seconds, and on an interrupt. Where windows end is fixed by the number of steps alone, so
+that a run that goes on from its checkpoint has the bits of one that was never stopped.
 """
 
 import contextlib
@@ -30,8 +29,7 @@ from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
 from symtop.core.progress import beating
 from symtop.core.signals import ending_on_sigterm
-from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.loop import Loop, Position
+from symtop.methods.framework.loop import FixedStep, Loop, Position, inside
 from symtop.methods.framework.plan import OK, OUTCOMES, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.charts import View
@@ -81,38 +79,37 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     """Relative changes of energy, modified energy and momenta since the start, and theta, of any samples of a run.
 
     The oscillation that the modified energy leaves is fitted on the first `FIRST` steps, which are run here. States are
-    the loop's own, or, where they are `shown`, those of the chart. The energy is that of the momenta that the run shows
-    unless the method keeps them: then those of the start have more digits.
+    the loop's own, or, where `shown`, those of the chart. The energy is that of the momenta that the run shows unless
+    the method conserves them: then those of the start have more digits.
     """
     chart, solver = chart_of(method)
     par, rule, state = solver.setup(scene.top, scene.start, h)
     assert isinstance(solver.loop, Loop)  # noqa: S101
     energy_unit, momentum_unit, start = scene.energy_scale, scene.momentum_scale, scene.top.momenta(scene.start)
 
+    conserved = {"p_phi", "p_psi"} <= set(method.conserves or ())
+
     def presented(states: Array) -> Array:
         return states if solver.present is None else solver.present(par, np.zeros(len(states)), states)
 
-    kept = {"p_phi", "p_psi"} <= set(method.conserves or ())
+    def energies(states: Array, momenta: Array) -> tuple[Array, Array]:
+        used = None if conserved else momenta
+        plain = modified.energy(scene, chart, states, used)
+        return plain, modified.modified_energy(scene, method, chart, states, h, used)
 
-    def with_momenta(momenta: Array) -> Array | None:
-        return None if kept else momenta
-
-    begun = solver.loop(par, rule, state, h, scattered(0, FIRST, 8 * SAMPLES))
-    first, ahead = presented(begun.states), begun.momenta
-    ran = np.isfinite(first).all(axis=1) & np.isfinite(ahead).all(axis=1)  # a run may fail in its first steps
+    head = solver.loop(par, rule, state, h, scattered(0, FIRST, 8 * SAMPLES))
+    first, momenta = presented(head.states), head.momenta
+    ran = np.isfinite(first).all(axis=1) & np.isfinite(momenta).all(axis=1)  # a run may fail in its first steps
     at_start, given = presented(solver.loop(par, rule, state, h, np.array([0])).states), np.array([start[:2]])
-    first, ahead = (first[ran], ahead[ran]) if ran.any() else (at_start, given)
-    energy_start = float(modified.energy(scene, chart, at_start, with_momenta(given))[0])
-    curve = modified.oscillation(
-        *modified.section(chart, first), modified.modified_energy(scene, method, chart, first, h, with_momenta(ahead))
-    )
+    first, momenta = (first[ran], momenta[ran]) if ran.any() else (at_start, given)
+    energy_start = float(energies(at_start, given)[0][0])
+    curve = modified.oscillation(*modified.section(chart, first), energies(first, momenta)[1])
 
     def gauge(states: Array, momenta: Array, *, shown: bool = False) -> dict[str, Array]:
         states = states if shown else presented(states)
-        seen = with_momenta(momenta)
-        values = modified.modified_energy(scene, method, chart, states, h, seen)
+        energy, values = energies(states, momenta)
         return {
-            "energy": (modified.energy(scene, chart, states, seen) - energy_start) / energy_unit,
+            "energy": (energy - energy_start) / energy_unit,
             "modified_energy": curve.rest(*modified.section(chart, states), values) / energy_unit,
             "p_phi": (momenta[:, 0] - start.p_phi) / momentum_unit,
             "p_psi": (momenta[:, 1] - start.p_psi) / momentum_unit,
@@ -146,51 +143,50 @@ def long_run(
     assert isinstance(solver.loop, Loop)  # noqa: S101
     loop = solver.loop if compensated else solver.loop.plain()
     par, rule, state = solver.setup(chosen.top, chosen.start, h)
-    book = _Book(checkpoint, _identity(chosen, method, h, count, compensated))
-    result = None if output is None else book.apart(file_path("output", output))
-    at, rows = book.resumed(loop.begun(par, rule, state, h))
-    ends, outcome, reached = windows(count), OK, at.k
+    checkpoints = _Checkpoint(checkpoint, _identity(chosen, method, h, count, compensated))
+    result = None if output is None else checkpoints.checked(file_path("output", output))
+    at, rows = checkpoints.resumed(loop.start(par, rule, state, h))
+    ends, outcome, reached, title = windows(count), OK, at.k, f"{method.name} on {chosen.name}"
     gauge = watch(chosen, method, h) if len(rows) < len(ends) else None
-    with book.kept():
-        with beating(tqdm(total=count, initial=at.k, desc=f"{method.name} on {chosen.name}", unit="step",
-                          unit_scale=True, disable=quiet or None, leave=False)) as bar:  # fmt: skip
+    bar = tqdm(total=count, initial=at.k, desc=title, unit="step", unit_scale=True, disable=quiet or None, leave=False)
+    with checkpoints.saved_on_failure():
+        with beating(bar):
             while gauge is not None and len(rows) < len(ends) and outcome == OK:
-                done, after = loop.advance(par, rule, at, h, scattered(at.k, ends[len(rows)]))
-                outcome, reached = done.outcome, after.k
+                stretch, after = loop.advance(par, rule, at, h, scattered(at.k, ends[len(rows)]))
+                outcome, reached = stretch.outcome, after.k
                 if outcome == OK:
-                    rows.append(summary(gauge(done.states, done.momenta)))
+                    rows.append(summary(gauge(stretch.states, stretch.momenta)))
                     bar.update(after.k - at.k)
                     at = after
-                    book.note(at, rows)
+                    checkpoints.note(at, rows)
         data = netcdf.describe(
-            _windowed(rows, ends), title=f"{method.name} on {chosen.name}, {count} steps", units=chosen.units,
-            integrator=method.name, scene=chosen.name, step_size=h, horizon=count * h,
-            compensated=str(compensated).lower(), outcome=OUTCOMES[outcome],
-            outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h), reached_time=reached * h,
+            _windowed(rows, ends), title=f"{title}, {count} steps", units=chosen.units, integrator=method.name,
+            scene=chosen.name, step_size=h, horizon=count * h, compensated=str(compensated).lower(),
+            outcome=OUTCOMES[outcome], outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h),
+            reached_time=reached * h,
         )  # fmt: skip
         if result is not None:
-            book.write(data, result)
-    book.close()
+            checkpoints.write(data, result)
+    checkpoints.close()
     return data
 
 
 def _windowed(rows: list[list[float]], ends: list[int]) -> xr.Dataset:
-    """What was seen in each window, and where it ends."""
+    """The dataset of the windows."""
     columns = np.array(rows).reshape(len(rows), len(QUANTITIES), 3)
     variables: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
     for i, name in enumerate(QUANTITIES):
         words, units = ("theta", "rad") if name == "theta" else (f"relative change of {name} since the start", "1")
         for m, part in enumerate(("least", "largest", "mean")):
-            told = {"long_name": f"{words}, {part} over the window", "units": units}
-            variables[f"{name}_{part}"] = ("window", columns[:, i, m], told)
+            attributes = {"long_name": f"{words}, {part} over the window", "units": units}
+            variables[f"{name}_{part}"] = ("window", columns[:, i, m], attributes)
     return xr.Dataset(variables)
 
 
 def summary(values: dict[str, Array]) -> list[float]:
     """Least, largest and mean of each quantity, in their order."""
-    return [
-        float(part) for name in QUANTITIES for part in (values[name].min(), values[name].max(), values[name].mean())
-    ]
+    chosen = [values[name] for name in QUANTITIES]
+    return [float(part) for value in chosen for part in (value.min(), value.max(), value.mean())]
 
 
 def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:
@@ -199,11 +195,9 @@ def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensate
     Code counts as it is compiled (`symtop.core.code_hash`), so that a checkpoint outlives a comment.
     """
     numbers = [[getattr(record, name) for name in record.__slots__] for record in (scene.top, scene.start)]
-    made = code_of((method, watch, windows, scattered, summary))
-    return digest({
-        **by_file(made),
-        "numbers": hashed(json.dumps([numbers, h, steps, compensated, FIRST, PER_DECADE, LONGEST, SAMPLES])),
-    })  # fmt: skip
+    settings = [numbers, h, steps, compensated, FIRST, PER_DECADE, LONGEST, SAMPLES]
+    made = by_file(code_of((method, watch, windows, scattered, summary)))
+    return digest(made | {"numbers": hashed(json.dumps(settings))})
 
 
 def leaves(carry: Any) -> list[float]:
@@ -224,31 +218,26 @@ def regrown(carry: Any, values: Iterator[float]) -> Any:
     return next(values)
 
 
-class _Book:
-    """The checkpoint of one run: what was done so far, on disk from time to time."""
+class _Checkpoint:
+    """The windows of one run so far, on disk from time to time."""
 
     def __init__(self, file: "str | Path | bool", identity: str) -> None:
-        own = cache_root() / "runs" / f"{identity}.nc"
-        self.own = file is True
-        if not isinstance(file, bool) and file_path("checkpoint", file).is_dir():
-            raise SymtopError(f"checkpoint must be a file, not the folder {str(file)!r}", "checkpoint")
-        self.file = own if file is True else None if file is False else file_path("checkpoint", file)
-        self.identity = identity
-        self.saved = time.monotonic()
+        self.own, self.identity, self.saved = file is True, identity, time.monotonic()
+        self.file = cache_root() / "runs" / f"{identity}.nc" if self.own else None
+        if not isinstance(file, bool):
+            self.file = file_path("checkpoint", file)
+            if self.file.is_dir():
+                raise SymtopError(f"checkpoint must be a file, not the folder {str(file)!r}", "checkpoint")
         self.latest: tuple[Position, list[list[float]]] | None = None
 
     def resumed(self, start: Position) -> tuple[Position, list[list[float]]]:
         """The position and the windows to go on from: those on disk, or the start."""
-        if self.file is None or not self.file.is_file():
-            return start, []
-        data = self._read(self.file)
+        data = self._read(self.file) if self.file is not None and self.file.is_file() else None
         if data is None:
             return start, []
         if data.attrs.get("identity") != self.identity:
-            raise SymtopError(
-                f"checkpoint {self.file} belongs to another run or version; remove it or name another file",
-                "checkpoint",
-            )
+            words = "belongs to another run or version; remove it or name another file"
+            raise SymtopError(f"checkpoint {self.file} {words}", "checkpoint")
         values = iter([float(value) for value in data["position"].values])
         state, low = (tuple(next(values) for _ in start.state) for _ in range(2))
         at = Position(state, low, regrown(start.carry, values), int(data["steps_done"]))
@@ -288,7 +277,7 @@ class _Book:
         self.saved, self.latest = time.monotonic(), None
 
     @contextlib.contextmanager
-    def kept(self) -> Iterator[None]:
+    def saved_on_failure(self) -> Iterator[None]:
         """A run that is ended early, by an interrupt, SIGTERM or an error, leaves a checkpoint."""
         with ending_on_sigterm():
             try:
@@ -297,14 +286,13 @@ class _Book:
                 self.save()
                 raise
 
-    def apart(self, output: Path) -> Path:
+    def checked(self, output: Path) -> Path:
         """The file for the result, refused if it is a folder or the checkpoint, which is removed at the end."""
         if output.is_dir():
             raise SymtopError(f"output must be a file, not the folder {str(output)!r}", "output")
         if self.file is not None and output.absolute() == self.file.absolute():
-            raise SymtopError(
-                f"output and checkpoint must be two files, not both {str(output)!r}", "output", "checkpoint"
-            )
+            words = f"output and checkpoint must be two files, not both {str(output)!r}"
+            raise SymtopError(words, "output", "checkpoint")
         check_replaceable(output)
         return output
 

@@ -9,12 +9,11 @@ it come off. The first is known in closed form, for kick-drift-kick splittings H
     midpoint              H - h^2 (p^2 V''/I1^2 + V'^2 / I1) / 24
     cayley                exactly conserved: `splitting_space.cayley_energy` / I1
 
-and leaves C h^4 (nothing for cayley). Each form stands with its kernel family and is a field of the record,
-`Integrator.modified_energy`. The second is whatever remains: the motion has one degree of freedom, a
-symplectic map stays on a closed curve of its (theta, p_theta), or of (u, u') with u = cos(theta), and any function of
-the state is on that curve a periodic function of the angle about its middle. A Fourier series in that angle, fitted to
-the first nutations of a run, takes it off to 5e-17, which is the rounding of one sample; only what moves the curve
-remains, and the mean of 512 samples shows 2e-18 of it.
+and leaves C h^4 (nothing for cayley); each form is the field `Integrator.modified_energy`. The second is whatever
+remains: the motion has one degree of freedom, a symplectic map stays on a closed curve of its (theta, p_theta), or of
+(u, u') with u = cos(theta), and any function of the state is on that curve a periodic function of the angle about its
+middle. A Fourier series in that angle, fitted to the first nutations of a run, takes it off to 5e-17, which is the
+rounding of one sample; only what moves the curve remains, and the mean of 512 samples shows 2e-18 of it.
 Source of the first layer: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
 """
 
@@ -65,8 +64,8 @@ def section(chart: str, states: Array) -> tuple[Array, Array]:
 class Oscillation(NamedTuple):
     """A periodic function of the angle about the middle of a closed curve: a level and a Fourier series.
 
-    The level comes in two parts, a large number and what is missing from it. Rounded to one double it would be wrong
-    by up to half a unit in its last place in every window of a run: 3.5e-17 (root mean square) was seen.
+    The level comes in two parts, a large number and what is missing from it: rounded to one double it would be wrong by
+    up to half a unit in its last place in every window of a run.
     """
 
     centre: float

@@ -1,16 +1,15 @@
 """simulate(): one scene, one integrator, one step or tolerance -> one dataset.
 
-Samples never bend the step: a fixed-step run has h = T/N exactly and is sampled at whole steps, t = k h. Samples
-are uniform unless they would fall on the same few phases of the nutation again and again (an energy error
-that is sampled at multiples of the nutation period reads 1e5 times too small); then they are dithered by the
-golden ratio, and the dataset says so.
+Samples never bend the step: a fixed-step run has h = T/N exactly and is sampled at whole steps, t = k h. Samples are
+uniform unless they would fall on the same few phases of the nutation again and again (where an energy error may read
+1e5 times too small); then they are dithered by the golden ratio, and the dataset says so.
 """
 
 import functools
 import math
 import warnings
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -151,26 +150,25 @@ def simulate(
     ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows every step. A whole number of
     steps fills the horizon, the one nearest to horizon/step_size: the attribute ``step_size`` is the step made.
 
-    Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a
-    large error is expected; the run is the same either way. Give a function to be handed the sentence instead, or
-    False for no warning. `budget` is the most steps of a fixed-step run
-    (`MOST_STEPS` by default; more are refused) and the most force evaluations, or Taylor steps, of an adaptive one,
-    which then ends `out_of_budget` (by default after about half a minute).
+    Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
+    error is expected; the run is the same either way. Give a function to be handed the sentence instead, or False for
+    no warning. `budget` is the most steps of a fixed-step run (`MOST_STEPS` by default; more are refused) and the most
+    force evaluations, or Taylor steps, of an adaptive one, which then ends `out_of_budget`.
 
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
     heard = guard if callable(guard) else _warn if boolean("guard", guard) else None
-    run = _prepared(scene, integrator, step_size, tolerance, horizon, samples, observe, budget)
-    trajectory, caution = _guarded(run, heard)
-    chosen, method, plan = run.scene, run.method, run.plan
+    given = scene, integrator, step_size, tolerance, horizon, samples, observe, budget
+    chosen, method, chart, plan, dithered = _prepared(*given)
+    trajectory, caution = _guarded(chosen, method, chart, plan, heard)
     data = dataset(trajectory.time, trajectory.columns, chosen.units)
     data.attrs = netcdf.attributes_of(
-        f"{method.name} on {chosen.name}", integrator=method.name, scene=chosen.name, chart=run.chart,
+        f"{method.name} on {chosen.name}", integrator=method.name, scene=chosen.name, chart=chart,
         implementation=method.implementation, horizon=plan.horizon, step_size=plan.step_size, tolerance=plan.tolerance,
         steps=trajectory.steps, force_evaluations=trajectory.force_evaluations,
         newton_iterations=trajectory.newton_iterations, outcome=trajectory.outcome,
         outcome_message=sentence(trajectory.outcome, trajectory.reached_time, plan.horizon),
-        reached_time=trajectory.reached_time, guard=caution, sampling="dithered" if run.dithered else "uniform",
+        reached_time=trajectory.reached_time, guard=caution, sampling="dithered" if dithered else "uniform",
         top=_json(chosen.top), start=_json(chosen.start),
     )  # fmt: skip
     return data
@@ -181,36 +179,28 @@ def integrate(
     **settings: Any,
 ) -> Trajectory:  # fmt: skip
     """The run of `simulate` as plain arrays; without a function for the sentence there is no guard."""
-    return _guarded(_prepared(scene, integrator, **settings), guard)[0]
-
-
-class _Run(NamedTuple):
-    """A run that has not begun: what a solver is called with, and whether its samples are dithered."""
-
-    scene: Scene
-    method: Integrator
-    chart: str
-    plan: Plan
-    dithered: bool
+    chosen, method, chart, plan, _ = _prepared(scene, integrator, **settings)
+    return _guarded(chosen, method, chart, plan, guard)[0]
 
 
 def _prepared(
     scene: "str | Scene", integrator: "str | Integrator", step_size: object = None, tolerance: object = None,
     horizon: object = None, samples: int = 501, observe: str | None = None, budget: object = None,
-) -> _Run:  # fmt: skip
-    """Check the arguments of `simulate`, and choose chart, steps and samples."""
+) -> tuple[Scene, Integrator, str, Plan, bool]:  # fmt: skip
+    """Check the arguments of `simulate`, choose the chart, and lay out steps and samples, which may be dithered."""
     chosen, method = find_scene(scene), find_integrator(integrator)
     end = chosen.horizon if horizon is None else horizon_of(horizon)
     count = whole("samples", samples, 2, MOST_SAMPLES)
     chart = chart_of(method, chosen.observes, observe)
     limit = None if budget is None else positive("budget", budget)
     plan, dithered = make_plan(chosen, method, step_size, tolerance, horizon=end, samples=count, budget=limit)
-    return _Run(chosen, method, chart, plan, dithered)
+    return chosen, method, chart, plan, dithered
 
 
-def _guarded(run: _Run, guard: Callable[[str], object] | None) -> tuple[Trajectory, str]:
+def _guarded(
+    scene: Scene, method: Integrator, chart: str, plan: Plan, guard: Callable[[str], object] | None
+) -> tuple[Trajectory, str]:
     """Make a run, after the guard's sentence if there is one; "off" is the sentence of no guard."""
-    scene, method, chart, plan, _ = run
     caution = "off" if guard is None else warning(scene, method, chart, plan)
     if caution and guard is not None:
         guard(caution)

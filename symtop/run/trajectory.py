@@ -78,10 +78,10 @@ COLUMNS, FACTS = Trajectory._fields[1:10], Trajectory._fields[10:]
 def dataset(time: Array, columns: Mapping[str, Array], units: str = "") -> xr.Dataset:
     """Columns (n,) or (n, 3 or 4) of doubles over ``time`` and ``component`` (x, y, z) or ``part`` (w, x, y, z).
 
-    Variables that symtop knows have their long names and units: "SI", or empty for a problem without units. Columns of
-    one run have one length and one clock, so that nothing is left to align: ``xr.Dataset(...)`` would take as long as
-    all the rest of a short run, and twice as long as that. So the dataset is put together as xarray does it after its
-    checks, which is private and may change: where the two differ in a small example, the public constructor is used.
+    Variables that symtop knows have their long names and units: "SI", or empty for a problem without units. One run has
+    one clock, so that nothing is left to align, and ``xr.Dataset(...)`` would take as long as all the rest of a short
+    run. So the dataset is put together as xarray does it after its checks, which is private: where the two differ in a
+    small example, the public constructor is used.
     """
     return (_direct if _direct_works() else _public)(time, columns, units)
 
@@ -89,10 +89,8 @@ def dataset(time: Array, columns: Mapping[str, Array], units: str = "") -> xr.Da
 def _public(time: Array, columns: Mapping[str, Array], units: str) -> xr.Dataset:
     attributes = netcdf.variable_attributes
     variables = {name: (_DIMS[values.shape[1:]], values, attributes(name, units)) for name, values in columns.items()}
-    used = {dims[-1] for dims, _, _ in variables.values()}
-    coordinates = {
-        name: (name, list(labels), attributes(name, units)) for name, labels in LABELS.items() if name in used
-    }
+    used = [name for name in LABELS if any(name in dims for dims, _, _ in variables.values())]
+    coordinates = {name: (name, list(LABELS[name]), attributes(name, units)) for name in used}
     return xr.Dataset(variables, {"time": ("time", time, attributes("time", units)), **coordinates})
 
 

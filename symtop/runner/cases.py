@@ -1,28 +1,35 @@
-"""The cases of a study in one run of it: which are stored and which are missing, and computing those."""
+"""The cases of a study: which are stored, failed, stale or missing; computing those; computing stored ones again.
 
-import sys
-from collections.abc import Iterable
+    done       a file holds what this version computes
+    failed     it failed, and is tried again by the next run
+    stale      it was computed, and something that its numbers depend on has changed since
+    missing    it was never computed with these settings
+
+Why a case is stale follows from the reasons that are stored in its file, compared with the present ones label by label.
+A stored case that is computed again (`check`) must agree to the last bit but for measured times: nothing here is random
+and no file holds a date.
+"""
+
+import json
+import tempfile
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
 import xarray as xr
-from tqdm import tqdm
 
-from symtop.core.files import is_terminal
-from symtop.core.progress import beating
-from symtop.runner import plugins, store
-from symtop.runner.execute_case import Result, Task
-from symtop.runner.pool import Pool
+from symtop.core import code_hash, netcdf
+from symtop.core.progress import beating, progress_bar
+from symtop.measure.datasets import Combined, combine, differences
+from symtop.run import plugins
+from symtop.runner import fingerprint, store
+from symtop.runner.pool import Pool, Result, Task
 from symtop.runner.scripts import file_of
-from symtop.runner.study import Case, Combined, Study, StudyError, door
+from symtop.runner.study import Case, Study, StudyError, failing
 
-
-def progress_bar(words: str, *, quiet: bool, **options: Any) -> Any:
-    """A progress bar, or without a total the words alone, where somebody is watching."""
-    hidden = quiet or not is_terminal(sys.stderr)
-    options = options or {"total": 1, "bar_format": "{desc}"}
-    return tqdm(desc=words, disable=hidden, leave=False, **options)
+DONE, FAILED, STALE, MISSING = STATES = ("done", "failed", "stale", "missing")
+SAMPLE = 5  # cases of each study that are checked
 
 
 @dataclass
@@ -40,25 +47,21 @@ class StudyCases:
     def stored(cls, study: Study, results: Path, *, quick: bool, full: bool) -> Self:
         """The cases of a study with what is stored of them; of the second round only if the first one is done."""
         cases = cls(study, results.resolve())
-        if not cases.missing(cases.add(study.grid(quick=quick, full=full))):
-            cases.missing(cases.add(cases.second_round()))
+        for new in cases.rounds(quick=quick, full=full):
+            if cases.missing(new):
+                break
         return cases
+
+    def rounds(self, *, quick: bool, full: bool) -> Iterator[dict[Path, Case]]:
+        """The cases of the first round by their files, then those that follow from what it found."""
+        yield self.add(self.study.grid(quick=quick, full=full))
+        if self.study.follow_up is not None:
+            yield self.add(self.study.later(self.combined()))
 
     def add(self, cases: Iterable[Case]) -> dict[Path, Case]:
         """Take cases in; returns them by their files."""
         chosen = list(cases)
-        try:
-            paths = store.case_paths(self.results, self.study, chosen)
-        except Exception as error:
-            flawed = self.study.flawed(chosen)
-            if flawed is not None:
-                raise flawed from error
-            if self.study.uses is not None:
-                with door(self.study.name, "uses"):
-                    for case in chosen:
-                        self.study.uses(case)
-            raise
-        new = dict(zip(paths, chosen, strict=True))
+        new = dict(zip(store.case_paths(self.results, self.study, chosen), chosen, strict=True))
         self.cases |= new
         return new
 
@@ -67,10 +70,6 @@ class StudyCases:
         if not fresh:
             self.read(cases)
         return {path: case for path, case in cases.items() if path not in self.data}
-
-    def second_round(self) -> list[Case]:
-        """The cases that follow from what the first round found."""
-        return [] if self.study.follow_up is None else self.study.later(self.combined())
 
     def read(self, paths: Iterable[Path]) -> None:
         """Read the files that are there and whole."""
@@ -89,7 +88,7 @@ class StudyCases:
     def compute(self, missing: dict[Path, Case], pool: Pool, limit: float, *, fresh: bool, quiet: bool) -> None:
         """Have cases computed, with a progress bar where somebody is watching."""
         script = str(file_of(self.study.name))
-        tasks = [Task(script, case, path, tuple(plugins.loaded()), limit, fresh) for path, case in missing.items()]
+        tasks = [Task(script, case, path, plugins.loaded(), limit, fresh) for path, case in missing.items()]
         with beating(progress_bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case")) as bar:
 
             def on_result(task: Task, result: Result) -> None:
@@ -108,5 +107,79 @@ class StudyCases:
         if not self.data:
             why = self.failures[0] if self.failures else "the grid is empty"
             raise StudyError(f"study {self.study.name}: no case could be measured; {why}")
-        with door(self.study.name, "combining what measure returned"):
-            return store.combine([(case, self.data[path]) for path, case in self.cases.items() if path in self.data])
+        with failing(self.study.name, "combining what measure returned"):
+            return combine([(case, self.data[path]) for path, case in self.cases.items() if path in self.data])
+
+
+def status(
+    study: Study, results: Path, *, quick: bool = False, full: bool = False, why: bool = False
+) -> list[dict[str, Any]]:
+    """Scene, integrator, state and message of every case; with `why` also what has changed since it was computed.
+
+    The second round of a study is known only when its first is done.
+    """
+    cases = StudyCases.stored(study, results, quick=quick, full=full)
+    stored = store.stored(cases.results, study)
+    older = store.superseded(stored, cases.cases)
+    rows = []
+    for path, case in cases.cases.items():
+        record = netcdf.read_json(store.failure_path(path))
+        earlier = [old for old in older if store.identity_of(old) == store.identity_of(path)]
+        state, message, causes = DONE, "", list[str]()
+        if path not in cases.data:
+            state = FAILED if isinstance(record, dict) else STALE if earlier else MISSING
+        if state == FAILED:
+            message = str(record.get("message", ""))
+        elif why and state == STALE:
+            before = _attribute(max(earlier, key=lambda old: old.stat().st_mtime), "made_of")
+            causes = code_hash.changes(before, fingerprint.reasons(study, case))
+        elif why and state == MISSING:
+            causes = other_settings(case, stored)
+        row = {"scene": case.scene, "integrator": case.integrator, "state": state, "message": message}
+        rows.append(row | ({"why": causes} if why else {}))
+    return rows
+
+
+def other_settings(case: Case, stored: list[Path]) -> list[str]:
+    """How the settings of a case differ from the nearest that were computed on its scene with its integrator."""
+    alike = [path for path in stored if store.identity_of(path).rpartition("--")[0] == case.label]
+    wanted = json.loads(json.dumps(dict(case.settings)))
+    differing = [
+        [f"setting {name}" for name in sorted({*old, *wanted}) if old.get(name, "") != wanted.get(name, "")]
+        for old in (_attribute(path, "settings") for path in alike)
+    ]
+    return min(differing, key=len, default=["never computed"])
+
+
+def _attribute(path: Path, name: str) -> dict[str, Any]:
+    """A mapping that a case's file holds; empty if the file is damaged or another program's."""
+    data = store.load_case(path)
+    content = {} if data is None else data.attrs.get(name)
+    return content if isinstance(content, dict) else {}
+
+
+def check(
+    study: Study, results: Path, pool: Pool, *, quick: bool = False, full: bool = False, everything: bool = False
+) -> dict[str, Any]:
+    """Compute `SAMPLE` stored cases again, or every one, and compare; likewise the dataset that they make together.
+
+    Returns how many are ``stored`` and up to date, how many were ``compared``, and the ``differences`` in words.
+    """
+    cases = StudyCases.stored(study, results, quick=quick, full=full)
+    # in the order of their digests, so that a sample is one of all parts of the grid
+    stored = sorted(cases.data.items(), key=lambda item: store.digest_of(item[0]))
+    chosen = {path.name: data for path, data in stored[: None if everything else SAMPLE]}
+    with tempfile.TemporaryDirectory(prefix="symtop-check-") as elsewhere:
+        again = StudyCases(study, Path(elsewhere).resolve())
+        missing = again.add(case for path, case in cases.cases.items() if path.name in chosen)
+        again.compute(missing, pool, study.limit, fresh=False, quiet=True)
+        again.read(missing)
+    differing = again.failures
+    for path, data in again.data.items():
+        label = f"{again.cases[path].integrator} on {again.cases[path].scene}"
+        differing += [f"{label}: {text}" for text in differences(chosen[path.name], data)]
+    whole = results / f"{study.name}.nc"
+    if whole.is_file() and len(stored) == len(cases.cases):
+        pair = differences(netcdf.read_any(whole), cases.combined(), attributes=False)
+        differing += [f"{whole.name}: {text}" for text in pair]
+    return {"study": study.name, "stored": len(stored), "compared": len(chosen), "differences": differing}

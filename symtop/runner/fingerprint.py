@@ -1,9 +1,8 @@
 """What a case's numbers and a study's figures are made of, found without running them (`core.code_hash`).
 
-A case is measured by a function of its study, on a scene, with the integrators that the study says it runs
-(`Study.uses`). Each of these counts by the code that it reaches and by its values, so that an edit of one method's
-coefficients makes the cases of that method stale and no other. Settings and versions of packages count besides, and for
-timed cases the processor.
+The measure of a study, a scene and the integrators that the case runs (`Study.uses`) count by the code that they reach
+and by their values, so that an edit of one method's coefficients makes the cases of that method stale and no other.
+Settings and versions of packages count besides, and for timed cases the processor.
 """
 
 import functools
@@ -16,7 +15,7 @@ from symtop.core import code_hash
 from symtop.core.code_hash import Code, Reasons
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.model.scenes import scenes
-from symtop.runner.study import REFERENCE, Case, Study
+from symtop.runner.study import REFERENCE, Case, Study, failing
 
 EVERY = "*"  # in place of an integrator's or a scene's name: all of them
 _known: dict[tuple[str, int], tuple[object, Reasons]] = {}  # by label and id of a thing, which is held for its id
@@ -39,49 +38,31 @@ def made_of(label: str, thing: object) -> Reasons:
 
 def used(study: Study, case: Case) -> list[str]:
     """Names of the integrators that a case runs, the closed form among them, which others are measured by."""
-    names = {*(case.integrators if study.uses is None else study.uses(case)), REFERENCE}
+    with failing(study.name, "uses"):
+        names = {*(case.integrators if study.uses is None else study.uses(case)), REFERENCE}
     known = integrators().keys()
     return sorted(known if EVERY in names else {split_name(name)[0] for name in names} & known)
 
 
 def settings_key(study: Study, case: Case) -> str:
     """Hash of what a case was asked to do, which an edit of the code does not change."""
-    return code_hash.hashed(
-        json.dumps([study.name, case.scene, case.integrator, case.group, dict(case.settings)], sort_keys=True)
-    )
+    asked = [study.name, case.scene, case.integrator, case.group, dict(case.settings)]
+    return code_hash.hashed(json.dumps(asked, sort_keys=True))
 
 
 def reasons(study: Study, case: Case) -> Reasons:
     """Everything that a case's numbers depend on: settings, scene, integrators, code, versions."""
-    return _own(study, case) | _shared(study, case.scene, used(study, case))
-
-
-def _own(study: Study, case: Case) -> Reasons:
-    processor = {"processor": code_hash.processor()} if study.is_timed(case) else {}
-    return {"settings": settings_key(study, case), **processor}
-
-
-def _shared(study: Study, place: str, names: Iterable[str]) -> Reasons:
-    """What all cases of a study on a scene with the same integrators depend on."""
     methods, catalogue = integrators(), scenes()
-    places = {name: catalogue.get(name) for name in (sorted(catalogue) if place == EVERY else [place])}
-    parts = [made_of("measure", study.measure)]
-    parts += [made_of(f"scene {name}", scene) for name, scene in places.items() if scene is not None]
-    parts += [made_of(f"integrator {name}", methods[name]) for name in names]
-    return code_hash.merged(parts) | code_hash.packages()
+    places = sorted(catalogue) if case.scene == EVERY else {case.scene} & catalogue.keys()
+    parts = [made_of("measure", study.measure), code_hash.packages(), {"settings": settings_key(study, case)}]
+    parts += [made_of(f"scene {name}", catalogue[name]) for name in places]
+    parts += [made_of(f"integrator {name}", methods[name]) for name in used(study, case)]
+    return code_hash.merged(parts) | ({"processor": code_hash.processor()} if study.is_timed(case) else {})
 
 
 def digests(study: Study, cases: Iterable[Case]) -> list[str]:
     """Hashes of everything that the numbers of cases depend on."""
-    shared: dict[tuple[str, ...], str] = {}
-
-    def of(case: Case) -> str:
-        names = tuple(used(study, case))
-        if (case.scene, *names) not in shared:
-            shared[case.scene, *names] = code_hash.digest(_shared(study, case.scene, names))
-        return code_hash.digest(_own(study, case) | {"code": shared[case.scene, *names]})
-
-    return [of(case) for case in cases]
+    return [code_hash.digest(reasons(study, case)) for case in cases]
 
 
 def drawing_digest(study: Study, script: Path, *drawing: Any) -> str:

@@ -1,46 +1,140 @@
-"""Worker processes for cases and figures, and the order in which cases are handed to them.
+"""Computes cases: in this process, in worker processes, or on a dask cluster, and in which order.
 
-The pool is Pebble's: it ends a case that takes longer than its limit, in compiled code as well, and a worker that dies
-fails its own case and no other. Workers are started when they are first needed, and stay for the next study, because a
-start takes two seconds. Few cases, and those of integrators that only this process knows, are computed in this process.
-A dask cluster may take the place of the workers for cases that are not timed; its own workers need this version of
-symtop, the scripts of the studies, and the results folder under the same path.
+The workers are Pebble's: a limit ends compiled code, too, and a worker that dies fails its own case alone. They stay
+for the next study. Few cases, and those of integrators that only this process knows, are computed here. On a dask
+cluster, for untimed cases, workers need this version of symtop, the studies, and the results folder at the same path.
+
+A failure that a case causes is recorded and the others go on; one of the machine's (a full disk) is raised.
 """
 
 import contextlib
+import faulthandler
 import gc
 import math
 import os
 import signal
-import statistics
 import threading
 import time
+import traceback
 from collections import Counter, deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import xarray as xr
 from pebble import ProcessExpired, ProcessPool
 from tqdm import tqdm
 
-from symtop.core import cluster, parallel
-from symtop.core.errors import SymtopError
-from symtop.measure.timing import bare_run
-from symtop.methods.framework.registry import integrator, integrators, split_name
-from symtop.model.scenes import scene
-from symtop.runner import plugins, scripts
-from symtop.runner.execute_case import GRACE, Neighbours, Result, Task, execute_case, failed, take_trace
-from symtop.runner.study import Study
+from symtop.core import files, netcdf, parallel
+from symtop.core.errors import SymtopError, words_of
+from symtop.core.signals import at_most, is_of_user
+from symtop.measure.timing import DISTURBED, slowdown
+from symtop.methods.framework.registry import integrators, split_name
+from symtop.run import cluster, plugins
+from symtop.runner import fingerprint, scripts, store
+from symtop.runner.study import Case, Study
 
 WORTH_WORKERS = 8  # cases; starting a worker takes two seconds
 MOST_FRUITLESS = 3  # times that all workers may end without having computed anything
 AHEAD = 3  # cases with the pool for each worker: enough that nobody waits, few enough to stop soon
 BUSY = 0.05  # seconds until a case that another command computes is looked for again
+GRACE = 5.0  # seconds between asking a case to end and ending its process
 ENDED = "its process was ended, by the system (memory) or by the method itself"
 
+_loading = threading.Lock()
+
+
+class Task(NamedTuple):
+    """A case to compute, and everything that another process must know for it."""
+
+    study: str  # its script
+    case: Case
+    path: Path  # absolute: a worker has a folder of its own
+    plugins: tuple[str, ...]
+    limit: float  # seconds
+    fresh: bool = False
+    timed: tuple[int, float] | None = None  # how many ran at once, and how many times longer a run took than alone
+
+
+class Result(NamedTuple):
+    """How a task ended: computed, found, failed, died (its process), or busy (another command is computing it)."""
+
+    state: str
+    message: str = ""
+
+
 OnResult = Callable[[Task, Result], None]
+
+
+def prepare(script: str, files_of_plugins: tuple[str, ...]) -> Study:
+    """The study of a script, with the plug-ins that its cases may need."""
+    with _loading:  # a file that two threads load at once would be executed twice
+        for file in files_of_plugins:
+            plugins.load(file)
+        return scripts.load(script)
+
+
+def execute_case(task: Task, study: Study | None = None) -> Result:
+    """Compute a case and store it, or record how it failed; SymtopError where the machine is the cause.
+
+    A worker loads the study by name. Compiled code hears no limit: the pool ends its process `GRACE` seconds later.
+    """
+    study = study or prepare(task.study, task.plugins)
+    path, case = task.path, task.case
+    if fingerprint.digests(study, [case]) != [store.digest_of(path)]:
+        raise SymtopError(
+            f"the sources or dependencies of {case.integrator} on {case.scene} are not those that the study was "
+            "started with; if a file was edited meanwhile, run the study again"
+        )
+    with files.locked(path, wait=False) as ours:
+        if not ours:
+            return Result("busy")
+        if not task.fresh and store.load_case(path) is not None:
+            return Result("found")
+        netcdf.sweep(path)  # of a worker that was killed
+        try:
+            with at_most(task.limit, processor=False), _traced(task):
+                data = study.measure(case)
+            if not isinstance(data, xr.Dataset):
+                raise SymtopError(f"the measure of a study must return a Dataset, not {type(data).__name__}")  # noqa: TRY301
+        except BaseException as error:  # (a failing case must not stop the others)
+            if is_of_user(error):
+                raise
+            return failed(task, error if isinstance(error, SymtopError) else words_of(error), traceback.format_exc())
+        if task.timed is not None:
+            data = data.assign_attrs(timed_at_once=task.timed[0], timed_slowdown=task.timed[1])
+        store.save_case(data, path, study, case)
+        return Result("computed")
+
+
+@contextlib.contextmanager
+def _traced(task: Task) -> Iterator[None]:
+    """Leave a traceback in a file before the process is ended that takes too long; a thread is in no such process."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    trace = store.trace_path(task.path)
+    try:
+        with trace.open("w") as file:
+            faulthandler.dump_traceback_later(task.limit + 0.5 * GRACE, file=file)
+            try:
+                yield
+            finally:
+                faulthandler.cancel_dump_traceback_later()
+    finally:
+        trace.unlink(missing_ok=True)
+
+
+def failed(task: Task, why: object, trace: str = "") -> Result:
+    """Record how a case failed; a file that an earlier run may have left is no longer its result."""
+    message = f"{task.case.integrator} on {task.case.scene} failed: {' '.join(str(why).split())}"
+    question = {"scene": task.case.scene, "integrator": task.case.integrator, "settings": dict(task.case.settings)}
+    record = question | {"message": message, "traceback": trace.splitlines()}
+    netcdf.write_json(store.failure_path(task.path), record)
+    task.path.unlink(missing_ok=True)
+    return Result("failed", message)
 
 
 class Pool(contextlib.AbstractContextManager["Pool"]):
@@ -52,15 +146,16 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         self.size = 0  # workers that are open
         self._workers: ProcessPool | None = None
         self._analyses: list[Future[Any]] = []
-        self._trials: dict[int, Neighbours] = {}
+        self._trials: dict[int, float] = {}  # by how many ran at once: how many times longer a run took
 
     def open(self, size: int) -> None:
         """Have at least so many workers."""
         if self._workers is None or size > self.size:
-            self.close_workers(wait_for=self._analyses)
+            wait(self._analyses)
+            self.close_workers()
             self.size = min(size, self.jobs)
             self._workers = ProcessPool(
-                self.size, initializer=begin_worker, initargs=(os.getpid(),), context=parallel.context()
+                self.size, initializer=begin_worker, initargs=(os.getpid(),), context=parallel.OneThreadEach()
             )
 
     def submit(self, function: Callable[..., Any], *args: Any, limit: float | None = None) -> "Future[Any]":
@@ -77,24 +172,21 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         return self._analyses[-1]
 
     def run(self, study: Study, tasks: Sequence[Task], on_result: OnResult) -> None:
-        """Compute all tasks and call `on_result` with each as it ends, in any order; timed ones last.
+        """Compute all tasks, timed ones last, and call `on_result` with each as it ends.
 
         Timed cases run one at a time, or one on each core where a trial shows that they do not disturb each other.
-        Raises SymtopError if the results cannot be written or the workers cannot work.
         """
         for timed in (False, True):
             chosen = in_order([task for task in tasks if study.is_timed(task.case) == timed])
-            if not chosen:
-                continue
-            if timed:
+            if chosen and timed:
                 wait(self._analyses)
             local = any(plugins.is_local(name) for task in chosen for name in task.case.names)
             if self.client is not None and not timed and not local:
-                executor = self.client.get_executor(pure=False)
-                _drain(chosen, partial(executor.submit, execute_case), cluster.width(self.client), on_result)
+                submit = partial(self.client.get_executor(pure=False).submit, execute_case)
+                _drain(chosen, submit, cluster.width(self.client), on_result)
             elif local or (len(chosen) < WORTH_WORKERS and not self.size):
-                alone = [task._replace(neighbours=Neighbours() if timed else None) for task in chosen]
-                _drain(alone, lambda task: _done(execute_case, task, study), 1, on_result)
+                here = [task._replace(timed=(1, math.nan) if timed else None) for task in chosen]
+                _drain(here, lambda task: _done(execute_case, task, study), 1, on_result)
             else:
                 self._in_workers(chosen, on_result, timed=timed)
 
@@ -107,21 +199,21 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             nonlocal fruitless
             fruitless = 0
             del left[task.path]
-            if result.state != "died":
-                on_result(task, result)
-            elif alone:
-                on_result(task, failed(task, ENDED))
-            else:
+            if result.state == "died" and not alone:
                 died[task.path] = task
+            else:
+                on_result(task, failed(task, ENDED) if result.state == "died" else result)
+
+        def submit(task: Task) -> "Future[Result]":
+            return self.submit(execute_case, task, limit=task.limit + GRACE)
 
         for alone in (False, True):
             while left:
                 self.open(min(self.jobs, len(left)))
-                neighbours = self.neighbours(min(self.size, len(left))) if timed else None
-                width = 1 if alone else AHEAD * self.size if neighbours is None else neighbours.at_once
-                batch = [task._replace(neighbours=neighbours) for task in left.values()]
+                together = self.at_once(min(self.size, len(left))) if timed else None
+                width = 1 if alone else AHEAD * self.size if together is None else together[0]
                 try:
-                    _drain(batch, self._submit_case, width, settle)
+                    _drain([task._replace(timed=together) for task in left.values()], submit, width, settle)
                 except BrokenExecutor:
                     self.close_workers()
                     fruitless += 1
@@ -131,24 +223,23 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
                         ) from None
             left.update(died)
 
-    def _submit_case(self, task: Task) -> "Future[Result]":
-        return self.submit(execute_case, task, limit=task.limit + GRACE)
+    def at_once(self, width: int) -> tuple[int, float]:
+        """How many timed cases may run at once, one for each worker if a trial shows no disturbance, or half, ...
 
-    def neighbours(self, width: int) -> Neighbours:
-        """How many timed cases may run at once: one for each worker if a trial shows no disturbance, or half, ..."""
-        known = Neighbours()
+        Beside it stands how many times longer a run took beside so many, or beside the fewest that were tried.
+        """
+        ratio = math.nan  # without a trial
         while width > 1:
             if width not in self._trials:
-                self._trials[width] = Neighbours(width, slowdown(self.submit, width))
-            if self._trials[width].slowdown <= DISTURBED:
-                return self._trials[width]
-            known = Neighbours(1, self._trials[width].slowdown)
+                self._trials[width] = slowdown(self.submit, width)
+            ratio = self._trials[width]
+            if ratio <= DISTURBED:
+                break
             width //= 2
-        return known
+        return width, ratio
 
-    def close_workers(self, wait_for: Sequence["Future[Any]"] = ()) -> None:
+    def close_workers(self) -> None:
         """End all workers at once, with what they are computing; what was computed is on disk."""
-        wait(wait_for)
         if self._workers is not None:
             self._workers.stop()
             self._workers.join()
@@ -182,13 +273,14 @@ def begin_worker(parent: int) -> None:
 def in_order(tasks: Sequence[Task]) -> list[Task]:
     """The first case of every family of methods, then the second, ...: methods of a family share kernels to compile."""
     known, count = integrators(), Counter[str]()
-    ranks = []
-    for task in tasks:
+
+    def rank(task: Task) -> int:
         method = known.get(split_name(task.case.integrator)[0])
         family = task.case.integrator if method is None else method.family
-        ranks.append(count[family])
         count[family] += 1
-    return [tasks[k] for k in sorted(range(len(tasks)), key=ranks.__getitem__)]
+        return count[family]
+
+    return sorted(tasks, key=rank)
 
 
 def _done(function: Callable[..., Any], *args: Any) -> "Future[Any]":
@@ -225,7 +317,10 @@ def _result(future: "Future[Result]", task: Task) -> Result:
     except (SymtopError, BrokenExecutor):
         raise
     except TimeoutError:
-        return failed(task, f"it was not done after {task.limit:g} s and did not answer", take_trace(task))
+        trace = store.trace_path(task.path)
+        text = trace.read_text(encoding="utf-8") if trace.is_file() else ""
+        trace.unlink(missing_ok=True)
+        return failed(task, f"it was not done after {task.limit:g} s and did not answer", text)
     except ProcessExpired:
         return Result("died")
     except CancelledError:
@@ -234,42 +329,3 @@ def _result(future: "Future[Result]", task: Task) -> Result:
         if type(error).__module__.partition(".")[0] != "distributed":
             raise
         return failed(task, f"the cluster gave it up: {type(error).__name__}: {error}")
-
-
-METHOD, CHART, SCENE, STEPS, STEP = "strang", "axis", "spheroid", 4000, 1e-3  # a short run of a compiled method
-SPAN = 0.03  # seconds of a worker in one turn
-TURNS = 7
-TRIES = 20  # to have all workers at once, the first time when they have to start
-DISTURBED = 1.05  # times as long as alone: beyond it timed cases run one after another
-
-
-def timed_turn() -> tuple[int, float, float, float]:
-    """Process, begin, end and mean seconds of runs for `SPAN` seconds, on the clock that all processes share."""
-    run = bare_run(scene(SCENE), integrator(METHOD), CHART, STEP, STEPS * STEP)
-    run()  # its kernel may have to be compiled
-    begin, count = time.monotonic(), 0
-    while (end := time.monotonic()) < begin + SPAN:
-        run()
-        count += 1
-    return os.getpid(), begin, end, (end - begin) / count
-
-
-def slowdown(submit: Callable[..., "Future[Any]"], size: int) -> float:
-    """How many times longer a run takes while `size` workers run; infinite if they never did at once.
-
-    Workers time the same run, one of them alone and all at once, in turns. Beside others it takes as long as alone
-    where cores share nothing that a run needs, and up to twice as long where two of them are threads of one core.
-    """
-
-    def at_once() -> list[tuple[int, float, float, float]]:
-        return [future.result() for future in [submit(timed_turn) for _ in range(size)]]
-
-    for _ in range(TRIES):
-        if len({process for process, *_ in at_once()}) == size:
-            break
-    ratios = []
-    for _ in range(TURNS):
-        alone, together = submit(timed_turn).result(), at_once()
-        if min(end for _, _, end, _ in together) - max(begin for _, begin, _, _ in together) > 0.5 * SPAN:
-            ratios.append(max(seconds for *_, seconds in together) / alone[-1])
-    return statistics.median(ratios) if ratios else math.inf

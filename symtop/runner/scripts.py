@@ -1,9 +1,8 @@
 """The scripts of the studies: where they are, their names, and how a Python file is loaded.
 
-A study that ships with symtop is a package of its own, ``symtop_studies.NAME``, whose module ``study`` defines
-``STUDY``. Its folder lies beside the package: `studies` in a checkout, `symtop_studies` in an installed wheel; both are
-imported under the second name, in the same way. Any other study is a Python file that the user names, alone or in a
-package of its own (a folder with an ``__init__.py``), so that it may import what stands beside it.
+A study that ships with symtop is a package, ``symtop_studies.NAME``, whose module ``study`` defines ``STUDY``. They lie
+beside symtop, in `studies` in a checkout and in `symtop_studies` in an installed wheel. Any other study is a Python
+file that the user names, alone or in a package, so that it may import what stands beside it.
 """
 
 import importlib
@@ -48,8 +47,8 @@ def install() -> ModuleType:
 def names() -> list[str]:
     """Names of the studies that ship with symtop, in the order of the report, which their package says."""
     shipped = sorted(path.parent.name for path in folder().glob("*/study.py"))
-    order = install().ORDER
-    return [name for name in order if name in shipped] + [name for name in shipped if name not in order]
+    order = [name for name in install().ORDER if name in shipped]
+    return order + [name for name in shipped if name not in order]
 
 
 def file_of(name: str) -> Path:

@@ -8,19 +8,14 @@ results/STUDY.json                                                     verdict, 
 results/figures/STUDY-NAME.png
 results/cases/manifest.json                                            what these were made of (`manifest`)
 
-SETTINGS is a hash of what the case was asked to do, DIGEST one of everything that its numbers depend on. Its file holds
-the settings and the reasons that make up the digest, and a hash of all that it holds: a truncated, damaged or foreign
-file counts as none. A file is removed only when a case with the same SETTINGS and another DIGEST takes its place; what
-was computed for another grid stays, until a user deletes it: remove ``cases/STUDY`` and run the study again, which
-computes its grid, or remove single files, of which nothing depends on any. The lock is the operating system's, so that
-it ends with the process that holds it, however that ends.
+SETTINGS is a hash of what the case was asked to do, DIGEST one of everything that its numbers depend on; its file holds
+both in full, and a hash of all its content: a truncated, damaged or foreign file counts as none. It is removed when a
+case with the same SETTINGS and another DIGEST takes its place. The operating system ends a lock with its process.
 """
 
 import json
-import math
 import tempfile
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,23 +23,21 @@ import numpy as np
 import xarray as xr
 
 from symtop.core import netcdf
-from symtop.core.code_hash import LENGTH, Reasons, hashed
+from symtop.core.code_hash import hashed
 from symtop.core.errors import SymtopError
 from symtop.core.files import locked
-from symtop.model.scenes import scenes
+from symtop.measure.datasets import as_text
 from symtop.runner import fingerprint
-from symtop.runner.study import Case, Combined, Study
+from symtop.runner.study import Case, Study
 
 SEED = 0  # of the order in which batches are timed; nothing else here is random
 
 
 def case_paths(results: Path, study: Study, cases: Sequence[Case]) -> list[Path]:
     """The files of cases; their names hold the digest of everything the numbers depend on."""
-    folder = results / "cases" / study.name
-    keys = [fingerprint.settings_key(study, case)[:8] for case in cases]
-    digests = fingerprint.digests(study, cases)
     return [
-        folder / f"{case.label}--{key}--{digest}.npz" for case, key, digest in zip(cases, keys, digests, strict=True)
+        results / "cases" / study.name / f"{case.label}--{fingerprint.settings_key(study, case)[:8]}--{digest}.npz"
+        for case, digest in zip(cases, fingerprint.digests(study, cases), strict=True)
     ]
 
 
@@ -58,18 +51,12 @@ def identity_of(path: Path) -> str:
     return path.name.rpartition("--")[0]
 
 
-def short(reasons: Reasons) -> Reasons:
-    """Reasons as they are stored: 12 digits of each hash; versions and the name of the processor as they are."""
-    return {label: value[:12] if len(value) == LENGTH else value for label, value in reasons.items()}
-
-
 def prepare(results: Path, study: Study) -> None:
     """Make the folders of a study and see that they can be written to, before hours are spent on computing."""
     for folder in (results / "cases" / study.name, results / "figures"):
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder) as trial:
-                trial.write(b"symtop")
+            tempfile.TemporaryFile(dir=folder).close()
         except OSError as error:
             raise SymtopError(f"cannot write into {folder}: {error.strerror or error}") from error
     for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):
@@ -81,12 +68,15 @@ def save_case(data: xr.Dataset, path: Path, study: Study, case: Case) -> None:
     """Store what a case measured, with what it was made from: arrays, and all that is said of them as JSON."""
     attributes = data.attrs | netcdf.provenance() | {
         "study": study.name, "settings": dict(case.settings), "sources": digest_of(path),
-        "made_of": short(fingerprint.reasons(study, case)), "seed": SEED,
+        "made_of": fingerprint.reasons(study, case), "seed": SEED,
     }  # fmt: skip
-    arrays = {str(k): _plain(variable.values) for k, variable in enumerate(data.variables.values())}
+    arrays = {str(k): as_text(variable.values) for k, variable in enumerate(data.variables.values())}
     variables = [[str(name), list(variable.dims), variable.attrs, name in data.coords]
                  for name, variable in data.variables.items()]  # fmt: skip
-    about = json.dumps({"variables": variables, "attributes": attributes}, default=_as_json)
+    about = json.dumps(
+        {"variables": variables, "attributes": attributes},
+        default=lambda value: value.tolist() if hasattr(value, "tolist") else str(value),
+    )
     with netcdf.replacing(path) as partial, partial.open("wb") as file:
         np.savez(file, about=about, content=_content(about, arrays), **arrays)
     failure_path(path).unlink(missing_ok=True)
@@ -105,35 +95,14 @@ def load_case(path: Path) -> xr.Dataset | None:
         return None
     if content != _content(text, arrays) or about["attributes"]["sources"] != digest_of(path):
         return None
-    variables = {
-        name: (dims, arrays[str(k)], attributes, coordinate)
-        for k, (name, dims, attributes, coordinate) in enumerate(about["variables"])
-    }
-    return xr.Dataset(
-        {name: one[:3] for name, one in variables.items() if not one[3]},
-        {name: one[:3] for name, one in variables.items() if one[3]},
-        about["attributes"],
-    )
+    kinds: tuple[dict[str, Any], dict[str, Any]] = {}, {}  # variables, coordinates
+    for k, (name, dims, attributes, is_coordinate) in enumerate(about["variables"]):
+        kinds[is_coordinate][name] = dims, arrays[str(k)], attributes
+    return xr.Dataset(*kinds, about["attributes"])
 
 
 def _content(about: str, arrays: dict[str, Any]) -> str:
     return hashed(about, *(netcdf.array_hash(arrays[name]) for name in sorted(arrays)))
-
-
-def _plain(values: Any) -> Any:
-    """Text of any length as text of one length: archives hold no objects."""
-    return values.astype(str) if values.dtype == object else values
-
-
-def _as_json(value: Any) -> Any:
-    """Numbers and arrays of NumPy as JSON has them; anything else in words."""
-    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)
-
-
-def units_of(names: Iterable[str]) -> str:
-    """The units that some scenes have in common: "SI", or empty."""
-    catalogue = scenes()
-    return "SI" if all(name in catalogue and catalogue[name].units == "SI" for name in names) else ""
 
 
 def failure_path(path: Path) -> Path:
@@ -141,113 +110,9 @@ def failure_path(path: Path) -> Path:
     return path.with_name(f"{path.stem}.failed.json")
 
 
-def save_failure(path: Path, case: Case, message: str, trace: str) -> None:
-    """Record how a case failed; a file that an earlier run may have left is no longer its result."""
-    question = {"scene": case.scene, "integrator": case.integrator, "settings": dict(case.settings)}
-    write_json(failure_path(path), {**question, "message": message, "traceback": trace.splitlines()})
-    path.unlink(missing_ok=True)
-
-
-def combine(cases: list[tuple[Case, xr.Dataset]]) -> Combined:
-    """One dataset over scene and integrator, or, of cases in groups, a tree with such a dataset for each group.
-
-    A dataset of a group covers the scenes and integrators of its own cases only. xarray aligns the coordinates of a
-    group with those of the groups above it, so that the root of the tree is empty: all cases are in groups, or none.
-    """
-    groups: dict[str, list[tuple[Case, xr.Dataset]]] = {}
-    for case, data in cases:
-        groups.setdefault(case.group, []).append((case, data))
-    if not groups.keys() - {""}:
-        return _dense(cases)
-    if "" in groups:
-        raise SymtopError(f"case {groups[''][0][0].label} has no group, but others of its study have one")
-    return xr.DataTree.from_dict({group: _dense(members) for group, members in groups.items()})
-
-
-def _dense(cases: list[tuple[Case, xr.Dataset]]) -> xr.Dataset:
-    """One dataset over scene and integrator; a cell that was not measured is NaN (a byte 255, a string empty).
-
-    Sizes differ from case to case: each dimension gets the largest one, and a shorter case fills the beginning.
-    """
-    cases = [one for case, data in cases for one in _apart(case, data)]
-    _check_apart(cases)
-    scenes = list(dict.fromkeys(case.scene for case, _ in cases))
-    methods = list(dict.fromkeys(case.integrator for case, _ in cases))
-    sizes: dict[str, int] = {}
-    coordinates: dict[str, Any] = {"scene": scenes, "variant": methods}
-    for case, data in cases:
-        for name, size in data.sizes.items():
-            if name in data.coords and name in coordinates and data[name].dtype.kind == "f":
-                shared = min(size, sizes[str(name)])
-                if not np.array_equal(data[name].values[:shared], coordinates[str(name)].values[:shared]):
-                    raise SymtopError(f"the coordinate {name} of {case.label} differs from that of the other cases")
-            if size > sizes.get(str(name), 0):
-                sizes[str(name)] = size
-                if name in data.coords:
-                    coordinates[str(name)] = data[name]
-    filled: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]] = {}
-    for case, data in cases:
-        place = scenes.index(case.scene), methods.index(case.integrator)
-        for name, variable in data.data_vars.items():
-            dims = tuple(str(dim) for dim in variable.dims)
-            if str(name) not in filled:
-                shape = (len(scenes), len(methods), *(sizes[dim] for dim in dims))
-                blank = np.full(shape, *_blank(variable.dtype))
-                filled[str(name)] = (("scene", "variant", *dims), blank, dict(variable.attrs))
-            corner = tuple(slice(0, size) for size in variable.shape)
-            filled[str(name)][1][(*place, *corner)] = variable.values
-    variables = {
-        name: (dims, values.astype(str) if values.dtype == object else values, attrs)
-        for name, (dims, values, attrs) in filled.items()
-    }
-    return xr.Dataset(variables, coords=coordinates)
-
-
-def _check_apart(cases: list[tuple[Case, xr.Dataset]]) -> None:
-    """SymtopError for cases that would replace each other; a later round may measure other variables of a cell."""
-    taken = set[tuple[str, str, str]]()
-    for case, data in cases:
-        cells = {(case.scene, case.integrator, str(name)) for name in data.data_vars}
-        for scene, method, name in sorted(cells & taken)[:1]:
-            raise SymtopError(
-                f"two cases of {method} on {scene} measure {name}, and one would replace the other: "
-                "give each a group, or measure all settings in one case, over a dimension of the dataset"
-            )
-        taken |= cells
-
-
-def _apart(case: Case, data: xr.Dataset) -> list[tuple[Case, xr.Dataset]]:
-    """A case that measured several integrators, as one case for each of them."""
-    if "variant" not in data.dims:
-        return [(case, data)]
-    names = [str(name) for name in data["variant"].values]
-    return [(replace(case, integrator=name), data.sel(variant=name, drop=True)) for name in names]
-
-
-def _blank(kind: "np.dtype[Any]") -> tuple[Any, Any]:
-    """What stands for nothing in an array of that type, and the type that can hold it."""
-    if kind.kind in "OUT":
-        return "", object
-    return (np.iinfo(kind).max, kind) if kind.kind == "u" else (math.nan, float)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Replace a small text file in one move."""
-    with netcdf.replacing(path) as partial:
-        partial.write_text(text, encoding="utf-8")
-
-
-def write_json(path: Path, content: Any) -> None:
-    """Replace a JSON file in one move."""
-    write_text(path, json.dumps(content, indent=1, ensure_ascii=False, default=str) + "\n")
-
-
-def read_json(path: Path) -> Any:
-    """The content of a JSON file, or None if there is none or it is damaged."""
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
+def trace_path(path: Path) -> Path:
+    """Where the traceback of a case that took too long waits to be recorded."""
+    return path.with_name(f".{path.stem}.trace")
 
 
 def stored(results: Path, study: Study) -> list[Path]:
@@ -255,17 +120,16 @@ def stored(results: Path, study: Study) -> list[Path]:
     return sorted((results / "cases" / study.name).glob("[!.]*.npz"))
 
 
-def superseded(paths: Iterable[Path], keep: Iterable[Path]) -> list[Path]:
-    """Those files that were asked for what one to keep was asked for, with another digest: an edit made them stale."""
-    wanted = {digest_of(path) for path in keep}
-    identities = {identity_of(path) for path in keep}
-    return [path for path in paths if digest_of(path) not in wanted and identity_of(path) in identities]
+def superseded(paths: Iterable[Path], present: Collection[Path]) -> list[Path]:
+    """Those files that an edit made stale: present ones have their scene, integrator and settings, none the digest."""
+    digests, identities = {digest_of(path) for path in present}, {identity_of(path) for path in present}
+    return [path for path in paths if digest_of(path) not in digests and identity_of(path) in identities]
 
 
-def forget(results: Path, study: Study, keep: Iterable[Path]) -> None:
+def forget(results: Path, study: Study, present: Collection[Path]) -> None:
     """Remove what newer files replace, and what killed writers left."""
     failures = (results / "cases" / study.name).glob("[!.]*.failed.json")
-    for path in superseded([*stored(results, study), *failures], list(keep)):
+    for path in superseded([*stored(results, study), *failures], present):
         path.unlink(missing_ok=True)
     tidy(results, study)
 
@@ -277,7 +141,7 @@ def tidy(results: Path, study: Study) -> None:
         with locked(path, wait=False) as ours:
             if ours:
                 netcdf.sweep(path)
-                path.with_name(f".{path.stem}.trace").unlink(missing_ok=True)
+                trace_path(path).unlink(missing_ok=True)
     with locked(results / f"{study.name}.nc", wait=False) as ours:
         if ours:
             for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):

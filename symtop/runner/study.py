@@ -1,86 +1,62 @@
-"""The declaration of a study; the runner does the rest.
-
-A study is a question, a grid of cases, a function that measures one case, and functions that turn the combined
-dataset into figures, tables and sentences. It holds no numerics of its own.
+"""The declaration of a study: a question, a grid of cases, a function that measures one case, and functions that turn
+the combined dataset into figures, tables and sentences. The runner does the rest.
 """
 
 import json
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType, TracebackType
+from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import xarray as xr
 
-from symtop.core.errors import SymtopError, label, shown, words_of
-from symtop.core.signals import is_of_user
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError, foreign_code, label, shown
+from symtop.measure.datasets import Combined
 from symtop.methods.framework.registry import split_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 REFERENCE = "exact"  # the integrator that is the closed form
-Combined = xr.Dataset | xr.DataTree  # what a study measured: a tree if its cases are in groups
-LONGEST = 120  # characters of a value that is told
+Save = Callable[["Figure", Path], object]  # writes a picture's figure to a file
+LONGEST = 120  # characters of a value that are shown
 
 
 class StudyError(SymtopError):
     """A function of a study failed or returned what it must not; the names in the sentence are the study's own."""
 
 
-class door:
+def failing(study: str, function: str) -> AbstractContextManager[None]:
     """Within it, whatever a function of a study raises becomes a StudyError that names both."""
-
-    __slots__ = ("function", "study")
-
-    def __init__(self, study: str, function: str) -> None:
-        self.study, self.function = study, function
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if error is not None and not isinstance(error, StudyError) and not is_of_user(error):
-            words = error if isinstance(error, SymtopError) else words_of(error)
-            raise StudyError(f"study {self.study}: {self.function} failed: {words}") from error
-
-    def refuse(self, wanted: str, given: object) -> StudyError:
-        """The sentence on what the function returned."""
-        text = " ".join(shown(given).split())
-        told = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
-        return StudyError(f"study {self.study}: {self.function} must return {wanted}, not {told}")
-
-    def each(self, make: Callable[[], Any], kind: type, wanted: str) -> Iterator[Any]:
-        """What the function returns or yields, one by one, each of which must be of that kind."""
-        with self:
-            made = make()
-        if isinstance(made, (str, bytes, Mapping, kind)) or not isinstance(made, Iterable):
-            raise self.refuse(wanted, made)
-        entries, nothing = iter(made), object()
-        while True:
-            with self:
-                entry = next(entries, nothing)
-            if entry is nothing:
-                return
-            if not isinstance(entry, kind):
-                raise StudyError(
-                    f"study {self.study}: {self.function} must return {wanted}; an entry is a {type(entry).__name__}"
-                )
-            yield entry
+    return foreign_code(f"study {study}: {function}", StudyError)
 
 
-def sentences(study: str, verdict: Callable[[], Any]) -> list[str]:
-    """The findings that the verdict of a study returns. Raises StudyError if they are no list of sentences."""
-    return list(door(study, "verdict").each(verdict, str, "a list of sentences"))
+def each(study: str, function: str, make: Callable[[], Any], kind: type, wanted: str) -> Iterator[Any]:
+    """What a function of a study returns or yields, one by one, each of which must be of that kind."""
+    with failing(study, function):
+        made = make()
+    if isinstance(made, (str, bytes, Mapping, kind)) or not isinstance(made, Iterable):
+        text = " ".join(shown(made).split())
+        text = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
+        raise StudyError(f"study {study}: {function} must return {wanted}, not {text}")
+    entries, end = iter(made), object()
+    while True:
+        with failing(study, function):
+            entry = next(entries, end)
+        if entry is end:
+            return
+        if not isinstance(entry, kind):
+            raise StudyError(f"study {study}: {function} must return {wanted}; an entry is a {type(entry).__name__}")
+        yield entry
 
 
 class Picture(NamedTuple):
     """A figure of the report: its file name, caption and text for those who cannot see it.
 
-    One with a `lead` opens the report: it is shown small on the first screen, in the order of the studies, under these
-    few words on what it answers.
+    One with a `lead` opens the report: it is shown small on the first screen, under these few words on what it answers.
     """
 
     name: str
@@ -129,12 +105,11 @@ class Opening(NamedTuple):
 
 @dataclass(frozen=True)
 class Case:
-    """One cell of a study's grid: an integrator on a scene, with settings that JSON can hold.
+    """One cell of a study's grid: an integrator on a scene, with settings that JSON can hold, or SymtopError.
 
     A case may measure several integrators against each other: then its dataset has a dimension ``variant``,
-    `integrator` names them together and ``settings["integrators"]`` lists them.
-    A study that measures several different things puts each into a `group` of its own: the study's dataset is then an
-    `xarray.DataTree` with one dataset a group (see `store.combine`), each over the scenes and integrators that it has.
+    `integrator` names them together and ``settings["integrators"]`` lists them. Cases of several kinds have a `group`
+    each: the study's dataset is then an `xarray.DataTree` with one dataset a group (`symtop.measure.datasets.combine`).
     """
 
     scene: str
@@ -142,6 +117,21 @@ class Case:
     settings: Mapping[str, Any] = field(default_factory=dict)
     timed: bool = False  # untimed cases must not run beside it, nor timed ones that disturb it
     group: str = ""
+
+    def __post_init__(self) -> None:
+        for name in ("scene", "integrator", "group"):
+            if not isinstance(value := getattr(self, name), str):
+                raise SymtopError(f"{name} must be a name, not {shown(value)[:LONGEST]}")
+        if not isinstance(self.settings, Mapping):
+            raise SymtopError(f"settings must be a mapping of names to values, not {shown(self.settings)[:LONGEST]}")
+        for key, value in self.settings.items():
+            if not isinstance(key, str):
+                raise SymtopError(f"the name of a setting must be text, not {shown(key)[:LONGEST]}")
+            try:
+                json.dumps(value)
+            except (TypeError, ValueError, RecursionError):
+                held = "numbers of Python, text, lists or mappings, which JSON can hold"
+                raise SymtopError(f"setting {key!r} must be {held}, not {shown(value)[:LONGEST]}") from None
 
     @property
     def integrators(self) -> tuple[str, ...]:
@@ -152,23 +142,6 @@ class Case:
     def names(self) -> tuple[str, ...]:
         """The scene and the integrators."""
         return self.scene, *self.integrators
-
-    def flaw(self) -> str:
-        """What of it cannot be stored or compared, in words; empty if nothing is wrong."""
-        for name in ("scene", "integrator", "group"):
-            if not isinstance(value := getattr(self, name), str):
-                return f"{name} must be a name, not {shown(value)[:LONGEST]}"
-        if not isinstance(self.settings, Mapping):
-            return f"settings must be a mapping of names to values, not {shown(self.settings)[:LONGEST]}"
-        for key, value in self.settings.items():
-            if not isinstance(key, str):
-                return f"the name of a setting must be text, not {shown(key)[:LONGEST]}"
-            try:
-                json.dumps(value)
-            except (TypeError, ValueError, RecursionError):
-                held = "numbers of Python, text, lists or mappings, which JSON can hold"
-                return f"setting {key!r} must be {held}, not {shown(value)[:LONGEST]}"
-        return ""
 
     @property
     def label(self) -> str:
@@ -181,9 +154,8 @@ class Case:
 class Study:
     """A question and how it is answered.
 
-    `pictures`, `verdict`, `tables`, `charts`, `opening` and `follow_up` get everything that was measured: an
-    `xarray.Dataset`, or an `xarray.DataTree` if the cases are in groups. Each picture is saved and closed before the
-    next one is drawn, if `pictures` draws them one by one.
+    `pictures`, `verdict`, `tables`, `charts`, `opening` and `follow_up` get everything that was measured. Each picture
+    is saved and closed before the next one is drawn, if `pictures` draws them one by one.
     """
 
     name: str
@@ -209,65 +181,101 @@ class Study:
     def grid(self, *, quick: bool = False, full: bool = False) -> list[Case]:
         """The cases of the first round: the coarse grid, the ordinary one, or the longest there is."""
         longest = self.full if full else None
-        return self.listed("cases", lambda: self.cases(quick)) if longest is None else self.listed("full", longest)
+        return self._listed("cases", lambda: self.cases(quick)) if longest is None else self._listed("full", longest)
 
     def later(self, data: Combined) -> list[Case]:
-        """The cases of the second round."""
-        follow_up = self.follow_up
-        return [] if follow_up is None else self.listed("follow_up", lambda: follow_up(data))
+        """The cases of the second round, which a study with a `follow_up` has."""
+        return self._listed("follow_up", lambda: self.follow_up and self.follow_up(data))
 
-    def listed(self, function: str, make: Callable[[], list[Case]]) -> list[Case]:
-        """The cases that one of its functions returns. Raises StudyError if they are no list of cases."""
-        return list(door(self.name, function).each(make, Case, "a list of Case"))
-
-    def flawed(self, cases: Iterable[Case]) -> StudyError | None:
-        """The sentence on the first case that cannot be stored, if there is one."""
-        for case in cases:
-            if flaw := case.flaw():
-                return StudyError(f"study {self.name}: a Case of {case.integrator} on {case.scene} is wrong: {flaw}")
-        return None
-
-    def only(self, names: Collection[str]) -> "Study":
-        """The same study with the cases of some methods, or variants, alone; SymtopError if it has none of them.
-
-        A case that measures several integrators against each other stays whole if one of them is asked for, and one of
-        the closed form, which others are measured by, stays in any case.
-        """
-        wanted = {*names, REFERENCE}
-
-        def asked(cases: list[Case]) -> list[Case]:
-            whole = [*door(self.name, "cases").each(lambda: cases, Case, "a list of Case")]
-            if (error := self.flawed(whole)) is not None:
-                raise error
-            return [case for case in whole if any({name, split_name(name)[0]} & wanted for name in case.integrators)]
-
-        def first(quick: bool) -> list[Case]:
-            kept = asked(self.cases(quick))
-            alone = all({*case.integrators} <= {REFERENCE} for case in kept)
-            if not kept or (alone and REFERENCE not in names):
-                raise StudyError(f"study {self.name} has no case of {', '.join(names)}")
-            return kept
-
-        def able(answer: Callable[[Any], Any]) -> Callable[[Any], Any]:
-            def answered(data: Any) -> Any:
-                try:
-                    return answer(data)
-                except Exception as error:
-                    if isinstance(error, StudyError):
-                        raise
-                    sentence = f"study {self.name} compares methods and has no answer with {', '.join(names)} alone"
-                    raise StudyError(f"{sentence}; name more of them") from error
-
-            return answered
-
-        full, later = self.full, self.follow_up
-        return replace(
-            self, cases=first, full=None if full is None else lambda: asked(full()),
-            follow_up=None if later is None else lambda data: asked(later(data)),
-            pictures=able(self.pictures), verdict=able(self.verdict), tables=able(self.tables),
-            charts=able(self.charts), opening=None if self.opening is None else able(self.opening),
-        )  # fmt: skip
+    def _listed(self, function: str, make: Callable[[], Any]) -> list[Case]:
+        return list(each(self.name, function, make, Case, "a list of Case"))
 
     def is_timed(self, case: Case) -> bool:
         """Are times measured in the case, so that nothing may run beside it that disturbs them?"""
         return self.timed or case.timed
+
+    def only(self, names: Collection[str]) -> "Study":
+        """The same study with the cases of some methods, or variants, alone; SymtopError if it has none of them.
+
+        A case that measures several integrators against each other stays whole if one of them is named, and one of
+        the closed form, which others are measured by, stays in any case.
+        """
+        wanted = {*names, REFERENCE}
+
+        def chosen(cases: list[Case]) -> list[Case]:
+            return [
+                case
+                for case in self._listed("cases", lambda: cases)
+                if any({name, split_name(name)[0]} & wanted for name in case.integrators)
+            ]
+
+        def first(quick: bool) -> list[Case]:
+            cases = chosen(self.cases(quick))
+            alone = all({*case.integrators} <= {REFERENCE} for case in cases)
+            if not cases or (alone and REFERENCE not in names):
+                raise StudyError(f"study {self.name} has no case of {', '.join(names)}")
+            return cases
+
+        def able(answer: Callable[[Any], Any] | None) -> Any:
+            def answered(data: Any) -> Any:
+                try:
+                    return answer(data)  # type: ignore[misc]
+                except StudyError:
+                    raise
+                except Exception as error:
+                    sentence = f"study {self.name} compares methods and has no answer with {', '.join(names)} alone"
+                    raise StudyError(f"{sentence}; name more of them") from error
+
+            return answer and answered
+
+        full, later = self.full, self.follow_up
+        answers = {name: able(getattr(self, name)) for name in ("pictures", "verdict", "tables", "charts", "opening")}
+        return replace(
+            self, cases=first, full=full and (lambda: chosen(full())),
+            follow_up=later and (lambda data: chosen(later(data))), **answers,
+        )  # fmt: skip
+
+
+def findings_of(
+    study: Study, data: Combined, results: Path, save: Save | None, *, failures: list[str], cases: int
+) -> dict[str, Any]:
+    """Draw a dataset and say what it shows, as the report wants it."""
+    verdict = each(study.name, "verdict", lambda: study.verdict(data), str, "a list of sentences")
+    tables = each(study.name, "tables", lambda: study.tables(data), Table, "a list of Table")
+    charts = each(study.name, "charts", lambda: study.charts(data), Chart, "a list of Chart")
+    opening = None
+    if study.opening is not None:
+        with failing(study.name, "opening"):
+            first = study.opening(data)
+        if not isinstance(first, Opening):
+            raise StudyError(f"study {study.name}: opening must return an Opening, not {shown(first)[:LONGEST]}")
+        opening = first._asdict() | {"table": first.table._asdict(), "explained": dict(first.explained)}
+    return {
+        "study": study.name,
+        **{name: getattr(study, name) for name in ("title", "question", "how_to_read")},
+        "verdict": list(verdict),
+        "tables": [table._asdict() for table in tables],
+        "charts": [chart._asdict() for chart in charts],
+        "opening": opening,
+        "pictures": [] if save is None else list(_saved(study, data, results, save)),
+        "failures": failures,
+        "cases": cases,
+        "quick": False,
+        "provenance": netcdf.provenance(changes=True),
+    }
+
+
+def _saved(study: Study, data: Combined, results: Path, save: Save) -> Iterator[dict[str, str]]:
+    """Save the pictures one by one; StudyError for what is none."""
+    for picture in each(study.name, "pictures", lambda: study.pictures(data), Picture, "or yield Pictures"):
+        words = {key: getattr(picture, key) for key in ("name", "caption", "alt", "lead")}
+        for key in (key for key, text in words.items() if not isinstance(text, str)):
+            raise StudyError(f"study {study.name}: a Picture must have a {key} that is text, not {shown(words[key])}")
+        if not hasattr(picture.figure, "savefig"):
+            kind = type(picture.figure).__name__
+            raise StudyError(f"study {study.name}: the figure of a Picture must be one of matplotlib, not a {kind}")
+        with failing(study.name, "pictures"):
+            label("name of a picture", picture.name)
+        file = f"{study.name}-{picture.name}.{getattr(picture.figure, 'suffix', 'png')}"  # a film is a GIF
+        save(picture.figure, results / "figures" / file)
+        yield {"file": file} | words

@@ -3,7 +3,6 @@
 import ctypes
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,9 +12,7 @@ from scipy.integrate import solve_ivp
 import symtop
 from benchmarks import peers
 from benchmarks.peers import callbacks, common, measure, own
-from benchmarks.peers.adapters import sundae
 from symtop.methods.framework.angles import field_angles, with_rates
-from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.space import field_axis
 from symtop.run.simulation import make_plan
 
@@ -175,33 +172,6 @@ def test_an_inner_loop_that_does_not_start_anew_is_seen(scene):
         return state[0]
 
     assert measure.end_error(scene, peer, common.Inner(call, lambda last: last)) > 1e-2
-
-
-def test_objects_are_built_inside_the_public_call_and_outside_the_inner_loop(scene):
-    built = []
-
-    class CVODE:
-        def __init__(self, *_, **__):
-            built.append(self)
-
-        def solve(self, times, state):
-            return SimpleNamespace(y=np.tile(state, (len(times), 1)), nfev=1)
-
-        def init_step(self, time, state):
-            self.state = state
-
-        def step(self, time):
-            return SimpleNamespace(y=self.state)
-
-    library = sundae.Sundae(SimpleNamespace(CVODE=CVODE), "Adams")
-    plan = Plan.until([0.0, 1.0, 2.0], 1e-6)
-    for _ in range(3):
-        library.public(scene.top, scene.start, plan)
-    assert len(built) == 3
-    loop = library.inner(scene.top, scene.start, plan)
-    for _ in range(3):
-        loop.call()
-    assert len(built) == 4
 
 
 # ---- accuracy and the search -----------------------------------------------------------------------------------------

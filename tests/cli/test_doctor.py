@@ -41,7 +41,7 @@ def test_a_package_that_is_missing_or_too_old(monkeypatch):
         return "0.1" if name == "numba" else real(name)
 
     monkeypatch.setattr(importlib.metadata, "version", version)
-    findings = faults(doctor._packages())
+    findings = faults(doctor._packages(Path()))
     assert set(findings) == {"tqdm", "numba"}
     assert findings["tqdm"].advice.startswith("pip install 'tqdm>=")
     assert "needs >=0." in findings["numba"].advice
@@ -68,14 +68,14 @@ def test_every_form_of_a_requirement_is_read(monkeypatch, requirement, result, h
     real = importlib.metadata.version
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: [requirement])
     monkeypatch.setattr(importlib.metadata, "version", lambda name: "2.4.6" if name == "numpy" else real(name))
-    findings = doctor._packages()
+    findings = doctor._packages(Path())
     assert [(finding.result, finding.healthy) for finding in findings] == ([(result, healthy)] if result else [])
 
 
 def test_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "file" / "cache"))
-    assert "SYMTOP_CACHE" in faults(doctor._caches())["cache"].advice
+    assert "SYMTOP_CACHE" in faults(doctor._caches(Path()))["cache"].advice
     assert set(faults(doctor._results(Path("/proc/none")))) == {"results"}
 
 
@@ -87,7 +87,7 @@ def test_a_disk_without_room(tmp_path, monkeypatch):
 def test_a_wrong_number_is_seen(monkeypatch):
     wrong = published.Published("somebody", "something", 1.0, 1.1, 1e-3, "printed")
     monkeypatch.setattr(published, "published_values", lambda: [wrong])
-    findings = faults(doctor._self_check())
+    findings = faults(doctor._self_check(Path()))
     assert "not somebody, something" in findings["published values"].result
     assert set(findings) == {"published values"}
 
@@ -97,7 +97,7 @@ def test_a_check_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path
         raise OSError("the tools are gone")
 
     monkeypatch.setitem(doctor.CHECKS, "machine", trouble)
-    monkeypatch.setattr(doctor, "_self_check", list)
+    monkeypatch.setitem(doctor.CHECKS, "self-check", lambda _: [])
     done = CliRunner().invoke(main, ["doctor", "--results", str(tmp_path)])
     assert done.exit_code == 1
     assert "BAD  machine" in done.output
@@ -105,17 +105,15 @@ def test_a_check_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path
 
 
 def test_every_compiled_method_is_run_in_each_of_its_charts():
-    todo = doctor.tasks()
-    for kind in ("alone", "together"):
-        names = [name for what, name in todo if what == kind]
-        assert len(names) == len(set(names))
-        for method in symtop.integrators().values():
-            variants = {f"{method.name}[{chart}]" for chart in method.charts()}
-            assert variants <= set(names) if method.implementation != "python" else not variants & set(names)
+    names = doctor.variants()
+    assert len(names) == len(set(names))
+    for method in symtop.integrators().values():
+        variants = {f"{method.name}[{chart}]" for chart in method.charts()}
+        assert variants <= set(names) if method.implementation != "python" else not variants & set(names)
 
 
 def test_a_run_that_fails_is_named(monkeypatch):
-    monkeypatch.setattr(doctor, "tasks", lambda: [("alone", "strang[axis]"), ("alone", "no-such-method[axis]")])
+    monkeypatch.setattr(doctor, "variants", lambda: ["strang[axis]", "no-such-method[axis]"])
     _, failed = doctor.compile_all(jobs=1)
     assert [why.partition(":")[0] for why in failed] == ["no-such-method[axis]"]
 
@@ -123,7 +121,7 @@ def test_a_run_that_fails_is_named(monkeypatch):
 @pytest.mark.slow
 def test_kernels_are_on_disk_afterwards(monkeypatch, tmp_path):
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
-    monkeypatch.setattr(doctor, "tasks", lambda: [("alone", "strang[axis]")])
+    monkeypatch.setattr(doctor, "variants", lambda: ["strang[axis]"])
     count, _ = doctor.compile_all(jobs=1)
     assert count == doctor.kernels() >= 1
     assert doctor.compile_all(jobs=1)[0] == 0

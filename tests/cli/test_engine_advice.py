@@ -6,8 +6,8 @@ import pytest
 from click.testing import CliRunner
 
 import symtop
+from symtop.advise import SETTINGS, i_use
 from symtop.cli.main import main
-from symtop.cli.recommend import SETTINGS, i_use
 from symtop.methods.framework.registry import engines
 
 

@@ -16,7 +16,7 @@ import numba
 import pytest
 
 import symtop
-from symtop.core import code_hash, files, jit, signals
+from symtop.core import code_hash, files, jit
 from symtop.core.code_hash import Code, by_file, changes, digest, merged
 from symtop.runner import fingerprint
 
@@ -33,7 +33,7 @@ def loaded(path: Path, name: str):
 SCRIPT = """
 import math
 from symtop.methods.runge_kutta import gauss
-from symtop.runner.check import differences
+from symtop.measure.datasets import differences
 
 STEPS = (5,)
 CAPTION = "unused"
@@ -55,7 +55,7 @@ def test_a_script_counts_by_the_functions_and_globals_that_are_reached(tmp_path)
     labels = {part.label for part in Code().reached("measure", module.measure)}
     assert {"function script.py:measure", "function script.py:part", "constant script.py:STEPS"} <= labels
     assert "function symtop/measure/errors.py:error_bound" in labels  # imported when the function runs
-    assert not any(name in label for label in labels for name in ("check.py", "CAPTION", "state"))
+    assert not any(name in label for label in labels for name in ("cases.py", "CAPTION", "state"))
     before = Code().reasons("measure", module.measure)
     module.state["calls"] = 9  # what calls leave behind is no part of code
     assert Code().reasons("measure", module.measure) == before
@@ -177,7 +177,7 @@ def test_an_edited_callee_makes_a_new_kernel_and_a_comment_makes_none(tmp_path):
         assert "\nfrom " in text
         file.write_text(text.replace("\nfrom ", "\n# a comment\nfrom ", 1))  # every line below moves down
     assert kernels_of(tmp_path, tmp_path / "cache") == before  # nothing compiled, and the checkpoint is still valid
-    callee = tmp_path / "symtop" / "methods" / "space.py"
+    callee = tmp_path / "symtop" / "methods" / "framework" / "space.py"
     text = callee.read_text()
     assert "par.mgl" in text
     callee.write_text(text.replace("par.mgl", "(1.5 * par.mgl)"))  # called from gauss.py, compiled in loop.py
@@ -268,32 +268,6 @@ def test_the_cache_keeps_what_was_used_last(tmp_path):
     files.prune(tmp_path, 100)
     assert not list(tmp_path.iterdir())
     files.prune(tmp_path / "nothing", 100)
-
-
-# ---- the rest of the room --------------------------------------------------------------------------------------------
-
-
-def test_units_follow_the_scene():
-    plain = symtop.simulate("goldstein", "strang", step_size=0.01, samples=3, guard=False)
-    assert {name: plain[name].attrs["units"] for name in ("time", "energy", "p_phi")} == dict.fromkeys(
-        ("time", "energy", "p_phi"), "1"
-    )
-    assert plain["theta"].attrs["units"] == "rad"
-    metric = symtop.reference("spheroid", [0.0, 1.0], precision="closed-form")
-    assert [metric[name].attrs["units"] for name in ("time", "energy", "p_psi")] == ["s", "kg m2 s-2", "kg m2 s-1"]
-    with pytest.raises(symtop.SymtopError, match="units"):
-        dataclasses.replace(symtop.scene("spheroid"), units="imperial")
-
-
-def test_sigterm_is_heard_as_an_exception_and_ends_with_143():
-    code = (
-        "import os, signal, sys; from symtop.core.signals import *\n"
-        "with ending_on_sigterm():\n"
-        "    try: os.kill(os.getpid(), signal.SIGTERM)\n"
-        "    except TerminatedError: print('heard'); raise\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
-    assert (done.stdout, done.returncode, done.stderr) == ("heard\n", signals.TERMINATED, "")
 
 
 def test_versions_of_packages_are_reasons():

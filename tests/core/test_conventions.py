@@ -4,6 +4,7 @@ The rules of the convention that a dataset of a run can break, as the IOOS compl
 for is not kept, on purpose: ``time`` is elapsed time and no date, so that it has no ``standard_name`` "time".
 """
 
+import dataclasses
 import re
 
 import numpy as np
@@ -61,3 +62,7 @@ def test_units_are_those_of_the_scene():
         scene = next(key for key, units in scenes.items() if units == name)
         data = symtop.simulate(scene, "strang", step_size=0.001, horizon=0.01)
         assert data["time"].attrs["units"] == ("s" if name == "SI" else "1")
+        assert data["energy"].attrs["units"] == ("kg m2 s-2" if name == "SI" else "1")
+        assert data["theta"].attrs["units"] == "rad"
+    with pytest.raises(symtop.SymtopError, match="units"):
+        dataclasses.replace(symtop.scene("spheroid"), units="imperial")

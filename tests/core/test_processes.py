@@ -6,7 +6,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
-from symtop.core.parallel import VARIABLES, context as one_thread
+from symtop.core.parallel import VARIABLES, OneThreadEach
 
 
 def looked_up(name):
@@ -27,12 +27,12 @@ def unset(monkeypatch):
 
 def test_a_process_has_one_thread_and_this_one_keeps_its_environment():
     before = dict(os.environ)
-    assert seen_by(one_thread()) == ["1"] * len(VARIABLES)
+    assert seen_by(OneThreadEach()) == ["1"] * len(VARIABLES)
     assert dict(os.environ) == before
     assert seen_by(multiprocessing.get_context("spawn")) == [None] * len(VARIABLES), "nobody else is told"
 
 
 def test_what_the_user_has_set_is_obeyed(monkeypatch):
     monkeypatch.setenv(VARIABLES[0], "3")
-    assert seen_by(one_thread()) == ["3", "1", "1"]
+    assert seen_by(OneThreadEach()) == ["3", "1", "1"]
     assert os.environ[VARIABLES[0]] == "3"

@@ -143,15 +143,6 @@ def test_every_figure_has_its_study_and_command(site):
         assert f"Made by symtop study {study} ;" in spoken, study
 
 
-def test_the_gallery_is_made_of_the_report():
-    text = gallery.markdown(SMALL, {"convergence-a.png"})
-    for wanted in (
-        "## Convergence", "*At what rate?*", "`symtop study convergence`", "**How to read it.** Filled",
-        "snapshot/figures/convergence-a.png", ":alt: Lines.", "Slope is order, for `rk4[axis]`.",
-    ):  # fmt: skip
-        assert wanted in text
-
-
 @pytest.mark.parametrize(
     ("report", "tracked"),
     [

@@ -84,13 +84,6 @@ def test_the_first_answer_is_put_between_the_marks_of_a_page():
             taker.quote(taker.answer(REPORT), bad)
 
 
-def test_findings_are_the_first_sentences_of_their_section():
-    taker = _taker()
-    assert taker.findings(REPORT, "Next", 3) == "- Not this.\n"
-    assert taker.findings(REPORT, "Which?", 1).startswith("- Begin with a;")
-    assert "Then b" not in taker.findings(REPORT, "Which?", 1)
-
-
 @pytest.mark.parametrize("name", ["choosing.md", "results.md"])
 def test_what_a_page_quotes_is_what_the_stored_report_says(name):
     page = (ROOT / "docs" / name).read_text(encoding="utf-8")

@@ -3,7 +3,6 @@
 import base64
 import http.client
 import json
-import os
 import re
 import signal
 import socket
@@ -404,28 +403,3 @@ def test_a_warning_is_shown_on_the_page(site, monkeypatch):
         browser.open(address(site))
         browser.wait_for("document.querySelector('#warnings').textContent === 'the phase will be <lost>'")
         assert browser.problems == []
-
-
-@pytest.mark.slow
-def test_a_change_is_drawn_within_a_tenth_of_a_second(site):
-    """From the slider's event to the last plot, 100 000 steps, the best of thirty; 51 ms on two cores.
-
-    A wall clock says nothing where ten processes wait for each core; the processor time above is judged even there.
-    """
-    if os.getloadavg()[0] > 2 * (os.cpu_count() or 1):
-        pytest.skip(
-            f"the machine is too busy for a wall clock: load {os.getloadavg()[0]:.0f} on {os.cpu_count()} cores"
-        )
-    with Browser() as browser:
-        browser.open(address(site))
-        browser.wait_for("document.body.dataset.answer === 'ok'")
-        answered(browser, lambda: browser.set("#horizon", 60))
-        answered(browser, lambda: browser.set("#step_size", 6e-4))
-        browser.wait_for("document.body.dataset.steps === '100000'")
-        best = np.inf
-        for k in range(30):
-            answered(browser, lambda k=k: browser.set("#theta-slider", 0.4 + 0.01 * k))
-            best = min(best, float(browser.evaluate("document.body.dataset.elapsed")))
-            if best < 100.0:
-                return
-        pytest.fail(f"the fastest change took {best:.0f} ms")

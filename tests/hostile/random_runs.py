@@ -97,15 +97,9 @@ def _any_start(draw, top):
     return top, Angles(draw.uniform(0.05, 3.05), *_turns(draw), *_rates(draw, top))
 
 
-def _fast(draw):
+def _fast(draw, least, most):
     top = _top(draw)
-    spin = _swing(top) * 10.0 ** draw.uniform(0.0, 1.7)
-    return top, Angles(draw.uniform(0.05, 3.0), *_turns(draw), psi_dot=spin)
-
-
-def _very_fast(draw):
-    top = _top(draw)
-    spin = _swing(top) * 10.0 ** draw.uniform(2.0, 6.0)
+    spin = _swing(top) * 10.0 ** draw.uniform(least, most)
     return top, Angles(draw.uniform(0.05, 3.0), *_turns(draw), psi_dot=spin)
 
 
@@ -133,12 +127,8 @@ def _through_upright(draw, spin, energy):
     return top, at
 
 
-def _separatrix(draw):
-    return _through_upright(draw, draw.uniform(0.0, 0.99), draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-12.0, -1.0))
-
-
-def _pendulum(draw):
-    return _through_upright(draw, 0.0, draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-12.0, 0.0))
+def _excess(draw, most):
+    return draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-12.0, most)
 
 
 def _aimed(draw):
@@ -172,10 +162,8 @@ def _units(draw):
     top, at = _any_start(draw, _top(draw))
     mass, clock = 10.0 ** draw.uniform(-9.0, 9.0), 10.0 ** draw.uniform(-9.0, 9.0)
     rates = (rate / clock for rate in (at.theta_dot, at.phi_dot, at.psi_dot))
-    return (
-        SymmetricTop(top.I1 * mass, top.I3 * mass, top.mgl * mass / clock**2),
-        Angles(at.theta, at.phi, at.psi, *rates),
-    )
+    other = SymmetricTop(top.I1 * mass, top.I3 * mass, top.mgl * mass / clock**2)
+    return other, Angles(at.theta, at.phi, at.psi, *rates)
 
 
 KINDS = {
@@ -186,12 +174,12 @@ KINDS = {
     "weightless": lambda draw: _any_start(draw, _top(draw, weight=10.0 ** draw.uniform(-12.0, -3.0))),
     "heavy": lambda draw: _any_start(draw, _top(draw, weight=10.0 ** draw.uniform(2.0, 6.0))),
     "units": _units,
-    "fast": _fast,
-    "very-fast": _very_fast,
+    "fast": lambda draw: _fast(draw, 0.0, 1.7),
+    "very-fast": lambda draw: _fast(draw, 2.0, 6.0),
     "upright": _upright,
     "sleeper": _sleeper,
-    "separatrix": _separatrix,
-    "pendulum": _pendulum,
+    "separatrix": lambda draw: _through_upright(draw, draw.uniform(0.0, 0.99), _excess(draw, -1.0)),
+    "pendulum": lambda draw: _through_upright(draw, 0.0, _excess(draw, 0.0)),
     "aimed": _aimed,
     "hanging": _hanging,
     "steady": _steady,
@@ -284,31 +272,15 @@ def read(path: Path, seed: int = SEED) -> dict[int, Outcome]:
 
 def told(runs: list[Outcome]) -> str:
     """The figures of so many runs, and each run that should not be."""
-    ended = collections.Counter(run.outcome for run in runs)
     wrong, right = [run for run in runs if run.wrong], [run for run in runs if run.right]
     silent, false = [run for run in wrong if not run.warning], [run for run in right if run.warning]
-    slow = [run for run in runs if run.seconds >= LONGEST or run.outcome == "endless"]
-    share = 100.0 * len(false) / max(1, len(right))
-    crashed = [run for run in runs if run.outcome == "crashed"]
+    odd = [run for run in runs if run.outcome in ("endless", "crashed") or run.seconds >= LONGEST]
     lines = [
-        f"{len(runs)} runs: " + ", ".join(f"{count} {name}" for name, count in ended.most_common()),
+        f"{len(runs)} runs: {dict(collections.Counter(run.outcome for run in runs))}",
         f"{len(wrong)} wrong by more than {WRONG} rad, of them silent: {len(silent)}",
-        f"{len(right)} right to {RIGHT} rad, of them warned of: {len(false)} ({share:.2f} %)",
-        f"longest {max((run.seconds for run in runs), default=0.0):.1f} s, beyond {LONGEST:.0f} s: {len(slow)}",
+        f"{len(right)} right to {RIGHT} rad, of them warned of: {len(false)}",
     ]
-    named = {
-        "silent": silent,
-        "slow": slow,
-        "crashed": crashed,
-        "refused": [r for r in runs if r.outcome == "refused"][:20],
-    }
-    for name, group in named.items():
-        lines += [
-            f"{name} {run.k} {run.kind} {run.integrator} {run.observe} {run.control} {run.nutations:.3g} nutations, "
-            f"error {run.error:.2g}, {run.seconds:.1f} s {run.warning}"
-            for run in group
-        ]
-    return "\n".join(lines)
+    return "\n".join([*lines, *map(repr, silent), *map(repr, odd)])
 
 
 def run_all(count: int, path: Path, seed: int = SEED) -> dict[int, Outcome]:

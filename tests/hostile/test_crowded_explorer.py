@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -22,14 +23,14 @@ QUESTION = json.dumps({
 
 @pytest.fixture
 def crowd(tmp_path):
-    """The port of an explorer in a process of its own, and the file of what it says."""
+    """The port of an explorer in a process of its own, the file of what it says, and that of its memory."""
     log = tmp_path / "log"
     with log.open("w") as said:
         process = subprocess.Popen(
             [sys.executable, "-c", SCRIPT], stdout=subprocess.PIPE, stderr=said, text=True, env={**os.environ}
         )
         try:
-            yield int(process.stdout.readline()), log
+            yield int(process.stdout.readline()), log, Path(f"/proc/{process.pid}/statm")
         finally:
             process.kill()
             process.communicate()
@@ -70,15 +71,18 @@ GOOD = b"HTTP/1.1 200 OK"
 
 @pytest.mark.parametrize("count", [pytest.param(20, id="few"), pytest.param(200, id="many", marks=pytest.mark.slow)])
 def test_a_crowd_is_served_and_nothing_is_said_of_those_who_leave(crowd, count):
-    port, log = crowd
-    assert asked(port, b"/run", QUESTION) == GOOD
-    at_once(count, lambda: asked(port, b"/run", QUESTION, leave=True))
-    assert at_once(count, lambda: asked(port, b"/run", QUESTION)) == [GOOD] * count
+    port, log, memory = crowd
+    sizes = []
+    for _ in range(3):
+        at_once(count, lambda: asked(port, b"/run", QUESTION, leave=True))
+        assert at_once(count, lambda: asked(port, b"/run", QUESTION)) == [GOOD] * count
+        sizes.append(int(memory.read_text().split()[1]))  # pages in memory now, not the peak
+    assert sizes[2] < 1.05 * sizes[1]  # the first round compiles and fills caches
     assert log.read_text() == ""
 
 
 def test_clients_that_never_finish_do_not_keep_others_waiting(crowd):
-    port, log = crowd
+    port, log, _ = crowd
     assert asked(port, b"/run", QUESTION) == GOOD
     idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(100)]
     for link in idle[:50]:

@@ -114,9 +114,9 @@ def test_a_damaged_checkpoint_is_not_gone_on_from(tmp_path, monkeypatch, flips):
     draw, scene, method = random.Random(8), symtop.scene("spheroid"), symtop.integrator("midpoint")
     _, solver = longrun.chart_of(method)
     par, rule, state = solver.setup(scene.top, scene.start, H)
-    start = solver.loop.begun(par, rule, state, H)
+    start = solver.loop.start(par, rule, state, H)
     for file in (True, tmp_path / "own.nc"):
-        book = longrun._Book(file, "an identity")
+        book = longrun._Checkpoint(file, "an identity")
         book.latest = start._replace(k=7), [[0.5] * 15] * 3
         book.save()
         good = book.resumed(start)

@@ -13,7 +13,7 @@ from symtop.cli.main import main
 from symtop.core.signals import InterruptedByUser, told_apart
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
-from symtop.runner import plugins
+from symtop.run import plugins
 from tests.commands import ended, symtop as command
 
 PLUGIN = Path(__file__).with_name("plugin.py")

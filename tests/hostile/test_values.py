@@ -15,16 +15,7 @@ import pytest
 import xarray as xr
 
 import symtop
-from tests.cli.test_bad_input import (
-    CALLS,
-    NOT_FINITE,
-    NOT_POSITIVE,
-    NOT_ROW,
-    NOT_WHOLE,
-    START,
-    TOP,
-    UNKNOWN,
-)  # fmt: skip
+from tests.cli.test_bad_input import CALLS, NOT_FINITE, NOT_POSITIVE, NOT_ROW, NOT_WHOLE, START, TOP, UNKNOWN
 
 SECONDS = 20.0  # of processor time for one call
 
@@ -52,18 +43,9 @@ ANY = [
     xr.Dataset(), xr.DataArray([1.0]), symtop.SymtopError("x"), TOP, START,
 ]  # fmt: skip
 RUN = symtop.simulate("spheroid", "strang", step_size=0.01, horizon=0.5, samples=11)
-NOT_DATA = [
-    None,
-    3,
-    "x",
-    [],
-    {},
-    object(),
-    {"time": [0.0]},
-    {"time": "x", "theta": [1.0]},
-    xr.Dataset(),
-    {"axis": [[0, 0, 1.0]]},
-]
+NO_TIMES = [{"time": [0.0]}, {"time": "x", "theta": [1.0]}, xr.Dataset(), {"axis": [[0, 0, 1.0]]}]
+NOT_DATA = [None, 3, "x", [], {}, object(), *NO_TIMES]
+NOT_HORIZONS = [value for value in NOT_POSITIVE if value is not None]
 NO_NUMBER = [value for value in NOT_POSITIVE if not isinstance(value, np.ndarray | list)]
 SMALL = symtop.population(3, seed=1)
 
@@ -82,12 +64,7 @@ MORE = {
     "recommend": (
         symtop.recommend,
         {"scene": "spheroid", "accuracy": 1e-2, "horizon": 0.1},
-        {
-            "scene": UNKNOWN,
-            "accuracy": NOT_POSITIVE,
-            "quantity": UNKNOWN,
-            "horizon": [value for value in NOT_POSITIVE if value is not None],
-        },
+        {"scene": UNKNOWN, "accuracy": NOT_POSITIVE, "quantity": UNKNOWN, "horizon": NOT_HORIZONS},
     ),
     "population": (
         symtop.population, {"n": 3, "seed": 1}, {"n": NOT_WHOLE, "seed": [None, "x", -1, 1.5, math.nan, [], 1j]}
@@ -96,12 +73,8 @@ MORE = {
         symtop.ensemble,
         {"members": SMALL, "integrator": "strang", "step_size": 0.05, "horizon": 0.2, "samples": 3, "quiet": True},
         {
-            "members": NOT_DATA[:4],
-            "integrator": UNKNOWN,
-            "step_size": NO_NUMBER,
-            "horizon": NO_NUMBER[1:],
-            "samples": [*NOT_WHOLE, 1],
-            "observe": [value for value in UNKNOWN if value is not None],
+            "members": NOT_DATA[:4], "integrator": UNKNOWN, "step_size": NO_NUMBER, "horizon": NO_NUMBER[1:],
+            "samples": [*NOT_WHOLE, 1], "observe": [value for value in UNKNOWN if value is not None],
             "threads": [value for value in NOT_WHOLE if value is not None],
         },
     ),
@@ -123,11 +96,8 @@ MORE = {
         symtop.judge,
         {"target": lambda f, t, y, h: y, "quick": True},
         {
-            "form": [value for value in UNKNOWN[1:] if value],
-            "chart": UNKNOWN,
-            "scene": UNKNOWN,
-            "order": NOT_WHOLE[1:],
-            "energy": UNKNOWN[1:],
+            "form": [value for value in UNKNOWN[1:] if value], "chart": UNKNOWN, "scene": UNKNOWN,
+            "order": NOT_WHOLE[1:], "energy": UNKNOWN[1:],
         },
     ),
 }  # fmt: skip
@@ -179,7 +149,3 @@ def test_anything_is_used_or_refused(function, good, argument, values):
         except Exception as error:  # noqa: BLE001
             faults.append((k, type(value).__name__, type(error).__name__, str(error)[:200]))
     assert not faults
-
-
-def test_they_are_many():
-    assert sum(len(case.values[3]) for case in [*BAD, *WHATEVER]) >= 2000

@@ -16,16 +16,12 @@ from scipy.integrate import RK23
 import symtop
 from symtop.cli.judge import FORMS as OFFERED
 from symtop.cli.main import main
-from symtop.judging import sandbox
-from symtop.judging.adapters.adapter import integrator, label_of
-from symtop.judging.adapters.choice import FORMS, open_target
-from symtop.judging.adapters.python_step import PythonStep
-from symtop.judging.adapters.rotation import RotationStep, to_body, to_space
-from symtop.judging.adapters.separable import SeparableStep
+from symtop.judging import judge_step
+from symtop.judging.adapters.adapter import heartbeat, integrator, label_of
+from symtop.judging.adapters.python_step import PythonStep, RotationStep, SeparableStep, to_body, to_space
 from symtop.judging.battery import CLAIMS, TABLE
-from symtop.judging.findings import VERDICTS, read
-from symtop.judging.heartbeat import heartbeat
-from symtop.judging.text_report import description
+from symtop.judging.claims.subject import FORMS, open_target
+from symtop.judging.findings import VERDICTS, description, read
 
 SPHEROID = symtop.scene("spheroid")
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no C compiler")
@@ -296,7 +292,7 @@ def test_a_program_that_gives_back_its_line_cannot_be_judged(tmp_path):
 
 @pytest.fixture
 def impatient(monkeypatch):
-    monkeypatch.setattr("symtop.judging.heartbeat.QUICK_PATIENCE", 0.5)
+    monkeypatch.setattr("symtop.judging.adapters.adapter.QUICK_PATIENCE", 0.5)
 
 
 @pytest.mark.parametrize(
@@ -323,13 +319,13 @@ def test_waiting_for_a_processor_takes_none_of_the_time_that_judging_has():
     try:
         for process in (0, busy.pid):
             os.sched_setaffinity(process, {min(allowed)})
-        wall, counted, worked = time.monotonic(), sandbox._clock(os.getpid()), time.process_time()
+        wall, counted, worked = time.monotonic(), judge_step._clock(os.getpid()), time.process_time()
         while time.process_time() < worked + 0.3:
             pass
-        assert sandbox._clock(os.getpid()) - counted < 0.8 * (time.monotonic() - wall)
-        counted = sandbox._clock(os.getpid())
+        assert judge_step._clock(os.getpid()) - counted < 0.8 * (time.monotonic() - wall)
+        counted = judge_step._clock(os.getpid())
         time.sleep(0.2)
-        assert sandbox._clock(os.getpid()) - counted > 0.19
+        assert judge_step._clock(os.getpid()) - counted > 0.19
     finally:
         os.sched_setaffinity(0, allowed)
         busy.kill()
@@ -341,7 +337,7 @@ def test_a_step_that_hangs_backwards_is_judged_forwards(impatient):
     assert (ledger["calls"].measured.kind, ledger["order"].verdict) == ("forward only", "confirmed")
     assert "a step of -h did not return" in ledger["calls"].why
     assert ledger["symplectic"].measured.kind == "no"
-    assert not heartbeat.look().inside
+    assert not heartbeat.inside
 
 
 def changes_its_input(f, t, y, h):

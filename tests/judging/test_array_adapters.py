@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.judging.adapters.batch_step import field_of
-from symtop.judging.adapters.choice import open_target
+from symtop.judging.adapters.external import field_of
+from symtop.judging.claims.subject import open_target
 from symtop.methods.framework.equations import FORMULATIONS
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import symtop
-from symtop.judging.text_report import description
+from symtop.judging.findings import description
 
 BLIND = Path(__file__).parent / "blind"
 

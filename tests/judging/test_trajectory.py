@@ -10,7 +10,7 @@ from click.testing import CliRunner
 import symtop
 from symtop.cli.main import main
 from symtop.core import netcdf
-from symtop.judging.adapters.choice import open_target
+from symtop.judging.claims.subject import open_target
 from symtop.methods.framework.equations import FORMULATIONS
 
 SPHEROID = symtop.scene("spheroid")

@@ -8,14 +8,12 @@ import pytest
 import xarray as xr
 
 import symtop
+from symtop.measure import datasets
 from symtop.measure.accuracy import error_table
-from symtop.measure.conservation import growth, trend
+from symtop.measure.conservation import trend
 from symtop.measure.order import order, power_law
 from symtop.measure.settings import ladder
 from symtop.measure.timing import Timing, timings
-from symtop.run.reference.truth import reference
-from symtop.run.simulation import sample_times
-from symtop.runner import store
 from symtop.runner.study import Case
 
 STEPS = 0.1 / 1.5 ** np.arange(16)
@@ -66,13 +64,6 @@ def test_what_is_not_a_power_of_the_step_is_not_judged_and_says_why(error, reaso
     assert reason in fit.reason
 
 
-@pytest.mark.parametrize("power", [0.0, 0.5, 1.0, 2.0])
-def test_growth_finds_the_exponent_and_ignores_the_start(power):
-    t = np.linspace(0.0, 1000.0, 4001)
-    residual = 1e-6 * t**power * np.abs(np.cos(7.3 * t)) * np.minimum(1.0, t / 2.0) ** 3
-    assert growth(t, residual).slope == pytest.approx(power, abs=0.05)
-
-
 def test_false_alarms_of_the_trend_are_as_rare_as_it_says():
     rng, t = np.random.default_rng(3), np.linspace(0.0, 1000.0, 2001)
     noise = [trend(t, rng.normal(size=t.size)).significant for _ in range(200)]
@@ -105,14 +96,6 @@ def test_a_node_at_the_start_of_a_step_is_counted_once_a_step():
     assert run.attrs["force_evaluations"] == run.attrs["newton_iterations"] + 100
 
 
-@pytest.mark.parametrize("fraction", [1.0, 0.5, 1.0 / 3.0])
-def test_samples_at_fractions_of_a_period_are_dithered(fraction):
-    times, _, dithered = sample_times(100.0 * fraction, 101, 1.0)
-    assert dithered
-    assert times[0] == 0.0
-    assert times[-1] == 100.0 * fraction
-
-
 def test_a_table_stops_for_good_once_a_run_took_too_much_work():
     where = symtop.scene("spheroid")
     method = symtop.integrator("rk45")
@@ -131,24 +114,15 @@ def test_ladders_end_at_the_largest_number_of_steps_and_the_least_tolerance():
     assert tolerances[-1] >= symtop.integrator("rk45").least_tolerance
 
 
-def test_two_starts_of_one_top_do_not_share_a_cached_reference():
-    top = symtop.SymmetricTop(2.0, 1.0, 3.0)
-    ends = [
-        float(reference(symtop.Scene("x", top, symtop.Angles(theta=theta, psi_dot=5.0), 1.0), [1.0])["theta"][0])
-        for theta in (0.7, 0.8)
-    ]
-    assert ends[0] != pytest.approx(ends[1], abs=1e-3)
-
-
 def test_combining_refuses_cases_with_different_coordinates():
     def case(name, horizons):
         data = xr.Dataset({"error": ("horizon", np.zeros(len(horizons)))}, coords={"horizon": horizons})
         return Case("spheroid", name), data
 
-    joined = store.combine([case("a", [8.0, 100.0]), case("b", [8.0, 100.0, 1000.0])])
+    joined = datasets.combine([case("a", [8.0, 100.0]), case("b", [8.0, 100.0, 1000.0])])
     assert np.isnan(joined["error"].sel(variant="a", horizon=1000.0))
-    with pytest.raises(symtop.SymtopError, match="coordinate horizon of spheroid--b differs"):
-        store.combine([case("a", [8.0, 100.0]), case("b", [8.0, 1000.0])])
+    with pytest.raises(symtop.SymtopError, match="coordinate horizon of b on spheroid differs"):
+        datasets.combine([case("a", [8.0, 100.0]), case("b", [8.0, 1000.0])])
 
 
 def test_a_function_that_has_taken_long_is_asked_no_more_but_twice_at_least():

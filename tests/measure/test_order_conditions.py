@@ -1,8 +1,22 @@
-"""Rooted trees and the conditions of tables: numbers of trees, known orders, and tables that are off."""
+"""Conditions of tables: numbers of trees and of brackets, known orders, and tables that are off."""
 
+import numpy as np
 import pytest
 
-from symtop.measure.order_conditions import conditions, density, size, trees, triangle
+from symtop.measure.order_conditions import (
+    commutator,
+    conditions,
+    density,
+    element,
+    exponential,
+    logarithm,
+    product,
+    size,
+    splitting_conditions,
+    trees,
+    triangle,
+    vanishing,
+)
 from symtop.methods.runge_kutta.pair_tables import DORMAND_PRINCE
 
 RK4 = ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
@@ -33,12 +47,68 @@ def test_known_tables_have_their_orders():
 
 @pytest.mark.parametrize(("off", "found"), [(1e-9, 2), (1e-13, 4)])
 def test_a_coefficient_that_is_off_shows_beyond_rounding(off, found):
-    rows = (
-        (),
-        (0.5,),
-        (0.0, 0.5),
-        (off, 0.0, 1.0 - off),
-    )  # the same nodes, b4 off c3 = off/12 in the tall tree of order 3
+    # the same nodes; b4 off c3 = off/12 in the tall tree of order 3
+    rows = ((), (0.5,), (0.0, 0.5), (off, 0.0, 1.0 - off))
     table = conditions(square(rows), RK4[1])
     assert table.order == found
     assert table.defect[2] == pytest.approx(off / 12, rel=0.01, abs=1e-16)
+
+
+FREE = [2, 1, 2, 3, 6, 9, 18, 30, 56, 99]  # dimensions of the free Lie algebra of two letters: Witt's formula
+ROOT = 19**0.5
+
+
+def test_there_are_as_many_conditions_as_there_are():
+    """McLachlan and Quispel, Acta Numerica 11 (2002) 341, of Runge-Kutta-Nystrom methods."""
+    count = [free - vanishing(length).shape[1] for length, free in enumerate(FREE, start=1)]
+    assert count == [2, 1, 2, 2, 4, 5, 10, 14, 25, 39]
+
+
+def test_log_undoes_exp_and_begins_as_baker_campbell_and_hausdorff_say():
+    t, v = element(4, t=1.0), element(4, v=1.0)
+    words = logarithm(product(exponential(t), exponential(v)))
+    np.testing.assert_allclose(words[1], [1.0, 1.0])
+    np.testing.assert_allclose(words[2], 0.5 * commutator(t, v)[2])
+    third = [a - b for a, b in zip(commutator(t, commutator(t, v)), commutator(v, commutator(t, v)), strict=True)]
+    np.testing.assert_allclose(words[3], third[3] / 12.0, atol=1e-16)
+    for row in logarithm(exponential(t))[2:]:
+        np.testing.assert_allclose(row, 0.0, atol=1e-15)
+
+
+def test_known_splittings_have_their_orders():
+    assert splitting_conditions((1.0,), (1.0, 0.0)).order == 1
+    assert splitting_conditions((1.0,), (0.5, 0.5)).order == 2
+    assert splitting_conditions((1.0,), (0.5, 0.4)).order == 0
+    a, b = (1.0, -2 / 3, 2 / 3), (-1 / 24, 3 / 4, 7 / 24)
+    assert splitting_conditions(a, (0.0, *b)).order == 3  # Ruth 1983
+    assert splitting_conditions(a, (0.0, *reversed(b))).order < 3
+
+
+def composed(first, second):
+    """The table of: T for a_i, V for a_i, V for b_i, T for b_i, one i after the other."""
+    inner = [b + a for b, a in zip(second, (*first[1:], 0.0), strict=True)]
+    return (first[0], *inner), (0.0, *(a + b for a, b in zip(first, second, strict=True)), 0.0)
+
+
+def test_a_public_library_composed_a_method_of_order_4_in_the_wrong_order():
+    """McLachlan, SIAM J. Sci. Comput. 16 (1995) 151, five stages: the adjoint comes first (a library had it second)."""
+    alpha = ((146 + 5 * ROOT) / 540, (-2 + 10 * ROOT) / 135, 1 / 5, (-23 - 20 * ROOT) / 270, (14 - ROOT) / 108)
+    right, wrong = composed(alpha[::-1], alpha), composed(alpha, alpha[::-1])
+    assert splitting_conditions(*right).order == 4
+    assert splitting_conditions(*wrong).order == 2
+    assert splitting_conditions(*wrong).defect[2] == pytest.approx(0.0633, rel=1e-2)
+
+
+@pytest.mark.parametrize(("off", "order"), [(3e-8, 2), (1e-11, 2), (1e-13, 4)])
+def test_a_coefficient_of_a_splitting_that_is_off_shows_beyond_rounding(off, order):
+    outer = 1 / (2 - 2 ** (1 / 3)) + off
+    inner = 1 - 2 * outer
+    half = (outer + inner) / 2
+    assert splitting_conditions((outer, inner, outer), (outer / 2, half, half, outer / 2)).order == order
+
+
+def test_gradients_and_processors_count():
+    assert splitting_conditions((0.5, 0.5), (1 / 6, 2 / 3, 1 / 6), (0.0, -1 / 72, 0.0)).order == 4
+    assert splitting_conditions((0.5, 0.5), (1 / 6, 2 / 3, 1 / 6), (0.0, 1 / 72, 0.0)).order == 2
+    assert splitting_conditions((1.0,), (0.5, 0.5), (-1 / 48, -1 / 48), 1 / 12).order == 4
+    assert splitting_conditions((1.0,), (0.5, 0.5), (-1 / 48, -1 / 48)).order == 2

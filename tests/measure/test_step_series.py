@@ -36,14 +36,14 @@ def test_the_series_of_every_method_has_its_order():
                 found, which = series(method, chart), (method.name, chart)
                 gap = restart_gap(one_step(method, chart, SPHEROID, 0.01), generic_start(SPHEROID))
                 if method.exact_steps:
-                    assert not found.seen, which
+                    assert not found.is_exact, which
                 elif method.order is None:  # engines that leave out a term, or round to single precision
-                    assert found.seen, which
+                    assert found.is_exact, which
                     assert found.order <= 1, which
                 elif gap > 1e-6:  # one step from a start has not what a run carries from step to step
                     assert found.order < method.order, which
                 else:
-                    assert found.order == method.order or (method.order > 8 and not found.seen), which
+                    assert found.order == method.order or (method.order > 8 and not found.is_exact), which
 
 
 @pytest.mark.parametrize("off", [3e-8, 1e-9])

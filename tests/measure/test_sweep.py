@@ -156,6 +156,7 @@ def test_a_cell_that_raised_is_tried_again_and_one_that_ended_early_is_not(tmp_p
         ({"step_size": 0.1, "integrators": []}, "integrators must be one or more, each once"),
         ({"step_size": 0.1, "scenes": ["spheroid", "spheroid"]}, "scenes must be one or more, each once"),
         ({"step_size": 0.1, "scenes": "sferoid"}, "did you mean spheroid"),
+        ({"step_size": 0.1, "scenes": {"I1": [1.0]}}, "for a dataset of tops there is ensemble"),
         ({"step_size": 0.1, "threads": 0}, "threads must be a whole number"),
     ],
 )
@@ -180,39 +181,9 @@ def test_steps_a_nutation_are_those_of_each_scene():
         assert data.sel(scene=name)["step_size"].item() == pytest.approx(steps)
 
 
-def test_everything_can_be_drawn_on_given_axes(data):
-    import matplotlib.pyplot as plt
-
-    _, ax = plt.subplots()
-    assert symtop.plot(data, ax) is ax
-    assert ax.get_xlabel() == "force evaluations"  # steps and tolerances share no axis
-    assert symtop.plot(data.sel(variant=["strang"]), quantity="energy").get_xlabel() == "step size"
-    run = symtop.simulate("spheroid", "strang", step_size=0.01)
-    drawn = symtop.plot(run).get_lines()[0].get_ydata()
-    assert drawn == pytest.approx(symtop.errors(run)["axis"].values[1:])
-    assert symtop.plot(run, quantity="phi").get_ylabel() == "phi (rad)"
-    tops = symtop.population(20, seed=1)
-    runs = symtop.ensemble(tops, "strang", per_nutation=50, nutations=2)
-    assert len(symtop.plot(runs, members=tops, quantity="energy").collections) == 2
-    for words, says in (
-        ({"data": runs}, "plot needs members"), ({"data": 3}, "data must be a dataset"),
-        ({"data": run, "quantity": "axs"}, "did you mean axis"), ({"data": data, "x": "speed"}, "x 'speed' is unknown"),
-    ):  # fmt: skip
-        with pytest.raises(symtop.SymtopError, match=says):
-            symtop.plot(**words)
-
-
 def test_the_chart_of_each_run_is_said(data):
     assert data["chart"].sel(scene="spheroid", variant="rk4[axis]").item() == "axis"
     charts = symtop.sweep(["spheroid", "grazing"], ["rk4", "strang"], step_size=0.01, horizon=0.5, quiet=True)["chart"]
     for (scene, name), chart in zip([(s, n) for s in ("spheroid", "grazing") for n in ("rk4", "strang")],
                                     charts.values.ravel(), strict=True):  # fmt: skip
         assert symtop.simulate(scene, name, step_size=0.01, horizon=0.5, guard=False).attrs["chart"] == chart
-
-
-def test_both_kinds_of_step_and_a_dataset_of_tops_are_refused():
-    with pytest.raises(symtop.SymtopError, match="give step_size or per_nutation, not both"):
-        symtop.sweep("spheroid", "strang", step_size=0.1, per_nutation=20)
-    for tops in (symtop.population(3, seed=1), {"I1": [1.0]}):
-        with pytest.raises(symtop.SymtopError, match="for a dataset of tops there is ensemble"):
-            symtop.sweep(tops, "strang", step_size=0.1)

@@ -48,9 +48,6 @@ def test_a_pole_passed_on_the_wrong_side_is_a_wrong_regime():
 
 
 def test_the_command_line_judges_a_run():
-    for name, says in (("0.01", "accurate to"), ("0.3", "bounded but wrong, the axis error passed")):
-        done = CliRunner().invoke(main, ["run", "goldstein", "strang", "--step-size", name, "--no-guard"])
-        assert f"judged against the truth: {says}" in done.output
     few = CliRunner().invoke(main, ["run", "goldstein", "strang", "--step-size", "0.3", "--samples", "2", "--json"])
     assert json.loads(few.stdout)["judgement"]["verdict"] == "bounded_but_wrong"
 

@@ -6,7 +6,7 @@ import pytest
 from scipy import integrate
 
 import symtop
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import bibliography, paragraphs
 
 NAMES = tuple(symtop.integrators())
@@ -21,15 +21,6 @@ def cost_in_words(text):
     """What a paragraph says of the force evaluations: number and unit, the first time that it says so."""
     word, unit = COST.search(text).groups()
     return NUMBERS[word], unit
-
-
-@pytest.mark.parametrize("name", DESCRIBED)
-def test_a_paragraph_says_when_to_use_an_integrator(name):
-    about = symtop.integrator(name).about
-    assert about == paragraphs()[name]
-    assert 80 <= len(about.split()) <= 150
-    assert re.search(r"\buse\b", about, re.IGNORECASE)  # when, and when not
-    assert "Source: " in about
 
 
 def test_other_integrators_that_a_paragraph_names_exist():
@@ -99,8 +90,3 @@ def test_no_entry_is_cited_by_nobody():
 def test_an_integrator_of_ones_own_cites_nobody_that_is_known_here():
     with pytest.raises(symtop.SymtopError, match="names no source that is known here"):
         symtop.citation(symtop.composition("mine", (1.0,), (0.5, 0.5)))
-
-
-def test_an_integrator_of_ones_own_says_what_its_author_says():
-    mine = symtop.runge_kutta("euler", ((),), (1.0,), order=1)
-    assert mine.about == ""

@@ -7,7 +7,7 @@ import pytest
 
 import symtop
 from symtop.methods.framework.adaptive import Adaptive
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
 from symtop.run.ensemble.chunks import nutation_periods
@@ -17,7 +17,7 @@ SOLVERS = {
     row.name: row.solvers[row.charts()[0]] for row in variants() if isinstance(row.solvers[row.charts()[0]], Adaptive)
 }
 COUNTS = 7
-BUDGET = 900.0
+BUDGET = 400.0
 
 
 def members(count=60):
@@ -30,9 +30,10 @@ def members(count=60):
 
 def test_the_adaptive_solvers_are_own_ones():
     assert {name.split("[")[0] for name in SOLVERS} == {
-        "rk45-compiled", "tsit5", "dop853-compiled", "vern9", "extrapolation", "series-adaptive",
+        "rk45-compiled", "tsit5", "dop853-compiled", "vern9", "extrapolation", "adams", "dprkn8", "series-adaptive",
+        "series-general-adaptive",
     }  # fmt: skip
-    assert len(SOLVERS) == 17
+    assert len(SOLVERS) == 23
 
 
 @pytest.mark.parametrize("budget", [None, BUDGET])
@@ -73,9 +74,9 @@ def test_a_budget_is_passed_by_less_than_a_step(name):
     done, reached = SOLVERS[name].many(numbers, tolerance, times, np.full(20, COUNTS), BUDGET)
     ended = done.outcome == OUTCOMES.index("out_of_budget")
     assert ended.any()
-    most = (
-        20.0 * (1 + COUNTS) if name.startswith("series") else 6.0 * 8
-    )  # a step and the samples in it; some rejections
+    most = 20.0 * (1 + COUNTS) if name.startswith("series") else 6.0 * 8  # a step and its samples; some rejections
+    if name.startswith("extrapolation"):
+        most = 2.0 * 101  # ten lines, tried twice
     assert (done.work[ended] < BUDGET + most).all()
     assert (reached[ended] < times[ended, -1]).all()
 

@@ -8,7 +8,7 @@ import pytest
 
 import symtop
 from symtop.methods.framework.angles import chart_outcome, on_angles
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK
 from symtop.methods.lagrangian import discrete_lagrangian, galerkin
 from symtop.model.top import Angles, SymmetricTop

@@ -6,17 +6,17 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from symtop_studies.grid import grid_variants
 
 import symtop
 from symtop.judging.battery import judge
 from symtop.measure.settings import compared
 from symtop.methods.framework import registry
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.many import members_of
+from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import Plan
 from symtop.model import charts
 from symtop.model.top import flat
-from symtop.runner.grid import grid_variants
 from tests.conftest import random_scenes
 from tests.methods import engine_formulas
 
@@ -194,7 +194,7 @@ def test_a_run_in_stretches_has_the_bits_of_the_run_in_one(name):
     solver = symtop.integrator(name).solvers["attitude"]
     par, rule, state = solver.setup(GOLDSTEIN.top, GOLDSTEIN.start, 0.01)
     whole = solver.loop(par, rule, state, 0.01, np.array([700]))
-    at = solver.loop.begun(par, rule, state, 0.01)
+    at = solver.loop.start(par, rule, state, 0.01)
     _, at = solver.loop.advance(par, rule, at, 0.01, np.array([311]))
     rest, _ = solver.loop.advance(par, rule, at, 0.01, np.array([700]))
     np.testing.assert_array_equal(rest.states, whole.states)

@@ -74,8 +74,3 @@ def test_a_state_of_another_shape_is_refused(chart, compiled):
     y = f.state(symtop.Angles(1.0, psi_dot=2.0))
     for same in (list(y), np.repeat(y, 2)[::2]):
         np.testing.assert_array_equal(f(0.0, same), f(0.0, y))
-
-
-def test_an_unknown_chart_is_refused():
-    with pytest.raises(symtop.SymtopError, match="did you mean axis"):
-        symtop.field("axs", symtop.SymmetricTop(2.0, 1.0, 1.0))

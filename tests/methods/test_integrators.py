@@ -10,11 +10,9 @@ from symtop.measure.accuracy import error_table
 from symtop.measure.order import order
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
 from symtop.methods.framework.angles import on_angles
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import FixedStep, kernel_loop
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lagrangian.discrete_lagrangian import forces, march, node_sums, opening
-from symtop.methods.lagrangian.quadrature import Quadrature
+from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, forces, march, node_sums, opening
 from tests.conftest import random_scenes
 
 DISCRETE = ("midpoint", "trapezoidal", "stormer-verlet")
@@ -217,10 +215,10 @@ def test_one_newton_iteration_is_not_enough_and_round_off_is_reached_with_more()
     assert residual(1e3) > 1e-9
 
 
-@pytest.mark.parametrize("name", DISCRETE)
+@pytest.mark.parametrize("name", [*DISCRETE, "galerkin-simpson", "midpoint-unreduced", "trapezoidal-unreduced"])
 def test_a_step_that_leaves_the_chart_is_a_failure_with_a_sentence(name):
     run = symtop.simulate("spheroid", name, step_size=1.1, horizon=100.0, guard=False)
-    assert run.attrs["outcome"] in ("left_chart", "not_converged")
+    assert run.attrs["outcome"] in ("left_chart", "not_converged", "not_finite")
     assert "stopped at t =" in run.attrs["outcome_message"]
     assert run.attrs["reached_time"] < 100.0
     gone = run["time"].values > run.attrs["reached_time"]
@@ -229,29 +227,12 @@ def test_a_step_that_leaves_the_chart_is_a_failure_with_a_sentence(name):
     assert np.isfinite(run["theta"].values[~gone]).all()
 
 
-def test_a_user_makes_a_method_from_two_tuples():
-    simpson = symtop.discrete_lagrangian("simpson-by-a-user", (0.0, 0.5, 1.0), (1 / 6, 2 / 3, 1 / 6), order=2)
-    assert simpson.symmetric is True
-    fit_table = error_table(symtop.scene("goldstein"), simpson, [0.05, 0.025, 0.0125, 0.00625, 0.003125, 0.0015], 8.0)
-    fit = order(fit_table["step_size"], fit_table["attitude"], fit_table["attitude_bound"], 2.1)
-    assert fit.slope == pytest.approx(2.0, abs=0.05)
-    outer = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
-    drift = (outer, 1 - 2 * outer, outer)
-    kick = (outer / 2, (1 - outer) / 2, (1 - outer) / 2, outer / 2)
-    fourth = symtop.composition("yoshida-by-a-user", drift, kick)
-    table = error_table(symtop.scene("goldstein"), fourth, [0.1 / 1.4**k for k in range(10)], 8.0)
-    fit = order(table["step_size"], table["attitude"], table["attitude_bound"], 2.1)
-    assert fit.slope == pytest.approx(4.0, abs=0.05)
-
-
 @pytest.mark.parametrize(
     ("build", "says"),
     [
         (lambda: symtop.discrete_lagrangian("x", (0.5,), (0.9,)), "weights must sum to 1"),
         (lambda: symtop.discrete_lagrangian("x", (0.5, 1.5), (0.5, 0.5)), "nodes must lie in"),
         (lambda: symtop.discrete_lagrangian("x", (), ()), "nodes and weights must be equally many"),
-        (lambda: symtop.composition("x", (1.0,), (0.5,)), "kick must have one coefficient more"),
-        (lambda: symtop.composition("x", (0.9,), (0.5, 0.5)), "drift coefficients must sum to 1"),
         (lambda: symtop.register(symtop.integrator("midpoint")), "already registered"),
         (lambda: symtop.register("midpoint"), "register needs an Integrator"),
         (lambda: Integrator(name="", family="other", summary="", solvers={}), "name must be 1 to 64 letters"),

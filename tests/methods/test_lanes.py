@@ -1,16 +1,13 @@
 """Members that step side by side in lanes have the bits of runs alone, whatever stands beside them."""
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 
 import symtop
 from symtop.measure.timing import timings
-from symtop.methods.framework import lanes, loop as loops, many
-from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.lanes import W
-from symtop.methods.framework.many import ALIKE, LEAST, Many, divided, in_turn, members_of, turns
+from symtop.methods.framework import lanes, loop as loops
+from symtop.methods.framework.lanes import ALIKE, LEAST, Many, W, divided, in_turn, members_of, turns
+from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
 from symtop.methods.framework.space import on_axis
@@ -58,14 +55,14 @@ def assert_runs_alone(solver, numbers, h, marks, done):
 def left_alone(solver, numbers, h, marks):
     """The members that the lanes give back."""
     whole = solver._whole
-    done = Many.begun(len(h), marks.shape[1], whole.size)
+    done = Many.empty(len(h), marks.shape[1], whole.size)
     return whole.blocks().run(np.arange(len(h)), numbers, whole.table, h, marks, done, loops.BLOCK)
 
 
 def times_faster(solver, numbers, h, marks):
     """How many times faster members are in lanes than one after another."""
     whole, everyone = solver._whole, np.arange(len(h))
-    done = Many.begun(len(h), marks.shape[1], whole.size)
+    done = Many.empty(len(h), marks.shape[1], whole.size)
     together, alone = timings(
         [lambda: whole.blocks().run(everyone, numbers, whole.table, h, marks, done, loops.BLOCK),
          lambda: in_turn(whole.alone[0], everyone, numbers, whole.rule, h, marks, done)], batches=25, batch=0.005,
@@ -170,7 +167,7 @@ def test_runs_of_a_few_steps_at_a_time_are_the_same(monkeypatch):
     solver = SOLVERS["takahashi-imada[attitude]"]
     whole = solver.many(*given)
     monkeypatch.setattr(loops, "BLOCK", 250)  # back to Python eight steps of a block at a time
-    monkeypatch.setattr(many, "BATCH", 2 * W)
+    monkeypatch.setattr(lanes, "BATCH", 2 * W)
     for one, other in zip(whole, solver.many(*given), strict=True):
         np.testing.assert_array_equal(one, other)
 
@@ -180,16 +177,6 @@ def test_a_long_run_in_which_lanes_are_given_up_between_samples():
     numbers, h, _ = members(W, seed=4)
     marks = np.tile([0, 2 * lanes.STRETCH + 7], (W, 1)) + np.arange(W)[:, None]
     assert_runs_alone(SOLVERS["strang[axis]"], numbers, h, marks, SOLVERS["strang[axis]"].many(numbers, h, marks))
-
-
-@pytest.mark.parametrize("count", [1, 8, 31, 32, 1000, 100_003])
-def test_what_lanes_step_begins_with_a_line_of_the_cache(count):
-    room = many.aligned(count)
-    assert room.shape == (count,)
-    assert room.ctypes.data % 64 == 0
-    assert room.flags.c_contiguous
-    room[:] = 1.0
-    assert room.sum() == count
 
 
 def test_members_stand_in_the_order_of_their_steps_and_uneven_blocks_are_left():
@@ -267,15 +254,6 @@ def test_a_rule_that_is_a_table_of_stages_runs_in_lanes():
     marks = np.tile([0, 10, 50], (40, 1))
     for one, other in zip(solver.many(numbers, steps, marks), strang.many(numbers, steps, marks), strict=True):
         np.testing.assert_array_equal(one, other)
-
-
-def test_threads_get_the_bits_of_one():
-    given = members(300)
-    alone = SOLVERS["strang[axis]"].many(*given)
-    with ThreadPoolExecutor(4) as pool:
-        for made in pool.map(lambda _: SOLVERS["strang[axis]"].many(*given), range(8)):
-            for one, other in zip(made, alone, strict=True):
-                np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.slow

@@ -124,16 +124,3 @@ def test_a_lane_that_takes_more_iterations_changes_no_other(name):
     for one, other in zip(before, after, strict=True):
         np.testing.assert_array_equal(one[others], other[others])
     assert_runs_alone(solver, numbers, h, marks, after)
-
-
-@pytest.mark.parametrize("name", ["rkmk-se3-2", "generalised-alpha", "euler-poincare"])
-def test_a_member_does_not_see_its_neighbours(name):
-    """Bits of the members that were not touched; those that were differ (the negative control)."""
-    numbers, h, marks = members(200)
-    solver = SOLVERS[f"{name}[attitude]"]
-    before = solver.many(numbers, h, marks)
-    numbers[100, 5], h[101], numbers[102, 8] = numbers[100, 5] + 1.0, 1e200, np.nan
-    after = solver.many(numbers, h, marks)
-    assert OUTCOMES[after.outcome[102]] != "ok"
-    moved = [i for i in range(200) if not np.array_equal(before.states[i], after.states[i], equal_nan=True)]
-    assert moved == [100, 101, 102]

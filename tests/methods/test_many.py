@@ -9,8 +9,8 @@ import pytest
 
 import symtop
 from symtop.methods.framework import loop as loops
-from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.many import groups, members_of
+from symtop.methods.framework.lanes import groups, members_of
+from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
 from symtop.methods.framework.space import on_axis

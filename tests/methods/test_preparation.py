@@ -10,10 +10,10 @@ import pytest
 
 import symtop
 from symtop.core.jit import compile_kernel
-from symtop.methods.framework import fixed_step, loop as loops
+from symtop.methods.framework import loop, loop as loops
 from symtop.methods.framework.angles import on_angles, require_chart, with_rates
-from symtop.methods.framework.fixed_step import FixedStep, inside
-from symtop.methods.framework.many import refused
+from symtop.methods.framework.lanes import refused
+from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.preparation import Body, Start
 from symtop.methods.framework.space import on_attitude, on_axis, on_frame
@@ -95,7 +95,7 @@ def assert_the_same_run(solver, top, start, plan):
     ("name", "chart"),
     [("midpoint", "angles"), ("midpoint-unreduced", "angles"), ("takahashi-imada", "attitude"), ("rk4", "angles"),
      ("cayley-tuned", "axis"), ("gauss-4", "attitude"), ("stormer-verlet", "angles"), ("kahan-li-8", "attitude"),
-     ("sofroniou-spaletta-10", "axis"), ("stormer-verlet-blanes-moan-6", "angles")],
+     ("sofroniou-spaletta-10", "axis"), ("stormer-verlet-blanes-moan-6", "angles"), ("collective-gauss-6", "axis")],
 )  # fmt: skip
 def test_a_run_at_once_is_a_run_in_stretches(name, chart):
     scene = symtop.scene("spheroid")
@@ -133,7 +133,7 @@ def test_long_runs_return_to_python(monkeypatch):
     plan = Plan.steps(0.01, [0, 50, 100])
     whole = solver(scene.top, scene.start, plan)
     monkeypatch.setattr(loops, "BLOCK", 7)
-    monkeypatch.setattr(fixed_step, "flat", None)  # what a run in one call begins with
+    monkeypatch.setattr(loop, "flat", None)  # what a run in one call begins with
     np.testing.assert_array_equal(solver(scene.top, scene.start, plan).states, whole.states)
 
 
@@ -160,23 +160,6 @@ def test_many_starts_are_refused_as_each_of_them_is():
     assert refused(require_chart, numbers).tolist() == [refuses(value) for value in theta]
     assert refused(require_chart, numbers).sum() == 6
     assert not refused(None, numbers).any()
-
-
-def test_functions_of_python_still_make_a_solver():
-    """A rule and a preparation that look at the run, as scripts have them."""
-    scene, strang = symtop.scene("spheroid"), symtop.integrator("strang").solvers["axis"]
-    seen = []
-
-    def rule(top, start, h):
-        seen.append(h)
-        return strang.rule(top, start, h)
-
-    solver = FixedStep(space.march_axis, rule, on_axis, 1, implicit=False)
-    plan = Plan.steps(0.01, [0, 10])
-    np.testing.assert_array_equal(
-        solver(scene.top, scene.start, plan).states, strang(scene.top, scene.start, plan).states
-    )
-    assert seen == [0.01]
 
 
 @pytest.mark.parametrize("rule", [(0.0,), np.array([0.5, 0.25]), 0.5])
@@ -206,18 +189,6 @@ def test_a_tuned_drift_hangs_on_the_start():
     assert angles.march is not space.march_axis
 
 
-def test_a_long_table_is_scaled_as_numbers_are():
-    """35 stages, which LLVM does not unroll: each times the step, but for the middle, which closes the sum."""
-    scene, h = symtop.scene("spheroid"), 0.01
-    rule = symtop.integrator("sofroniou-spaletta-10").solvers["axis"].rule
-    drift, whole = rule(scene.top, scene.start, h).drift, 0.5 * h / scene.top.I1
-    plain = [share * whole for share in rule.rule.drift]
-    middle = len(drift) // 2
-    assert [a == b for a, b in zip(drift, plain, strict=True)].count(False) <= 1 + (len(drift) + 1) % 2
-    assert drift[middle] == pytest.approx(plain[middle], rel=1e-13)
-    assert math.fsum(drift) == pytest.approx(whole, rel=1e-15)
-
-
 def test_a_composition_travels_as_an_array_and_arrives_whole():
     """Numbers of every kind, a rule that hangs on the start included, to the bits of the rule that Python makes."""
     scene = symtop.scene("spheroid")
@@ -226,14 +197,3 @@ def test_a_composition_travels_as_an_array_and_arrives_whole():
         for solver in symtop.composition("long", drift, kick, chart="space", **more).solvers.values():
             assert solver._whole.rule.tolist()[:11] == [*solver.rule.rule.drift, *solver.rule.rule.kick]
             assert_the_same_run(solver, scene.top, scene.start, Plan.steps(0.02, [0, 1, 300]))
-
-
-@pytest.mark.parametrize("name", ["gauss-2", "gauss-12", "collective-gauss-6"])
-def test_the_table_of_a_gauss_method_travels_as_one_array(name):
-    """To the bits of the table that Python reads, which a march in stretches takes."""
-    scene = symtop.scene("spheroid")
-    for solver in symtop.integrator(name).solvers.values():
-        table = solver.rule(scene.top, scene.start, 0.02)
-        assert solver._whole.rule[: len(table.b)].tolist() == table.mu.tolist()
-        assert solver._whole.rule[len(table.b)].tolist() == table.b.tolist()
-        assert_the_same_run(solver, scene.top, scene.start, Plan.steps(0.02, [0, 1, 300]))

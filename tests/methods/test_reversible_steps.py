@@ -18,7 +18,7 @@ from symtop.methods.splitting import reversible
 from symtop.methods.splitting.reversible import Reversible
 from symtop.model import charts
 from symtop.model.scenes import closed_form, grazing
-from symtop.model.top import Angles, effective_force, effective_potential
+from symtop.model.top import effective_force, effective_potential
 
 METHOD = symtop.integrator("stormer-verlet-reversible")
 SOLVER = METHOD.solvers["angles"]
@@ -213,14 +213,6 @@ def test_steps_of_the_square_of_the_sine_need_more_forces_than_equal_ones():
     """They are made for a barrier of given strength, and that of a close passage is weak."""
     square = replace(METHOD, name="square", solvers={"angles": Reversible(2.0)})
     assert forces_for(grazing(1e-2), square, 1e-2) > 2.0 * forces_for(grazing(1e-2), "stormer-verlet", 1e-2)
-
-
-@pytest.mark.parametrize("theta", [0.0, math.pi])
-def test_a_start_on_a_pole_is_refused_in_a_sentence(theta):
-    top, start = symtop.SymmetricTop(1.0, 1.0, 1.0), Angles(theta, psi_dot=1.0)
-    words = rf"^theta must lie inside \(0, pi\) for an integrator in the angles chart, not {theta!r}$"
-    with pytest.raises(symtop.SymtopError, match=words):
-        SOLVER(top, start, Plan.steps(0.1, [10]))
 
 
 def test_runs_that_fail_say_how(monkeypatch):

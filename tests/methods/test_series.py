@@ -10,8 +10,8 @@ from numba.extending import intrinsic
 
 import symtop
 from symtop.core.errors import SymtopError
-from symtop.core.simd import Components, Vectors
 from symtop.methods.framework.plan import Plan
+from symtop.methods.simd import Components, Vectors
 from symtop.methods.taylor.series import ORDERS, attitude_sum, axis_sum, order_for, series
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForm

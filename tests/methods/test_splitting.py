@@ -16,6 +16,7 @@ from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.preparation import Scaled
 from symtop.methods.splitting import coefficients as tables, space
 from symtop.methods.splitting.composition import built_in, composition
+from symtop.methods.splitting.rotor import half_square, rotor
 from symtop.model import charts
 from symtop.model.scenes import closed_form
 
@@ -165,7 +166,8 @@ def extended_error(table, scene, steps):
             axis = space.force_axis(None, state, step)
             step = space.kick_space(None, axis, step, wide(b) * pull, wide(0))
             if i < len(table.drift):
-                step = space.drift_axis(rule, state, step, wide(table.drift[i]) * half)
+                part = wide(table.drift[i]) * half
+                step = space.turn_axis(state, step, *rotor(rule, half_square(state, step, part), part))
         state = tuple(a + b for a, b in zip(state, step, strict=True))
     with workdps(40):
         w, x, y, z = PreciseForm(scene.top, scene.start, 40).quaternion(8.0)

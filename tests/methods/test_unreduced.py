@@ -9,7 +9,7 @@ from symtop.measure.conservation import trend
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
 from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.lagrangian import unreduced as kernel
-from symtop.methods.lagrangian.quadrature import RULES, Quadrature
+from symtop.methods.lagrangian.discrete_lagrangian import RULES, Quadrature
 from symtop.methods.lagrangian.unreduced import march, unreduced, with_momenta
 from tests.conftest import random_scenes
 from tests.methods.test_integrators import fitted
@@ -186,29 +186,3 @@ def test_long_horizons_do_not_slow_it_down():
     assert abs(float(long["phi"][-1])) > 5e3
     per_step = [run.attrs["newton_iterations"] / run.attrs["steps"] for run in (short, long)]
     assert per_step[1] == pytest.approx(per_step[0], rel=0.05)
-
-
-@pytest.mark.parametrize("name", [name + TWIN for name in PAIRS])
-def test_a_step_too_large_ends_in_a_sentence(name):
-    run = symtop.simulate("spheroid", name, step_size=1.1, horizon=100.0, guard=False)
-    assert run.attrs["outcome"] in ("left_chart", "not_converged", "not_finite")
-    assert "stopped at t =" in run.attrs["outcome_message"]
-
-
-@pytest.mark.parametrize(
-    ("build", "says"),
-    [
-        (lambda: unreduced(symtop.integrator("rk4")), "unreduced takes a method that discrete_lagrangian made"),
-        (
-            lambda: symtop.simulate(
-                symtop.Scene("pole", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(0.0, psi_dot=1.0), 1.0),
-                "midpoint-unreduced",
-                step_size=0.1,
-            ),
-            "theta must lie inside",
-        ),
-    ],
-)
-def test_bad_arguments_are_refused_in_one_sentence(build, says):
-    with pytest.raises(symtop.SymtopError, match=says):
-        build()

@@ -14,7 +14,7 @@ from symtop.methods.framework.plan import Plan
 from symtop.methods.library import exact
 from symtop.model import charts
 from symtop.model.charts import space_momenta
-from symtop.model.exact import closed_form
+from symtop.model.exact import closed_form, samples
 from symtop.model.exact.closed_form import NUMBERS, ClosedForm, ClosedForms
 from symtop.model.top import Angles, SymmetricTop, flat
 from tests.model.test_closed_form import SEPARATRIX
@@ -129,7 +129,7 @@ def test_threads_share_forms_and_kernels():
     rows = np.array([flat(*pair) for pair in _pairs(1)])
     alone = ClosedForms(rows).state(TIMES).tobytes()
     forms, begin = ClosedForms(rows), threading.Barrier(8)
-    kernel = LazyKernel(closed_form.all_samples, closed_form._fill.arguments, patience=1e9)
+    kernel = LazyKernel(samples.all_samples, closed_form._fill.arguments, patience=1e9)
 
     def work(_):
         begin.wait()
@@ -144,7 +144,7 @@ def test_threads_share_forms_and_kernels():
 
 def test_exact_solves_many_tops_as_it_solves_one():
     pairs, plan = _pairs(1), Plan.until(np.linspace(0.0, 5.0, 6), math.nan)
-    states, momenta = exact.solve_many(np.array([flat(*pair) for pair in pairs]), plan.times)
+    states, momenta = ClosedForms(np.array([flat(*pair) for pair in pairs])).run(plan.times)
     for i, pair in enumerate(pairs):
         run = exact.solve(*pair, plan)
         assert states[i].tobytes() == run.states.tobytes()

@@ -8,7 +8,7 @@ import mpmath as mp
 import pytest
 
 from symtop.core.jit_functions import two_product
-from symtop.model.exact import double_double as dd, quad_double as qd
+from symtop.model.exact import double_double as dd
 
 UNIT = 2.0**-106
 
@@ -109,22 +109,22 @@ def test_quad_double_is_right_to_sixty_digits():
             b = (-a[0], *b[1:])
             b = (b[0], *(draw.uniform(-0.5, 0.5) * math.ulp(a[0]) * 2.0 ** (-53 * k) for k in range(3)))
         terms = abs(_exact(a)) + abs(_exact(b))
-        assert float(abs(_exact(qd.add(a, b)) - _exact(a) - _exact(b)) / terms) <= 2.0**-204
-        assert _error(qd.mul(a, b), _exact(a) * _exact(b)) <= 2.0**-203
+        assert float(abs(_exact(dd.quad_add(a, b)) - _exact(a) - _exact(b)) / terms) <= 2.0**-204
+        assert _error(dd.quad_mul(a, b), _exact(a) * _exact(b)) <= 2.0**-203
         x = draw.uniform(0.0, 1.57)
-        for ours, true in zip(qd.sincos(x), (mp.sin(x), mp.cos(x)), strict=True):
+        for ours, true in zip(dd.quad_sincos(x), (mp.sin(x), mp.cos(x)), strict=True):
             assert _error(ours, true) <= 1e-62
-            assert _error(qd.narrowed(ours), true) <= UNIT
+            assert _error(dd.narrowed(ours), true) <= UNIT
     assert _error(dd.mul((0.1, 0.0), (0.3, 1e-18)), mp.mpf(0.1) * (mp.mpf(0.3) + mp.mpf(1e-18))) > 1e-40  # the control
 
 
 def test_one_formula_serves_both_kinds():
     a, b = (0.1, 1e-18), (0.3, -2e-18)
-    for ours in (qd.plus, qd.minus, qd.times):
-        short, long = ours(a, b), ours(qd.widened(a), qd.widened(b))
+    for ours in (dd.plus, dd.minus, dd.times):
+        short, long = ours(a, b), ours(dd.widened(a), dd.widened(b))
         assert len(short) == 2
         assert len(long) == 4
         assert abs(_exact(short) - _exact(long)) < 1e-31
-        assert abs(_exact(qd.narrowed(long)) - _exact(long)) < 1e-32
-    assert qd.like(a, b) == b
-    assert qd.like(qd.widened(a), b) == qd.widened(b)
+        assert abs(_exact(dd.narrowed(long)) - _exact(long)) < 1e-32
+    assert dd.like(a, b) == b
+    assert dd.like(dd.widened(a), b) == dd.widened(b)

@@ -45,21 +45,8 @@ def _agrees_as_printed(value, printed):
     return abs(mp.mpf(value) - mp.mpf(printed)) <= mp.mpf(10) ** exponent
 
 
-CONSTANTS = {
-    "E": "energy",
-    "p_phi": "p_phi",
-    "p_psi": "p_psi",
-    "a": "a",
-    "b": "b",
-    "alpha": "alpha",
-    "beta": "beta",
-    "m": "m",
-    "Omega": "Omega",
-    "K": "K",
-    "nutation_period": "nutation_period",
-    "dphi_per_period": "phi_per_period",
-    "dpsi_per_period": "psi_per_period",
-}
+CONSTANTS = {name: name for name in ("p_phi", "p_psi", "a", "b", "alpha", "beta", "m", "Omega", "K", "nutation_period")}
+CONSTANTS |= {"E": "energy", "dphi_per_period": "phi_per_period", "dpsi_per_period": "psi_per_period"}
 
 
 @pytest.mark.parametrize("name", TRUTH)

@@ -74,7 +74,7 @@ def test_the_separatrix_never_comes_back():
 def test_families_carry_their_parameter_in_their_name():
     names = [make(value).name for make in (spinning, grazing, sleeping, steady) for value in (3.0, 4.5)]
     assert len(set(names)) == len(names)
-    assert spinning(10.0, name="cusp").start == symtop.scene("cusp").start
+    assert spinning(10.0).start == symtop.scene("cusp").start
     assert {"grazing", "sleeping", "sleeping-unstable", "separatrix", "steady-fast"} <= set(symtop.scenes())
 
 

@@ -6,9 +6,7 @@ import xml.etree.ElementTree as ET
 import pytest
 
 import symtop
-from symtop.judging.findings import Finding, Measured
-from symtop.judging.judge_step import StepLedger
-from symtop.judging.sandbox import About
+from symtop.judging.findings import About, Finding, Measured, StepLedger
 from symtop.report.card import badge, card, figures, write_badge
 
 
@@ -65,7 +63,7 @@ def test_the_badge_says_what_is_refuted_or_what_the_method_is(ledger, tmp_path):
     words = [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")]
     assert words == ["symtop", "refuted: symplectic, energy"]
     good = handmade(
-        Finding("order", "2", Measured("slope", 2.0, 0.001, text="2.000 +- 0.001"), "confirmed", "a <b>", 2.0, 0.05),
+        Finding("order", "2", Measured("slope", 2.0, text="2.000 +- 0.001"), "confirmed", "a <b>", 2.0, 0.05),
         name="<mine>",
     )
     assert "order 2" in badge(good)

@@ -1,6 +1,5 @@
 """Every figure of every study can be read in print: letters, colours, lines and names; and the instruments of that."""
 
-import itertools
 import math
 
 import numpy as np
@@ -78,15 +77,6 @@ def test_a_figure_that_cannot_be_read_is_found():
     assert "no message" in faults("drift", figure)
 
 
-def test_families_differ_in_their_lines_and_charts_in_their_markers():
-    names = ("midpoint", "strang", "rk4", "simo-wong", "taylor", "rk45")
-    dashes = [style.look(name).dash for name in names]
-    assert all(one != other for one, other in itertools.combinations(dashes, 2))
-    assert style.look("strang").dash == style.look("chin-4a[attitude]").dash
-    fills = {style.line(f"rk4[{chart}]")["fillstyle"] for chart in ("angles", "axis", "attitude")}
-    assert len(fills) == 3
-
-
 def contrast(color) -> float:
     """Of a colour on white, as WCAG 2 defines it."""
     part = np.array(to_rgb(color))
@@ -99,21 +89,6 @@ def test_letters_have_the_contrast_that_letters_need():
     assert min(map(contrast, colors)) < 2.0  # as they are, not all could be read
     assert min(contrast(style.ink(color)) for color in colors) >= 4.5
     assert style.ink(style.BLUE) == pytest.approx(to_rgb(style.BLUE))  # dark enough as it is
-
-
-def test_names_at_the_ends_of_lines_do_not_meet():
-    figure, axes = style.panels(1, 1)
-    axis = axes[0, 0]
-    axis.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
-    figures.name_ends(axis, {})  # nothing to name
-    assert not axis.texts
-    ends = {f"name {k}": (1.0, 0.5 + 0.001 * k, style.BLUE) for k in range(8)}
-    figures.name_ends(axis, ends)
-    figure.draw_without_rendering()
-    boxes = {text.get_text(): Text.get_window_extent(text) for text in axis.texts}  # without the strokes to the lines
-    names = sorted(boxes, key=lambda name: boxes[name].y0)
-    assert names == list(ends)  # in the order of their lines
-    assert all(boxes[low].y1 <= boxes[high].y0 + 1.0 for low, high in itertools.pairwise(names))
 
 
 @pytest.mark.parametrize("places", [[0.5] * 10, [0.0, 0.01, 0.99, 1.0, 1.0], [0.2, 0.9, 0.4]])
@@ -134,42 +109,6 @@ def test_labels_keep_their_order_and_their_distance(places):
 def test_a_number_of_a_title(value, said):
     assert style.number(value).replace(style.FIRM, " ") == said
     assert " " not in style.number(value)
-
-
-def test_a_headline_has_no_last_line_of_a_single_word():
-    figure, _ = style.panels(1, 1)
-    style.headline(figure, "series[axis] wins on 67% of the tops at 0.001 rad, on 76% of the tops at a millionth rad")
-    lines = figure.get_suptitle().split("\n")
-    assert len(lines) == 2
-    assert min(map(len, lines)) > 0.7 * max(map(len, lines))
-
-
-@pytest.mark.parametrize(("power", "inverted"), [(2.0, False), (2.0, True), (-1.0, False)])
-def test_the_label_of_a_slope_lies_beside_its_line(power, inverted):
-    figure, axes = style.panels(1, 1)
-    axis = axes[0, 0]
-    axis.set(xscale="log", yscale="log", xlim=(1e-3, 1.0), ylim=(1e-9, 1e3))
-    if inverted:
-        axis.invert_xaxis()
-    style.slope_guide(axis, power, (1e-2, 0.5), 1e-3, "slope")
-    figure.draw_without_rendering()
-    box = axis.texts[0].get_window_extent()
-    x, y = axis.get_lines()[0].get_data()
-    at = axis.transData.transform(np.column_stack([np.geomspace(*x, 200), np.geomspace(*y, 200)]))
-    assert not any(box.contains(*one) for one in at)
-
-
-def test_the_band_of_the_reference_reaches_the_frame_and_does_not_move_it():
-    _, axes = style.panels(1, 1)
-    axis = axes[0, 0]
-    axis.plot([1.0, 2.0], [1e-10, 1e-3])
-    axis.set_yscale("log")
-    before = axis.get_ylim()
-    assert figures.error_band(axis, np.array([np.nan, 1e-12, 3e-12])) == 2e-12
-    (band,) = axis.patches
-    assert band.get_y() < before[0]
-    assert band.get_y() + band.get_height() == 2e-12
-    assert axis.get_ylim() == before
 
 
 def test_a_published_figure_has_a_vector_beside_it_and_the_same_bytes_again(tmp_path):

@@ -105,11 +105,3 @@ def test_one_integrator_or_scene_of_a_sweep_is_drawn(sweep):
     with pytest.raises(SymtopError, match="a sweep must have the scenes that it compares"):
         symtop.plot(sweep.isel(scene=0, drop=True), plt.figure().gca())
     plt.close("all")
-
-
-def test_names_of_quantities_are_told_once(run):
-    for data in (run, symtop.errors(run)):
-        with pytest.raises(SymtopError, match="is unknown; did you mean") as said:
-            symtop.plot(data, plt.figure().gca(), quantity="thet")
-        assert str(said.value).count(" theta ") == 1
-    plt.close("all")

@@ -14,7 +14,7 @@ import xarray as xr
 import symtop
 from symtop.core import netcdf
 from symtop.methods.framework.registry import split_name
-from symtop.report import markdown, page, style
+from symtop.report import page, style
 from symtop.runner import run as runner
 from symtop.runner.study import Table
 from tests.browser import FAINT, Browser
@@ -179,12 +179,6 @@ def test_the_keyboard_reaches_content_tables_and_points(browser):
     assert browser.evaluate("document.querySelector('.chart .tip').hidden")
 
 
-def test_the_page_has_landmarks(browser):
-    for landmark in ("header", "nav[aria-label]", "main", "footer"):
-        assert browser.evaluate(f"document.querySelectorAll('{landmark}').length") == 1, landmark
-    assert browser.evaluate("[...document.querySelectorAll('th')].every(one => one.scope === 'col')")
-
-
 @pytest.mark.parametrize("scheme", ["light", "dark"], indirect=True)
 def test_it_prints_with_every_figure_and_in_black_on_white(browser, scheme, results, tmp_path):
     printed = browser.pdf(tmp_path / "report.pdf").read_bytes()
@@ -271,15 +265,6 @@ def test_the_filter_and_the_choice_change_what_is_drawn(browser):
     assert browser.evaluate("document.querySelector('.chart svg').innerHTML") == before
 
 
-def test_the_first_screen_answers_the_question(browser):
-    browser.resize(1280, 900)
-    assert (
-        browser.evaluate("document.querySelector('h2').firstChild.textContent.trim()")
-        == "Which integrator should I use?"
-    )
-    assert browser.evaluate("document.querySelector('#answer table').getBoundingClientRect().top") < 900.0
-
-
 def test_words_follow_from_the_stored_data_and_from_nothing_else(results):
     study, stored = runner.load("cost"), netcdf.read_any(results / "cost.nc")
     findings = json.loads((results / "cost.json").read_text(encoding="utf-8"))
@@ -300,11 +285,3 @@ def test_the_twin_names_every_figure(results):
     shown = re.findall(r"!\[[^]]+\]\((figures/[^)]+)\)", twin)
     assert len(shown) == len(list((results / "figures").iterdir()))
     assert all((results / file).is_file() for file in shown)
-
-
-def test_an_answer_links_to_the_studies_on_the_page_that_explain_it():
-    first = {"question": "Which?", "sentences": ["This one."], "table": {"header": ["a"], "rows": [["b"]]}}
-    study = {"opening": first | {"explained": {"drift": "where it drifts", "nowhere": "not shown"}}}
-    linked = markdown.opening(study, {"drift": "Drift and phase"})
-    assert linked.endswith("More: [where it drifts](#drift-and-phase).")
-    assert "More" not in markdown.opening(study, {}) + markdown.opening({"opening": first}, {"drift": "Drift"})

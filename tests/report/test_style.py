@@ -54,14 +54,3 @@ def test_an_added_integrator_has_a_look_of_its_own_whatever_else_was_added(clean
     assert alone.color in style.ORANGES
     symtop.register(dataclasses.replace(symtop.integrator("rk4"), name="bogacki-shampine"))
     assert style.look("heun-3") == alone
-
-
-@pytest.mark.parametrize(("count", "columns"), [(1, 1), (5, 3), (6, 3), (2, 4)])
-def test_a_grid_labels_its_left_and_its_lowest_panels(count, columns):
-    figure, axes = style.grid(count, columns, ("step", "error"), sharex=True, sharey=True)
-    assert len(axes) == count
-    assert sum(axis.get_visible() for axis in figure.axes) == count
-    assert [k for k, axis in enumerate(axes) if axis.get_ylabel()] == list(range(0, count, columns))
-    assert [k for k, axis in enumerate(axes) if axis.get_xlabel()] == list(range(max(0, count - columns), count))
-    lowest = [axis.xaxis.get_tick_params()["labelbottom"] for axis in axes[-columns:]]
-    assert all(lowest)

@@ -77,7 +77,7 @@ def test_a_run_in_stretches_has_the_bits_of_one_in_one_piece(name):
     par, rule, state = solver.setup(WHERE.top, WHERE.start, H)
     marks = np.array([3, 50, 51, 200])
     whole = solver.loop(par, rule, state, H, marks)
-    first, at = solver.loop.advance(par, rule, solver.loop.begun(par, rule, state, H), H, marks[:2])
+    first, at = solver.loop.advance(par, rule, solver.loop.start(par, rule, state, H), H, marks[:2])
     again = at._replace(carry=regrown(at.carry, iter(leaves(at.carry))))
     for position in (at, again):
         second, end = solver.loop.advance(par, rule, position, H, marks[2:])
@@ -90,7 +90,7 @@ def test_a_run_in_stretches_has_the_bits_of_one_in_one_piece(name):
 def test_what_was_rounded_off_is_part_of_a_position():
     _, solver = chart_of(symtop.integrator("stormer-verlet"))
     par, rule, state = solver.setup(WHERE.top, WHERE.start, H)
-    _, at = solver.loop.advance(par, rule, solver.loop.begun(par, rule, state, H), H, np.array([1000]))
+    _, at = solver.loop.advance(par, rule, solver.loop.start(par, rule, state, H), H, np.array([1000]))
     forgetful = at._replace(low=(0.0,) * 4)
     ends = [solver.loop.advance(par, rule, one, H, np.array([20_000]))[0].states for one in (at, forgetful)]
     assert not np.array_equal(*ends)
@@ -137,14 +137,16 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
     assert 10_000 <= reached < 12_000_000
     steps = 12_000_000
     seen = []
-    resume = longrun._Book.resumed
+    resume = longrun._Checkpoint.resumed
 
     def noting(self, start):
         at, rows = resume(self, start)
         seen.append(at.k)
         return at, rows
 
-    monkeypatch.setattr(longrun._Book, "resumed", noting)  # the loop itself is part of what a checkpoint is told by
+    monkeypatch.setattr(
+        longrun._Checkpoint, "resumed", noting
+    )  # the loop itself is part of what a checkpoint is told by
     resumed = long_run(WHERE, "midpoint", steps=steps, step_size=H, checkpoint=file, quiet=True)
     assert reached in seen  # it did go on from there
     assert not file.exists()
@@ -182,7 +184,7 @@ def _root() -> str:
 
 def test_an_interrupt_keeps_every_finished_window(tmp_path, monkeypatch):
     file, calls = tmp_path / "run.nc", []
-    note = longrun._Book.note
+    note = longrun._Checkpoint.note
 
     def tired(self, at, rows):
         calls.append(1)
@@ -190,7 +192,7 @@ def test_an_interrupt_keeps_every_finished_window(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         note(self, at, rows)
 
-    monkeypatch.setattr(longrun._Book, "note", tired)
+    monkeypatch.setattr(longrun._Checkpoint, "note", tired)
     with pytest.raises(KeyboardInterrupt):
         long_run(WHERE, "rk4", steps=50_000, step_size=H, checkpoint=file, quiet=True)
     resumed = long_run(WHERE, "rk4", steps=50_000, step_size=H, checkpoint=file, quiet=True)
@@ -213,7 +215,7 @@ def test_a_result_that_cannot_be_written_leaves_the_checkpoint(tmp_path, monkeyp
         long_run(WHERE, "rk4", **asked)
     assert file.is_file()
     monkeypatch.undo()
-    monkeypatch.setattr(longrun._Book, "note", lambda *_: pytest.fail("it steps"))
+    monkeypatch.setattr(longrun._Checkpoint, "note", lambda *_: pytest.fail("it steps"))
     data = long_run(WHERE, "rk4", **asked)
     assert not file.exists()
     assert longrun.netcdf.read(output).identical(data)
@@ -222,7 +224,7 @@ def test_a_result_that_cannot_be_written_leaves_the_checkpoint(tmp_path, monkeyp
 
 
 def test_an_output_that_can_be_no_file_is_refused_before_a_step(tmp_path, monkeypatch):
-    monkeypatch.setattr(longrun._Book, "resumed", lambda *_: pytest.fail("it begins"))
+    monkeypatch.setattr(longrun._Checkpoint, "resumed", lambda *_: pytest.fail("it begins"))
     asked = {"steps": 50_000, "step_size": H, "quiet": True}
     with pytest.raises(SymtopError, match="output must be a file, not the folder"):
         long_run(WHERE, "rk4", output=tmp_path, **asked)
@@ -232,7 +234,7 @@ def test_an_output_that_can_be_no_file_is_refused_before_a_step(tmp_path, monkey
 
 def test_a_checkpoint_of_another_run_is_refused(tmp_path):
     file = tmp_path / "run.nc"
-    book = longrun._Book(file, "another")
+    book = longrun._Checkpoint(file, "another")
     book.note(drive.Position((1.0,), (0.0,), (), 7), [[0.0]])
     book.save()
     with pytest.raises(SymtopError, match="belongs to another run"):
@@ -300,20 +302,8 @@ def test_a_fused_sum_is_rounded_once_and_a_plain_one_twice():
 
 def test_the_command_runs_and_says_what_changed(tmp_path):
     output = tmp_path / "long.nc"
-    done = CliRunner().invoke(
-        main,
-        [
-            "long",
-            "spheroid",
-            "cayley",
-            "--steps",
-            "2e4",
-            "--checkpoint",
-            str(tmp_path / "c.nc"),
-            "--output",
-            str(output),
-        ],
-    )
+    files = ["--checkpoint", str(tmp_path / "c.nc"), "--output", str(output)]
+    done = CliRunner().invoke(main, ["long", "spheroid", "cayley", "--steps", "2e4", *files])
     assert done.exit_code == 0, done.output
     assert "modified_energy" in done.output
     assert output.is_file()

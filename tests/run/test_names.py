@@ -10,7 +10,6 @@ import symtop
 from symtop.judging.battery import judge
 from symtop.methods.framework import registry
 from symtop.methods.lagrangian.discrete_lagrangian import is_midpoint
-from symtop.methods.lagrangian.galerkin import is_galerkin
 from symtop.run.guard import forecast
 from symtop.run.long_run import long_run
 from symtop.run.modified_energy import modified_energy
@@ -95,8 +94,6 @@ def test_other_ways_to_step_a_rule_know_it_by_its_numbers():
     assert is_midpoint(symtop.discrete_lagrangian("mine", (0.5,), (1.0,)))
     assert not is_midpoint(symtop.integrator("trapezoidal"))
     assert not is_midpoint(symtop.integrator("midpoint-unreduced"))
-    assert is_galerkin(dataclasses.replace(symtop.integrator("galerkin-simpson"), name="mine"))
-    assert not is_galerkin(symtop.integrator("midpoint"))
 
 
 @pytest.mark.parametrize("conserves", [{"charm"}, "energy", 3, {"energy", "p_theta"}])

@@ -231,18 +231,6 @@ def test_a_start_on_a_pole_is_refused_by_the_angles_chart_and_welcome_elsewhere(
     assert run["theta"].values == pytest.approx(theta, abs=1e-15)
 
 
-def test_scenes_say_what_they_are_for():
-    names = {
-        "spheroid", "goldstein", "goldstein-falling", "goldstein-rising", "cusp", "loop", "wave", "fast", "steady",
-        "hairer-lubich-wanner", "simo-wong", "kinon-betsch",
-    }  # fmt: skip
-    assert names <= set(symtop.scenes())
-    for where in map(symtop.scene, names):
-        assert where.purpose
-        assert "\n" not in where.purpose
-        assert where.nutation_period > 0.0
-
-
 def test_the_two_readings_of_the_notebooks_second_top_differ_as_they_should():
     """alpha = 1.6 is not a release at rest: u'^2 there is 0.0473752579827533, and at rest alpha = 1.4981443962885."""
     rest, rising = symtop.scene("goldstein"), symtop.scene("goldstein-rising")

@@ -30,10 +30,10 @@ def test_implicit_kernels_cost_at_most_three_verlet_steps():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["goldstein", "spheroid"])
 def test_a_run_costs_what_it_computes(name):
-    """400 steps with all columns, in times of the steps alone: 9, and 13 with the guard but for its closed form.
+    """400 steps with all columns, in times of the steps alone: 10, and 16 to 20 with the guard but for its closed form.
 
-    They were 45 and 65 while xarray checked every dataset and the plan sorted every mark. On spheroid the guard warns
-    and tries the step that it advises: one more forecast, whose time is taken off.
+    They were 45 and 65 while xarray checked every dataset and the plan sorted every mark. The guard's probe makes the
+    steps once more. On spheroid it warns and tries the step that it advises: one more forecast, which is taken off.
     """
     chosen, row = symtop.scene(name), symtop.integrator("stormer-verlet[angles]")
     horizon = min(chosen.horizon, 3.0 * chosen.nutation_period) if name == "goldstein" else chosen.horizon
@@ -52,7 +52,7 @@ def test_a_run_costs_what_it_computes(name):
     kernel, bare, whole, truth, tried = (timing.best for timing in timings(calls, batches=80, batch=2e-3))
     assert bool(warned) == (name == "spheroid")
     assert bare / kernel < 12.0
-    assert (whole - truth - (tried if warned else 0.0)) / kernel < 18.0
+    assert (whole - truth - (tried if warned else 0.0)) / kernel < 24.0
 
 
 @pytest.mark.slow

@@ -14,9 +14,9 @@ from symtop.cli.main import main
 from symtop.core import files
 from symtop.core.errors import SymtopError
 from symtop.runner import manifest, run as runner, store
-from symtop.runner.analyse import Analysis, analyse_stored, drawing_digest
 from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool
+from symtop.runner.run import analyse_stored, drawing_digest
 from symtop.runner.study import Case
 from tests.commands import contents, leftovers
 
@@ -117,7 +117,7 @@ def test_a_study_that_is_edited_before_it_is_concluded_is_drawn_again(script, tm
         cases.add(study.grid())
         manifest.path_of(tmp_path / "r").unlink()
         drawing = drawing_digest(study, None) if name == "second" else "before the edit"
-        analyse_stored(Analysis(file, tmp_path / "r", cases.cases, [], (), "made of", drawing, None, quick=False))
+        analyse_stored(file, (), tmp_path / "r", cases.cases, [], "made of", drawing, None, quick=False)
         assert manifest.is_current(tmp_path / "r", name, "made of") is (name == "second")
 
 

@@ -106,7 +106,7 @@ def test_an_ensemble_computed_there_is_the_one_computed_here(cluster, tmp_path, 
 
 @pytest.mark.parametrize("address", ["nowhere", "tcp://127.0.0.1:1", "ftp://x", "tcp://[::1:0"])
 def test_a_scheduler_that_is_none_is_one_sentence(address, tmp_path, monkeypatch):
-    monkeypatch.setattr("symtop.core.cluster.PATIENCE", 0.5)
+    monkeypatch.setattr("symtop.run.cluster.PATIENCE", 0.5)
     done = CliRunner().invoke(main, ["study", str(PROBE), "--results", str(tmp_path), "--scheduler", address])
     assert done.exit_code == 2, done.output
     assert "scheduler must be the address of a dask scheduler that answers and has workers" in done.output
@@ -114,7 +114,7 @@ def test_a_scheduler_that_is_none_is_one_sentence(address, tmp_path, monkeypatch
 
 
 def test_a_cluster_without_workers_is_one_sentence(monkeypatch):
-    monkeypatch.setattr("symtop.core.cluster.PATIENCE", 2)
+    monkeypatch.setattr("symtop.run.cluster.PATIENCE", 2)
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address=None, silence_logs=50) as empty,
         pytest.raises(SymtopError, match="has workers"),

@@ -11,7 +11,7 @@ import pytest
 import symtop
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import order
-from symtop.runner import plugins
+from symtop.run import plugins
 
 registry = importlib.import_module("symtop.methods.framework.registry")
 scenes = importlib.import_module("symtop.model.scenes")

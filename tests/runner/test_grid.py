@@ -3,11 +3,11 @@
 import dataclasses
 
 import pytest
+from symtop_studies.grid import grid_scenes
 
 import symtop
 from symtop.model import scenes as catalogue
 from symtop.model.scenes import TAGS
-from symtop.runner.grid import grid_scenes
 from symtop.runner.run import load
 
 BUILT_IN = {

@@ -8,6 +8,7 @@ from click.testing import CliRunner
 
 from symtop.cli.main import main
 from symtop.core import netcdf
+from symtop.report import sources
 from symtop.runner import manifest, run as runner, scripts, store
 from tests.commands import PROBE
 from tests.runner.test_rounds import ROUNDS
@@ -109,38 +110,18 @@ def every(tmp_path, monkeypatch):
     return tmp_path / "r"
 
 
-def test_up_to_date_studies_are_not_loaded(every, monkeypatch):
-    words = ["study", "--all", "--results", str(every)]
-    loads = []
-    real = scripts.load
-    monkeypatch.setattr(scripts, "load", lambda name: loads.append(name) or real(name))
-    said = CliRunner().invoke(main, words)
-    assert (said.exit_code, loads) == (0, []), said.output
-    assert "two: 0 of 1 cases computed" in said.output
-    for change in (
-        lambda: next((every / "cases" / "two").glob("*.npz")).unlink(),
-        lambda: (every / "one.json").write_text("{}"),
-        lambda: os.utime(every / "one.nc", ns=(1, 1)),
-    ):
-        change()
-        loads.clear()
-        assert CliRunner().invoke(main, words).exit_code == 0
-        assert loads
-        loads.clear()
-        assert CliRunner().invoke(main, words).exit_code == 0
-        assert not loads
-
-
-def test_other_sources_and_another_grid_are_not_the_same(monkeypatch):
-    grids = [{"quick": True, "full": False}, {"quick": False, "full": True}, {"quick": False, "full": False}]
-    before = [manifest.all_made_of(grid) for grid in grids]
-    assert len(set(before)) == 3
-    monkeypatch.setattr(manifest, "processor", lambda: "another")
-    assert manifest.all_made_of(grids[0]) != before[0]
+def test_the_hash_of_the_report_follows_sources_processor_and_files(tmp_path, monkeypatch):
+    before = sources.report_hash(tmp_path, embed=False)
+    assert sources.report_hash(tmp_path, embed=False) == before != sources.report_hash(tmp_path, embed=True)
+    (tmp_path / "one.json").touch()
+    assert sources.report_hash(tmp_path, embed=False) != before
+    (tmp_path / "one.json").unlink()
+    monkeypatch.setattr(sources, "processor", lambda: "another")
+    assert sources.report_hash(tmp_path, embed=False) != before
     monkeypatch.undo()
-    real = manifest.file_hash
-    monkeypatch.setattr(manifest, "file_hash", lambda path: real(path) + "x" * (path.name == "page.js"))
-    assert manifest.all_made_of(grids[0]) != before[0]
+    real = sources.file_hash
+    monkeypatch.setattr(sources, "file_hash", lambda path: real(path) + "x" * (path.name == "page.js"))
+    assert sources.report_hash(tmp_path, embed=False) != before
 
 
 def test_the_report_is_written_again_only_if_something_has_changed(every):

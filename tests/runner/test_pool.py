@@ -8,9 +8,9 @@ import time
 import pytest
 
 from symtop.core.parallel import cores
+from symtop.measure import timing
 from symtop.runner import pool as pools, run as runner, store
-from symtop.runner.execute_case import Neighbours, Task
-from symtop.runner.pool import Pool, in_order
+from symtop.runner.pool import Pool, Task, in_order
 from symtop.runner.study import Case
 
 SCRIPT = """
@@ -86,9 +86,9 @@ def test_a_trial_decides_whether_timed_cases_run_at_once(study, tmp_path, monkey
 def test_where_all_workers_disturb_each_other_half_as_many_may_not(monkeypatch):
     monkeypatch.setattr(pools, "slowdown", lambda _, size: 0.3 * size)
     with Pool(1) as pool:
-        assert pool.neighbours(8) == Neighbours(2, 0.6)
-        assert pool.neighbours(3) == Neighbours(3, 0.3 * 3)
-        assert pool.neighbours(1) == Neighbours(1, pytest.approx(math.nan, nan_ok=True))
+        assert pool.at_once(8) == (2, 0.6)
+        assert pool.at_once(3) == (3, 0.3 * 3)
+        assert pool.at_once(1) == (1, pytest.approx(math.nan, nan_ok=True))
 
 
 def test_few_cases_are_computed_here_and_timed_ones_need_no_trial(study, tmp_path):
@@ -103,7 +103,7 @@ def test_few_cases_are_computed_here_and_timed_ones_need_no_trial(study, tmp_pat
 def test_the_trial_sees_workers_that_share_a_core(monkeypatch):
     """With twice as many workers as cores a run takes twice as long."""
     crowd = 2 * cores()
-    monkeypatch.setattr(pools, "TURNS", 3)
+    monkeypatch.setattr(timing, "TURNS", 3)
     with Pool(crowd) as pool:
         pool.open(crowd)
-        assert 1.3 < pools.slowdown(pool.submit, crowd) < math.inf
+        assert 1.3 < timing.slowdown(pool.submit, crowd) < math.inf

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from symtop.cli.main import main
 from symtop.core.errors import SymtopError
 from symtop.runner import run as runner
-from symtop.runner.study import Case, StudyError, sentences
+from symtop.runner.study import Case, StudyError, each
 
 SCRIPT = """\
 import numpy as np
@@ -127,17 +127,20 @@ def test_measures_that_do_not_fit_together_are_told_of(tmp_path):
 
 
 def test_sentences_may_come_in_any_order_of_things():
-    assert sentences("mine", lambda: ("a", "b")) == ["a", "b"]
-    assert sentences("mine", lambda: iter(["a"])) == ["a"]
-    assert sentences("mine", list) == []
+    sentences = lambda verdict: list(each("mine", "verdict", verdict, str, "a list of sentences"))
+    assert sentences(lambda: ("a", "b")) == ["a", "b"]
+    assert sentences(lambda: iter(["a"])) == ["a"]
+    assert sentences(list) == []
     for bad in ("a", b"a", {"a": 1}, 3, [None]):
         with pytest.raises(StudyError, match="study mine: verdict must return a list of sentences"):
-            sentences("mine", lambda bad=bad: bad)
+            sentences(lambda bad=bad: bad)
 
 
 @pytest.mark.parametrize("settings", [{}, {"a": [1, 2.0, None, "x", {"b": True}]}, {"a": np.float64(0.1)}, {"a": (1,)}])
 def test_settings_that_json_can_hold_are_right(settings):
-    assert Case("spheroid", "rk4", settings).flaw() == ""
+    assert Case("spheroid", "rk4", settings).settings is settings
+    with pytest.raises(SymtopError, match="setting 'b' must be numbers"):
+        Case("spheroid", "rk4", {**settings, "b": {1, 2}})
 
 
 def test_what_python_raises_is_kept_as_the_cause(tmp_path):

@@ -17,10 +17,11 @@ from click.testing import CliRunner
 import symtop
 from symtop.cli.main import main
 from symtop.core import netcdf
+from symtop.measure.datasets import differences
 from symtop.methods.framework import registry
 from symtop.methods.framework.registry import Integrator
 from symtop.report import style
-from symtop.runner import check, run as runner, store
+from symtop.runner import run as runner, store
 from tests.commands import PROBE, contents
 
 
@@ -150,14 +151,14 @@ def test_check_finds_a_value_that_this_version_does_not_compute(tmp_path):
 
 def test_differences_leave_out_times_and_nothing_else():
     one = xr.Dataset({"axis": ("x", [1.0, float("nan")]), "seconds": ("x", [1.0, 2.0])}, attrs={"seed": 0})
-    assert check.differences(one, one.copy(deep=True)) == []
-    assert check.differences(one, one.assign(seconds=one["seconds"] * 2)) == []
-    assert check.differences(one, one.assign(axis=one["axis"] * 2)) == ["axis differs by up to 1"]
-    assert check.differences(one, one.drop_vars("axis")) == ["axis is in one of them only"]
-    assert check.differences(one, one.assign_attrs(seed=1)) == ["attribute seed differs: 0 and 1"]
+    assert differences(one, one.copy(deep=True)) == []
+    assert differences(one, one.assign(seconds=one["seconds"] * 2)) == []
+    assert differences(one, one.assign(axis=one["axis"] * 2)) == ["axis differs by up to 1"]
+    assert differences(one, one.drop_vars("axis")) == ["axis is in one of them only"]
+    assert differences(one, one.assign_attrs(seed=1)) == ["attribute seed differs: 0 and 1"]
     beside = [one.assign_attrs(timed_at_once=n, timed_slowdown=x) for n, x in ((1, float("nan")), (2, 1.01))]
-    assert check.differences(*beside) == []  # as times are, how they were taken is another matter each time
-    assert len(check.differences(one, one.isel(x=[0]))) == 2  # also of the times: their shape
+    assert differences(*beside) == []  # as times are, how they were taken is another matter each time
+    assert len(differences(one, one.isel(x=[0]))) == 2  # also of the times: their shape
 
 
 GRIDS = """

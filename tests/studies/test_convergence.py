@@ -4,15 +4,14 @@ import math
 
 import numpy as np
 import pytest
-import xarray as xr
 from symtop_studies.convergence import study, tables, words
 
 import symtop
 from symtop.judging.battery import CLAIMS
 from symtop.judging.claims.order import measured_order
+from symtop.measure import datasets
 from symtop.measure.order import BESIDE, order_verdict
 from symtop.methods.framework.registry import integrator, methods, split_name, variants
-from symtop.runner import store
 from symtop.runner.study import Case
 
 ROWS = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "strang[axis]", "strang[attitude]",
@@ -26,7 +25,7 @@ def data():
     chosen = [case for case in study.on_scene("goldstein", quick=True) if case.integrator in ROWS]
     assert {case.integrator for case in chosen} == set(ROWS)
     longer = [Case(case.scene, case.integrator, case.settings | {"dense": True}) for case in chosen]
-    return store.combine([(case, study.measure(case)) for case in longer])
+    return datasets.combine([(case, study.measure(case)) for case in longer])
 
 
 def test_every_chart_of_every_method_is_a_row_and_a_formula_is_none():
@@ -112,16 +111,6 @@ def test_the_ledger_and_the_study_say_the_same_of_an_order():
     assert order_verdict(5, radau.fits[radau.observed]) != "confirmed"
     verlet = measured_order(integrator("stormer-verlet"), symtop.scene("spheroid"), quick=True)
     assert order_verdict(2, verlet.fits[verlet.observed], verlet.fits.values()) == "confirmed"
-
-
-def test_tables_hold_a_row_for_every_pair_and_say_what_a_chart_does_not_show(data):
-    *_, orders, tolerances = words.tables(data)
-    assert len(orders.rows) == len(tables.judged(data))
-    by_name = {row[1]: row for row in orders.rows}
-    assert "not shown" in by_name["strang[axis]"]
-    assert "not shown" not in by_name["strang[attitude]"]
-    assert {row[1] for row in tolerances.rows} == {name for name in ROWS if integrator(name).adaptive}
-    assert isinstance(data, xr.Dataset)
 
 
 def test_errors_of_adaptive_methods_follow_their_tolerance(data):

@@ -122,12 +122,6 @@ def test_settings_side_by_side_show_what_each_shows_by_itself(name):
     assert runs.measured(row, tops, []) == []
 
 
-def test_marks_that_nobody_asked_for_stand_before_the_last():
-    marks = np.array([1, 4, 9, 30])
-    np.testing.assert_array_equal(runs.filled(marks, 7), [1, 2, 3, 4, 5, 9, 30])
-    np.testing.assert_array_equal(runs.filled(marks, 4), marks)
-
-
 def test_step_times_number_is_exact():
     tops = runs.tops_of(8, 1)
     h = runs.steps_of(tops, 17.48)

@@ -100,8 +100,6 @@ def test_at_the_same_cost_a_method_of_four_evaluations_takes_a_quarter_of_the_st
 
 
 def test_without_the_term_the_spherical_top_is_followed_by_order_h_and_with_it_not_at_all(measured):
-    assert "no-gyro[axis] are off it by" in words.spherical(measured)
-    assert "on goldstein, with order 1.00. The" in words.spherical(measured)
     (table,) = listed.spherical(measured)
     assert [line[0] for line in table.rows] == ["no-gyro[axis]"]
     off = [
@@ -109,13 +107,6 @@ def test_without_the_term_the_spherical_top_is_followed_by_order_h_and_with_it_n
     ]
     near = {row for row, values in zip(words.rows(measured), off, strict=True) if max(values) < 0.01}
     assert near == {"no-gyro[axis]"}
-
-
-def test_every_table_has_a_cell_below_each_heading_and_every_engine_a_source(measured):
-    for table in listed.tables(measured):
-        assert {len(row) for row in table.rows} == {len(table.header)}
-    assert all(one.says.endswith(".") and one.source for one in listed.STATEMENTS)
-    assert len({one.engine for one in listed.STATEMENTS}) == len(listed.STATEMENTS)
 
 
 def test_maps_are_ordered_in_double_precision_and_none_without_the_gyroscopic_term(measured):

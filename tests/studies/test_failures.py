@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from symtop_studies.grid import grid_variants
 from symtop_studies.stability import study
 from symtop_studies.stability.failures import (
     sampled_energy_error,
@@ -29,8 +30,7 @@ from symtop.model import charts, scenes
 from symtop.model.charts import View, axis_of
 from symtop.model.scenes import Scene, closed_form, grazing, sleeping
 from symtop.model.top import Angles, SymmetricTop, effective_force
-from symtop.run.linear_stability import few_steps, trace, with_momenta
-from symtop.runner.grid import grid_variants
+from symtop.run.linear_stability import trace, with_momenta
 
 STEADY = scenes.scene("steady-fast")  # I1, I3, mgl, theta, w3 = 2, 1, 2, 60 degrees, 20
 OMEGA = STEADY.top.nutation_frequency(STEADY.top.momenta(STEADY.start))
@@ -476,13 +476,6 @@ def test_rk45_loses_energy_and_momenta_linearly(rk45):
         assert values[200] / values[-1] == pytest.approx(0.5, abs=0.1)
 
 
-def test_a_discrete_lagrangian_does_not():
-    run = symtop.simulate("spheroid", "midpoint", step_size=0.01, horizon=200.0, samples=401, guard=False)
-    assert np.max(np.abs(run["p_phi"] - run["p_phi"][0])) < 1e-12
-    energy = np.abs(run["energy"].values - run["energy"].values[0])
-    assert energy[200:].max() < 1.1 * energy[:200].max()
-
-
 def test_in_reduced_variables_the_momenta_cannot_be_seen_to_drift(rk45):
     """They are parameters there: the same solver is as wrong, and its momenta read no error at all."""
     scene = scenes.scene("spheroid")
@@ -550,17 +543,6 @@ def test_every_fixed_step_method_shows_its_trace():
             measured = trace(method, STEADY, turn / OMEGA)
             turned = math.acos(measured.trace / (2.0 * math.sqrt(measured.determinant)))
             assert turned == pytest.approx(turn, rel=2e-3), name
-
-
-def test_few_steps_energies_are_the_scenes():
-    scene = scenes.scene("goldstein")
-    for name in ("midpoint", "strang", "rk4"):
-        method = integrator(name)
-        chart = method.chart_for("axis")
-        done = few_steps(method, chart, scene.top, scene.start, 1e-3)
-        assert View(chart, scene.top, done.states, done.p_phi, done.p_psi).energy == pytest.approx(
-            scene.top.energy(scene.start), rel=1e-6
-        )
 
 
 def test_sign_changes_finds_roots_and_skips_what_is_not_a_number():

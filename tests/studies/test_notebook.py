@@ -5,8 +5,10 @@ import math
 
 import numpy as np
 import pytest
-from symtop_studies.notebook import solid
+import xarray as xr
+from symtop_studies.notebook import solid, words as notebook_words
 from symtop_studies.notebook.derivations import easy_way, energies, hard_way, notebook_top, nutation_cubic, with_alpha
+from symtop_studies.notebook.long_energy import better_from
 from symtop_studies.notebook.tables import (
     SOLVER,
     SOLVER_TOLERANCE,
@@ -16,13 +18,15 @@ from symtop_studies.notebook.tables import (
     modified_energy_table,
     residual_history,
 )
+from symtop_studies.notebook.words import long_table
 
 import symtop
 from symtop.core.errors import SymtopError
 from symtop.measure.order import power_law
 from symtop.methods.framework.angles import accelerations, momenta
 from symtop.methods.framework.plan import Plan
-from symtop.methods.lagrangian.quadrature import RULES
+from symtop.methods.lagrangian.discrete_lagrangian import RULES
+from symtop.model import charts
 from symtop.run.modified_energy import modified_energy
 
 FIRST = symtop.scene("spheroid").top
@@ -215,18 +219,42 @@ def test_discrete_methods_keep_the_momenta_and_27_or_more_are_in_the_study():
         assert max(float(run[f"{p}_largest"]) for p in ("p_phi", "p_psi")) < 1e-13
 
 
-def test_the_films_body_axes_are_those_of_the_charts(tmp_path):
-    from PIL import Image
-
-    from symtop.model import charts
-
+def test_body_axes_are_those_of_the_charts():
     q = charts.quaternion_from_angles(*np.random.default_rng(1).uniform(0.2, 2.8, (3, 5)))
     frames = solid.columns_of(q)
     assert np.max(np.abs(frames[:, 2] - charts.axis_from_quaternion(q))) < 1e-15
-    assert np.max(np.abs(frames[:, 0] - charts.transverse_from_quaternion(q))) < 1e-15
+    assert np.max(np.abs(frames[:, 0] - solid.transverse_from_quaternion(q))) < 1e-15
     assert np.max(np.abs(np.cross(frames[:, 0], frames[:, 1]) - frames[:, 2])) < 1e-15
-    solid.Film(q, q[::-1], "five attitudes", pixels=120).savefig(tmp_path / "film.gif")
-    with Image.open(tmp_path / "film.gif") as film:
-        assert film.n_frames == 5
-        colors = {color for _, color in film.convert("RGB").getcolors(1 << 20)}
-    assert {(0xD5, 0x5E, 0x00), (0x00, 0x9E, 0x73), (0x00, 0x72, 0xB2)} <= colors  # the triad's own
+
+
+def long_runs(level, slope):
+    """A discrete method of a level energy error beside a solver whose error grows with time, to t = 1000."""
+    time = np.geomspace(1.0, 1000.0, 301)
+    coords = {"scene": ["spheroid"], "variant": ["midpoint[angles]", SOLVER]}
+    return xr.Dataset({
+        Column.LONG_TIME: (("scene", "variant", "long"), [[time, time]]),
+        Column.LONG_ENERGY: (("scene", "variant", "long"), [[np.full(301, level), slope * time]]),
+        "energy_largest": (("scene", "variant"), [[level, slope * 8.0]]),
+        Column.SAMPLE_TIME: (("scene", "variant", "sample"), np.full((1, 2, 1), 8.0)),
+    }, coords=coords)  # fmt: skip
+
+
+def test_the_notebooks_question_is_answered_and_the_time_from_which_its_hope_is_true_is_measured():
+    late = long_runs(3e-5, 1e-7)
+    assert better_from(late, "spheroid", "midpoint[angles]") == pytest.approx(300.0, rel=0.03)
+    table = long_table(late, ["midpoint[angles]"])
+    assert list(table.rows[-1]) == ["spheroid", "midpoint[angles]", "8", "3e-05", "3e-05", "302"]
+    never, always = long_runs(3e-5, 1e-9), long_runs(1e-9, 1e-7)
+    assert better_from(never, "spheroid", "midpoint[angles]") == math.inf
+    assert better_from(always, "spheroid", "midpoint[angles]") == 0.0
+
+
+def test_the_notebooks_path_is_turned_by_a_quarter_about_the_vertical():
+    phi = np.linspace(0.1, 1.0, 5)
+    angles = {Column.SOLVER_THETA: 0.5 + phi, Column.SOLVER_PHI: phi, Column.TRUE_THETA: 0.5 + phi,
+              Column.TRUE_PHI: phi}  # fmt: skip
+    data = xr.Dataset(
+        {name: (("scene", "variant", "path"), values[None, None]) for name, values in angles.items()},
+        coords={"scene": ["spheroid"], "variant": [SOLVER]},
+    )
+    assert notebook_words.turned(data, "spheroid") == pytest.approx(90.0)

@@ -7,10 +7,10 @@ and a number without its step or tolerance cannot be compared with another.
 import numpy as np
 import pytest
 import xarray as xr
+from symtop_studies.grid import grid_variants
 
 from symtop.core import netcdf
 from symtop.methods.framework.registry import integrators, methods, split_name
-from symtop.runner.grid import grid_variants
 
 STUDIES = (
     "cost", "truth", "convergence", "factors", "drift", "stability", "reduction", "claims", "notebook", "oscillators",

@@ -1,17 +1,21 @@
 """What every adapter gives: something that steps a state of one formulation, and its record for the battery.
 
 The momenta of the runs of a `Stepper` are read off its states here and never asked from it, so that it cannot report
-others than it has.
+others than it has. Each call of it stands in the context of `heartbeat`, which the process that waits for it can see.
 """
 
+import ctypes
+import mmap
 import re
 from collections.abc import Callable, Sequence
+from ctypes import c_bool, c_double, c_long
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from symtop.core.errors import SymtopError, words_of
 from symtop.measure.step_map import reversed_rates
 from symtop.methods.framework.equations import Formulation, as_run
 from symtop.methods.framework.plan import NOT_FINITE, OK, Array, Plan, Run
@@ -20,6 +24,7 @@ from symtop.model.top import Angles, SymmetricTop
 
 Marks = NDArray[np.int64]
 LOOK = 64  # steps from one look at whether the state is finite to the next
+PATIENCE, QUICK_PATIENCE = 10.0, 3.0  # seconds for one call
 
 
 class March(NamedTuple):
@@ -57,14 +62,10 @@ def repeat(once: Callable[[int, Any], Any], y: Any, marks: Marks, show: Callable
     return states
 
 
-def label_of(text: str) -> str:
-    """A name of an integrator made of any text."""
+def label_of(thing: Any) -> str:
+    """A name of an integrator made of any text, or of what a function or the class of something callable is called."""
+    text = thing if isinstance(thing, str) else getattr(thing, "__name__", type(thing).__name__)
     return re.sub(r"[^A-Za-z0-9._+-]+", "-", text).strip("-._+")[:64] or "step"
-
-
-def function_name(function: Callable[..., Any]) -> str:
-    """The name of a function, or of the class of something that is called like one."""
-    return getattr(function, "__name__", type(function).__name__)
 
 
 @dataclass(frozen=True)
@@ -102,8 +103,7 @@ class AdapterSolver:
         turned = np.ones(len(state))
         turned[-3 if turned.size > 2 else -1 :] = -1.0  # L, w, the rates or p_theta
         y = turned * self._once(top, par, np.array(state, dtype=float), h)
-        back, _ = form.prepare(top, reversed_rates(start))
-        y = turned * self._once(top, back, y, h)
+        y = turned * self._once(top, form.prepare(top, reversed_rates(start))[0], y, h)
         return as_run(form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
 
     def _once(self, top: SymmetricTop, par: Any, y: Array, h: float) -> Array:
@@ -114,12 +114,40 @@ class AdapterSolver:
 def integrator(stepper: Stepper, **claims: Any) -> Integrator:
     """The record of a stepper with the claims that are made for it."""
     chart = "angles" if stepper.chart == "nutation" else stepper.chart
-    return Integrator(
-        name=stepper.name,
-        family="other",
-        summary="given through an adapter",
-        solvers={chart: stepper.adaptive or AdapterSolver(stepper)},
-        control="tolerance" if stepper.adaptive else "step_size",
-        implementation=stepper.implementation,
-        **claims,
-    )
+    solvers = {chart: stepper.adaptive or AdapterSolver(stepper)}
+    claims |= {"control": "tolerance" if stepper.adaptive else "step_size", "implementation": stepper.implementation}
+    return Integrator(stepper.name, "other", "given through an adapter", solvers, **claims)
+
+
+class Heartbeat(ctypes.Structure):
+    """Counts calls of a step, in memory that a forked process shares: ``with heartbeat.call(h): step(...)``.
+
+    `calls` have begun; `step` is the h of the last one, which is under way if `inside` and may take `allowed` seconds.
+    What it raises becomes a SymtopError. Once a step backwards has not returned, `forward_only` refuses such steps.
+    """
+
+    _fields_ = (("calls", c_long), ("step", c_double), ("inside", c_bool), ("allowed", c_double))
+    forward_only, patience = False, PATIENCE
+
+    def reset(self, *, quick: bool) -> None:
+        """Something else is judged from now on."""
+        self.forward_only, self.patience = False, QUICK_PATIENCE if quick else PATIENCE
+
+    def call(self, h: float, seconds: float = 0.0) -> Self:
+        """The context of a call that steps by h, which may take so many seconds beyond the usual."""
+        if self.forward_only and h < 0.0:
+            raise SymtopError("it makes no step backwards: a step of -h did not return")
+        self.step, self.allowed = h, self.patience + seconds
+        return self
+
+    def __enter__(self) -> None:
+        self.inside = True
+        self.calls += 1
+
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
+        self.inside = False
+        if isinstance(error, Exception) and not isinstance(error, SymtopError):
+            raise SymtopError(f"a step of h = {self.step:.3g} raises {words_of(error)}") from error
+
+
+heartbeat = Heartbeat.from_buffer(mmap.mmap(-1, ctypes.sizeof(Heartbeat)))  # of the one step that is judged at a time

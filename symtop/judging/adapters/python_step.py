@@ -1,26 +1,58 @@
-"""A Python function ``step(f, t, y, h) -> y`` for y' = f(t, y).
+"""Steps in Python: functions of a state in a chart, of a rigid body or of the nutation, and classes of SciPy's kind.
 
-    def step(f, t, y, h):
-        k1 = f(t, y)
-        return y + h * f(t + h / 2, y + h / 2 * k1)
+*ode*, ``step(f, t, y, h) -> y`` for y' = f(t, y): y and what f returns are NumPy arrays of shape (6,), (e, L) on the
+axis or (theta, phi, psi and their rates) in angles, or (7,), (q, L) on the attitude. h may be negative. A step that
+changes its input in place, and returns it, works.
 
-y and what f returns are NumPy arrays of shape (6,): (e, L) on the axis, (theta, phi, psi and their rates) in angles; or
-(7,): (q, L) on the attitude. h may be negative. A step that changes its input in place, and returns it, works.
+*rotation*, ``step(q, w, h, inertia, torque) -> q, w`` for a rigid body, as engines integrate it, in the body frame:
+
+    q' = q (0, w) / 2,        inertia w' = (inertia w) x w + torque(q)
+
+q = (w, x, y, z) turns body vectors into space vectors, w is the angular velocity, inertia holds the three principal
+moments (I1, I1, I3) about the pivot, and torque(q) is that of gravity. L in space is R(q) inertia w, R(q) with q at
+length one; a q that loses its length shows it as an axis that is not a unit vector.
+
+*separable*, ``step(state, h, dT, dV) -> state`` for the nutation alone, whose Hamiltonian separates:
+
+    H = T(p_theta) + V(theta),     T = p_theta^2/2 I1,     V the effective potential at the p_phi and p_psi of the start
+
+state is (theta, p_theta), a NumPy array of shape (2,), in radians and the units of the scene's top; dT is p_theta/I1
+and dV the slope of V, both of one number. The chart ends at theta = 0 and pi.
+
+*scipy*, a class derived from ``scipy.integrate.OdeSolver``: max_step = first_step = h with tolerances that accept any
+error make steps of h, so that the formula is judged and not its step control; the end of the interval lies beyond the
+last step, which is never cut short. With a tolerance, rtol = atol, the class chooses its steps, as for ``solve_ivp``.
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.adapters.adapter import March, Marks, Stepper, function_name, label_of, repeat
-from symtop.judging.heartbeat import heartbeat
-from symtop.methods.framework.equations import FORMULATIONS
+from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat, label_of, repeat
+from symtop.methods.framework.angles import chart_outcome, on_angles
+from symtop.methods.framework.equations import FORMULATIONS, Formulation
 from symtop.methods.framework.plan import Array
-from symtop.model.top import SymmetricTop
+from symtop.methods.framework.space import on_attitude
+from symtop.methods.library.scipy_ivp import solver as solver_of
+from symtop.model.charts import space_momenta
+from symtop.model.top import Angles, SymmetricTop, effective_force
 
 Field = Callable[[float, Array], Array]
+ANY = 1e300  # a tolerance that every step meets; infinity times a component of zero would be no number
+SAME = 1e-9  # of a step: one that is this near to h has its length
+
+
+def state_like(before: Array, after: Any, what: str = "step") -> Array:
+    """What a step returned as an array of floats; SymtopError if it is no state."""
+    if type(after) is np.ndarray and after.shape == before.shape and after.dtype == np.float64:
+        return after
+    shown = np.asarray(after) if after is not None else None
+    if shown is None or shown.shape != before.shape or shown.dtype.kind not in "fiu":
+        given = "None" if shown is None else f"{type(after).__name__} of shape {shown.shape} and type {shown.dtype}"
+        raise SymtopError(f"{what} must return the new state, {before.size} real numbers, not {given}")
+    return shown.astype(float)
 
 
 class Equations:
@@ -44,8 +76,7 @@ class FunctionStep(Stepper):
     """A stepper around somebody's function, whose results are checked as they come."""
 
     def __init__(self, function: Callable[..., Any], name: str = "") -> None:
-        self.function = function
-        self.name = label_of(name or function_name(function))
+        self.function, self.name = function, label_of(name or function)
 
     def steps(self, once: Callable[[float, Array], Any], t: float, y: Array, h: float, marks: Marks) -> Array:
         """The states at the marks, from a time t on; `once(t, y)` asks the function for one step of h."""
@@ -60,13 +91,13 @@ class FunctionStep(Stepper):
                     raise
                 after = np.full(y.shape, np.nan)
             self.wrote = self.wrote or (k == 0 and not np.array_equal(before, y))
-            return state_like(before, after, "step")
+            return state_like(before, after)
 
         return repeat(checked, y, marks)
 
 
 class PythonStep(FunctionStep):
-    """A stepper around the function."""
+    """A stepper around a function ``step(f, t, y, h) -> y``."""
 
     def __init__(self, function: Callable[..., Any], chart: str, name: str = "") -> None:
         super().__init__(function, name)
@@ -83,12 +114,139 @@ class PythonStep(FunctionStep):
         return self.steps(lambda at, state: self.function(f, at, state, h), t, y, h, marks)
 
 
-def state_like(before: Array, after: Any, what: str) -> Array:
-    """What a step returned as an array of floats; SymtopError if it is no state."""
-    if type(after) is np.ndarray and after.shape == before.shape and after.dtype == np.float64:
-        return after
-    shown = np.asarray(after) if after is not None else None
-    if shown is None or shown.shape != before.shape or shown.dtype.kind not in "fiu":
-        given = "None" if shown is None else f"{type(after).__name__} of shape {shown.shape} and type {shown.dtype}"
-        raise SymtopError(f"{what} must return the new state, {before.size} real numbers, not {given}")
-    return shown.astype(float)
+class ScipySolver(PythonStep):
+    """A stepper around a class of SciPy's kind; with `adaptive`, it chooses its steps by a tolerance."""
+
+    def __init__(self, kind: type, chart: str, *, adaptive: bool = False) -> None:
+        if not callable(getattr(kind, "step", None)):
+            raise SymtopError(f"a class must be derived from scipy.integrate.OdeSolver, not {kind.__name__}")
+        super().__init__(kind, chart)
+        self.adaptive = solver_of(kind, chart) if adaptive else None
+
+    def along(self, f: Field, t: float, y: Array, h: float, marks: Marks) -> Array:
+        """The states at the marks for any right-hand side, from a time t on; SymtopError for steps that are not h."""
+        end, size = t + (int(marks[-1]) + 2) * h, abs(h)
+        with heartbeat.call(h):
+            made: Any = self.function(f, t, y, end, max_step=size, first_step=size, rtol=ANY, atol=ANY)
+
+        def once(k: int, y: Array) -> Array:
+            if made.status != "running" or not np.isfinite(y).all():
+                return np.full(y.shape, np.nan)
+            with heartbeat.call(h):
+                made.step()
+            if abs(made.t - (t + (k + 1) * h)) > SAME * size * (k + 1):
+                raise SymtopError(
+                    f"{self.name} must make steps of max_step = first_step = {size:.3g} where the tolerance accepts "
+                    f"any error, and made one of {made.t - t - k * h:.3g}"
+                )
+            return state_like(y, made.y, "a solver")
+
+        return repeat(once, state_like(y, made.y, "a solver"), marks)
+
+
+class Body(NamedTuple):
+    """What a rigid body on a pivot is: principal moments (3,), and its weight times the height of its centre."""
+
+    inertia: Array
+    mgl: float
+
+
+def to_space(q: Any, vector: Any) -> Any:
+    """R(q) vector for q of any length, shapes (..., 4) and (..., 3)."""
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    turned = np.cross(q[..., 1:], vector)
+    return vector + 2.0 * (q[..., :1] * turned + np.cross(q[..., 1:], turned))
+
+
+def to_body(q: Any, vector: Any) -> Any:
+    """R(q)^T vector."""
+    return to_space(q * np.array([1.0, -1.0, -1.0, -1.0]), vector)
+
+
+def _body_of(top: SymmetricTop, at: Angles) -> tuple[Body, tuple[float, ...]]:
+    """The body and the state (q, w) of a start."""
+    state = np.array(on_attitude(top, at)[1])
+    inertia = np.array([top.I1, top.I1, top.I3])
+    return Body(inertia, top.mgl), (*state[:4].tolist(), *(to_body(state[:4], state[4:]) / inertia).tolist())
+
+
+def _body_shown(body: Body, _times: Array, states: Array) -> Array:
+    """States (q, L) of states (q, w)."""
+    with np.errstate(all="ignore"):
+        return np.concatenate([states[:, :4], to_space(states[:, :4], body.inertia * states[:, 4:])], axis=1)
+
+
+def _body_momenta(body: Body, states: Array) -> tuple[Array, Array]:
+    p_phi, p_psi = space_momenta("attitude", _body_shown(body, states[:, 0], states))
+    return p_phi, p_psi
+
+
+ROTATION = FORMULATIONS["attitude"]._replace(prepare=_body_of, present=_body_shown, momenta=_body_momenta)
+
+
+class RotationStep(FunctionStep):
+    """A stepper around the function of a rigid body; the torques that it asks for are its force evaluations."""
+
+    chart, form = "attitude", ROTATION
+
+    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
+        """The state at the marks."""
+        calls, down = 0, np.array([0.0, 0.0, -par.mgl])
+
+        def torque(q: Any) -> Array:
+            nonlocal calls
+            calls += 1
+            moment: Array = np.cross([0.0, 0.0, 1.0], to_body(np.asarray(q, dtype=float), down))
+            return moment
+
+        def once(_: float, y: Array) -> Array:
+            after = self.function(y[:4].copy(), y[4:].copy(), h, par.inertia.copy(), torque)
+            if not isinstance(after, (tuple, list)) or len(after) != 2:
+                raise SymtopError(f"step must return q and w, a pair, not {type(after).__name__}")
+            return np.concatenate([state_like(y[:4], after[0]), state_like(y[4:], after[1])])
+
+        states = self.steps(once, 0.0, y, h, marks)
+        return March(states, calls)
+
+
+def _no_field(*_: Any) -> Any:
+    raise SymtopError("a map of (theta, p_theta) has no equations of six variables")
+
+
+def _plane_of(top: SymmetricTop, at: Angles) -> tuple[Any, tuple[float, ...]]:
+    """The top with its momenta, and (theta, p_theta) of a start."""
+    par, state = on_angles(top, at)
+    return par, state[:2]
+
+
+def _plane_momenta(par: Any, states: Array) -> tuple[Array, Array]:
+    """p_phi and p_psi, which are parameters of the reduced motion."""
+    p_phi = 0.5 * (par.north + par.south)
+    return np.full(len(states), p_phi), np.full(len(states), par.p_psi)
+
+
+REDUCED = Formulation(_no_field, lambda y: chart_outcome(y[0]), _no_field, _plane_of, None, _plane_momenta)
+
+
+class SeparableStep(FunctionStep):
+    """A stepper around the function of the nutation; a call of dV is a force evaluation."""
+
+    chart, form = "nutation", REDUCED
+
+    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
+        """The state at the marks."""
+        calls = 0
+
+        def dT(p_theta: Any) -> Any:
+            return p_theta / par.I1
+
+        def dV(theta: Any) -> Any:
+            nonlocal calls
+            calls += 1
+            try:
+                return effective_force(theta, par.north, par.south, par.I1, par.mgl)[0]
+            except (OverflowError, ZeroDivisionError, ValueError):  # at a pole, or at infinity
+                return np.nan
+
+        states = self.steps(lambda _, state: self.function(state, h, dT, dV), 0.0, y, h, marks)
+        return March(states, calls)

@@ -1,9 +1,9 @@
 """What a step from elsewhere is like to call: the same twice, from any start, in double precision, backwards.
 
-A one-step method is a function of its arguments. A call is repeated, then repeated after a step somewhere else: numbers
-that depend on what was called before are those of a step that keeps something, such as the last force, and its runs
-depend on the runs before. Where the loop over steps is somebody else's, a run of n + m steps is compared with a run of
-n and one of m: a loop that sums its time and stops too late or too soon is a step away, a method of several steps less.
+A one-step method is a function of its arguments. A call is repeated, then repeated after a step somewhere else: one
+that differs keeps something, such as the last force, and its runs depend on the runs before. Where the loop over steps
+is somebody else's, a run of n + m steps is compared with a run of n and one of m: a loop that sums its time and stops
+too late or too soon is a step away, a method of several steps less.
 """
 
 import contextlib
@@ -35,16 +35,16 @@ ELSEWHERE = 0.3  # rad and units of the rates, from the start that is called
 
 def measure(subject: Subject) -> list[Finding]:
     """The finding on the calls; refuted if a step is not a function of its arguments."""
-    if not subject.method.fixed_step:
-        return [inapplicable("calls", "it has no step of a given length")]
-    return [_calls(subject.stepper, subject.scene)]
+    fixed = subject.method.fixed_step
+    return [_calls(subject) if fixed else inapplicable("calls", "it has no step of a given length")]
 
 
 def _refuted(kind: str, why: str, value: float = math.nan, resolution: float = SAME) -> Finding:
     return Finding("calls", "a function", Measured(kind), "refuted", why, value, resolution)
 
 
-def _calls(stepper: Stepper, scene: Scene) -> Finding:
+def _calls(subject: Subject) -> Finding:
+    stepper, scene = subject.stepper, subject.scene
     h, start = SHARE * scene.time_scale(), generic_start(scene)
 
     def once(at: Angles, step: float) -> Any:
@@ -67,18 +67,19 @@ def _calls(stepper: Stepper, scene: Scene) -> Finding:
         why = f"two calls with the same arguments differ by {twice:.1e}"
         why = why if np.isfinite(twice) else "of calls with the same arguments one returns NaN and another does not"
         return _refuted("not repeatable", why, twice)
-    keeps = "it keeps something between calls"
-    if later > SAME:
-        return _refuted("keeps state", f"{keeps}: after a step elsewhere the same call differs by {later:.1e}", later)
-    if differs > SAME:
-        why = f"{keeps}: call {count} with the same arguments differs by {differs:.1e}"
-        return _refuted("keeps state", why, differs)
+    if max(later, differs) > SAME:
+        how, gap = "after a step elsewhere the same call", later
+        if not later > SAME:
+            how, gap = f"call {count} with the same arguments", differs
+        return _refuted("keeps state", f"it keeps something between calls: {how} differs by {gap:.1e}", gap)
     still = np.array(stepper.form.prepare(scene.top, other)[1])
     moved = _apart(still, _alike(stepper.chart, still, once(other, NOTHING * h)))
     if moved > STANDS:
         why = f"it keeps something of its first start: from another one, a step of {NOTHING * h:.0e} moves by "
         return _refuted("keeps state", f"{why}{moved:.1e}", moved, STANDS)
-    traits = _traits(stepper, first)
+    traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # in two words, and in a clause
+    single = {"single precision": "its numbers are those of single precision"}
+    traits |= single if (first == first.astype(np.float32)).all() else {}
     if stepper.own_loop:
         missed, why = _steps_missed(stepper, scene, h / 10.0)
         if missed > MISSED:
@@ -130,11 +131,3 @@ def _apart(first: Any, second: Any) -> float:
     size = float(np.max(np.abs(first)))
     apart = float(np.max(np.abs(first - second))) / max(size, 1e-300)
     return apart if np.isfinite(apart) else math.inf
-
-
-def _traits(stepper: Stepper, state: Any) -> dict[str, str]:
-    """What else a call is like: in two words, and in a clause."""
-    traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}
-    if (state == state.astype(np.float32)).all():
-        traits["single precision"] = "its numbers are those of single precision"
-    return traits

@@ -1,28 +1,259 @@
-"""The claims that one long run in each chart shows: constants of the motion, and the cost of a step.
+"""What a million steps do to the constants of the motion, and what a step costs; the worst chart of a method decides.
 
-The worst chart decides, and the finding names it. What a run *reports* of its momenta is compared with what its states
-have: a method that hands back the momenta of its start would keep them for ever.
+A constant is kept, bounded, a random walk, a drift or just growing by the rule of every study,
+`symtop.measure.conservation.behaviour`: by its size, and by the exponent of its growth (0, 1/2, 1) if the 95 % interval
+excludes the others. Somebody else's sums may be plain. So a change that grows is rounding, too, while it is no more
+than `KEPT`, relative, or than the random walk that the rounding seen in one step makes, n^1/2 times as much: a bias
+beyond a thousandth of that rounding is visible in a million steps. A drift that hides below a bounded oscillation shows
+in the means of 24 equal stretches, and counts if the line through them exceeds `SURE` of its own intervals. A random
+walk passes a plain test of the slope in one case in three, and not this one; at the size of rounding only the size is
+judged.
+
+A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 tau, whatever its tau: c is fitted, and it
+is the rest of the fit that must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
+
+In the space frame p_phi = L_z and p_psi = L.e are those of the states, whatever the run reports; in angles, where they
+are parameters of a state, those of the increments are set beside the reported ones (`symtop.measure.conservation`). The
+one constant of a map of (theta, p_theta) is the energy at the p_phi and p_psi of the start, which are parameters.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims.long_run import Constant, LongRun, long_run
-from symtop.judging.claims.subject import CONSTANTS, Subject, declared
-from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided
+from symtop.judging.claims.subject import CONSTANTS, PLANE, Subject, declared
+from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
+from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, residuals, tops
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import NOT_FINITE, OK, OUTCOMES, Array, Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator
+from symtop.model.charts import space_momenta
+from symtop.model.scenes import Scene
+from symtop.model.top import SymmetricTop
+from symtop.run.simulation import make_plan
+from symtop.run.trajectory import Trajectory
 
+STEPS, QUICK_STEPS = 1_000_000, 50_000
+STEPS_A_NUTATION = 118.02
+FINER = (1.0, 3.17, 10.03)  # times more, if a run does not reach its end
+SAMPLES = 4001
+PILOT = 400  # steps of the run that is sampled at every step
+EVALUATIONS = {"compiled": 2e8, "python": 4e4}
+QUICK_SHARE = 0.25  # of these; no verdict on a method of the package changes
+TOLERANCE = 1e-6  # of an adaptive method without a default of its own
+KEPT = 1e-11
+REPORTED = 1e-9  # relative, of a reported momentum from that of the states: plain sums leave 1e-11 in a million steps
+ROUNDING_OF_A_STEP = 2e-13  # a change in one step that may be rounding, where |p| is small beside what makes it up
+BOUNDED = 0.25  # an exponent that exceeds it with its whole interval is growth
+SURE = 8.0
+VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
 OF_A_RUN = (*CONSTANTS, "reported", "invariant", "explicit", "work")
 KINDS = ("kept", "bounded", "random walk", "growing", "drift")  # from best to worst
 OWN = "its states'"  # what every run says of the momenta that it reports
 BADNESS = ("inapplicable", "measured", "confirmed", "undecided", "refuted")
+WINDOWS = 160  # of a long run, evenly spaced in the logarithm of time: what a figure shows of it
+
+Rows = dict[str, Array]  # by the names of constants
+
+
+class Constant(NamedTuple):
+    """What became of one constant of the motion."""
+
+    changed: Changed  # relative change, its trend and its growth
+    a_step: float  # largest change in one step
+    floor: float  # a smaller change is rounding
+    grain: float = 1.0  # rounding of the constant, in units of the machine's
+
+    @property
+    def kind(self) -> str:
+        """kept, bounded, random walk, drift, or just growing; unknown without a size or an exponent to judge it by."""
+        change = self.changed
+        word = behaviour(change.largest, change.exponent, change.exponent_interval, self.grain, self.floor)
+        if word == "kept":
+            return word
+        if not (math.isfinite(change.largest) and math.isfinite(change.exponent)):
+            return "unknown"
+        sure = 0.0 < SURE * change.interval < abs(change.slope)
+        return "drift" if sure and abs(change.rise) > VISIBLE * change.largest else word
+
+    @property
+    def grows(self) -> bool | None:
+        """Is it beyond doubt that it grows? None if the exponent leaves that open."""
+        if self.kind in ("kept", "bounded", "unknown"):
+            return None if self.kind == "unknown" else False
+        least = self.changed.exponent - self.changed.exponent_interval
+        return True if self.kind == "drift" or least > BOUNDED else None
+
+
+class LongRun(NamedTuple):
+    """One long run: its constants by name, and its cost."""
+
+    constants: dict[str, Constant]
+    outcome: str
+    message: str
+    chart: str
+    steps: int
+    nutations: float
+    evaluations: float  # of the force, a step
+    iterations: float  # of a solver, a step
+    steady_cost: bool  # every run of the same number of steps cost the same, at two step sizes
+    reported: Difference | None  # of the momenta from those of the states; None where the states show none
+    energy: tuple[Array, Array]  # times, in nutations, and the largest relative change around each, shape (WINDOWS,)
+
+    @property
+    def span(self) -> str:
+        """Its length in words."""
+        return f"{f'{self.steps} steps' if self.steps else 'a formula'} over {self.nutations:.3g} nutations"
+
+    def traces(self) -> dict[str, Array]:
+        """What a figure shows of it."""
+        times, change = self.energy
+        length = {"steps_run": np.array(self.steps), "nutations_run": np.array(self.nutations)}
+        return length | {"long_nutations": times, "energy_change": change}
+
+
+def _run(
+    method: Integrator, scene: Scene, chart: str, steps: float, step: float, samples: int
+) -> tuple[Trajectory, Run, Plan]:
+    """A run for `steps` times `step`: with the momenta of its states, as the solver returned it, and its plan."""
+    horizon = (round(steps) if method.fixed_step else steps) * step
+    control = {"step_size": step} if method.fixed_step else {}
+    if method.adaptive and method.default_tolerance is None:
+        control = {"tolerance": TOLERANCE}
+    plan, _ = make_plan(scene, method, **control, horizon=horizon, samples=samples)
+    own = run = solve(method, chart, scene.top, scene.start, plan, f" on {scene.name}")
+    if chart != "angles":
+        with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up
+            p_phi, p_psi = space_momenta(chart, run.states)
+        own = run._replace(p_phi=p_phi, p_psi=p_psi)
+    return Trajectory.of_run(scene, chart, plan, own), run, plan
+
+
+def long_run(
+    method: Integrator, scene: Scene, chart: str, *, quick: bool = False, most: float | None = None
+) -> LongRun:
+    """A million steps of a compiled method in one of its charts, or `most`; fewer where that would take minutes."""
+    for finer in FINER:  # a motion that passes close to a pole needs shorter steps
+        step = scene.time_scale() / (STEPS_A_NUTATION * finer)
+        pilot, first, _ = _run(method, scene, chart, PILOT, step, PILOT + 1)
+        steps = float(PILOT)  # of a formula, which has no steps: nothing adds up
+        if method.control is not None:
+            cost = max(first.force_evaluations / PILOT, 1.0)
+            share = QUICK_SHARE if quick else 1.0
+            limit = share * EVALUATIONS[method.implementation] / cost if most is None else most
+            steps = max(min(QUICK_STEPS if quick else STEPS, limit) * method.speed, PILOT)
+        shown, run, plan = _run(method, scene, chart, steps, step, SAMPLES)
+        if run.outcome == "ok" or not method.fixed_step:
+            break
+    _, other, _ = _run(method, scene, chart, PILOT, 0.21 * step, PILOT + 1)
+    if chart == "angles":
+        reported = from_increments(method, scene, plan) if method.fixed_step else None
+    else:
+        reported = _difference(scene, shown, run)
+    steady = len({one.force_evaluations / max(one.steps, 1) for one in (first, other)}) == 1
+    return found_in(run, scene, chart, plan.times, constants(scene, shown), constants(scene, pilot), steady, reported)
+
+
+def found_in(
+    run: Run, scene: Scene, chart: str, times: Array, changes: Rows, pilot: Rows, steady: bool, apart: Difference | None
+) -> LongRun:
+    """What a run showed: relative `changes` at `times`, and in each step of its `pilot`."""
+    made, unit = max(run.steps, 1), scene.time_scale()
+    grains = {"energy": scene.energy_grain}
+    kept = {name: change_of(times, changes[name], pilot[name], made, grains.get(name, 1.0)) for name in changes}
+    message, nutations = sentence(run.outcome, run.reached, float(times[-1])), run.reached / unit
+    cost = run.force_evaluations / made, run.newton_iterations / made, steady
+    energy = windows(times / unit, changes["energy"])
+    return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *cost, apart, energy)
+
+
+def run_in_plane(subject: Subject) -> LongRun:
+    """The energy of a map of (theta, p_theta) over many steps, and in each of the first."""
+    stepper, scene = subject.stepper, subject.scene
+    steps = round(min(subject.long_steps or STEPS, QUICK_STEPS if subject.quick else STEPS))
+    par, state = stepper.form.prepare(scene.top, scene.start)
+    p_phi, p_psi = (float(value[0]) for value in stepper.form.momenta(par, np.array([state])))
+
+    def change(marks: Array, h: float) -> tuple[dict[str, Array], int]:
+        """The change of the energy since the start, as a share of the nutation's, and the forces."""
+        states, forces = stepper.march(scene.top, par, np.array(state), h, marks.astype(np.int64))
+        with np.errstate(all="ignore"):
+            energy = scene.top.reduced_energy(states[:, 0], states[:, 1], p_phi, p_psi)
+        return {"energy": (energy - energy[0]) / scene.energy_scale}, forces
+
+    h, first = scene.time_scale() / STEPS_A_NUTATION, np.arange(PILOT + 1.0)
+    marks = np.unique(np.rint(np.linspace(0, max(steps, PILOT), SAMPLES)))
+    values, forces = change(marks, h)
+    every, few = change(first, h)
+    _, other = change(first, 0.21 * h)
+    good = np.isfinite(values["energy"])
+    made, outcome = int(marks[good][-1]), OUTCOMES[OK if good.all() else NOT_FINITE]
+    nothing = np.empty(0)  # neither states nor momenta are shown
+    run = Run(nothing, nothing, nothing, made, forces, 0, outcome, made * h)
+    return found_in(run, scene, PLANE, marks * h, values, every, few == other, None)
+
+
+def windows(nutations: Array, change: Array) -> tuple[Array, Array]:
+    """The largest |change| in windows of the logarithm of time, with their middles; NaN where there is no sample."""
+    middles, largest = np.full((2, WINDOWS), math.nan)
+    times, values = tops(nutations, change, math.log10(nutations[-1] / nutations[1]), WINDOWS)
+    middles[: len(times)], largest[: len(values)] = times, values
+    return middles, largest
+
+
+def _difference(scene: Scene, shown: Trajectory, run: Run) -> Difference:
+    """How far the reported momenta are from those of the states, over the long run."""
+    apart = {}
+    for name in ("p_phi", "p_psi"):
+        gap = np.abs(getattr(run, name) - getattr(shown, name)) / scene.momentum_scale
+        apart[name] = float(np.max(gap[np.isfinite(gap)], initial=0.0))
+    name = max(apart, key=lambda one: apart[one])
+    return Difference(name, apart[name], REPORTED, f"of the larger momentum in {run.steps} steps")
+
+
+def constants(scene: Scene, run: Trajectory) -> Rows:
+    """Relative change of every constant that the run's chart has, at its samples."""
+    changes = residuals(scene, run)
+    if run.chart != "angles":
+        changes["axis_length"] = np.linalg.norm(run.axis, axis=1) - 1.0
+    if run.chart != "angles" and math.isfinite(run.step_size):
+        changes["cayley_energy"] = _cayley_residual(scene.top, run)
+    return changes
+
+
+def _cayley_residual(top: SymmetricTop, run: Trajectory) -> Array:
+    """|L|^2/2 + c u - k^2 (1-u^2)/8 with the best c, relative to its size; |L|^2 is in the energy."""
+    u = run.axis[:, 2]
+    spin: Array = 0.5 * run.p_psi**2 * (1.0 / top.I3 - 1.0 / top.I1)
+    square: Array = top.I1 * (run.energy - top.mgl * u - spin)  # |L|^2 / 2
+    kick = run.step_size * top.mgl
+    rest = square - kick * kick * (1.0 - u) * (1.0 + u) / 8.0
+    good = np.isfinite(rest) & np.isfinite(u)
+    if good.sum() < 8 or np.ptp(u[good]) == 0.0:
+        return np.full(u.size, math.nan)
+    du, dr = u[good] - u[good].mean(), rest[good] - rest[good].mean()
+    c = -float(du @ dr) / float(du @ du)
+    whole = rest + c * u
+    return np.asarray((whole - whole[0]) / float(np.max(np.abs(rest[good]))))
+
+
+def change_of(time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0) -> Constant:
+    """Size, growth and trend of a residual over so many steps; `every_step` holds it at consecutive ones."""
+    jumps = np.abs(np.diff(every_step))
+    a_step = float(np.max(jumps[np.isfinite(jumps)])) if np.isfinite(jumps).any() else math.nan
+    rounding = a_step * math.sqrt(steps) if a_step <= ROUNDING_OF_A_STEP * grain else 0.0
+    return Constant(constant_of(time, values), a_step, max(KEPT * grain, rounding), grain)
 
 
 def measure(subject: Subject) -> list[Finding]:
     """Everything that one long run in each chart shows; the worst chart decides, and the finding names it."""
     method, runs, by_chart = subject.method, [], []
+    if subject.in_plane:
+        run = run_in_plane(subject)
+        subject.traces.update(run.traces())
+        return of_run(method, run)
     for chart in method.charts():
         try:
             run = long_run(method, subject.scene, chart, quick=subject.quick, most=subject.long_steps)
@@ -32,20 +263,14 @@ def measure(subject: Subject) -> list[Finding]:
             findings = [undecided(claim, declared(method, claim), str(error)) for claim in OF_A_RUN]
         by_chart.append([_named(one, chart) for one in findings])
     if runs:
-        subject.traces.update(traces_of(min(runs, key=lambda run: run.steps)))
+        subject.traces.update(min(runs, key=lambda run: run.steps).traces())
     return [max(findings, key=_badness) for findings in zip(*by_chart, strict=True)]
 
 
 def of_run(method: Integrator, run: LongRun) -> list[Finding]:
     """What one long run shows of each claim of `OF_A_RUN`."""
-    rest = [_reported(run), _invariant(method, run), _explicit(method, run), _work(method, run)]
-    return [*(_constant(one, declared(method, one), run, run.constants.get(one)) for one in CONSTANTS), *rest]
-
-
-def traces_of(run: LongRun) -> dict[str, np.ndarray]:
-    """What a figure shows of a long run."""
-    names = ("steps_run", "nutations_run", "long_nutations", "energy_change")
-    return dict(zip(names, (np.array(run.steps), np.array(run.nutations), *run.energy), strict=True))
+    motion = [_constant(one, declared(method, one), run, run.constants.get(one)) for one in CONSTANTS]
+    return [*motion, _reported(run), _invariant(method, run), *_costs(method, run)]
 
 
 def _named(finding: Finding, chart: str) -> Finding:
@@ -70,11 +295,13 @@ def _constant(claim: str, claimed: str, run: LongRun, constant: Constant | None)
         why += f", growth exponent {changed.exponent:.2f} +- {changed.exponent_interval:.2f}"
         if kind == "drift":
             why += f", drifting by {changed.rise / max(run.steps, 1):.1e} a step"
+    # an error that returns with the nutation cannot exceed the largest change of a step, all one way
+    most = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
     if run.outcome not in ("ok", "not_finite") or (kind in ("kept", "bounded") and run.outcome != "ok"):
         why += f"; but the run {run.message}"
     elif kind == "unknown":
         why = f"the run {run.message}" if run.outcome != "ok" else f"{why}: no exponent to judge it by"
-    elif claimed == "bounded" and constant.grows is None and changed.largest > run.most_in_a_nutation(constant):
+    elif claimed == "bounded" and constant.grows is None and changed.largest > most:
         verdict, why = "refuted", f"{why}, more than the steps of a nutation can add up to: it does not come back"
     elif claimed == "bounded" and constant.grows is None:
         why += ", which leaves open whether it grows"
@@ -110,34 +337,27 @@ def _invariant(method: Integrator, run: LongRun) -> Finding:
     return _constant("invariant", "kept", run, run.constants[worst])._replace(declared=claimed)
 
 
-def _no_cost(method: Integrator, run: LongRun) -> str:
-    """Why nothing can be said of the cost of a step; empty if something can."""
-    return "it makes no steps" if method.control is None else "" if run.evaluations else "its forces are not counted"
-
-
-def _explicit(method: Integrator, run: LongRun) -> Finding:
+def _costs(method: Integrator, run: LongRun) -> list[Finding]:
+    """The findings on explicit and work."""
     claimed = declared(method, "explicit")
-    if without := _no_cost(method, run):
-        return inapplicable("explicit", without, claimed)
+    if method.control is None or not run.evaluations:
+        why = "it makes no steps" if method.control is None else "its forces are not counted"
+        return [inapplicable("explicit", why, claimed), inapplicable("work", why)]
+    answer, why = None, f"it reports no iterations and {run.evaluations:.2f} forces a step, always"
     if run.iterations > 0.0:
-        verdict = agreement(declared=method.explicit, measured=False)
-        why = f"it reports {run.iterations:.2f} iterations a step"
-        return Finding("explicit", claimed, Measured("no"), verdict, why, run.iterations, 0.0)
-    if not run.steady_cost:
-        return undecided("explicit", claimed, "it reports no iterations, but its steps do not all cost the same")
-    why = f"it reports no iterations and {run.evaluations:.2f} forces a step, always"
-    if method.explicit is False:
+        answer, why = False, f"it reports {run.iterations:.2f} iterations a step"
+    elif method.explicit is False:
         why += "; so does a method that solves linear equations"
-        return Finding("explicit", claimed, NOTHING, "undecided", why, 0.0, 0.0)
-    verdict = agreement(declared=method.explicit, measured=True)
-    return Finding("explicit", claimed, Measured("yes"), verdict, why, 0.0, 0.0)
-
-
-def _work(method: Integrator, run: LongRun) -> Finding:
-    if without := _no_cost(method, run):
-        return inapplicable("work", without)
+    else:
+        answer = True
+    measured = NOTHING if answer is None else Measured(yes_no(answer))
+    verdict = agreement(declared=method.explicit, measured=answer)
+    explicit = Finding("explicit", claimed, measured, verdict, why, run.iterations, 0.0)
+    if not (run.iterations > 0.0 or run.steady_cost):
+        why = "it reports no iterations, but its steps do not all cost the same"
+        explicit = undecided("explicit", claimed, why)
     solves = f" and {run.iterations:.2f} iterations" if run.iterations else ""
     why = f"{run.evaluations:.2f} force evaluations{solves} a step, in {run.span}"
     text = f"{run.evaluations:.1f}" + (f" ({run.iterations:.1f} it.)" if run.iterations else "")
-    measured = Measured("work", run.evaluations, unit="forces a step", text=text)
-    return Finding("work", "", measured, "measured", why, run.evaluations, 0.0)
+    measured = Measured("work", run.evaluations, text=text)
+    return [explicit, Finding("work", "", measured, "measured", why, run.evaluations, 0.0)]

@@ -1,4 +1,4 @@
-"""The order claim: the conditions of a table, the power series of a step, the slopes of runs and their limit.
+"""The order claim: what a table, the power series of a step, the slopes of runs and their limit show of it.
 
 The four see different defects, and a declared order is refuted if any of them refutes it. It is confirmed if the slope
 confirms it, by `symtop.measure.order.order_verdict` as in every study, or the series where no slope can be judged.
@@ -8,17 +8,28 @@ then again with more steps put into the decades of error above rounding where a 
 the scene does not show it, on `FALLBACK` over longer runs. An adaptive method is fitted against its mean step.
 
 *The limit.* A method whose coefficients miss their sum by 1e-9 has the right slope down to an error of 1e-9 and stays
-there. So the error at the end of a short run of many steps, taken with its sign, is extrapolated to h = 0
-(Richardson's, eliminating h^p and h^(p+1)); what is left beyond rounding is a wrong limit.
+there. So the error at the end of a short run of many steps, with its sign, is extrapolated to h = 0 (Richardson's,
+eliminating h^p and h^(p+1)); what is left beyond rounding is a wrong limit.
 
-*The series of one step* (`claims.series`) sees an order condition that is off by 1e-10, but not what a run carries from
-step to step.
+*The power series of one step* (`symtop.measure.step_series`) sees an order condition that is off by 1e-10, which no
+slope does, but not what a run carries from step to step.
 
 *The table*, Butcher's or a splitting's, needs no run. A condition of order k that is off by d adds an error of
 d (w h)^k to a step, w = 2 pi/nutation, beside d' (w h)^(p+1), which a method of order p has anyway: a slope shows it
 below w h = (d/d')^(1/(p + 1 - k)), often a step that is so small that rounding is larger.
+
+A map of (theta, p_theta) is judged by its distance from the true point, p_theta in units of the larger momentum.
+
+*Time.* The top's equations are autonomous: a method whose f is called at wrong times, the nodes c of its tableau, is
+right on them. In a frame that turns about a horizontal axis at a rate w, z = R(t)^T y moves by
+
+    z' = R^T f(R z) - w x z          for e and L alike, gravity being R^T k,
+
+which depends on t. The series of one step from t0 is set beside that of R(t)^T y(t). An order that is lower than in a
+frame at rest, w = 0, is one of wrong times. A step that asks f at t0 alone was written for f(y), which refutes nothing.
 """
 
+import contextlib
 import math
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -26,15 +37,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims.series import ChartSeries, series_of
-from symtop.judging.claims.subject import FINEST, Subject
+from symtop.judging.claims.structure import ONE_MAP, map_of
+from symtop.judging.claims.subject import FEWEST, FINEST, PLANE, Subject
 from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, yes_no
 from symtop.measure.accuracy import error_table
-from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order_verdict
+from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order as order_of, order_verdict
 from symtop.measure.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
-from symtop.methods.framework.fixed_step import FixedStep
+from symtop.measure.step_map import generic_start, restart_gap
+from symtop.measure.step_series import AGREES, SURE, Series, compared, step_series
+from symtop.methods.framework.equations import FORMULATIONS
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import Array, sentence
 from symtop.methods.framework.preparation import Scaled
 from symtop.methods.framework.registry import Integrator
@@ -43,16 +57,22 @@ from symtop.methods.splitting.loop import Composition
 from symtop.methods.splitting.rotor import EXACT
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
+from symtop.model.top import Angles
 from symtop.run.simulation import integrate
 
 NUTATIONS = 1.37  # length of the runs that the slope is fitted to
 FALLBACK, LONGER = "goldstein", (8.37, 40.0)
+COARSEST, RUNS = 17, 13  # in the plane: steps of the shortest run, and how many runs
+BOUND = 1e-14  # of the closed form at the end of such a run
 QUICK_SHARE = 0.25  # of these; no verdict on a method of the package changes
 LARGEST_EXACT = 2.37  # steps a nutation that a method with exact steps is tried at, beside the ladder
 SHARE = 0.37  # of a nutation: length of the runs that are extrapolated to h = 0
 STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the coarsest of them; 200 beyond order 6
 TRUE_LIMIT = 1e-11  # a limit as close as this is the true motion
 SHOWN = 24  # settings of the order that are kept
+TURNS = 0.7  # of the frame in a nutation
+BEGIN = 0.23  # of a nutation: t0
+CLEAR = 1e-9  # noise of the h^1 term: a step that is rounded to single precision leaves 1e-8
 ABOVE, FINEST_RUNS, SPREAD = 10.0, 5, 10.0  # errors beyond so many bounds, of so many runs, fall as h^p to this factor
 
 
@@ -70,6 +90,53 @@ def measure(subject: Subject) -> list[Finding]:
             words, verdict = words + _visible_from(table, power, subject.scene), "refuted"
         finding = finding._replace(verdict=verdict, why=f"{words}; {finding.why}")
     return [finding]
+
+
+class ChartSeries(NamedTuple):
+    """The series of a step in one chart."""
+
+    chart: str
+    series: Series
+
+    @property
+    def order(self) -> int:
+        """The order that the series shows."""
+        return self.series.order
+
+    def words(self, power: int) -> str:
+        """What it says of the order `power`."""
+        agreed = min(power, self.order)
+        if agreed < min(power, self.series.resolved):
+            return f"{self.wrong_term()}, in the {self.chart} chart"
+        return f"a step has the motion's terms up to h^{agreed} to {max(self.series.worst(agreed), 1e-16):.0e}"
+
+    def wrong_term(self) -> str:
+        """The first term that is not the motion's."""
+        term = self.order + 1
+        defect, noise = self.series.defect[term], self.series.noise[term]
+        return f"the h^{term} term of a step is off by {defect:.1e} of itself (noise {noise:.0e})"
+
+    def term(self, power: int) -> tuple[float, float]:
+        """The largest defect up to h^power, and the least that is told from none."""
+        noise = self.series.noise[min(power, self.series.noise.size - 1)]
+        return self.series.worst(power), max(AGREES, SURE * float(noise))
+
+    @property
+    def measured(self) -> Measured:
+        """The order that is seen, or the least that it can be."""
+        text = f"{self.order} by its h^{self.order + 1} term" if self.series.is_exact else f"{self.order} or more"
+        return Measured("by a term", self.order, text=text)
+
+
+def series_of(subject: Subject) -> ChartSeries | None:
+    """The series of the chart with the lowest order; None where no step is one map of the state."""
+    shown = []
+    for chart in subject.charts if subject.method.fixed_step else ():
+        with contextlib.suppress(SymtopError):
+            step, start = map_of(subject, chart)
+            if restart_gap(step, start) <= ONE_MAP:
+                shown.append(ChartSeries(chart, step_series(step, start, subject.scene.time_scale())))
+    return min(shown, key=lambda one: one.order, default=None)
 
 
 class Order(NamedTuple):
@@ -91,65 +158,94 @@ class Order(NamedTuple):
     @property
     def measured(self) -> Measured:
         """Its slope, if it can be judged."""
-        slope = self.main.slope
-        return Measured("slope", slope, self.main.interval, text=str(self.main)) if math.isfinite(slope) else NOTHING
+        fit = self.main
+        return Measured("slope", fit.slope, text=str(fit)) if math.isfinite(fit.slope) else NOTHING
 
 
 def measured_order(method: Integrator, scene: Scene, *, quick: bool = False, finest: float | None = None) -> Order:
     """Slopes of the errors of attitude, theta and energy, where they can be judged; `finest`: most steps of a run."""
     if method.control is None:
         raise SymtopError(f"{method.name} has neither a step nor a tolerance")
-    fitted = _slopes(method, scene, NUTATIONS, quick, finest)
-    if finest is not None and method.fixed_step and not math.isfinite(fitted.main.slope):
-        shorter = _slopes(method, scene, SHARE, quick, finest)  # the same number of steps, and smaller errors
-        fitted = shorter if math.isfinite(shorter.main.slope) else fitted
-    if quick or not method.fixed_step or method.order is None or method.implementation == "python":
-        return fitted
-    for nutations in LONGER:
-        if math.isfinite(fitted.main.slope):
-            break
-        again = _slopes(method, find_scene(FALLBACK), nutations, quick, finest)
-        fitted = again if math.isfinite(again.main.slope) else fitted
-    return fitted
+    runs = [(scene, NUTATIONS)]
+    if finest is not None and method.fixed_step:
+        runs.append((scene, SHARE))  # the same number of steps, and smaller errors
+    if not (quick or not method.fixed_step or method.order is None or method.implementation == "python"):
+        runs += [(find_scene(FALLBACK), nutations) for nutations in LONGER]
+    tried: list[Order] = []
+    for where, nutations in runs:
+        tried.append(_slopes(method, where, nutations, quick, finest))
+        if math.isfinite(tried[-1].main.slope):
+            return tried[-1]
+    return tried[0]
 
 
-def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool, finest: float | None = None) -> Order:
+def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool, finest: float | None) -> Order:
     horizon = nutations * scene.time_scale()
     count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # steps that are chosen scatter
     most = FINEST[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
-    settings = ladder(method, scene, horizon, count, most)
-    main = observable(method)
+    main, settings = observable(method), ladder(method, scene, horizon, count, most)
     table = order_table(scene, method, settings, horizon, main, dense=finest is None)
     step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
     fits = {name: order_fit(scene, method, table, name, horizon) for name in (main, "theta", "energy")}
-    bound = table[f"{main}_bound"].values
-    return Order(scene.name, step, table[main].values, bound, fits, main, method.fixed_step)
+    error, bound = table[main].values, table[f"{main}_bound"].values
+    return Order(scene.name, step, error, bound, fits, main, method.fixed_step)
 
 
 def _by_steps(subject: Subject) -> Finding:
     """What steps and runs show of the order."""
     method, scene, quick, finest = subject.method, subject.scene, subject.quick, subject.finest
-    series = series_of(method, scene, quick=quick) if method.fixed_step else None
-    fitted, claim = measured_order(method, scene, quick=quick, finest=finest), method.order
-    if series and not fitted.measured and series.series.seen and series.order < (claim or 0):
+    series, claim = series_of(subject), method.order
+    fitted = _in_plane(subject) if subject.in_plane else measured_order(method, scene, quick=quick, finest=finest)
+    if (
+        series
+        and not subject.in_plane
+        and not fitted.measured
+        and series.series.is_exact
+        and series.order < (claim or 0)
+    ):
         # a method of high order is tried at long steps, whose errors fall as no power where the order is low, and the
         # limit of its runs is extrapolated by a power that they do not have: it looks wrong
         method = replace(method, order=max(series.order, 1))
         fitted = measured_order(method, scene, quick=quick, finest=finest)
-    subject.traces.update(settings_shown(fitted))
+    rank = np.argsort(fitted.step_size)[:SHOWN]
+    columns = {"step_size": fitted.step_size, "error": fitted.error, "fitted": fitted.main.used.astype(float)}
+    padded = np.full(SHOWN - rank.size, math.nan)
+    subject.traces.update({name: np.concatenate([values[rank], padded]) for name, values in columns.items()})
     main = fitted.main
     slopes = ", ".join(f"{name} {fit}" for name, fit in fitted.fits.items() if math.isfinite(fit.slope))
     slopes = f"slopes {slopes} on {fitted.scene}" if slopes else "no slope"
-    if method.fixed_step and not (fitted.measured and series and series.follows(max(method.order or 1, 1))):
-        power = method.order or 1
+    power = method.order or 1
+    # runs of a step that has the motion's terms up to h^power, beyond doubt, go to the motion
+    follows = series and series.order >= max(power, 1) and float(series.series.noise[1]) < CLEAR
+    sure = subject.in_plane or (fitted.measured and follows)
+    if method.fixed_step and not sure:
         if fitted.measured:
-            power = max(1, min(power if method.order else 99, round(main.slope)))
+            power = max(1, min(method.order or 99, round(main.slope)))
         wrong = limit(method, scene, power, finest).wrong
         if wrong:
             why = f"as its step goes to zero it goes to a motion that is wrong by {wrong:.1e} ({slopes})"
             verdict = "measured" if claim is None else "refuted"
             return Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)
     return weighed(claim, fitted, series, slopes)
+
+
+def _in_plane(subject: Subject) -> Order:
+    """The slope of the errors at the end of runs of a map of (theta, p_theta)."""
+    method, scene, stepper = subject.method, subject.scene, subject.stepper
+    horizon = NUTATIONS * scene.time_scale()
+    finest = max(subject.finest or FEWEST, 4 * COARSEST)
+    counts = np.unique(np.rint(np.geomspace(COARSEST, finest, RUNS)).astype(np.int64))
+    truth = closed_form(scene)(np.array([horizon]))
+    end = np.array([float(truth.theta[0]), scene.top.I1 * float(truth.theta_dot[0])])
+    par, state = stepper.form.prepare(scene.top, scene.start)
+    errors, unit = [], np.array([1.0, scene.momentum_scale])
+    for count in counts:
+        done = stepper.march(scene.top, par, np.array(state), horizon / count, np.array([count]))
+        errors.append(float(np.linalg.norm((done.states[0] - end) / unit)))
+    step_size, error, bound = horizon / counts, np.array(errors), np.full(counts.size, BOUND)
+    omega = 2.0 * math.pi / scene.time_scale()
+    fit = order_of(step_size, error, bound, omega, method.order, symmetric=method.symmetric)
+    return Order(scene.name, step_size, error, bound, {PLANE: fit}, PLANE, True)
 
 
 def weighed(claim: int | None, fitted: Order, series: ChartSeries | None, slopes: str) -> Finding:
@@ -177,8 +273,8 @@ def _claimed(power: int, fitted: Order, series: ChartSeries | None, slopes: str)
     fits = list(fitted.fits.values()) if fitted.fixed_step else []
     verdict = order_verdict(power, main, fits)
     value, resolution = main.slope, BESIDE + main.interval
-    why = slopes if series is None else f"{slopes}; {series.words(power)}"
-    if series is not None and series.order == power and series.series.seen and verdict != "confirmed":
+    why = f"{slopes}; {series.words(power)}" if series else slopes
+    if series is not None and series.order == power and series.series.is_exact and verdict != "confirmed":
         early = bool(measured) and main.slope > power and all(not fit.slope < power - BESIDE for fit in fits)
         if early or (not measured and _agree(fitted, power)):
             why = f"{why} ({main.reason or 'at steps too long for a slope'})"
@@ -217,10 +313,7 @@ class Limit(NamedTuple):
 
 
 def limit(method: Integrator, scene: Scene, power: int, finest: float | None = None) -> Limit:
-    """How far from the true motion a run ends in the limit of small steps, for a method whose order is `power`.
-
-    The finest of the three runs has at most `finest` steps.
-    """
+    """How far from the true motion runs of a method of order `power`, of `finest` steps at most, end as h -> 0."""
     fewest = STEPS.get(power, 200) // (1 if method.implementation == "compiled" else 20)
     if finest is not None:
         fewest = min(fewest, int(finest) // 4)
@@ -238,8 +331,8 @@ def limit(method: Integrator, scene: Scene, power: int, finest: float | None = N
 def _signed_error(method: Integrator, scene: Scene, horizon: float, steps: int) -> Array:
     run = integrate(scene, method, step_size=horizon / steps, horizon=horizon, samples=2, observe=observable(method))
     if run.outcome != "ok":
-        ended = sentence(run.outcome, run.reached_time, horizon)
-        raise SymtopError(f"a run of {steps} steps over {horizon:.3g} {ended}")
+        end = sentence(run.outcome, run.reached_time, horizon)
+        raise SymtopError(f"a run of {steps} steps over {horizon:.3g} {end}")
     true = closed_form(scene)(np.array([horizon]))
     axis = charts.axis_from_angles(true.theta[0], true.phi[0])
     slip = (float(run.p_theta[-1]) - scene.top.I1 * float(true.theta_dot[0])) / scene.momentum_scale
@@ -247,21 +340,12 @@ def _signed_error(method: Integrator, scene: Scene, horizon: float, steps: int) 
     return np.array([*(run.axis[-1] - axis), slip, *turn])
 
 
-def settings_shown(fitted: Order) -> dict[str, Array]:
-    """Steps, errors and the mask of the fit, in order of the step and padded to one length, for a dataset."""
-    rank = np.argsort(fitted.step_size)[:SHOWN]
-    columns = {"step_size": fitted.step_size, "error": fitted.error, "fitted": fitted.main.used.astype(float)}
-    padded = np.full(SHOWN - rank.size, math.nan)
-    return {name: np.concatenate([values[rank], padded]) for name, values in columns.items()}
-
-
 def _exactness(subject: Subject) -> Finding:
     """The errors of a method whose every step is said to be the motion itself, at steps of all sizes."""
     method, scene = subject.method, subject.scene
     horizon, main = NUTATIONS * scene.time_scale(), observable(method)
-    largest_step = scene.time_scale() / LARGEST_EXACT
-    count = 7 if subject.quick else 13
-    settings = [largest_step, *ladder(method, scene, horizon, count, FINEST[method.implementation])]
+    finer = ladder(method, scene, horizon, 7 if subject.quick else 13, FINEST[method.implementation])
+    settings = [scene.time_scale() / LARGEST_EXACT, *finer]
     table = error_table(scene, method, settings, horizon, observe=main)
     largest = float(table[main].max())
     why = f"largest error {largest:.1e} at steps from {settings[-1]:.1e} s to {settings[0]:.1e} s on {scene.name}"
@@ -271,16 +355,13 @@ def _exactness(subject: Subject) -> Finding:
 
 
 def table_of(method: Integrator) -> Conditions | None:
-    """The conditions of an explicit Runge-Kutta method of fixed step or a splitting into two flows, None for any other.
-
-    A splitting whose drift is a Cayley map has no table of this kind: its drift is no flow.
-    """
+    """The conditions of an explicit Runge-Kutta method of fixed step or of a splitting into two flows; else None."""
     for solver in method.solvers.values():
         rule: Any = solver.rule if isinstance(solver, FixedStep) else None
         rule = rule.rule if isinstance(rule, Scaled) else rule
         if isinstance(rule, Tableau):
             return conditions(triangle(rule.a, len(rule.b)), rule.b)
-        if isinstance(rule, Composition) and rule.turn == EXACT:
+        if isinstance(rule, Composition) and rule.turn == EXACT:  # a Cayley map is no flow
             return splitting_conditions(rule.drift, rule.kick, rule.gradient, rule.processor)
     return None
 
@@ -292,3 +373,63 @@ def _visible_from(table: Conditions, power: int, scene: Scene) -> str:
         return ""
     turn = (table.defect[low - 1] / table.defect[high - 1]) ** (1.0 / (high - low))
     return f" (slopes show it from steps of {turn * scene.time_scale() / (2.0 * math.pi):.0e} downwards)"
+
+
+def time_order(subject: Subject) -> list[Finding]:
+    """The finding on the order in a frame that turns."""
+    if not subject.method.fixed_step or not hasattr(subject.stepper, "along"):
+        return [inapplicable("time", "it takes no right-hand side")]
+    order, rate = subject.method.order, 2.0 * math.pi * TURNS / subject.scene.time_scale()
+    turning, calls = series_in_frame(subject, rate)
+    if not calls:
+        return [inapplicable("time", "it asks for no right-hand side")]
+    if turning.order < 0:
+        return [inapplicable("time", "a step of no length moves a state that is not of its chart")]
+    series, power = turning.series, turning.order if order is None else order
+    shown = min(turning.order, power)
+    declared, measured, verdict = yes_no(order), Measured("order", shown, text=str(shown)), "measured"
+    if turning.order >= min(power, series.resolved):
+        verdict = "measured" if order is None else "confirmed"
+        why = f"where f depends on t, {turning.words(power)}"
+    elif calls == {BEGIN * subject.scene.time_scale()}:  # a step for f(y): no fault on a top
+        declared, measured = "", Measured("f(y) only", shown, text=f"f(y) only, {shown}")
+        why = "f is asked at the start of a step alone, which is right for f(y); where f depends on t, "
+        why += turning.wrong_term()
+    elif series_in_frame(subject, 0.0)[0].order <= turning.order:  # the order is wrong, and not the times
+        declared, why = "", f"{turning.wrong_term()}, as for f(y)"
+    else:
+        verdict, why = "refuted", f"where f depends on t, {turning.wrong_term()}: f is asked at wrong times"
+    return [Finding("time", declared, measured, verdict, why, *turning.term(power))]
+
+
+def series_in_frame(subject: Subject, rate: float) -> tuple[ChartSeries, set[float]]:
+    """The series of a step in a frame that turns at a rate, and the times at which it asks for f."""
+    scene, start = subject.scene, generic_start(subject.scene)
+    begin, unit = BEGIN * scene.time_scale(), np.repeat([1.0, scene.momentum_scale], 3)
+    form, exact = FORMULATIONS["axis"], closed_form(Scene("start", scene.top, start, 1.0))
+    par, _ = form.prepare(scene.top, start)
+    times: set[float] = set()
+
+    def turned(t: float, y: Array, sign: float) -> Array:
+        """R(t) y for sign 1, R(t)^T y for -1; the frame turns about x."""
+        c, s = math.cos(rate * t), sign * math.sin(rate * t)
+        x, v, w, lx, lv, lw = y
+        return np.array([x, c * v - s * w, s * v + c * w, lx, c * lv - s * lw, s * lv + c * lw])
+
+    def f(t: float, z: Any) -> Array:
+        z = np.asarray(z, dtype=float)
+        swept = rate * np.array([0.0, -z[2], z[1], 0.0, -z[5], z[4]])
+        times.add(t)
+        rates: Array = turned(t, np.array(form.field(par, turned(t, z, 1.0).tolist())), -1.0) - swept
+        return rates
+
+    def motion(h: float) -> Any:
+        at = Angles(*(float(value[0]) for value in exact(np.array([h]))))
+        return turned(begin + h, charts.space_state("axis", scene.top, at), -1.0) / unit
+
+    def image(h: float) -> Any:
+        return subject.stepper.along(f, begin, first.copy(), h, np.array([1]))[0] / unit
+
+    first = motion(0.0) * unit
+
+    return ChartSeries("turning", compared(image, motion, scene.time_scale())), times

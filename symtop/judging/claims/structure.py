@@ -1,20 +1,34 @@
-"""The symplectic and the symmetric claim: what one step does to the bracket, and whether it retraces itself.
+"""The symplectic, the symmetric and the pole claim: one step, and a run through theta = 0.
 
-The measurements are those of `symtop.measure.step_map`, in every chart of a method. A chart says no if the defect
-stands out of what the differencing leaves in doubt, yes if it is none, and nothing between. The answer is no if any
-chart says no, yes if one says yes and none no.
+What a step does to the bracket, and whether it retraces itself, is measured by `symtop.measure.step_map` in every chart
+of a method. A chart says no if the defect stands out of what the differencing leaves in doubt, yes if it is none, and
+nothing between. The answer is no if any chart says no, yes if one says yes and none no.
+
+At the pole the axis passes theta = 0 exactly, and must come out right on the other side. A method in the space frame
+claims to pass, one in angles claims nothing; both are run, with a step and with half of it.
+
+A map of (theta, p_theta) is symplectic if it keeps the area, {theta, p_theta} = 1; p_theta is in units of the larger
+momentum.
 """
 
 import math
-from collections.abc import Callable, Mapping
-from functools import partial
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims.subject import Subject
+from symtop.judging.adapters.adapter import AdapterSolver
+from symtop.judging.adapters.python_step import SeparableStep
+from symtop.judging.claims.subject import Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, undecided, yes_no
 from symtop.measure import step_map as maps
-from symtop.model.top import Angles
+from symtop.measure.errors import errors
+from symtop.methods.framework.plan import Array, Run
+from symtop.methods.framework.registry import Integrator
+from symtop.model.scenes import Scene
+from symtop.model.top import Angles, Momenta, SymmetricTop
+from symtop.run.simulation import simulate
 
 SYMPLECTIC = 1e-9  # a smaller defect of the bracket is none
 MET = 1e-8  # a larger one is one, if it stands out of its noise
@@ -22,78 +36,175 @@ STANDS = 0.2  # the raw defect of a symplectic map falls to 1/256 over the width
 RETURNED = 1e-10  # a return as close as this is exact
 MISSED = 1e-8
 ONE_MAP = 1e-9  # two steps are twice one step within this
+POLE_STEPS = 400
+POLE_RIGHT = 1e-7  # rad: right, whatever the step
+# the axis passes theta = 0 exactly: I1 = I3 = mgl = 1, w3 = 1, p_phi = p_psi, theta' = -1.2 at theta = 1
+_POLE_RATE = 0.5 / math.cos(0.5) ** 2
+_POLE_START = Angles(theta=1.0, theta_dot=-1.2, phi_dot=_POLE_RATE, psi_dot=1.0 - _POLE_RATE * math.cos(1.0))
+POLE = Scene("pole", SymmetricTop(1.0, 1.0, 1.0), _POLE_START, 4.0)
 
-
-class _Chart(NamedTuple):
-    """What one chart says on one question: yes, no, or neither."""
-
-    chart: str
-    answer: bool | None
-    value: float
-    resolution: float
-    why: str
+Answer = tuple[bool | None, float, float, str]  # of a chart: yes, no or neither; value, resolution and reason
 
 
 def measure(subject: Subject) -> list[Finding]:
     """The findings on symplectic and symmetric."""
-    names = subject.method.charts()[-1:] if subject.quick else subject.method.charts()
-    steps = {chart: partial(maps.step_map, subject.method, chart, subject.scene) for chart in names}
-    return structure_of(steps, subject)
-
-
-def structure_of(steps: Mapping[str, Callable[[], tuple[maps.StepMap, Angles]]], subject: Subject) -> list[Finding]:
-    """The findings from the map of a step in each chart, with the point to judge it at; a map may refuse to be made."""
-    brackets: dict[str, _Chart] = {}
-    returns: dict[str, _Chart] = {}
-    for chart, made in steps.items():
+    by_chart = []
+    for chart in subject.charts:
+        answers: list[Answer] = []
         try:
-            step, start = made()
-            defect = maps.symplectic_defect(step, start)
-            gap = maps.restart_gap(step, start)
-            brackets[chart] = _bracket(chart, defect, gap)
+            step, start = map_of(subject, chart)
+            defect, gap = maps.symplectic_defect(step, start), maps.restart_gap(step, start)
+            answers.append(_bracket(chart, defect, gap))
             subject.traces.update(defect_width=defect.widths, bracket_defect=defect.raw)
-            returns[chart] = _returned(chart, maps.return_miss(step, start), gap)
+            answers.append(_returned(maps.return_miss(step, start), gap))
         except SymtopError as error:
-            unknown = _Chart(chart, None, math.nan, math.nan, undecided("", "", str(error)).why)
-            brackets.setdefault(chart, unknown)
-            returns.setdefault(chart, unknown)
-    return [
-        _over_charts("symplectic", subject.method.symplectic, list(brackets.values())),
-        _over_charts("symmetric", subject.method.symmetric, list(returns.values())),
-    ]
+            answers += [(None, math.nan, math.nan, undecided("", "", str(error)).why)] * (2 - len(answers))
+        names = ("symplectic", "symmetric")
+        by_chart.append([_in_chart(chart, subject.method, *each) for each in zip(names, answers, strict=True)])
+    return [max(findings, key=_badness) for findings in zip(*by_chart, strict=True)]
 
 
-def _bracket(chart: str, defect: maps.Defect, gap: float) -> _Chart:
+@dataclass(frozen=True)
+class Plane(maps.StepMap):
+    """The map of a step in the plane; z and Y are (theta, p_theta) alike."""
+
+    stepper: SeparableStep
+    momenta: Momenta
+
+    def run(self, start: Angles, h: float, steps: int = 1) -> Run:
+        """So many steps, shown at their end."""
+        done: Run = self.onward(self.top, start, (h,) * steps)
+        if not np.isfinite(done.states).all():
+            raise SymtopError(f"a step of {h:.3g} is not finite")
+        return done
+
+    @property
+    def onward(self) -> Any:
+        """Steps of given lengths, each from the state where the last one ended."""
+        return AdapterSolver(self.stepper).onward
+
+    @property
+    def there_and_back(self) -> Any:
+        """A step, and one from its end with p_theta reversed."""
+        return AdapterSolver(self.stepper).there_and_back
+
+    def scaled(self, state: Array, _phi: float, _psi: float) -> Array:
+        """A state as Y."""
+        return np.asarray(state / np.array([1.0, self.unit]))
+
+    def angles(self, z: Array) -> Angles:
+        """The start that a point stands for, phi and psi zero."""
+        whole = [float(z[0]), 0.0, 0.0, self.unit * float(z[1]), self.momenta.p_phi, self.momenta.p_psi]
+        return maps.angles_at(self.top, np.array(whole))
+
+    def point(self, start: Angles) -> Array:
+        """z of a start."""
+        return np.array([start.theta, self.top.I1 * start.theta_dot / self.unit])
+
+    def at(self, start: Angles) -> Array:
+        """Y of a start."""
+        return self.point(start)
+
+    def restart(self, y: Array) -> Angles:
+        """The start that a Y stands for."""
+        return self.angles(y)
+
+    def length(self, _: Array) -> float:
+        """A state of the plane has no length to keep."""
+        return 1.0
+
+
+def map_of(subject: Subject, chart: str) -> tuple[maps.StepMap, Angles]:
+    """The map at a step so large that its structure shows, and the point to judge it at; it may refuse to be made."""
+    if not subject.in_plane:
+        return maps.step_map(subject.method, chart, subject.scene)
+    scene, start = subject.scene, maps.generic_start(subject.scene)
+    h, momenta = maps.SHARE * scene.time_scale(), scene.top.momenta(start)
+    trial = Plane(subject.method, chart, scene.top, scene.momentum_scale, h, subject.stepper, momenta)
+    return maps.coarsest(trial, start), start
+
+
+def _in_chart(chart: str, method: Integrator, claim: str, answer: Answer) -> Finding:
+    yes, value, resolution, why = answer
+    claimed, measured = getattr(method, claim), NOTHING if yes is None else Measured(yes_no(yes), value)
+    verdict = agreement(declared=claimed, measured=yes)
+    return Finding(claim, yes_no(claimed), measured, verdict, f"{why}, in the {chart} chart", value, resolution)
+
+
+def _badness(one: Finding) -> tuple[int, float]:
+    """The rank of a finding among the charts: no, then yes, then neither; then by its number."""
+    return ("", "yes", "no").index(one.measured.kind), one.value if math.isfinite(one.value) else -1.0
+
+
+def _bracket(chart: str, defect: maps.Defect, gap: float) -> Answer:
     floor = max(3.0 * defect.noise, 1e-12)
     shrinks = f"from {defect.raw[0]:.0e} to {defect.raw[-1]:.0e} as the differencing width shrinks 16 times"
     if defect.size <= SYMPLECTIC and defect.noise <= SYMPLECTIC:
-        return _Chart(chart, True, defect.size, floor, f"defect of the bracket {defect.size:.0e} (it falls {shrinks})")
-    stays = f"defect of the bracket {defect.size:.1e} (it goes {shrinks})"
-    met = defect.size > max(10.0 * defect.noise, MET)
-    met = met or (defect.raw[-1] > STANDS * defect.raw[0] and defect.raw[-1] > 100.0 * MET)
+        return True, defect.size, floor, f"defect of the bracket {defect.size:.0e} (it falls {shrinks})"
     if gap > ONE_MAP:
         if chart != "axis" and defect.rest <= max(3.0 * defect.noise, SYMPLECTIC):
             why = f"one number that a run takes from its start explains the defect ({defect.rest:.0e} is left)"
-            return _Chart(chart, True, defect.rest, floor, why)
-        return _Chart(chart, None, defect.size, floor, f"two steps differ from twice one step by {gap:.0e}: no one map")
-    return _Chart(chart, False if met else None, defect.size, floor, stays)
+            return True, defect.rest, floor, why
+        return None, defect.size, floor, f"two steps differ from twice one step by {gap:.0e}: no one map"
+    stands = defect.raw[-1] > STANDS * defect.raw[0] and defect.raw[-1] > 100.0 * MET
+    met = stands or defect.size > max(10.0 * defect.noise, MET)
+    return False if met else None, defect.size, floor, f"defect of the bracket {defect.size:.1e} (it goes {shrinks})"
 
 
-def _returned(chart: str, miss: float, gap: float) -> _Chart:
-    why = f"a step forth and back misses the start by {miss:.1e}"
+def _returned(miss: float, gap: float) -> Answer:
     if miss > RETURNED and gap > ONE_MAP:
-        return _Chart(chart, None, miss, RETURNED, f"two steps differ from twice one step by {gap:.0e}: no one map")
-    return _Chart(chart, True if miss <= RETURNED else False if miss > MISSED else None, miss, RETURNED, why)
+        return None, miss, RETURNED, f"two steps differ from twice one step by {gap:.0e}: no one map"
+    why = f"a step forth and back misses the start by {miss:.1e}"
+    return True if miss <= RETURNED else False if miss > MISSED else None, miss, RETURNED, why
 
 
-def _over_charts(claim: str, declared: bool | None, by_chart: list[_Chart]) -> Finding:
-    """No if any chart says no, yes if one says yes and none no."""
-    for answer in (False, True, None):
-        agreeing = [one for one in by_chart if one.answer is answer]
-        if agreeing:
-            worst = max(agreeing, key=lambda one: one.value if math.isfinite(one.value) else -1.0)
-            measured = NOTHING if answer is None else Measured(yes_no(answer), worst.value)
-            verdict = agreement(declared=declared, measured=answer)
-            why = f"{worst.why}, in the {worst.chart} chart"
-            return Finding(claim, yes_no(declared), measured, verdict, why, worst.value, worst.resolution)
-    return undecided(claim, yes_no(declared), "no chart could be tried")
+class Passage(NamedTuple):
+    """What a method did in one chart when the axis passed a pole."""
+
+    chart: str
+    outcome: str
+    error: float  # of the axis, rad
+    finer: float  # with half the step or a tenth of the tolerance
+
+    @property
+    def passes(self) -> bool:
+        """Did it come out on the other side, with an error that falls with the step?"""
+        return self.outcome == "ok" and (self.finer < 0.7 * self.error or self.finer < POLE_RIGHT)
+
+
+def passages(method: Integrator) -> list[Passage]:
+    """What happens at a pole, in every chart of the method."""
+    rows = []
+    for chart in method.charts():
+        only, ends, largest = method.variant(chart), [], []
+        for finer in (1.0, 2.0):
+            step, tolerance = POLE.horizon / (POLE_STEPS * finer), max(10.0 ** (-5.0 - finer), method.least_tolerance)
+            control = method.setting(step if method.fixed_step else tolerance).kwargs()
+            observe = "attitude" if chart == "attitude" else "axis"
+            run = simulate(POLE, only, samples=201, observe=observe, guard=False, **control)
+            ends.append(str(run.attrs["outcome"]))
+            miss = errors(run)["axis"].values
+            largest.append(float(np.nanmax(miss)) if np.isfinite(miss).any() else math.nan)
+        rows.append(Passage(chart, next((end for end in ends if end != "ok"), "ok"), *largest))
+    return rows
+
+
+def pole(subject: Subject) -> list[Finding]:
+    """The finding on the pole; of a bare step it is measured alone, for its chart may be the simplest and no claim."""
+    claim, passed = "" if subject.stepper else declared(subject.method, "pole"), passages(subject.method)
+    sentence = "; ".join(
+        f"{one.chart}: passes, off by {one.error:.0e} and {one.finer:.0e} with finer steps" if one.passes
+        else f"{one.chart}: ends there ({one.outcome})" if one.outcome != "ok"
+        else f"{one.chart}: comes out wrong by {one.error:.0e}, {one.finer:.0e} with finer steps"
+        for one in passed
+    )  # fmt: skip
+    judged = [one for one in passed if one.chart != "angles"] or passed
+    words = ["passes" if one.passes else "wrong" if one.outcome == "ok" else "ends there" for one in judged]
+    if not claim:
+        verdict = "measured"
+    elif any(one.outcome not in ("ok", "left_chart", "not_finite") for one in judged):
+        verdict = "undecided"
+    else:
+        verdict = "confirmed" if all(one.passes for one in judged) else "refuted"
+    measured = Measured(", ".join(dict.fromkeys(words)))
+    return [Finding("pole", claim, measured, verdict, sentence, max(one.finer for one in judged), POLE_RIGHT)]

@@ -3,25 +3,36 @@
 How much a bare step may run follows from the seconds that it takes, so that a method in Python is judged in a minute
 and a compiled one in seconds; the findings name the steps that were run. A registered integrator runs as far as its
 implementation is given by default.
+
+A bare step is given as a function, a class, a solver, a file or a command; its adapter is chosen by what it is.
 """
 
+import inspect
+import sys
 import time
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.errors import SymtopError
+from symtop.core.errors import SymtopError, foreign_code, one_of
+from symtop.core.files import execute, python_file
 from symtop.judging.adapters.adapter import Stepper, integrator
-from symtop.judging.adapters.choice import open_target
-from symtop.judging.adapters.separable import SeparableStep
+from symtop.judging.adapters.external import BatchStep, DiffraxSolver, Program, SharedObject, is_solver
+from symtop.judging.adapters.python_step import PythonStep, RotationStep, ScipySolver, SeparableStep
 from symtop.judging.findings import yes_no
 from symtop.measure.conservation import CONSTANTS as MOTION
 from symtop.measure.step_map import generic_start
 from symtop.methods.framework.registry import Integrator
+from symtop.model.charts import CHARTS
 from symtop.model.scenes import Scene
 
+FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
+ARGUMENTS = {"ode": "(f, t, y, h)", "separable": "(state, h, dT, dV)", "rotation": "(q, w, h, inertia, torque)"}
+LIBRARIES = (".so", ".dylib", ".dll")
 CONSTANTS = (*MOTION, "axis_length")
+PLANE = "nutation"  # the chart of a map of (theta, p_theta)
 LONG, SLOPES = (16.0, 2.5), (8.0, 1.5)  # seconds of a long run and of the runs of the order; the second with --quick
 STEPS = 1_000_000  # most steps of a long run
 SAMPLES = 4000  # intervals of a long run: a program that writes every so many steps needs a multiple
@@ -46,6 +57,11 @@ class Subject:
     def in_plane(self) -> bool:
         """Is it a map of (theta, p_theta)?"""
         return isinstance(self.stepper, SeparableStep)
+
+    @property
+    def charts(self) -> tuple[str, ...]:
+        """The charts in which a step is looked at."""
+        return (PLANE,) if self.in_plane else self.method.charts()[-1 if self.quick else 0 :]
 
     @property
     def long_steps(self) -> float | None:
@@ -127,3 +143,59 @@ def declared(method: Integrator, claim: str) -> str:
     if claim == "pole":
         return "no pole" if set(method.solvers) & {"axis", "attitude"} else ""
     return yes_no(getattr(method, "order" if claim == "time" else claim, None))
+
+
+def form_of(target: Any) -> str:
+    """The form of what is given, where it shows: a class, a function, FILE.py:NAME, a library, or else a program."""
+    if isinstance(target, type):
+        return "scipy"
+    if callable(target) or is_solver(target):
+        return "diffrax" if is_solver(target) else "ode"
+    path = "" if " " in str(target).strip() else str(target).partition(":")[0]
+    return "ode" if path.endswith(".py") else "shared" if path.endswith(LIBRARIES) else "program"
+
+
+def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = False) -> Stepper:
+    """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else."""
+    kind = one_of("form", form or form_of(target), FORMS)
+    one_of("chart", chart, CHARTS)
+    if kind == "program":
+        return Program(str(target), chart)
+    if kind == "shared":
+        path, _, symbol = str(target).partition(":")
+        return SharedObject(path, chart, symbol or "step")
+    thing, name = _from_file(target) if isinstance(target, (str, Path)) else (target, "")
+    if kind == "diffrax" or is_solver(thing):
+        return DiffraxSolver(thing, chart, name)
+    if isinstance(thing, type):
+        return ScipySolver(thing, chart, adaptive=adaptive)
+    if kind == "scipy" or adaptive:
+        raise SymtopError(f"form scipy, and a tolerance, need a class derived from OdeSolver, not {thing!r}")
+    arguments = ARGUMENTS.get(kind, ARGUMENTS["ode"])
+    try:
+        inspect.signature(thing).bind(*arguments.split(","))
+    except ValueError:  # built in, without a signature
+        pass
+    except TypeError:
+        signature = inspect.signature(thing)
+        raise SymtopError(f"a step of the form {kind} must take {arguments}, not {signature}") from None
+    if kind in ("torch", "jax"):
+        return BatchStep(thing, chart, kind, name)
+    if kind == "ode":
+        return PythonStep(thing, chart, name)
+    return RotationStep(thing, name) if kind == "rotation" else SeparableStep(thing, name)
+
+
+def _from_file(target: str | Path) -> tuple[Any, str]:
+    """What FILE.py:NAME names, and its name; without a name the function ``step``."""
+    path, _, name = str(target).partition(":")
+    file = python_file(path, "a step", "FILE.py:NAME with a file that is there")
+    with foreign_code(f"the file {file.name}"):
+        sys.path.insert(0, str(file.parent))  # what stands beside it, as Python has it for a script
+        module = execute(f"symtop_judged_{Path(file).stem}", file)
+    thing = getattr(module, name or "step", None)
+    if not (callable(thing) or is_solver(thing)):
+        known = [key for key, value in vars(module).items() if callable(value) and not key.startswith("_")]
+        hint = f"it has {', '.join(known[:8])}" if known else "it has no function"
+        raise SymtopError(f"{file.name} must have a function {name or 'step'!r}; {hint}")
+    return thing, f"{file.stem}-{name}" if name else file.stem

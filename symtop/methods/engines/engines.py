@@ -2,31 +2,529 @@
 
 People choose an engine and get its integrator. Each of these is the map that an engine takes a free body with a torque
 through, written down again from its source and run against it (`make engines`); the top is a body whose centre is
-fixed, in a torque mgl k x e. Only the map is here: no contacts, no joints, no damping, no limit of speed.
+fixed, in a torque mgl k x e. An engine that works in single precision has its map in both, as ``jolt`` and
+``jolt-float32``: the first shows the method, the second what rounding makes of it; it claims no limit h -> 0.
 
-Comparisons of methods leave this family out (`registry.methods`); the claims table judges it and a study of its own
-runs it. An engine that works in single precision has its map in both, as ``jolt`` and ``jolt-float32``: the first shows
-the method, the second what rounding makes of it, and of a limit h -> 0 it claims nothing.
+*A body in space axes.* An engine steps an orientation and the angular velocity w in space, some the angular momentum L.
+With I_s = I1 + (I3 - I1) e e^T, the inertia in space,
+
+    I_s w = I1 w + (I3 - I1) (e.w) e,      I_s^-1 L = L/I1 + (1/I3 - 1/I1) (e.L) e,      tau = mgl k x e,
+
+the right sides of Euler's equations need the axis e alone. So every map whose step commutes with a turn of the body
+about its axis is one function, on the axis and on the attitude, that returns the rotation of the step as a quaternion p
+in space beside the new v, which is what the engine carries, w or L:
+
+    step(par, rule, e, v, carry, h) -> (p, v, carry),      e <- p e p*,  q <- p q/|p q|.
+
+Two rotations are in use. With u = h w/2,
+
+    exponential   p = (cos |u|, u sin |u|/|u|)                    the body turns at the rate w for a time h
+    linear        p = (1, u)/sqrt(1 + u.u)                        q + h (0, w) q/2, normalised: the Cayley rotation
+
+Every function works in the precision of its arguments: 0, 1/2 and 1 are fields of `EngineTop`, for a literal of Python
+would make it double. The loop's compensated sum gives a rounded state exactly; samples are shown at multiples of h.
+
+*Kicks.* The angular velocity changes first, then the body turns by it: the semi-implicit family. They differ in what
+becomes of the gyroscopic term w x I_s w, which is why two engines disagree on a top and agree on a ball. All take tau
+at the start of the step, and one evaluation of it. With L = I_s w and [v] x = v x x:
+
+    none        w += h I_s^-1 tau
+    explicit    w += h I_s^-1 (tau - w x L)
+    implicit    w += h J^-1 (tau - w x L),    J = I + h ([w] I - [I w]) in body axes: one Newton step for the velocity
+    rescaled    N = L - h w x L,  w = I_s^-1 N |L|/|N|                        turns L but keeps its length
+    projected   (I_s - h [L]) w' = L                                          implicit in w, explicit in L
+
+In body axes the third row of J is (0, 0, I3), so that the spin is kept and two equations are left, I1 x + h (I1 - I3)
+w3 e x x = r; the projected form has a closed form too. All are of order 1, but for the first, which leaves out a term
+of the equations: it follows the spherical top with I3 := I1, started with the same w, at any step. What `rescaled`
+keeps is |L|, not L: in a fast top the axis wanders away from L by (1 - I3/I1)^2 w3^2 h/2 a second, relatively, until
+the body lies flat.
+
+*Half kicks*, as in molecular dynamics, where L is what is carried: L += h tau/2 before and after a rotation of order 2,
+not the exact one of a free body (`strang` takes that). With w(q, L) = R(q) I^-1 R(q)^T L and n(q) = q/|q|:
+
+    richardson   q1 = n(q + h w q/2);  q2 = n(q + h w q/4), q2 = n(q2 + h w(q2, L) q2/4);  q <- n(2 q2 - q1)
+    leapfrog     q_h = q + h w q/4, not normalised;  q <- n(q + h w' q_h/2),  w' = R(q_h) I^-1 A^T (L + h tau/2)
+    no squish    exact turns q <- q exp(t (L_k/I_k) b_k) about s1 s2 s3 s2 s1 by h/2, h/2, h, h/2, h/2
+
+The leapfrog is of order 2 with A = R(q_h), as Fincham published it; with A = R(q), as one code has it, of order 1. Each
+turn of the last is the flow of one term of the kinetic energy, so that the step is symplectic on (q, L), symmetric and
+of order 2; L.e is the momentum of one of the three turns only and wobbles. s3 is the axis of the smallest moment, as
+LAMMPS sorts them: the result hangs on where the transverse axes of a symmetric body are put, here psi.
+
+*Stages* of a Runge-Kutta method in the axes of the start of the step, q_i = q exp(Theta_i) and rates b_i:
+
+    b_i = b + h sum_j a_ij b'_j,      Theta_i = h sum_j a_ij k_j,      k_i = dexp^-1(Theta_i) b_i   (Munthe-Kaas)
+
+k_i = b_i, without dexp^-1, is of order 2 at most on a body that turns about more than one axis, whatever the tableau.
+Sources: each engine's own file (`Integrator.reference`); Munthe-Kaas, Appl. Numer. Math. 29 (1999) 115; Fincham, Mol.
+Simul. 8 (1992) 165; Miller, Eleftheriou, Pattnaik, Ndirango, Newns, Martyna, J. Chem. Phys. 116 (2002) 8649.
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
-from symtop.methods.engines import maps, maps as kicks, maps as schemes
-from symtop.methods.engines.loop import (
-    ANGULAR_MOMENTUM,
-    VELOCITY,
-    Carried,
-    Substeps,
-    acceleration,
-    attitude_loop,
-    axis_loop,
-    nothing,
-    single,
-)
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import Loop
+import numpy as np
+
+from symtop.core.jit import register_jitable
+from symtop.methods.framework.loop import FixedStep, Loop, as_stepped, kernel_loop, no_carry
+from symtop.methods.framework.preparation import Body, Preparation
 from symtop.methods.framework.registry import ENGINE, Integrator
+from symtop.methods.framework.space import L_at, e_at, finite_outcome, observe_attitude, observe_axis, q_at
+from symtop.methods.vectors import cross, dot, plus, product, scaled
+
+
+class EngineTop(NamedTuple):
+    """The numbers of the top in the precision of a map."""
+
+    I1: float
+    I3: float
+    mgl: float
+    zero: float = 0.0
+    half: float = 0.5
+    one: float = 1.0
+
+
+def _prepared(place_at: Callable[..., Any], size: int, *, rates: bool) -> Preparation:
+    """A start as (e, L) or (q, L), or with `rates` w for L: the angular momentum of a body whose moments are one."""
+
+    def prepare(top, at):  # type: ignore[no-untyped-def]
+        body: Any = Body(1.0, 1.0, 0.0) if rates else Body(top.I1, top.I3, top.mgl)
+        return EngineTop(top.I1, top.I3, top.mgl, 0.0, 0.5, 1.0), (*place_at(at), *L_at(body, at))
+
+    return Preparation(prepare, size)
+
+
+@register_jitable
+def momentum(par: Any, e: Any, w: Any) -> Any:
+    """I_s w."""
+    return plus(scaled(par.I1, w), (par.I3 - par.I1) * dot(e, w), e)
+
+
+@register_jitable
+def velocity(par: Any, e: Any, L: Any) -> Any:
+    """I_s^-1 L."""
+    return plus(scaled(par.one / par.I1, L), (par.one / par.I3 - par.one / par.I1) * dot(e, L), e)
+
+
+@register_jitable
+def torque(par: Any, e: Any) -> Any:
+    """Gravity about the fixed point."""
+    return -par.mgl * e[1], par.mgl * e[0], par.zero
+
+
+@register_jitable
+def moment(par: Any, e: Any, w: Any) -> Any:
+    """tau - w x I_s w."""
+    return plus(torque(par, e), -par.one, cross(w, momentum(par, e, w)))
+
+
+@register_jitable
+def acceleration(par: Any, e: Any, w: Any) -> Any:
+    """Euler's equations: I_s^-1 (tau - w x I_s w)."""
+    return velocity(par, e, moment(par, e, w))
+
+
+@register_jitable
+def exponential(par: Any, w: Any, h: Any) -> Any:
+    """The rotation by h |w| about w."""
+    rate = np.sqrt(dot(w, w))
+    x = par.half * h * rate
+    s = np.sin(x) / rate if rate > 0 else par.half * h
+    return np.cos(x), s * w[0], s * w[1], s * w[2]
+
+
+@register_jitable
+def linear(par: Any, w: Any, h: Any) -> Any:
+    """The rotation of q + h (0, w) q/2, normalised."""
+    u = scaled(par.half * h, w)
+    s = par.one / np.sqrt(par.one + dot(u, u))
+    return s, s * u[0], s * u[1], s * u[2]
+
+
+@register_jitable
+def normalised(par: Any, q: Any) -> Any:
+    """q/|q|."""
+    s = par.one / np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return s * q[0], s * q[1], s * q[2], s * q[3]
+
+
+@register_jitable
+def turned(p: Any, v: Any) -> Any:
+    """How far the rotation p moves a vector: p v p* - v."""
+    u = p[1], p[2], p[3]
+    c = cross(u, v)
+    d = plus(cross(u, c), p[0], c)
+    return d[0] + d[0], d[1] + d[1], d[2] + d[2]  # doubled by addition, in any precision
+
+
+@register_jitable
+def rotated(par: Any, p: Any, v: Any) -> Any:
+    """p v p*."""
+    return plus(v, par.one, turned(p, v))
+
+
+@register_jitable
+def axis(q: Any) -> Any:
+    """The axis of an attitude, the third column of its matrix."""
+    x, y = q[1] * q[3] + q[0] * q[2], q[2] * q[3] - q[0] * q[1]
+    return x + x, y + y, q[0] * q[0] - q[1] * q[1] - q[2] * q[2] + q[3] * q[3]
+
+
+@register_jitable
+def _double(x: Any) -> Any:
+    return np.float64(x)
+
+
+@register_jitable
+def _single(x: Any) -> Any:
+    return np.float32(x)
+
+
+@register_jitable
+def _nothing(par: Any, e: Any, v: Any) -> Any:
+    return 0.0
+
+
+@register_jitable
+def _momenta(par: Any, e: Any, w: Any) -> Any:
+    """p_phi = L_z and p_psi = L.e."""
+    L = momentum(par, e, w)
+    return L[2], L[0] * e[0] + L[1] * e[1] + L[2] * e[2]
+
+
+@register_jitable
+def _after(before: Any, dstate: Any, i: int) -> Any:
+    return before[i] + dstate[i], before[i + 1] + dstate[i + 1], before[i + 2] + dstate[i + 2]
+
+
+def _observe_rates_on_axis(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+    return _momenta(par, _after(before, dstate, 0), _after(before, dstate, 3))
+
+
+def _observe_rates_on_attitude(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+    return _momenta(par, axis((before[0] + dstate[0], *_after(before, dstate, 1))), _after(before, dstate, 4))
+
+
+def _present_rates_on_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
+    e = state[0], state[1], state[2]
+    return (*e, *momentum(par, e, (state[3], state[4], state[5])))
+
+
+def _present_rates_on_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
+    q = state[0], state[1], state[2], state[3]
+    return (*q, *momentum(par, axis(q), (state[4], state[5], state[6])))
+
+
+class Carried(NamedTuple):
+    """What a map carries in a chart: how it starts, is observed and is shown."""
+
+    prepare: Preparation
+    observe: Callable[..., Any]
+    present: Callable[..., Any] = as_stepped
+
+
+VELOCITY = {
+    "axis": Carried(_prepared(e_at, 6, rates=True), _observe_rates_on_axis, _present_rates_on_axis),
+    "attitude": Carried(_prepared(q_at, 7, rates=True), _observe_rates_on_attitude, _present_rates_on_attitude),
+}
+ANGULAR_MOMENTUM = {
+    "axis": Carried(_prepared(e_at, 6, rates=False), observe_axis),
+    "attitude": Carried(_prepared(q_at, 7, rates=False), observe_attitude),
+}
+
+
+def axis_loop(step: Callable[..., Any], carried: Carried, reused: Callable[..., Any] = _nothing) -> Loop:
+    """The loop on the axis around a map; `reused` is what its first step takes for the one before."""
+    register_jitable(step)
+
+    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
+        return reused(par, (state[0], state[1], state[2]), (state[3], state[4], state[5]))
+
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        e, v = (state[0], state[1], state[2]), (state[3], state[4], state[5])
+        p, new, carry = step(par, rule, e, v, carry, h)
+        x, y, z = turned(p, e)
+        r, s, t = e[0] + x, e[1] + y, e[2] + z
+        lost = 0.5 * (1.0 - (r * r + s * s + t * t))  # |e| = 1 to rounding, as engines keep |q|
+        dstate = x + lost * r, y + lost * s, z + lost * t, new[0] - v[0], new[1] - v[1], new[2] - v[2]
+        total = dstate[0] + dstate[1] + dstate[2] + dstate[3] + dstate[4] + dstate[5]
+        return dstate, carry, 1, finite_outcome(total)
+
+    return kernel_loop(begin, increment, carried.observe, present=carried.present)
+
+
+def attitude_loop(
+    step: Callable[..., Any], carried: Carried, reused: Callable[..., Any] = _nothing,
+    number: Callable[..., Any] = _double,
+) -> Loop:  # fmt: skip
+    """The loop on the attitude around a map, in the precision of `number`."""
+    register_jitable(step)
+
+    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
+        return reused(par, axis((state[0], state[1], state[2], state[3])), (state[4], state[5], state[6]))
+
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        top = EngineTop(
+            number(par.I1), number(par.I3), number(par.mgl), number(par.zero), number(par.half), number(par.one)
+        )
+        cut = Substeps(rule.parts, number(rule.share))
+        q = number(state[0]), number(state[1]), number(state[2]), number(state[3])
+        v = number(state[4]), number(state[5]), number(state[6])
+        p, v, carry = step(top, cut, axis(q), v, carry, number(h))
+        q = normalised(top, product(p, q))
+        dstate = (
+            _double(q[0]) - state[0], _double(q[1]) - state[1], _double(q[2]) - state[2], _double(q[3]) - state[3],
+            _double(v[0]) - state[4], _double(v[1]) - state[5], _double(v[2]) - state[6],
+        )  # fmt: skip
+        total = dstate[0] + dstate[1] + dstate[2] + dstate[3] + dstate[4] + dstate[5] + dstate[6]
+        return dstate, carry, 1, finite_outcome(total)
+
+    return kernel_loop(begin, increment, carried.observe, present=carried.present)
+
+
+class Substeps(NamedTuple):
+    """How many equal parts an engine cuts a step into, and the share of each."""
+
+    parts: int = 1
+    share: float = 1.0
+
+
+@register_jitable
+def _pulled(par: Any, e: Any, w: Any, h: Any) -> Any:
+    """w + h I_s^-1 tau."""
+    return plus(w, h, velocity(par, e, torque(par, e)))
+
+
+@register_jitable
+def _implicit(par: Any, e: Any, w: Any, r: Any, h: Any) -> Any:
+    """J^-1 r of a right side across the axis."""
+    k = h * (par.I1 - par.I3) * dot(e, w)
+    return scaled(par.one / (par.I1 * par.I1 + k * k), plus(scaled(par.I1, r), -k, cross(e, r)))
+
+
+@register_jitable
+def _rescaled(par: Any, e: Any, w: Any, h: Any) -> Any:
+    """The gyroscopic term in an explicit step, at the length that L had."""
+    L = momentum(par, e, w)
+    N = plus(L, -h, cross(w, L))
+    square = dot(N, N)
+    stretch = np.sqrt(dot(L, L) / square) if square > 0 else par.zero  # a body at rest stays so, as in the engines
+    return velocity(par, e, scaled(stretch, N))
+
+
+@register_jitable
+def _explicit(par: Any, e: Any, w: Any, h: Any) -> Any:
+    return plus(w, h, acceleration(par, e, w))
+
+
+@register_jitable
+def _newton_step(par: Any, e: Any, w: Any, h: Any) -> Any:
+    return plus(w, h, _implicit(par, e, w, moment(par, e, w), h))
+
+
+@register_jitable
+def _implicit_then_torque(par: Any, e: Any, w: Any, h: Any) -> Any:
+    return _pulled(par, e, plus(w, -h, _implicit(par, e, w, cross(w, momentum(par, e, w)), h)), h)
+
+
+@register_jitable
+def _rescaled_then_torque(par: Any, e: Any, w: Any, h: Any) -> Any:
+    return _pulled(par, e, _rescaled(par, e, w, h), h)
+
+
+@register_jitable
+def _torque_then_rescaled(par: Any, e: Any, w: Any, h: Any) -> Any:
+    """|L| kept by a change of w: in single precision I_s^-1 (I_s w) would round w the same way in every step."""
+    w = _pulled(par, e, w, h)
+    L = momentum(par, e, w)
+    N = plus(L, -h, cross(w, L))
+    length = np.sqrt(dot(N, N))
+    stretch = np.sqrt(dot(L, L)) / length if length > 0 else par.zero
+    return plus(w, par.one, velocity(par, e, plus(scaled(stretch, N), -par.one, L)))
+
+
+@register_jitable
+def _projected_then_torque(par: Any, e: Any, w: Any, h: Any) -> Any:
+    """(I_s - h [L]) w' = L, then the torque.
+
+    With L = a + l e and a across the axis: w3' = l (D + h^2 a.a)/(I3 D + h^2 I1 a.a) where D = I1^2 + h^2 l^2, and
+    D w_a' = (I1 + h^2 l w3') a + h (l - I1 w3') e x a.
+    """
+    L = momentum(par, e, w)
+    spin = dot(e, L)
+    across = plus(L, -spin, e)
+    D, stretch = par.I1 * par.I1 + h * h * spin * spin, h * h * dot(across, across)
+    w3 = spin * (D + stretch) / (par.I3 * D + par.I1 * stretch)
+    turn = plus(scaled(par.I1 + h * h * spin * w3, across), h * (spin - par.I1 * w3), cross(e, across))
+    return _pulled(par, e, plus(scaled(par.one / D, turn), w3, e), h)
+
+
+def _kicked(rate: Callable[..., Any], turn: Callable[..., Any] = exponential) -> Callable[..., Any]:
+    """The map that changes w by ``rate(par, e, w, h)`` and turns the body by the new one."""
+
+    def step(par, rule, e, w, carry, h):  # type: ignore[no-untyped-def]
+        w = rate(par, e, w, h)
+        return turn(par, w, h), w, carry
+
+    return step
+
+
+def substepped(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
+    """Equal parts of the step, the torque's share of each taken once at the start; linear rotations."""
+    part = rule.share * h
+    pull = scaled(part, velocity(par, e, torque(par, e)))
+    p = par.one, par.zero, par.zero, par.zero
+    for _ in range(rule.parts):
+        w = _rescaled(par, e, plus(w, par.one, pull), part)
+        turn = linear(par, w, part)
+        e, p = rotated(par, turn, e), product(turn, p)
+    return p, w, carry
+
+
+SMALL = 1e-4  # angle below which 1/12 is the coefficient of dexp^-1 to rounding (the next term is a^2/720)
+
+
+@register_jitable
+def _advanced(q: Any, w: Any, over: Any, h: Any) -> Any:
+    """q + h (0, w) over/2."""
+    rate = product((0.0, w[0], w[1], w[2]), over)
+    half = 0.5 * h
+    return q[0] + half * rate[0], q[1] + half * rate[1], q[2] + half * rate[2], q[3] + half * rate[3]
+
+
+def richardson(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: Any) -> Any:
+    """Half kick, a rotation extrapolated from one and two linear ones, half kick."""
+    L = plus(L, 0.5 * h, torque(par, e))
+    w = velocity(par, e, L)
+    full, half = linear(par, w, h), linear(par, w, 0.5 * h)
+    half = product(linear(par, velocity(par, rotated(par, half, e), L), 0.5 * h), half)
+    a, b, c, d = half
+    p = normalised(par, (2.0 * a - full[0], 2.0 * b - full[1], 2.0 * c - full[2], 2.0 * d - full[3]))
+    return p, plus(L, 0.5 * h, torque(par, rotated(par, p, e))), carry
+
+
+def _leapfrog(*, published: bool) -> Callable[..., Any]:
+    """The rotational leapfrog, with the momentum in the body axes of the half step, or of the start of the step."""
+
+    def step(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
+        one = 1.0, 0.0, 0.0, 0.0
+        middle = _advanced(one, velocity(par, e, L), one, 0.5 * h)
+        L = plus(L, 0.5 * h, torque(par, e))
+        turn = normalised(par, middle)
+        w = velocity(par, rotated(par, turn, e), L) if published else rotated(par, turn, velocity(par, e, L))
+        p = normalised(par, _advanced(one, w, middle, h))
+        return p, plus(L, 0.5 * h, torque(par, rotated(par, p, e))), carry
+
+    return step
+
+
+@register_jitable
+def _slope(par: Any, e: Any, p: Any, b: Any) -> Any:
+    """b' of rates in the axes of the start, where the body stands p further."""
+    up = rotated(par, (p[0], -p[1], -p[2], -p[3]), (0.0, 0.0, 1.0))
+    rest = plus(scaled(par.mgl, cross(up, e)), -1.0, cross(b, momentum(par, e, b)))
+    return velocity(par, e, rest)
+
+
+@register_jitable
+def _straightened(turn: Any, b: Any) -> Any:
+    """dexp^-1(turn) b = b + turn x b/2 + c turn x (turn x b), c = (1 - (a/2) cot(a/2))/a^2, a = |turn|."""
+    square = dot(turn, turn)
+    a = np.sqrt(square)
+    c = (1.0 - 0.5 * a / np.tan(0.5 * a)) / square if a > SMALL else 1.0 / 12.0
+    bent = cross(turn, b)
+    return plus(plus(b, 0.5, bent), c, cross(turn, bent))
+
+
+def _kutta(*, munthe_kaas: bool) -> Callable[..., Any]:
+    """Kutta's classical tableau; the stages' turns are those of Munthe-Kaas (order 4), or the rates (order 2)."""
+
+    def step(par, rule, e, b, carry, h):  # type: ignore[no-untyped-def]
+        turns = total = scaled(0.0, b)
+        rates, slopes, gain = b, total, total
+        for i in range(4):
+            ahead = 0.0 if i == 0 else h if i == 3 else 0.5 * h
+            weight = h / 3.0 if 0 < i < 3 else h / 6.0
+            turn = scaled(ahead, turns)
+            rates = plus(b, ahead, slopes)
+            slopes = _slope(par, e, exponential(par, turn, 1.0), rates)
+            turns = _straightened(turn, rates) if munthe_kaas else rates
+            total, gain = plus(total, weight, turns), plus(gain, weight, slopes)
+        p = exponential(par, total, 1.0)
+        return p, rotated(par, p, plus(b, 1.0, gain)), carry
+
+    return step
+
+
+def explicit_euler(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
+    """Attitude and body rates both from the start of the step; a linear rotation."""
+    p = linear(par, w, h)
+    return p, rotated(par, p, plus(w, h, acceleration(par, e, w))), carry
+
+
+def adams_bashforth(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
+    """Rates by Adams and Bashforth, the attitude by Magnus; `carry` is the last acceleration, turned with the body."""
+    now = acceleration(par, e, w)
+    p = exponential(par, plus(plus(w, 0.5 * h, now), h * h / 12.0, cross(now, w)), h)
+    w = plus(plus(w, 1.5 * h, now), -0.5 * h, carry)
+    return p, rotated(par, p, w), rotated(par, p, now)
+
+
+@register_jitable
+def _first_turn(par: Any, q: Any, L: Any, h: float) -> Any:
+    """About the body's first axis, with L in body axes."""
+    x = 0.5 * h * L[0] / par.I1
+    c, s = np.cos(x), np.sin(x)
+    C, S = c * c - s * s, 2.0 * s * c
+    q = q[0] * c - q[1] * s, q[1] * c + q[0] * s, q[2] * c + q[3] * s, q[3] * c - q[2] * s
+    return q, (L[0], C * L[1] + S * L[2], C * L[2] - S * L[1])
+
+
+@register_jitable
+def _second_turn(par: Any, q: Any, L: Any, h: float) -> Any:
+    y = 0.5 * h * L[1] / par.I1
+    c, s = np.cos(y), np.sin(y)
+    C, S = c * c - s * s, 2.0 * s * c
+    q = q[0] * c - q[2] * s, q[1] * c - q[3] * s, q[2] * c + q[0] * s, q[3] * c + q[1] * s
+    return q, (C * L[0] - S * L[2], L[1], C * L[2] + S * L[0])
+
+
+@register_jitable
+def _third_turn(par: Any, q: Any, L: Any, h: float) -> Any:
+    z = 0.5 * h * L[2] / par.I3
+    c, s = np.cos(z), np.sin(z)
+    C, S = c * c - s * s, 2.0 * s * c
+    q = q[0] * c - q[3] * s, q[1] * c + q[2] * s, q[2] * c - q[1] * s, q[3] * c + q[0] * s
+    return q, (C * L[0] + S * L[1], C * L[1] - S * L[0], L[2])
+
+
+def _increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
+    """One step on (q, L); the free rotation leaves L in space as it is."""
+    q, half = (state[0], state[1], state[2], state[3]), 0.5 * h
+    kick = scaled(half, torque(par, axis(q)))
+    kicked = state[4] + kick[0], state[5] + kick[1], state[6] + kick[2]
+    L = plus(kicked, 1.0, turned((q[0], -q[1], -q[2], -q[3]), kicked))
+    if par.I3 < par.I1:
+        q, L = _first_turn(par, q, L, half)
+        q, L = _second_turn(par, q, L, half)
+        q, L = _third_turn(par, q, L, h)
+        q, L = _second_turn(par, q, L, half)
+        q, L = _first_turn(par, q, L, half)
+    else:
+        q, L = _third_turn(par, q, L, half)
+        q, L = _second_turn(par, q, L, half)
+        q, L = _first_turn(par, q, L, h)
+        q, L = _second_turn(par, q, L, half)
+        q, L = _third_turn(par, q, L, half)
+    q = normalised(par, q)
+    kick = plus(kick, half, torque(par, axis(q)))
+    dstate = (q[0] - state[0], q[1] - state[1], q[2] - state[2], q[3] - state[3], *kick)
+    total = dstate[0] + dstate[1] + dstate[2] + dstate[3] + dstate[4] + dstate[5]
+    return dstate, carry, 1, finite_outcome(total)
+
+
+march_no_squish = kernel_loop(no_carry, _increment_no_squish, observe_attitude)
 
 
 def _entry(
@@ -48,7 +546,7 @@ def _entry(
 
 def _engine(
     name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, keeps: str = "", *,
-    carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = nothing, **more: Any,
+    carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = _nothing, **more: Any,
 ) -> Integrator:  # fmt: skip
     """A map in double, on the axis and on the attitude."""
     loops = {
@@ -63,49 +561,48 @@ def _both(
     rule: Any = None, energy_error: str | None = None,
 ) -> list[Integrator]:  # fmt: skip
     """A map in double and in the single precision of the engine, there on the attitude as the engine steps it."""
-    rounded = {"attitude": attitude_loop(step, VELOCITY["attitude"], number=single)}
-    in_single = f"{summary}, in single precision"
+    rounded, words = attitude_loop(step, VELOCITY["attitude"], number=_single), f"{summary}, in single precision"
     return [
         _engine(name, step, order, summary, reference, keeps, rule=rule, energy_error=energy_error),
-        _entry(f"{name}-float32", rounded, None, in_single, reference, rule=rule, precision="single"),
+        _entry(f"{name}-float32", {"attitude": rounded}, None, words, reference, rule=rule, precision="single"),
     ]
 
 
 def built_in() -> list[Integrator]:
     """The maps in double, and those of engines in single precision in that, too."""
     return [
-        *_both("no-gyro", kicks.no_gyro, None, "Havok, PhysX and Jolt by default: no gyroscopic term",
+        *_both("no-gyro", _kicked(_pulled), None, "Havok, PhysX and Jolt by default: no gyroscopic term",
                "havok physx jolt", "p_psi", energy_error="bounded"),
-        _engine("no-gyro-linear", kicks.no_gyro_linear, None,
+        _engine("no-gyro-linear", _kicked(_pulled, linear), None,
                 "cannon-es, ODE with its gyroscopic mode off: no gyroscopic term, a linear turn", "cannon-es ode",
                 "p_psi", energy_error="bounded"),
-        _engine("mujoco-euler", kicks.explicit, 1, "MuJoCo Euler, PyBullet, DART: explicit gyroscopic term",
+        _engine("mujoco-euler", _kicked(_explicit), 1, "MuJoCo Euler, PyBullet, DART: explicit gyroscopic term",
                 "mujoco pybullet dart"),
-        _engine("mujoco-implicit", kicks.implicit, 1, "MuJoCo implicit: one Newton step of the velocity",
+        _engine("mujoco-implicit", _kicked(_newton_step), 1, "MuJoCo implicit: one Newton step of the velocity",
                 "mujoco", "p_psi"),
-        *_both("bullet", kicks.implicit_then_torque, 1, "Bullet by default: implicit gyroscopic term, then the torque",
-               "bullet", "p_psi"),
-        *_both("jolt", kicks.rescaled_then_torque, 1, "Jolt with its gyroscopic term: |L| kept, then the torque",
+        *_both("bullet", _kicked(_implicit_then_torque), 1,
+               "Bullet by default: implicit gyroscopic term, then the torque", "bullet", "p_psi"),
+        *_both("jolt", _kicked(_rescaled_then_torque), 1, "Jolt with its gyroscopic term: |L| kept, then the torque",
                "jolt"),
-        *_both("physx", kicks.torque_then_rescaled, 1, "PhysX with its gyroscopic flag: the torque, then |L| kept",
+        *_both("physx", _kicked(_torque_then_rescaled), 1, "PhysX with its gyroscopic flag: the torque, then |L| kept",
                "physx"),
-        *_both("rapier", kicks.substepped, 1, "Rapier by default: four substeps, |L| kept in each",
+        *_both("rapier", substepped, 1, "Rapier by default: four substeps, |L| kept in each",
                "rapier", rule=Substeps(4, 0.25)),
-        _engine("ode", kicks.projected_then_torque, 1, "ODE by default: gyroscopic term implicit in the velocity",
-                "ode lacoursiere-2006"),
-        _engine("lammps-rigid", schemes.richardson, 2, "LAMMPS fix rigid: half kicks around an extrapolated rotation",
+        _engine("ode", _kicked(_projected_then_torque, linear), 1,
+                "ODE by default: gyroscopic term implicit in the velocity", "ode lacoursiere-2006"),
+        _engine("lammps-rigid", richardson, 2, "LAMMPS fix rigid: half kicks around an extrapolated rotation",
                 "lammps", "p_phi", carried=ANGULAR_MOMENTUM),
-        _entry("no-squish", {"attitude": maps.march_no_squish}, 2, "LAMMPS fix rigid/nve: turns about the body's axes",
+        _entry("no-squish", {"attitude": march_no_squish}, 2, "LAMMPS fix rigid/nve: turns about the body's axes",
                "miller-2002 lammps", "p_phi", carried=ANGULAR_MOMENTUM, symplectic=True, needs="kicks"),
-        _engine("yade", schemes.fincham_at_start, 1, "YADE: rotational leapfrog with the axes of the start of a step",
+        _engine("yade", _leapfrog(published=False), 1, "YADE: rotational leapfrog with the axes of the start of a step",
                 "yade", "p_phi", carried=ANGULAR_MOMENTUM),
-        _engine("fincham", schemes.fincham, 2, "the rotational leapfrog as published", "fincham-1992", "p_phi",
-                carried=ANGULAR_MOMENTUM),
-        _engine("mujoco3-rk4", schemes.runge_kutta_on_rates, 2, "MuJoCo RK4 up to 3.17: stages turn by their rates",
+        _engine("fincham", _leapfrog(published=True), 2, "the rotational leapfrog as published", "fincham-1992",
+                "p_phi", carried=ANGULAR_MOMENTUM),
+        _engine("mujoco3-rk4", _kutta(munthe_kaas=False), 2, "MuJoCo RK4 up to 3.17: stages turn by their rates",
                 "mujoco-3", "p_psi", forces=4),
-        _engine("rkmk4", schemes.runge_kutta_munthe_kaas, 4, "MuJoCo 4.0 RK4, Exudyn: Runge-Kutta-Munthe-Kaas",
+        _engine("rkmk4", _kutta(munthe_kaas=True), 4, "MuJoCo 4.0 RK4, Exudyn: Runge-Kutta-Munthe-Kaas",
                 "munthe-kaas-1999 mujoco exudyn", "p_psi", forces=4),
-        _engine("jsbsim-default", schemes.explicit_euler, 1, "JSBSim by default: explicit Euler", "jsbsim"),
-        _engine("jsbsim-buss2", schemes.adams_bashforth, 2, "JSBSim Buss2 and AB2: Adams-Bashforth and Magnus",
+        _engine("jsbsim-default", explicit_euler, 1, "JSBSim by default: explicit Euler", "jsbsim"),
+        _engine("jsbsim-buss2", adams_bashforth, 2, "JSBSim Buss2 and AB2: Adams-Bashforth and Magnus",
                 "jsbsim buss-2000", reused=acceleration),
     ]  # fmt: skip

@@ -2,11 +2,10 @@
 
     loop(numbers, tolerance, times, budget, seen, place, states, momenta) -> (seen, steps, effort, outcome)
 
-goes on from `place`, or begins at the start in `numbers` (`symtop.model.top.flat`) if `seen` is negative, and fills
-`states` and `momenta` (p_phi, p_psi) at `times` until the last of them, a failure or `budget` units of effort, which
-may be passed by one step. It returns the samples that it has filled since the start, and the steps and the effort of
-this call. `place` holds all that its next step depends on, the time that was reached among it, so that a run in several
-calls has the bits of one call.
+goes on from `place`, all that its next step depends on, or begins at the start in `numbers` (`symtop.model.top.flat`)
+if `seen` is negative. It fills `states` and `momenta` (p_phi, p_psi) at `times` until the last of them, a failure or
+`budget` units of effort, which one step may pass, and returns the samples filled since the start, and the steps and the
+effort of this call. A run in several calls has the bits of one call.
 """
 
 from collections.abc import Callable
@@ -15,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from symtop.core.parallel import heed
-from symtop.methods.framework.many import Many, Whole, refused
+from symtop.methods.framework.lanes import Many, Whole, refused
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUT_OF_BUDGET, OUTCOMES, Array, Plan, Run
-from symtop.methods.framework.preparation import Requirement
 from symtop.model.top import Angles, SymmetricTop, flat
 
 Loop = Callable[..., tuple[int, int, int, int]]
@@ -34,7 +32,7 @@ class Adaptive:
     most: float  # units of effort of a run without a budget
     block: int  # units between returns to Python, so that an interrupt is heard within a second
     unit: Callable[[float], int] = lambda _: 1  # force evaluations of a unit of effort, of a tolerance
-    check: Requirement | None = None  # what a start must meet
+    check: Callable[[Angles], None] | None = None  # as `Preparation` has it
 
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         """Start to horizon."""
@@ -51,10 +49,10 @@ class Adaptive:
     ) -> tuple[Many, Array]:
         """The runs of n members one after another, and the times that they reached, (n,).
 
-        `numbers` (n, 9), `tolerance` (n,), `times` (n, samples), of which the first `counts` (n,) of a member are
-        asked for. Each has the bits of a run alone, and a member that fails fails alone. Work is in force evaluations.
+        `numbers` (n, 9), `tolerance` (n,), `times` (n, samples), of which the first `counts` (n,) are asked for. Each
+        member has the bits of a run alone and fails alone. Work is in force evaluations.
         """
-        done, reached = Many.begun(len(numbers), times.shape[1], self.size), np.zeros(len(numbers))
+        done, reached = Many.empty(len(numbers), times.shape[1], self.size), np.zeros(len(numbers))
         out, times = refused(self.check, numbers), np.ascontiguousarray(times)
         done.outcome[out] = LEFT_CHART
         for i, plain in enumerate(map(tuple, numbers.tolist())):

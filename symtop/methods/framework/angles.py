@@ -18,10 +18,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, Array
-from symtop.methods.framework.preparation import Preparation, Requirement, Shown, conserved
+from symtop.methods.framework.preparation import Preparation, Shown, conserved
 
 
 class ReducedTop(NamedTuple):
@@ -53,28 +54,25 @@ def chart_outcome(theta: float) -> int:
     return NOT_FINITE
 
 
-def _in_chart(at: Any) -> Any:
-    """Is theta no pole, where phi and psi have no meaning of their own?"""
-    return (at.theta > 0.0) & (at.theta < np.pi)
+def in_chart(theta: Any) -> Any:
+    """Is theta, a number or an array, no pole, where phi and psi have no meaning of their own?"""
+    return (theta > 0.0) & (theta < np.pi)
 
 
-def _outside(at: Any) -> str:
-    return f"theta must lie inside (0, pi) for an integrator in the angles chart, not {at.theta!r}"
-
-
-require_chart = Requirement(_in_chart, _outside)
+def require_chart(at: Any) -> None:
+    """Refuse a start on a pole: raises SymtopError."""
+    if not in_chart(at.theta):
+        raise SymtopError(f"theta must lie inside (0, pi) for an integrator in the angles chart, not {at.theta!r}")
 
 
 def _on_angles(top: Any, at: Any) -> Any:
-    """Kernel parameters and state of a start; p_theta0 = dL/dtheta' is the discrete Legendre transform's start."""
+    """p_theta0 = dL/dtheta' is the discrete Legendre transform's start."""
     momenta = conserved(top, at)
     par = ReducedTop(top.I1, top.I3, top.mgl, momenta.p_psi, momenta.north, momenta.south)
     return par, (at.theta, top.I1 * at.theta_dot, at.phi, at.psi)
 
 
 on_angles = Preparation(_on_angles, 4, require_chart)
-
-
 LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, where SciPy draws the line
 
 
@@ -98,7 +96,6 @@ def field_angles(par: Any, y: Any) -> Any:
 
 
 def _with_rates(top: Any, at: Any) -> Any:
-    """Kernel parameters and state of a start."""
     state = (at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot)
     return BareTop(top.I1, top.I3, top.mgl), state
 
@@ -122,7 +119,7 @@ def observe_angles(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> A
 @register_jitable
 def ended_angles(y: Any) -> int:
     """Is the state finite and theta a point of the chart?"""
-    # zero, or NaN where any of them is not finite: one question about theta then answers for all six, without a branch
+    # zero, or NaN where any of them is not finite: theta then answers for all six, without a branch
     nothing = 0.0 * (y[1] + y[2] + y[3] + y[4] + y[5])
     return chart_outcome(y[0] + nothing)
 

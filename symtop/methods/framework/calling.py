@@ -1,8 +1,7 @@
 """The one call of a solver: what it is given it cannot spoil, and what it returns is checked.
 
-A solver may be anybody's. Whatever it raises is a `SymtopError` (`symtop.core.errors`), and so is anything that it
-returns but a `Run` that fits its plan. A run whose states are not finite and that says nothing of it ends where they
-cease to be.
+A solver may be anybody's. Whatever it raises is a `SymtopError` (`symtop.core.errors`), and so is anything but a `Run`
+that fits its plan. A run whose states cease to be finite without its saying so ends there.
 """
 
 import contextlib
@@ -33,9 +32,7 @@ def solve(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan
     with foreign_code(f"integrator {method.name}{context}"):
         own = getattr(solver, "__module__", "").startswith(OWN)
         given = plan if own else plan._replace(times=plan.times.copy(), marks=plan.marks.copy())
-        backwards = (
-            not own and plan.step_size < 0.0
-        )  # a loop up to the horizon that counts on a step forwards never ends
+        backwards = not own and plan.step_size < 0.0  # a loop that counts on a step forwards never ends
         with np.errstate(all="ignore"), at_most(PATIENCE) if backwards else contextlib.nullcontext():
             run = solver(top, start, given)
         if not own:

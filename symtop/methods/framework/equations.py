@@ -35,9 +35,7 @@ class Formulation(NamedTuple):
     ended: Callable[[Any], int]  # outcome of a state: OK, or how the chart was left
     observe: Callable[..., Any]  # (par, rule, before, dstate, h) -> p_phi and p_psi after a step
     prepare: Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]  # parameters and state of a start
-    present: (
-        Callable[[Any, Array, Array], Array] | None
-    )  # (par, times, states) -> states of the chart that `simulate` shows, where they differ
+    present: Callable[[Any, Array, Array], Array] | None  # (par, times, states) -> states as shown, if others
     momenta: Callable[[Any, Array], tuple[Array, Array]]  # (par, states) -> p_phi and p_psi of samples
 
 
@@ -78,20 +76,19 @@ def _axis(I1: Any, I3: Any, mgl: Any, y: Any) -> Any:
 
 @register_jitable
 def _attitude(I1: Any, I3: Any, mgl: Any, y: Any) -> Any:
-    """The kernels hold L . e as a parameter of the run; here it is taken from the state."""
+    """With L.e taken from the state; in the kernels it is a parameter of the run."""
     w, x, v, z = y[0], y[1], y[2], y[3]
     along = 2.0 * (x * z + w * v) * y[4] + 2.0 * (v * z - w * x) * y[5] + (w * w - x * x - v * v + z * z) * y[6]
     return field_attitude(SpaceTop(I1, mgl, along * (1.0 / I3 - 1.0 / I1)), y)
 
 
-_RIGHT = {"angles": _angles, "axis": _axis, "attitude": _attitude}
-_SHAPES = {"angles": (6,), "axis": (6,), "attitude": (7,)}
+_RIGHT = {"angles": (_angles, (6,)), "axis": (_axis, (6,)), "attitude": (_attitude, (7,))}  # and the shape of y
 
 
 @functools.cache
 def _kernel(chart: str) -> Any:
     """f(I1, I3, mgl, y) -> y' of a chart, compiled."""
-    right = _RIGHT[chart]
+    right = _RIGHT[chart][0]
 
     def kernel(I1, I3, mgl, y):  # type: ignore[no-untyped-def]
         return np.array(right(I1, I3, mgl, y))
@@ -100,12 +97,12 @@ def _kernel(chart: str) -> Any:
 
 
 class Field:
-    """y' = f(t, y) of a chart of one top; `kernel` with `parameters` is the same for code that is compiled itself."""
+    """y' = f(t, y) of a chart of one top, as `field` makes it."""
 
     def __init__(self, chart: str, top: SymmetricTop, *, compiled: bool) -> None:
         self.chart, self.top, self.compiled = chart, top, compiled
         self.parameters = top.I1, top.I3, top.mgl
-        self._shape = _SHAPES[chart]
+        self._right, self._shape = _RIGHT[chart]
 
     def __call__(self, _: float, y: Any) -> Array:
         """y' at any time: an array like y. Raises SymtopError for a y that is no state of the chart."""
@@ -115,7 +112,7 @@ class Field:
             raise SymtopError(f"y must have the shape {self._shape} in the chart {self.chart}, not {y.shape}")
         if self.compiled:
             return np.asarray(self.kernel(*self.parameters, y))
-        return np.array(_RIGHT[self.chart](*self.parameters, np.asarray(y, dtype=float).tolist()))
+        return np.array(self._right(*self.parameters, np.asarray(y, dtype=float).tolist()))
 
     @property
     def kernel(self) -> Any:
@@ -139,8 +136,7 @@ def field(chart: str, top: SymmetricTop, *, compiled: bool = False) -> Field:
     ``f.state(start)`` is an `Angles` as y. With `compiled` each call runs compiled code (y must be an array of floats);
     ``f.kernel(*f.parameters, y)`` can be called from functions that numba compiles; it does not look at the shape of y.
 
-    Raises SymtopError for a chart that is none of the three, and for a top that is none; so does a call for a y that
-    has not the shape of the chart.
+    Raises SymtopError for another chart and for what is no top; so does a call for a y of another shape.
     """
     if not isinstance(top, SymmetricTop):
         raise SymtopError(f"top must be a SymmetricTop, not {type(top).__name__}")

@@ -11,34 +11,35 @@ and two more where what is stepped is not what is shown (a processed method, a m
     enter(par, rule, state, h) -> state                    the start as the kernel steps it, once a run
     present(par, rule, state, k, h) -> state               a sample as the user sees it, once a sample
 
-`par` are the numbers of the top, `rule` the numbers of the method, `work` its force evaluations or solver
-iterations. A kernel returns the *increment* of the state; the loop adds it with Knuth's two-sum and carries
-the rounding error to the next step, which costs nothing (the loop is bound by the latency of the
-kernel) and lowers the growth of round-off about 60-fold. Time is k h with h = T/N exactly, never accumulated.
+`par` are the numbers of the top, `rule` those of the method, `work` force evaluations or solver iterations. A kernel
+returns the *increment* of the state; the loop adds it with Knuth's two-sum and carries the rounding error to the next
+step. That costs nothing, for the loop is bound by the latency of the kernel. Time is k h, never accumulated.
 
 A run that nobody interrupts is one compiled call from plain numbers to samples (`Loop.whole`), the preparation of the
-kernel included: a run of one step takes a fifth of the time.
-
-A loop can stop after any step and go on from there, now or in another process, to the same bits: a `Position` is all
-that the next step depends on. Runs too long to wait for are made of such stretches (`symtop.run.long_run`).
-Reference: Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit Runge-Kutta methods,
-BIT 48 (2008) 231.
+kernel included. A loop can stop after any step and go on, in another process too, to the same bits: a `Position` is all
+that the next step depends on (`symtop.run.long_run`).
+Source: Hairer, McLachlan, Razakarivony, BIT 48 (2008) 231 (Brouwer's law).
 """
 
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from symtop.core.jit import compile_kernel, register_jitable, set_item
-from symtop.methods.framework.lanes import Lanes, marching as marching_lanes, preparing, showing
-from symtop.methods.framework.many import Blocks
-from symtop.methods.framework.plan import OK
-from symtop.methods.framework.preparation import Body, Start, as_it_steps, conserved
+from symtop.core.parallel import heed
+from symtop.methods.framework import lanes as many, preparation
+from symtop.methods.framework.lanes import Blocks, Lanes, Many, Whole
+from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan, Run
+from symtop.methods.framework.preparation import Body, Preparation, Shown, Start, as_it_steps, conserved
+from symtop.methods.framework.registry import Solver
 from symtop.methods.vectors import accumulate, accumulate_plainly
+from symtop.model import charts
+from symtop.model.top import Angles, SymmetricTop, flat
 
 Array = NDArray[np.float64]
 Marks = NDArray[np.int64]
@@ -86,12 +87,11 @@ def as_stepped(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
 class Loop:
     """The loop around one kernel family, compiled when it is first used: ``loop(par, rule, state, h, marks)``.
 
-    A run records the state after ``marks[j]`` steps for each j (increasing whole numbers; a mark at 0 records the
-    start). `begun` and `advance` do the same in stretches, and the bits do not depend on where a stretch ends.
-    ``whole(kind, prepare, scale, sample)`` is a run in one compiled call, from the plain numbers of
-    `symtop.methods.framework.preparation` to filled arrays: ``run(numbers, rule, h, marks, states, momenta)``, with
-    momenta (2, samples), returns steps, work and outcome. `lanes` is what the family has for a rule to run many
-    members in lanes, if it has it, and ``blocks(lanes, ...)`` the kernels of that, from the same parts.
+    A run records the state after ``marks[j]`` steps for each j (increasing; 0 is the start). `start` and `advance` do
+    the same in stretches, and the bits do not depend on where a stretch ends. ``whole(kind, prepare, scale, sample)``
+    is a run in one compiled call, from plain numbers (`preparation`) to filled arrays: ``run(numbers, rule, h, marks,
+    states, momenta)``, with momenta (2, samples), returns steps, work and outcome. `lanes` is what the family has for a
+    rule to run many members in lanes, or None, and ``blocks(lanes, ...)`` the kernels of that, from the same parts.
     """
 
     begin: Callable[..., Any]
@@ -104,9 +104,9 @@ class Loop:
 
     def __call__(self, par: Any, rule: Any, state: tuple[float, ...], h: float, marks: Marks) -> March:
         """From the start to the last mark."""
-        return self.advance(par, rule, self.begun(par, rule, state, h), h, marks)[0]
+        return self.advance(par, rule, self.start(par, rule, state, h), h, marks)[0]
 
-    def begun(self, par: Any, rule: Any, state: tuple[float, ...], h: float) -> Position:
+    def start(self, par: Any, rule: Any, state: tuple[float, ...], h: float) -> Position:
         """A run before its first step."""
         state, carry = self.prepare(par, rule, state, h)
         return Position(state, (0.0,) * len(state), carry, 0)
@@ -197,11 +197,11 @@ def kernel_loop(  # noqa: C901  (one loop, read in one piece)
 
     @functools.cache
     def together(family: Lanes, kind: Any, numbers: Any, scale: Any, show: Any) -> Blocks:
-        prepare = preparing(family, begin, enter, kind, numbers, scale)
-        return Blocks(family, prepare, marching_lanes(family, observe, present, show))
+        prepare = many.preparing(family, begin, enter, kind, numbers, scale)
+        return Blocks(family, prepare, many.marching(family, observe, present, show))
 
     def blocks(family: Lanes, kind: Any, numbers: Any, scale: Any, sample: Any) -> Blocks:
-        return together(family, kind, numbers, scale, family.show or showing(sample))
+        return together(family, kind, numbers, scale, family.show or many.showing(sample))
 
     @functools.cache
     def plain() -> Loop:
@@ -209,3 +209,153 @@ def kernel_loop(  # noqa: C901  (one loop, read in one piece)
 
     alone = compile_kernel(prepare), compile_kernel(marching(as_it_steps))
     return Loop(begin, *alone, whole, lanes, blocks, plain)
+
+
+Prepare = Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]
+Present = Callable[[Any, Array, Array], Array]
+
+
+class _Whole(NamedTuple):
+    """The parts of a run in one compiled call."""
+
+    rule: Any  # what compiled code makes the rule from
+    size: int  # of a sample
+    alone: tuple[Any, ...]  # what a run of one takes, for a plain tuple comes apart quicker than a NamedTuple
+    blocks: Callable[[], Blocks] | None  # many members in lanes
+    table: Any  # the rule as the method has it
+
+    def run(self, members: Whole, numbers: Array, h: Array, marks: Whole, done: Many) -> Whole:
+        """Run members in lanes or by one call each; returns those that take a call of Python."""
+        most = min(many.GROUP, BLOCK)
+        if self.blocks is not None:
+            members = self.blocks().run(members, numbers, self.table, h, marks, done, most)
+        short = marks[members, -1] <= BLOCK
+        for chosen in many.groups(members[short], marks[:, -1], most):
+            heed()
+            many.in_turn(self.alone[0], chosen, numbers, self.rule, h, marks, done)
+        longer: Whole = members[~short]
+        return longer
+
+
+@dataclass(frozen=True)
+class FixedStep:
+    """A solver around a loop: `prepare` gives a kernel its parameters and state, `rule` the method's numbers.
+
+    A rule whose numbers depend on the run is a function of the top, the start and the step. `evaluations` is how many
+    force evaluations a unit of the kernel's counted work takes (of an implicit method, an iteration), and `each_step`
+    come on top of every step. `present(par, times, states)` makes states of the chart from the kernel's, where they
+    differ. A run is one compiled call where `prepare` is a `Preparation` and `present`, if there is one, is `Shown`.
+    """
+
+    loop: Loop | Callable[..., March]
+    rule: Any
+    prepare: Prepare
+    evaluations: int
+    implicit: bool = field(kw_only=True)
+    each_step: int = 0
+    present: Present | None = None
+
+    def setup(self, top: SymmetricTop, start: Angles, h: float) -> tuple[Any, Any, tuple[float, ...]]:
+        """The numbers of the top and of the method, and the state that the kernel starts from."""
+        par, state = self.prepare(top, start)
+        return par, self.rule(top, start, h) if callable(self.rule) else self.rule, state
+
+    def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+        """Start to horizon, in one compiled call where that is possible."""
+        whole, h, marks = self._whole, plan.step_size, plan.marks
+        if whole is None or marks.item(-1) > BLOCK:
+            return self._in_stretches(top, start, plan)
+        # a run of few steps takes as long as what follows: no fields one at a time, no `counts`, no constructor
+        run, rule, check, size, evaluations, each_step, counted = whole.alone
+        if check is not None:
+            check(start)
+        samples, numbers = len(marks), flat(top, start)
+        states, momenta = np.empty((samples, size)), np.empty((2, samples))
+        steps, work, outcome = run(numbers, rule, h, marks, states, momenta)
+        spent, ended = work * evaluations + steps * each_step, OUTCOMES[outcome]
+        seen = states, momenta[0], momenta[1], steps, spent, work * counted, ended, steps * h
+        return tuple.__new__(Run, seen)
+
+    def _in_stretches(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+        """The same with the preparation in Python, and a return to Python after every `BLOCK` steps."""
+        par, rule, state = self.setup(top, start, plan.step_size)
+        done = self.loop(par, rule, state, plan.step_size, plan.marks)
+        if plan.marks[0] == 0:
+            done.momenta[0] = top.momenta(start)[:2]
+        states = done.states if self.present is None else self.present(par, plan.times, done.states)
+        counts = done.steps, *self.counts(done.steps, done.work), OUTCOMES[done.outcome], done.steps * plan.step_size
+        return Run(states, done.momenta[:, 0], done.momenta[:, 1], *counts)
+
+    def many(self, numbers: Array, h: Array, marks: Whole) -> Many:
+        """The runs of n members: `numbers` (n, 9) as `flat` has them, steps `h` (n,), `marks` (n, samples).
+
+        Each has the bits of a run alone, in lanes too, and fails alone, as does one whose start the kernel cannot step.
+        Threads may call it at the same time; after every `GROUP` steps, or a stretch of a longer member, it heeds an
+        interrupt.
+        """
+        # writable too: a kernel is compiled again for an array that is not, as a broadcast one
+        numbers, h = np.require(numbers, requirements=("C", "W")), np.require(h, requirements=("C", "W"))
+        marks = np.require(marks, requirements=("C", "W"))
+        whole, check = self._whole, getattr(self.prepare, "check", None)
+        out = many.refused(check, numbers)
+        left, done = np.flatnonzero(~out), None
+        if whole is not None:
+            done = Many.empty(len(numbers), marks.shape[1], whole.size)
+            left = whole.run(left, numbers, h, marks, done)
+        for i, top in zip(left.tolist(), many.members_of(numbers[left]), strict=True):
+            heed()
+            run = self(*top, Plan.steps(float(h[i]), marks[i]))
+            if done is None:
+                done = Many.empty(len(numbers), *run.states.shape)
+            done.states[i], done.momenta[i, :, 0], done.momenta[i, :, 1] = run.states, run.p_phi, run.p_psi
+            done.steps[i], done.outcome[i] = run.steps, OUTCOMES.index(run.outcome)
+            done.work[i] = (run.force_evaluations - run.steps * self.each_step) // self.evaluations
+        if done is None:  # nobody ran, and only angles refuse a start
+            done = Many.empty(len(numbers), marks.shape[1], charts.DIMENSIONS["angles"])
+        done.outcome[out] = LEFT_CHART
+        return done
+
+    @property
+    def in_python(self) -> bool:
+        """Does every run take a call of Python, because parts of it do not compile?"""
+        return self._whole is None
+
+    @property
+    def in_lanes(self) -> bool:
+        """Does `many` run members side by side, but for those whose lane is given up?"""
+        return self._whole is not None and self._whole.blocks is not None
+
+    def counts(self, steps: Any, work: Any) -> tuple[Any, Any]:
+        """Force evaluations and solver iterations, of the counts of a `March` or of `Many`."""
+        return work * self.evaluations + steps * self.each_step, work if self.implicit else 0 * work
+
+    @cached_property
+    def _whole(self) -> "_Whole | None":
+        """The run in one call, if all of its parts are functions that compile."""
+        loop, prepare, present, rule = self.loop, self.prepare, self.present, self.rule
+        if not isinstance(loop, Loop) or not isinstance(prepare, Preparation):
+            return None
+        if present is not None and not isinstance(present, Shown):
+            return None
+        sample, size = (as_it_steps, prepare.size) if present is None else (present.sample, present.size)
+        scale = preparation.as_it_is
+        pack = getattr(rule, "pack", None) or preparation.as_fields
+        if isinstance(rule, preparation.Scaled):
+            scale, rule = rule.scale, rule.rule
+        elif isinstance(rule, preparation.Later):
+            rule = rule.make()
+        if not isinstance(rule, tuple) or not rule:  # a function of Python, or numbers in an array
+            return None
+        kind, numbers = pack(rule)
+        parts = kind, prepare.numbers, scale, sample
+        lanes = loop.lanes(rule)
+        blocks = None if lanes is None else partial(loop.blocks, lanes, lanes.pack(rule)[0], *parts[1:])
+        costs = self.evaluations, self.each_step, int(self.implicit)
+        alone = loop.whole(*parts), numbers, prepare.check, size, *costs
+        return _Whole(numbers, size, alone, blocks, rule)
+
+
+def inside(solver: Solver | None) -> FixedStep | None:
+    """The fixed-step loop inside a solver, if it has one that can be run in stretches."""
+    inner = getattr(solver, "solve", solver)
+    return inner if isinstance(inner, FixedStep) and isinstance(inner.loop, Loop) else None

@@ -9,15 +9,13 @@ A kernel supplies three functions of `problem`, a tuple of whatever they need; x
     restart(problem) -> x                     another first guess, taken once, after half of the evaluations
 
 The iteration ends where ``size <= enough``, or where a correction of at most `grain` did not even halve: that is
-rounding, which Newton cannot lower. The last correction is *not* applied: the caller has the trial at x and may follow
-it to first order, which saves one evaluation a step. A predicted x is good to many digits, but in a large step it may
-lie outside the basin of the root; hence `restart`. The functions are arguments and everything is inlined, so that a
-step takes as long as with the loop written out in each kernel.
+rounding. The last correction is *not* applied: the caller has the trial at x and may follow it to first order, which
+saves one evaluation a step. A predicted x may lie outside the basin of the root in a large step; hence `restart`. All
+is inlined.
 
 In lanes the iteration runs over a block until no lane is live. A lane that has ended keeps its x and evaluates the same
-numbers again, so that all that follows from them may be written at every pass, and only x is chosen. A step takes as
-many passes as its slowest lane, two where the lanes by themselves take 1.1 to 1.8. A lane that is live after half of
-the evaluations is given up (`lanes`): there `newton` begins again with another guess.
+numbers again, so that all that follows from them may be written at every pass, and only x is chosen. A lane that is
+live after half of the evaluations is given up (`lanes`): there `newton` begins again with another guess.
 """
 
 from collections.abc import Callable
@@ -26,9 +24,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.core.simd import wide_vectors
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
 from symtop.methods.framework.plan import OK
+from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 
 NEGLIGIBLE_ANGLE = 1e-18  # radians: no correction below this can matter to an angle
@@ -36,7 +34,7 @@ ANGLE_GRAIN = 1e-12  # radians: a smaller correction that does not halve is roun
 
 
 class Correction(NamedTuple):
-    """What Newton proposes at x, and how it is judged."""
+    """What Newton proposes at x."""
 
     change: Any  # like x
     after: Any  # x + change
@@ -96,8 +94,8 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
         keep(trial, correction) -> end               what the increment is made of, a NamedTuple of floats
         close(problem, end) -> (dstate, newest, outcome)
 
-    The next carry is `newest`, so many numbers, and this carry without as many at its end. `rule` is a constant of the
-    kernel: a branch that hangs on it alone is none.
+    The next carry is `newest`, so many numbers, before the rest of this one. `rule` is a constant of the kernel: a
+    branch that hangs on it alone is none.
     """
     like = (0.0,) * max(dimension, carry, steady, opened, unknowns, len(end._fields), len(top._fields))
     numbers, constant, states, carries = like[: len(top._fields)], like[:steady], like[:dimension], like[:carry]

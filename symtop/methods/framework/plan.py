@@ -12,12 +12,12 @@ Array = NDArray[np.float64]
 class Plan(NamedTuple):
     """What a solver is asked for: the sample times, and the step or the tolerance to reach them with.
 
-    A fixed-step solver makes marks[-1] steps of `step_size` and keeps the states after marks[0], marks[1], ... of
-    them; `times` are the same instants. An adaptive solver has no marks: it keeps the states at `times`, which need not
-    be ends of its steps. The first sample may be the start itself (mark 0, time 0).
+    A fixed-step solver makes marks[-1] steps of `step_size` and keeps the states after marks[0], marks[1], ... of them,
+    at `times`. An adaptive solver has no marks, and `times` need not be ends of its steps. The first sample may be the
+    start itself (mark 0, time 0).
 
-    A fixed step may be negative: probes of reversibility ask for one step of -h, and then `times` and `horizon` are
-    negative too. A solver that cannot do that raises SymtopError and is judged by the motion with all rates reversed.
+    Probes of reversibility ask for one step of -h; then `times` and `horizon` are negative too. A solver that cannot do
+    that raises SymtopError and is judged by the motion with all rates reversed.
     """
 
     times: Array  # (samples,) increasing in size, the first may be 0

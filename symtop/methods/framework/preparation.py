@@ -4,21 +4,19 @@
     scale(rule, top, at, h) -> rule          the coefficients of a method times the step
     sample(par, t, state) -> state           a sample at the time t, in the chart that a user sees
 
-A `Preparation`, a `Scaled` rule and a `Shown` chart each hold one such function. Called, they are what a function of
-Python would be; a run of a few steps takes the function itself and compiles it into the loop (`loop.Loop.whole`), for
-what surrounds a kernel costs more than its steps: a call looks ten times as long at a NamedTuple as at nine doubles, an
-array or a plain tuple.
+A `Preparation`, a `Scaled` rule and a `Shown` chart each hold one such function and can be called like it. A run takes
+the function itself and compiles it into the loop (`loop.Loop.whole`): what surrounds a kernel costs more than a few
+steps of it, above all a NamedTuple that is handed to compiled code.
 """
 
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.core.errors import SymtopError
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.model import top as model
 from symtop.model.top import Angles, SymmetricTop, flat
@@ -50,28 +48,12 @@ class Start(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Requirement:
-    """What a start must meet so that a kernel can step it: `holds(at)`, of numbers or of arrays; `refusal(at)` if not.
-
-    A call refuses one start; of many, arrays are asked.
-    """
-
-    holds: Callable[[Any], Any]
-    refusal: Callable[[Any], str]
-
-    def __call__(self, at: Any) -> None:
-        """Raise SymtopError for a start that does not meet it."""
-        if not self.holds(at):
-            raise SymtopError(self.refusal(at))
-
-
-@dataclass(frozen=True)
 class Preparation:
-    """What a kernel steps: `numbers(top, at)` compiles, `check(at)` refuses a start that the kernel cannot step."""
+    """What a kernel steps: `numbers(top, at)` compiles, `check` refuses a start that the kernel cannot step."""
 
     numbers: Callable[..., tuple[Any, Numbers]]
     size: int  # of the state
-    check: Requirement | None = None
+    check: Callable[[Any], None] | None = None  # raises SymtopError
 
     def __post_init__(self) -> None:
         register_jitable(self.numbers)  # at once: what a kernel is made of must not hang on what has run
@@ -85,7 +67,7 @@ class Preparation:
 
 @functools.cache
 def _on_numbers(scale: Callable[..., Any], opened: Callable[[Any], Any]) -> Any:
-    """`scale` by itself, compiled: between plain numbers, from which `opened` makes a table, and a rule."""
+    """`scale` by itself, compiled; `opened` makes the table from plain numbers."""
 
     def scaled(body, start, numbers, h):  # type: ignore[no-untyped-def]
         return scale(opened(numbers), Body(*body), Start(*start), h)
@@ -95,10 +77,7 @@ def _on_numbers(scale: Callable[..., Any], opened: Callable[[Any], Any]) -> Any:
 
 @dataclass(frozen=True)
 class Scaled:
-    """A rule whose numbers hang on the run: those of `scale(rule, top, start, h)`, which compiles.
-
-    `pack` is how the rule travels into compiled code: by default as its fields.
-    """
+    """A rule whose numbers hang on the run, ``scale(rule, top, start, h)``, compiled; `pack` is `as_fields` if None."""
 
     rule: Any  # a NamedTuple
     scale: Callable[..., Any]
@@ -116,7 +95,7 @@ class Scaled:
 
 @dataclass(frozen=True)
 class Later:
-    """A rule that hangs on nothing, made when it is first used: coefficients may take milliseconds."""
+    """A rule that hangs on nothing, made when it is first used."""
 
     make: Callable[[], Any]
     pack: Pack | None = None
@@ -128,8 +107,6 @@ class Later:
 
 @functools.cache
 def _on_samples(sample: Callable[..., Any], kind: Any) -> Any:
-    """`sample` for many samples, compiled."""
-
     def shown(par, times, states, out):  # type: ignore[no-untyped-def]
         top = kind(*par)
         for i in range(len(times)):
@@ -152,10 +129,9 @@ class Shown:
 
     def __call__(self, par: Any, times: Array, states: Array) -> Array:
         """States of the chart, shape (samples, size), of states of the kernel."""
-        out = np.empty((len(times), self.size))
-        kind: Any = type(par)
-        flat_times, flat_states = np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states)
-        _on_samples(self.sample, kind)(tuple(par), flat_times, flat_states, out)
+        out, kind = np.empty((len(times), self.size)), cast("Any", type(par))
+        shown = _on_samples(self.sample, kind)
+        shown(tuple(par), np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states), out)
         return out
 
 
@@ -167,8 +143,6 @@ def plain(values: Any) -> Any:
 
 @functools.cache
 def _made_of_fields(kind: Any) -> Callable[[Any], Any]:
-    """From the fields of a NamedTuple to the NamedTuple, in compiled code."""
-
     def made(fields: Any) -> Any:
         return kind(*fields)
 
@@ -176,7 +150,7 @@ def _made_of_fields(kind: Any) -> Callable[[Any], Any]:
 
 
 def as_fields(rule: Any) -> tuple[Callable[[Any], Any], Any]:
-    """A rule as its fields: a call looks five times as long at a NamedTuple as at a plain tuple."""
+    """A rule as its fields, which a call takes sooner than a NamedTuple."""
     kind: Any = type(rule)
     return plain if kind is tuple else _made_of_fields(kind), tuple(rule)
 

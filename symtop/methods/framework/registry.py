@@ -1,15 +1,12 @@
 """The registry: an integrator is a record of claims and a solver for each chart it works in.
 
-Traits are data. They are *claims* until measured; `None` means that nobody has claimed anything. A record is
-made by a family (`discrete_lagrangian`, `composition`, ...) from a table of numbers, or by hand around any
-function ``solve(top, start, plan) -> Run``. Nothing is decided by an integrator's name: what a measurement needs to
-know of a method is a field of its record.
+Traits are *claims* until measured; `None` means that nobody has claimed anything. A record is made by a family
+(`discrete_lagrangian`, `composition`, ...) from a table of numbers, or by hand around any function
+``solve(top, start, plan) -> Run``. Nothing is decided by an integrator's name.
 
-A method in one of its charts is a *variant*, ``rk4[axis]``: method and chart are two factors, and a comparison of
-``rk4[angles]`` with ``strang[axis]`` changes both. `variants` lists them; `integrator` knows them by name.
-
-The maps of physics engines, family ``engine``, are registered, judged and run by name as every integrator is. They are
-what people are given, not what one would choose: `methods`, and so `variants` and every comparison, leaves them out.
+A method in one of its charts is a *variant*, ``rk4[axis]``. `variants` lists them; `integrator` knows them by name. The
+maps of physics engines, family ``engine``, are run and judged by name as every integrator is; they are what people are
+given, not what one would choose: `methods`, and so `variants` and every comparison, leaves them out.
 """
 
 import functools
@@ -27,19 +24,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from symtop.core import errors
 from symtop.core.code_hash import by_name
-from symtop.core.errors import (
-    SymtopError,
-    SymtopWarning,
-    finite,
-    label,
-    not_negative,
-    one_of,
-    positive,
-    shown,
-    whole,
-    words_of,
-)
+from symtop.core.errors import SymtopError, SymtopWarning, one_of, shown, words_of
 from symtop.core.signals import is_of_user
 from symtop.methods.framework.plan import Plan, Run
 from symtop.model.charts import DIMENSIONS, View
@@ -145,11 +132,11 @@ class Integrator:
 
     def __post_init__(self) -> None:
         name, chart = split_name(self.name)
-        label("name", name)
+        errors.label("name", name)
         if chart and tuple(self.solvers) != (chart,):
             raise SymtopError(f"name {self.name!r} needs one solver, of {chart}, not of {', '.join(self.solvers)}")
         if self.order is not None:
-            whole("order", self.order, 1)
+            errors.whole("order", self.order, 1)
         one_of("family", self.family, FAMILIES)
         one_of("implementation", self.implementation, IMPLEMENTATIONS)
         self._check_kinds()
@@ -158,7 +145,7 @@ class Integrator:
             charts = ", ".join(DIMENSIONS)
             raise SymtopError(f"solvers must map one of {charts} to a function, not {shown(self.solvers)}")
         object.__setattr__(self, "solvers", MappingProxyType(given))
-        positive("speed", self.speed)
+        errors.positive("speed", self.speed)
         if self.exact_steps and (self.order is not None or not self.fixed_step):
             raise SymtopError("exact_steps must be False for a method that has an order or no step_size")
         if self.conserves is not None:
@@ -176,13 +163,13 @@ class Integrator:
         for name, (kind, words) in KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 raise SymtopError(f"{name} must be {words}, not {shown(getattr(self, name))}")
-        least, usual = not_negative("least_tolerance", self.least_tolerance), self.default_tolerance
-        if usual is not None and not max(least, 5e-324) <= finite("default_tolerance", usual) < 1.0:
+        least, usual = errors.not_negative("least_tolerance", self.least_tolerance), self.default_tolerance
+        if usual is not None and not max(least, 5e-324) <= errors.finite("default_tolerance", usual) < 1.0:
             raise SymtopError(f"default_tolerance must be above zero, at least {least:g} and below 1, not {usual!r}")
 
     def check_tolerance(self, tolerance: object) -> float:
         """The tolerance to use, refused where the arithmetic cannot reach it."""
-        value = self.default_tolerance if tolerance is None else positive("tolerance", tolerance)
+        value = self.default_tolerance if tolerance is None else errors.positive("tolerance", tolerance)
         if value is None:
             raise SymtopError(f"{self.name} is adaptive and needs a tolerance, for example 1e-6")
         if value < self.least_tolerance or value >= 1.0:
@@ -190,7 +177,7 @@ class Integrator:
                 f"tolerance of {self.name} must be at least {self.least_tolerance:.3g} and below 1, not {value!r}",
                 "tolerance",
             )
-        return finite("tolerance", value)
+        return errors.finite("tolerance", value)
 
     @property
     def fixed_step(self) -> bool:
@@ -251,10 +238,10 @@ class Integrator:
 _BUILT_IN = (
     "lagrangian.discrete_lagrangian", "lagrangian.unreduced", "lagrangian.galerkin", "lagrangian.exact_discrete",
     "lie_group.variational", "splitting.composition", "splitting.reversible", "runge_kutta.explicit",
-    "runge_kutta.pairs", "runge_kutta.extrapolation", "runge_kutta.nystrom", "runge_kutta.adams", "runge_kutta.gauss", "runge_kutta.kahan",
-    "lie_group.runge_kutta", "lie_group.energy_momentum", "lie_group.generalised_alpha",
-    "runge_kutta.collective_gauss", "library.scipy_ivp", "taylor.heyoka", "taylor.series", "library.exact",
-    "engines.engines",
+    "runge_kutta.pairs", "runge_kutta.extrapolation", "runge_kutta.nystrom", "runge_kutta.adams", "runge_kutta.gauss",
+    "runge_kutta.kahan", "lie_group.runge_kutta", "lie_group.energy_momentum", "lie_group.generalised_alpha",
+    "runge_kutta.collective_gauss", "library.scipy_ivp", "taylor.heyoka", "taylor.series", "taylor.series_general",
+    "library.exact", "engines.engines",
 )  # fmt: skip
 ENTRY_POINTS = "symtop.integrators"  # an Integrator, or a function that returns several
 
@@ -364,8 +351,8 @@ def engines() -> dict[str, Integrator]:
 def integrator(name: "str | Integrator") -> Integrator:
     """The integrator or variant of that name: ``rk4[axis]``, or ``rk4-axis``, works in no other chart.
 
-    An Integrator is returned as is. Raises SymtopError for an unknown name, with the nearest ones, and for a chart that
-    the method does not have.
+    An Integrator is returned as is. Raises SymtopError for an unknown name and for a chart that the method does not
+    have.
     """
     if isinstance(name, Integrator):
         return name
@@ -405,10 +392,7 @@ def citation_keys(method: Integrator) -> list[str]:
 
 
 def citation(name: "str | Integrator") -> str:
-    """BibTeX of the source of an integrator, by its name.
-
-    Raises SymtopError for an unknown name, or if the integrator names no source that is known here.
-    """
+    """BibTeX of the source of an integrator. SymtopError for an unknown name and where no source is known."""
     method = integrator(name)
     named = citation_keys(method)
     if not named:

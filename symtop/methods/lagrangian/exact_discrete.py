@@ -3,13 +3,12 @@
 In the chart of `oscillators`, with Z_n = exp(-i n delta) chi(n h) and s = |Z|^2,
 
     Z_{n+1} + Z_{n-1} = 2 A Z_n/(1 + B s_n)        A = sqrt((P - e1)(P - e2)(P - e3)/D^3),  B = -sigma/D,  D = P - b
-    P = wp(h) (`symtop.model.exact.elliptic`)         delta = sigma J int_0^h dt/(wp(t) - b) = sigma J R_J(P - e_i,
-    D)/3
+    P = wp(h) (`symtop.model.exact.elliptic`),  delta = sigma J int_0^h dt/(wp(t) - b) = sigma J R_J(P - e_i, D)/3
 
 for each of the two oscillators: McMillan's map in a plane. Why: chi(t+h) (wp(t) - wp(h)) has poles of order 2 at most
 and the multipliers of chi, so that it is alpha chi + beta chi'; added at h and -h, beta drops out.
 
-*Discrete Lagrangian.* With r = sqrt(D), which is 1/h and smaller terms,
+*Discrete Lagrangian.* With r = sqrt(D), about 1/h,
 
     L_d(Z0, Z1) = r (|Z1 - Z0|^2/2 - (V(Z0) + V(Z1))/2),        V(Z) = s - (A/B) log(1 + B s)
     p_0 = -D1 L_d = r (Z1 - A Z0/(1 + B s0)),                   p_1 = D2 L_d = r (A Z1/(1 + B s1) - Z0)
@@ -40,8 +39,7 @@ large. Next to a separatrix P - wp is a small difference at large steps; there a
 *Rounding.* On the orbit 1 + B s = (P - wp)/D with one wp for both oscillators: one division a step. Each step brings
 the p of the longer of Z_1, Z_2 nearer to the second condition above, and its length to the one that |chi| = 1 asks for
 once that is off by `IDLE`. That keeps J; without it two oscillators whose energies are rounded apart leave each other
-near an unstable pole (`sleeping-unstable`, ten nutations: 1e-4, and 5e-11 with it). Phases n delta are taken off by
-exact products at samples.
+near an unstable pole (`sleeping-unstable`, ten nutations: 1e-4, and 5e-11 with it). Phases are exact products.
 
 *Sums.* A state is Z and W = Z_{n+1} - Z_n = p/r + f Z, f Z the half kick: a step is one drift W and one kick 2 f Z. Z,
 W and the kick are carried as two doubles each; f is one. A kick along Z, whatever its strength, and a drift along W
@@ -53,9 +51,8 @@ of Z is: put off, it would grow by sqrt |2 f| a step, and end a run with two ste
 
 Sources: Kuznetsov, Petrera, Ragnisco, nlin/0403028 (Baecklund transformations of the Lagrange top discretise its flow);
 Suris, The Problem of Integrable Discretization (discrete Garnier system); Marsden and West, Acta Numerica 10 (2001)
-357. The constants in this form, and L_d, are derived here. Bobenko and Suris, Commun. Math. Phys. 204 (1999) 147, give
-the top a discrete Lagrangian that is integrable, with deformed constants; one whose orbits are those of the top was
-not found in these sources, which does not say that it is nowhere.
+357. The constants in this form, and L_d, are derived here; the integrable discrete Lagrangian of Bobenko and Suris,
+Commun. Math. Phys. 204 (1999) 147, has deformed constants.
 """
 
 import math
@@ -65,20 +62,13 @@ import numpy as np
 
 from symtop.core.jit import fused, register_jitable, set_item
 from symtop.core.jit_functions import two_product
-from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import one_loop
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import FixedStep, kernel_loop
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import finite_outcome
-from symtop.methods.lagrangian.oscillators import (
-    Map,
-    OscillatorTop,
-    attitude_state,
-    axis_state,
-    numbers,
-    on_oscillators,
-)
+from symtop.methods.lagrangian import oscillators
+from symtop.methods.lagrangian.oscillators import Map, OscillatorTop, attitude_state, axis_state, on_oscillators
 from symtop.methods.vectors import accumulate_plainly
 
 SHARE = 0.5  # of what breaks |chi| = 1 that a step takes off: all of it would feed on the rounding that the loop sums
@@ -121,10 +111,7 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 @register_jitable
 def _sum(high: float, low: float, more: float, late: float) -> Any:
-    """(high + low) + (more + late): what to add to `high`, what it becomes, and all that is left.
-
-    `late` is not waited for: it joins what is left, and with it the next step.
-    """
+    """(high + low) + more: what to add to `high`, what it becomes, and what is left, with `late`."""
     addend = more + low
     total = high + addend
     virtual = total - high
@@ -209,16 +196,11 @@ def _between(state: Any, after: Any, carry: Any) -> Any:
     return total, carry
 
 
-@register_jitable
-def _plus(state: Any, step: Any) -> Any:
-    for i in range(8):
-        state = set_item(state, i, state[i] + step[i])
-    return state
-
-
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     """p_phi and p_psi after the step, from J = r Im(conj(Z) W)."""
-    s = _plus(before, dstate)
+    s = before
+    for i in range(8):
+        s = set_item(s, i, s[i] + dstate[i])
     first, second = rule.r1 * (s[0] * s[5] - s[1] * s[4]), rule.r2 * (s[2] * s[7] - s[3] * s[6])
     return -2.0 * par.I1 * (first - second), -2.0 * par.I1 * (first + second)
 
@@ -261,13 +243,11 @@ def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     return (*attitude_state(par, _unwound(rule, state, k), k * h), 0.0)
 
 
-def first_six(par: Any, t: float, state: Any) -> Any:
-    """(e, L) alone."""
+def _first_six(par: Any, t: float, state: Any) -> Any:
     return state[0], state[1], state[2], state[3], state[4], state[5]
 
 
-def first_seven(par: Any, t: float, state: Any) -> Any:
-    """(q, L) alone."""
+def _first_seven(par: Any, t: float, state: Any) -> Any:
     return state[0], state[1], state[2], state[3], state[4], state[5], state[6]
 
 
@@ -286,15 +266,14 @@ march_axis, march_attitude = (
 
 def built_in() -> list[Integrator]:
     """`exact-discrete`."""
-    axis, attitude = Shown(first_six, 6), Shown(first_seven, 7)
+    charts = {"axis": (march_axis, Shown(_first_six, 6)), "attitude": (march_attitude, Shown(_first_seven, 7))}
     return [
         Integrator(
-            name="exact-discrete",
-            family="discrete-lagrangian",
+            name="exact-discrete", family="discrete-lagrangian",
             summary="discrete Lagrangian of two oscillators whose step is the motion itself, one force",
             solvers={
-                "axis": FixedStep(march_axis, numbers, on_oscillators, 1, implicit=False, present=axis),
-                "attitude": FixedStep(march_attitude, numbers, on_oscillators, 1, implicit=False, present=attitude),
+                chart: FixedStep(march, oscillators.numbers, on_oscillators, 1, implicit=False, present=shown)
+                for chart, (march, shown) in charts.items()
             },
             explicit=True, symplectic=True, symmetric=True,
             conserves=frozenset({"energy", "p_phi", "p_psi", "axis_length"}),

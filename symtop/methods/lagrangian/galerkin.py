@@ -23,11 +23,11 @@ is Newton on (thetam, theta1). Its Jacobian is analytic: with g_i = dV_i/d(south
 
     (B0 + Bm + B1) de/dthetam = 4 g_m,      (B0 + Bm + B1) de/dtheta1 = -2 g_1.
 
-Order 4, symmetric, symplectic, p_phi and p_psi conserved exactly; 1.4 times the cost of the midpoint rule at equal
-iterations. It is not `simpson-linear`, whose path is a straight line and whose order is 2, and only for a constant mass
-is it Lobatto IIIA-IIIB of order 4: that pair makes the momenta linear in time, this method the rates. On the top, whose
-inertia depends on theta, the two differ by O(h^4), and Lobatto IIIA-IIIB is what comes of reducing first. Source:
-Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357, on Galerkin methods.
+Order 4, symmetric, symplectic, p_phi and p_psi conserved exactly. It is not `simpson-linear`, whose path is a straight
+line and whose order is 2, and only for a constant mass is it Lobatto IIIA-IIIB of order 4: that pair makes the momenta
+linear in time, this method the rates. On the top, whose inertia depends on theta, the two differ by O(h^4), and Lobatto
+IIIA-IIIB is what comes of reducing first. Source: Marsden and West, Discrete mechanics and variational integrators,
+Acta Numerica 10 (2001) 357, on Galerkin methods.
 """
 
 import functools
@@ -36,24 +36,21 @@ from typing import Any, NamedTuple
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome, on_angles
-from symtop.methods.framework.fixed_step import FixedStep, inside
 from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import FixedStep, kernel_loop
 from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
 from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.registry import Integrator
 
 
 class Iteration(NamedTuple):
-    """When Newton stops: after a correction below `tolerance` times the step, applied to first order."""
+    """When Newton stops, as `discrete_lagrangian.Quadrature` says."""
 
     tolerance: float = 1e-8
     iterations: int = 50
 
 
 class _Node(NamedTuple):
-    """The trigonometry of one node."""
-
     d: float  # 1 / (4 I1 cos^2 x)
     a: float  # 1 / (4 I1 sin^2 x)
     tangent: float  # tan x
@@ -62,9 +59,7 @@ class _Node(NamedTuple):
 
 
 class _Pull(NamedTuple):
-    """The slope of the effective potential at a node and its derivatives."""
-
-    slope: float  # V'
+    slope: float  # V' at a node
     stiffness: float  # V''
     south: float  # dV'/dsouth
     north: float  # dV'/dnorth
@@ -96,8 +91,6 @@ class _Jet(NamedTuple):
 
 
 class _Trial(NamedTuple):
-    """What a step is made of, at one trial (thetam, theta1)."""
-
     V0: _Jet
     Vm: _Jet
     V1: _Jet
@@ -148,8 +141,6 @@ def _evaluate(par: Any, start: Any, theta_m: float, theta_1: float) -> Any:
 
 
 class _Step(NamedTuple):
-    """The two equations of one step."""
-
     par: Any
     rule: Any
     theta: float
@@ -161,7 +152,6 @@ class _Step(NamedTuple):
 
 @register_jitable
 def _steady(par: Any, h: float) -> Any:
-    """What no step changes."""
     return h, h * h / par.I1
 
 
@@ -222,8 +212,6 @@ def _predict(step: Any, carry: Any) -> Any:
 
 
 class _End(NamedTuple):
-    """What the increment is made of, once the iteration has ended."""
-
     V0: float
     Vm: float
     V1: float
@@ -244,7 +232,6 @@ def _keep(trial: Any, correction: Any) -> Any:
 
 @register_jitable
 def _close(step: Any, end: Any) -> Any:
-    """The increment, the slopes to predict with and the outcome."""
     V0, Vm, V1, plus, minus, d = end
     h = step.h
     dstate = (d, -h * (V0 + 4.0 * Vm + V1) / 6.0, 0.5 * h * (plus + minus), 0.5 * h * (plus - minus))
@@ -300,19 +287,11 @@ def built_in() -> list[Integrator]:
     """The Galerkin integrator that ships with symtop."""
     return [
         Integrator(
-            name="galerkin-simpson",
-            family="discrete-lagrangian",
+            name="galerkin-simpson", family="discrete-lagrangian",
             summary="Galerkin discrete Lagrangian, parabola in time and Simpson's rule",
             solvers={"angles": FixedStep(march, Iteration(), on_angles, 2, implicit=True, each_step=1)},
-            order=4, explicit=False,
-            symplectic=True, symmetric=True,
+            order=4, explicit=False, symplectic=True, symmetric=True,
             conserves=frozenset({"p_phi", "p_psi"}),
             reference="marsden-west-2001", needs="lagrangian", general=True,
         )
     ]  # fmt: skip
-
-
-def is_galerkin(method: Integrator) -> bool:
-    """Is it this integrator, whatever its name?"""
-    solver = inside(method.solvers.get("angles"))
-    return solver is not None and solver.loop is march

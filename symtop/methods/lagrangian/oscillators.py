@@ -39,11 +39,10 @@ from symtop.core.jit import register_jitable
 from symtop.methods.framework.preparation import Preparation, Scaled
 from symtop.methods.framework.space import with_spin
 from symtop.model.exact.elliptic import differences, half_period, r_j, roots
-from symtop.model.top import Angles, SymmetricTop
 
 
 class OscillatorTop(NamedTuple):
-    """The numbers of a top and a start that the two oscillators need."""
+    """The numbers of a top and a start."""
 
     I1: float
     twist: float  # p_psi (1/I3 - 1/I1)
@@ -189,9 +188,3 @@ def _mapped(rule: Any, top: Any, at: Any, h: float) -> Any:
 
 
 numbers = Scaled(Map(), _mapped)
-
-
-def exact_map(top: SymmetricTop, start: Angles, h: float) -> Map:
-    """The numbers of the exact step h from a start."""
-    made: Map = numbers(top, start, h)
-    return made

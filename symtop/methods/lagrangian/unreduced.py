@@ -10,12 +10,10 @@ the step is p0 = -D1 L_d, solved by Newton with an analytic 3 x 3 Jacobian, and 
     p_theta0 = I1 w - h sum w_i (1-a_i) f_i,    p_phi0 = sum w_i l_i,    p_psi0 = sum w_i m_i
     p_theta1 = I1 w + h sum w_i a_i f_i,        p_phi1 = sum w_i l_i,    p_psi1 = sum w_i m_i
 
-All three momenta are variables of the state: each step forms them anew from the increments that it adds, so that
-p_phi and p_psi are conserved only as far as the equations were solved and are free to drift. Order 2, symplectic,
-symmetric if the rule is. It is the witness that the reduced kernel assumed nothing: in exact arithmetic both are
-one map. It is not a method to use: a step takes two to three times as long (its solver iterates more
-often: the study `reduction` measures both), with an error of rounding per step that no compensated
-sum can undo (p1 is formed at full size, not as an increment), and p_phi - p_psi cos(theta) cancels near a pole.
+All three momenta are variables of the state: p_phi and p_psi are conserved only as far as the equations were solved.
+Order 2, symplectic, symmetric if the rule is. It shows that the reduced kernel assumed nothing: in exact arithmetic
+both are one map. It is not a method to use: its solver iterates more often (the study `reduction` measures both), p1 is
+formed at full size, so that no compensated sum undoes its rounding, and p_phi - p_psi cos(theta) cancels near a pole.
 Source: Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357.
 """
 
@@ -27,8 +25,7 @@ import numpy as np
 from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.angles import BareTop, chart_outcome, require_chart
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import FixedStep, kernel_loop
 from symtop.methods.framework.newton import Correction, newton
 from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.preparation import Preparation, Shown, conserved
@@ -52,7 +49,6 @@ class _Sums(NamedTuple):
 
 @register_jitable
 def _node_sums(par: Any, rule: Any, theta: float, rate: Any, h: float) -> Any:
-    """All sums over the nodes for one trial rate."""
     before = after = stiffness = before_v = before_u = after_v = after_u = across = mixed = 0.0
     w, v, u = rate
     spread = par.I1 - par.I3
@@ -78,10 +74,7 @@ def _node_sums(par: Any, rule: Any, theta: float, rate: Any, h: float) -> Any:
 
 @register_jitable
 def _solve(first: Any, second: Any, third: Any, right: Any) -> Any:
-    """Solve a 3 x 3 system by elimination from the last row up.
-
-    No row exchange: the pivots are I3, the inertia about the vertical with psi eliminated, and nearly I1, all positive.
-    """
+    """Elimination from the last row up; the pivots are positive: I3, the inertia with psi eliminated, and nearly I1."""
     upper, lower = second[2] / third[2], first[2] / third[2]
     pivot = second[1] - upper * third[1]
     middle = first[1] - lower * third[1]
@@ -95,7 +88,6 @@ def _solve(first: Any, second: Any, third: Any, right: Any) -> Any:
 
 @register_jitable
 def _inertia(par: Any, sums: Any, h: float) -> Any:
-    """The diagonal of the momenta's part of the system."""
     return sums.across, par.I3
 
 
@@ -132,8 +124,6 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 
 class _Step(NamedTuple):
-    """The three equations of one step."""
-
     par: Any
     rule: Any
     state: Any
@@ -153,11 +143,10 @@ def _from_the_start(step: Any) -> Any:
 
 @register_jitable
 def _correct(step: Any, sums: Any, rate: Any) -> Any:
-    """Newton's correction, judged against the rates themselves.
+    """Newton's correction, judged against the rates themselves, to stagnation.
 
-    To stagnation, and p1 comes from the very sums whose residual was seen to vanish. Stopping as the reduced kernel
-    does, after a correction of 1e-8, saves 0.6 evaluations of 3.6 and lets p_phi of `goldstein` walk off linearly,
-    2e-12 in 1e6 steps at h = 0.01 against 3e-13.
+    p1 comes from the very sums whose residual was seen to vanish. Stopped as in the reduced kernel, after a correction
+    of 1e-8, p_phi of `goldstein` walks off linearly, 2e-12 in 1e6 steps at h = 0.01 against 3e-13.
     """
     w, v, u = rate
     dw, dv, du = _correction(step.inertia, step.par, sums, rate, step.state[3:], step.h)
@@ -169,8 +158,8 @@ def _correct(step: Any, sums: Any, rate: Any) -> Any:
 def unreduced_step(inertia: Any, momenta: Any, par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, phi, psi, p_theta, p_phi, p_psi); the work counted is the number of Newton iterations.
 
-    `inertia(par, sums, h)` is the diagonal of the system for (p_phi0, p_psi0), `momenta(par, sums, v, u, h)` what
-    p_phi1 and p_psi1 are: with friction both have a term of their own.
+    `inertia(par, sums, h)` is the diagonal of the system for (p_phi0, p_psi0), `momenta(par, sums, v, u, h)` both at
+    the end: friction adds a term to each.
     """
     # the rates are smooth in time: the parabola through their last three values predicts the next ones
     near, far, farther = carry
@@ -190,12 +179,11 @@ def unreduced_step(inertia: Any, momenta: Any, par: Any, rule: Any, state: Any, 
 
 @register_jitable
 def _momenta(par: Any, sums: Any, v: float, u: float, h: float) -> Any:
-    """p_phi1 and p_psi1."""
     return sums.across * v + sums.mixed * u, sums.mixed * v + par.I3 * u
 
 
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (theta, phi, psi, p_theta, p_phi, p_psi); the work counted is the number of Newton iterations."""
+    """One step."""
     return unreduced_step(_inertia, _momenta, par, rule, state, carry, h)
 
 
@@ -208,7 +196,6 @@ march = kernel_loop(begin, increment, observe)
 
 
 def _with_momenta(top: Any, at: Any) -> Any:
-    """Kernel parameters and state of a start: the momenta are dL/dq' there."""
     momenta = conserved(top, at)
     return BareTop(top.I1, top.I3, top.mgl), (
         at.theta, at.phi, at.psi, top.I1 * at.theta_dot, momenta.p_phi, momenta.p_psi,

@@ -3,9 +3,9 @@
 Source: Klein and Sommerfeld, Theory of the Top, chapter 6; see `symtop.model.exact.closed_form`.
 """
 
-from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.plan import Plan, Run
 from symtop.methods.framework.registry import Integrator
-from symtop.model.exact.closed_form import ClosedForm, ClosedForms
+from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.top import Angles, SymmetricTop
 
 
@@ -15,24 +15,14 @@ def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
     return Run(states, p_phi, p_psi, 0, plan.times.size, 0, "ok", plan.horizon)
 
 
-def solve_many(numbers: Array, times: Array) -> tuple[Array, Array]:
-    """States (n, samples, 7) and momenta (n, samples, 2) of n tops, rows of nine numbers, with the bits of `solve`.
-
-    `times` is one row for all members or a row for each. A member that has no closed form in doubles is NaN.
-    """
-    return ClosedForms(numbers).run(times)
-
-
 def built_in() -> list[Integrator]:
     """The closed form under the name `exact`."""
     return [
         Integrator(
-            name="exact",
-            family="exact",
+            name="exact", family="exact",
             summary="closed form in elliptic functions, in double; one evaluation a sample",
             solvers={"attitude": solve},
-            control=None, explicit=True,
-            symplectic=True, symmetric=True,
+            control=None, explicit=True, symplectic=True, symmetric=True,
             conserves=frozenset({"energy", "p_phi", "p_psi"}),
             reference="klein-sommerfeld-1910", needs="solution", general=False,
         )

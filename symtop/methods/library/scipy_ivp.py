@@ -1,6 +1,6 @@
 """SciPy's solvers on the top's equations in any chart, as a user of SciPy would call them.
 
-Nothing is reduced (see `formulations`), so that every conserved quantity is free to drift; the tolerance is used for
+Nothing is reduced (see `equations`), so that every conserved quantity is free to drift; the tolerance is used for
 both rtol and atol; no Jacobian is given. None of the four is symplectic or symmetric, and nothing is conserved but
 p_phi in the space frame, where it is a component of the state.
 
@@ -10,12 +10,9 @@ p_phi in the space frame, where it is a component of the state.
     lsoda    Adams (order 1-12) or BDF (1-5), chosen on the way   Petzold, SIAM J. Sci. Stat. Comput. 4 (1983) 136
 
 Radau and LSODA are made for stiff equations, which the top's are not: they are here because people use them. Every
-call of the right-hand side is counted, also those of difference quotients for a Jacobian, which SciPy's own `nfev` of
-Radau leaves out.
-
-The language of the right-hand side is a factor of its own. In the registry it is plain Python on floats, three times
-faster than the same on NumPy scalars; `scipy_method(name, compiled=True)` is the same solver around a right-hand side
-that numba has compiled, from the same source. The loop around it is SciPy's and is Python in both (LSODA's is Fortran).
+call of the right-hand side is counted, also those of difference quotients for a Jacobian, unlike SciPy's `nfev` of
+Radau. In the registry the right-hand side is plain Python on floats; ``scipy_method(name, compiled=True)`` is the same
+solver around one that numba has compiled, from the same source. The loop around it is SciPy's (LSODA's is Fortran).
 """
 
 import functools
@@ -39,39 +36,25 @@ EVALUATIONS = {"RK45": 6_000_000, "DOP853": 7_000_000, "LSODA": 9_000_000, "Rada
 
 
 class RightHandSide:
-    """y' = f(t, y) of a chart in plain Python on floats, and how often it was called."""
+    """y' = f(t, y) of a chart, in plain Python on floats or by its `compiled_field`, and how often it was called."""
 
-    __slots__ = ("calls", "field", "par")
+    __slots__ = ("calls", "compiled", "field", "par")
 
-    def __init__(self, field: Callable[[Any, Any], Any], par: Any) -> None:
-        self.field, self.par = field, par
+    def __init__(self, field: Callable[[Any, Any], Any], par: Any, compiled: Callable[..., Any] | None = None) -> None:
+        self.field, self.par, self.compiled = field, par, compiled
         self.calls = 0
 
     def __call__(self, _: float, y: Any) -> Any:
         """y' at any time."""
         self.calls += 1
-        return self.field(self.par, y.tolist())
-
-
-class CompiledRightHandSide(RightHandSide):
-    """The same with the `compiled_field` of a chart, which returns an array."""
-
-    __slots__ = ("compiled",)
-
-    def __init__(self, chart: str, par: Any) -> None:
-        super().__init__(FORMULATIONS[chart].field, par)
-        self.compiled = compiled_field(chart)
-
-    def __call__(self, _: float, y: Any) -> Any:
-        """y' at any time."""
-        self.calls += 1
-        return self.compiled(*self.par, y)
+        return self.field(self.par, y.tolist()) if self.compiled is None else self.compiled(*self.par, y)
 
 
 @functools.cache
 def compiled_field(chart: str) -> Any:
     """f(a, b, c, y) -> y' of a chart, compiled; a, b, c are the three parameters of its equations."""
-    field, parameters = FORMULATIONS[chart].field, PARAMETERS[chart]
+    field = FORMULATIONS[chart].field
+    parameters: type = BareTop if chart == "angles" else SpaceTop
 
     def compiled(a, b, c, y):  # type: ignore[no-untyped-def]
         return np.array(field(parameters(a, b, c), y))
@@ -79,14 +62,11 @@ def compiled_field(chart: str) -> Any:
     return compile_kernel(compiled)
 
 
-PARAMETERS: dict[str, type] = {"angles": BareTop, "axis": SpaceTop, "attitude": SpaceTop}
-
-
 def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solver:
     """A solver of the registry around a method of ``scipy.integrate`` or a class like it; `compiled`: the field.
 
-    This is the loop of ``solve_ivp`` with ``t_eval``, to the same bits, kept open so that a run that fails
-    returns what it had and a run that would never end is stopped.
+    It is the loop of ``solve_ivp`` with ``t_eval``, to the same bits, kept open: a run that fails returns what it had,
+    and one that would never end is stopped.
     """
     form = FORMULATIONS[chart]
     most = EVALUATIONS.get(method if isinstance(method, str) else "", EVALUATIONS["Radau"])
@@ -95,7 +75,7 @@ def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solve
         from scipy import integrate  # 0.6 s to import
 
         par, y0 = form.prepare(top, start)
-        rhs = CompiledRightHandSide(chart, par) if compiled else RightHandSide(form.field, par)
+        rhs = RightHandSide(form.field, par, compiled_field(chart) if compiled else None)
         states = np.full((plan.times.size, len(y0)), np.nan)
         steps = seen = 0
         outcome = OK
@@ -128,18 +108,14 @@ def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solve
 
 
 def integrated(rates: Callable[..., Any], start: Sequence[float], times: Array, method: str, tolerance: float) -> Array:
-    """Any equations by ``solve_ivp`` at the given times, the first 0: shape (variables, times).
-
-    `tolerance` is both the relative and the absolute one. Raises SymtopError if the solver does not reach the end.
-    """
+    """Equations by ``solve_ivp`` (rtol = atol) at times from 0 on: (variables, times). SymtopError if it fails."""
     from scipy.integrate import solve_ivp  # 0.6 s to import
 
     span = (0.0, float(times[-1]))
     done = solve_ivp(rates, span, start, method=method, rtol=tolerance, atol=tolerance, t_eval=times)
     if not done.success:
         raise SymtopError(f"{method} cannot integrate to t = {times[-1]:g}: {done.message}")
-    states: Array = done.y
-    return states
+    return done.y  # type: ignore[no-any-return]
 
 
 _METHODS = {  # summary, order, reference, explicit

@@ -17,17 +17,15 @@ denominator: Moser and Veselov's keeps a bracket in its place (`lie_variational`
 
 *Discrete gradients* on (e, L) are no methods of their own. The energy is quadratic in L and linear in e, for which
 Gonzalez's midpoint gradient, the mean gradient and that of Itoh and Abe are all (mgl k, (L_0 + L_1)/2 I1); with the
-structure matrix at the midpoint each is the implicit midpoint rule, `gauss-2`. The average vector field, the mean of
-the whole right side instead of the gradient, loses the energy here, because the bracket is not constant.
+structure matrix at the midpoint each is the implicit midpoint rule, `gauss-2`.
 Sources: Simo, Wong, Int. J. Numer. Methods Eng. 31 (1991) 19; Gonzalez, J. Nonlinear Sci. 6 (1996) 449.
 """
 
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, inertia, iterated, lie_loop
+from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, inertia, iterated_loop
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
 MOST = 30  # iterations of a step; 3 or 4 are the rule
@@ -81,25 +79,6 @@ def _corrected(par: Any, e: Any, a: Any, quarter: float, u: Any) -> Any:
     return u, size <= ENOUGH * (1.0 + abs(u[0]) + abs(u[1]) + abs(u[2]))
 
 
-@register_jitable
-def _rotated(par: Any, e: Any, h: float, u: Any) -> Any:
-    """The rotation of u, and the change of L."""
-    m, v = cayley(u)
-    return m, v, scaled(h, gravity(par, _mean(e, u)))
-
-
-def turn(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
-    """One step; the work counted is the number of Newton iterations."""
-    quarter, a = 0.25 * h * h, scaled(0.5 * h, L)
-    u = _guess(par, e, a, quarter)
-    for k in range(MOST):
-        u, ended = _corrected(par, e, a, quarter, u)
-        if ended:
-            m, v, dL = _rotated(par, e, h, u)
-            return m, v, dL, k + 1, OK
-    return 0.0, u, u, MOST, NOT_CONVERGED
-
-
 def _start(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
     a = scaled(0.5 * h, L)
     return (*e, *a), _guess(par, e, a, 0.25 * h * h)
@@ -110,11 +89,12 @@ def _again(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> An
 
 
 def _close(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
-    return (*_rotated(par, opened[:3], h, u), carry)
+    """The rotation of u, and the change of L."""
+    m, v = cayley(u)
+    return m, v, scaled(h, gravity(par, _mean(opened[:3], u))), carry
 
 
-_LANES = iterated(_start, _again, _close, MOST, opened=6, unknowns=3)
-march = lie_loop(turn, lanes=lambda _: _LANES)
+march = iterated_loop(_start, _again, _close, MOST, opened=6, unknowns=3)
 
 
 def built_in() -> list[Integrator]:

@@ -52,22 +52,16 @@ def _rates(par: Any, e: Any, x: Any) -> Any:
 
 
 @register_jitable
-def _freely(par: Any, e: Any, w: Any) -> Any:
-    """W x J W."""
-    return cross(w, inertia(par, e, w))
-
-
-@register_jitable
-def _begun(par: Any, state: Any) -> Any:
+def _initial(par: Any, state: Any) -> Any:
     """W' of the start, in space."""
     e = axis_of(state[0], state[1], state[2], state[3])
     w = _rates(par, e, (state[4], state[5], state[6]))
-    return _rates(par, e, plus(gravity(par, e), -1.0, _freely(par, e, w)))
+    return _rates(par, e, plus(gravity(par, e), -1.0, cross(w, inertia(par, e, w))))
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """a and W' of the start, and room for those of the end, in space."""
-    carry, change = np.empty(6), _begun(par, state)
+def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+    """a and W' of the start, in space."""
+    carry, change = np.empty(6), _initial(par, state)
     for k in range(3):
         carry[k] = carry[3 + k] = change[k]
     return carry
@@ -95,8 +89,8 @@ def _corrected(par: Any, e: Any, w: Any, m: float, v: Any, gain: Any, by: float,
     rate = plus(w, 1.0, gain)
     torque = gravity(par, plus(e, 1.0, moved(m, v, e)))
     torque = plus(torque, 1.0, moved(m, scaled(-1.0, v), torque))
-    free, J = _freely(par, e, rate), inertia(par, e, rate)
-    rest = plus(plus(torque, -1.0, free), -1.0, inertia(par, e, slope))
+    J = inertia(par, e, rate)
+    rest = plus(plus(torque, -1.0, cross(rate, J)), -1.0, inertia(par, e, slope))
     x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     Jx, Jy, Jz = inertia(par, e, x), inertia(par, e, y), inertia(par, e, z)
     change = solve3(
@@ -142,7 +136,7 @@ def turn(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
 
 
 def _carried(par: Any, rule: Any, state: Any, h: float) -> Any:
-    change = _begun(par, state)
+    change = _initial(par, state)
     return (*change, *change)
 
 
@@ -186,14 +180,11 @@ def _close(par: Any, numbers: Any, carry: Any, h: float, opened: Any, x: Any) ->
 _LANES = iterated(
     _start, _again, _close, MOST, opened=6, unknowns=7, numbers=_numbers, count=4, begin=_carried, carry=6
 )
-march = lie_loop(turn, begin, lambda _: _LANES)
+march = lie_loop(turn, _begin, lambda _: _LANES)
 
 
 def generalised_alpha(name: str, spectral_radius: float, *, summary: str = "") -> Integrator:
-    """The method of one spectral radius, between 0 (what is not resolved is annihilated) and 1 (kept).
-
-    Raises SymtopError for any other.
-    """
+    """The method of a spectral radius from 0 (annihilates what is not resolved) to 1; SymtopError beyond."""
     r = finite("spectral_radius", spectral_radius)
     if not 0.0 <= r <= 1.0:
         raise SymtopError(f"spectral_radius must be between 0 and 1, not {r!r}")

@@ -16,10 +16,9 @@ p - 1 in place of p keeps increments free of cancellation. What |q| lacks is add
 
 In lanes the shares stand outside and the lanes inside. A family writes what stands between, as one loop over the lanes
 or several (`stepped`), or as the parts of an iteration (`iterated`). The table holds the numbers of the top, those of
-the rule and, share by share, what a share is made of: one kernel for compositions of any length, and for both charts,
-which differ in what is shown of a sample. An iteration runs until no lane is live; a lane that has ended keeps its x. A
-lane that is live after half of the passes that a run alone may make is given up, and so is one whose equation cannot be
-solved: alone, it goes on or fails.
+the rule and those of each share: one kernel for compositions of any length, and for both charts. An iteration runs
+until no lane is live. A lane that is live after half of the passes that a run alone may make is given up, and so is one
+whose equation cannot be solved.
 """
 
 import math
@@ -27,38 +26,26 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.core.simd import wide_vectors
-from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
-from symtop.methods.framework.loop import Loop, kernel_loop, no_carry
-from symtop.methods.framework.plan import OK
+from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
+from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Body, Preparation, Shown, as_it_steps
-from symtop.methods.framework.space import (
-    SpaceTop,
-    axis_of,
-    finite_outcome,
-    momentum_parts,
-    observe_attitude,
-    on_attitude,
-    quaternion_parts,
-    with_spin,
-)
+from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, observe_attitude, on_attitude, with_spin
+from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate, cross, dot, plus, scaled
+
+_attitude_numbers = on_attitude.numbers
 
 
 def _on_body(top: Any, at: Any) -> Any:
-    """The numbers of the top and the state (q, L) of a start."""
-    momentum = momentum_parts(math, top, at.theta, at.phi, at.theta_dot, at.phi_dot, at.psi_dot)
-    return Body(top.I1, top.I3, top.mgl), (*quaternion_parts(math, at.theta, at.phi, at.psi), *momentum)
+    return Body(top.I1, top.I3, top.mgl), _attitude_numbers(top, at)[1]
 
 
 def _axis_shown(par: Any, t: float, y: Any) -> Any:
-    """(e, L) of (q, L)."""
     return (*axis_of(y[0], y[1], y[2], y[3]), y[4], y[5], y[6])
 
 
 def _spin_shown(par: Any, t: float, y: Any) -> Any:
-    """(q, L) with the spin of the time t."""
     return with_spin(par, y, t)
 
 
@@ -148,29 +135,11 @@ def lie_loop(
     return kernel_loop(begin, increment, observe_attitude, lanes=lanes)
 
 
-def shown_in(carried: Carried) -> Callable[..., None]:
-    """A sample of either chart, by how many numbers it has: ``(par, t, state, out)``, for a kernel of both."""
-    axis, attitude = _AXIS, carried.present
-    sample = as_it_steps if attitude is None else attitude.sample
-    small, large = showing(axis.sample), showing(sample)
-    size = axis.size
-
-    def show(par, t, state, out):  # type: ignore[no-untyped-def]
-        if len(out) == size:
-            small(par, t, state, out)
-        else:
-            large(par, t, state, out)
-
-    return show
-
-
-def in_both_charts(
-    loop: Loop, rule: Any, carried: Carried, evaluations: int, *, implicit: bool
-) -> dict[str, FixedStep]:  # fmt: skip
-    """Solvers on the axis and on the attitude; `evaluations` is the force evaluations of one unit of work."""
+def in_both_charts(loop: Loop, rule: Any, carried: Carried, forces: int, *, implicit: bool) -> dict[str, FixedStep]:
+    """Solvers on the axis and on the attitude; a unit of work is so many force evaluations."""
     return {
-        "axis": FixedStep(loop, rule, carried.prepare, evaluations, implicit=implicit, present=_AXIS),
-        "attitude": FixedStep(loop, rule, carried.prepare, evaluations, implicit=implicit, present=carried.present),
+        chart: FixedStep(loop, rule, carried.prepare, forces, implicit=implicit, present=shown)
+        for chart, shown in (("axis", _AXIS), ("attitude", carried.present))
     }
 
 
@@ -203,11 +172,6 @@ def give_up(block: Any, j: int, when: bool) -> None:
     block[FLAG * W + j] = 1.0 if when else block[FLAG * W + j]
 
 
-def _read(numbers: Any) -> Any:
-    """What `observe` and `present` see of the rule, who ask for nothing."""
-    return 0.0
-
-
 def stepped(
     part: Callable[..., None], lay: Callable[..., None], fields: int, each: int, *,
     carried: Carried, carry: int = 1, begin: Callable[..., Any] = no_carry, room: int = 0,
@@ -236,19 +200,25 @@ def stepped(
     def size(rule: Any) -> int:
         return fields + each * len(rule.shares)
 
-    show = shown_in(carried)
-    return Lanes(step, lay, _read, size, carried.top, SIZE, carry, effort, lambda _: room, begin, show)
+    small, large = showing(_AXIS.sample), showing(as_it_steps if carried.present is None else carried.present.sample)
+
+    def show(par, t, state, out):  # type: ignore[no-untyped-def]
+        if len(out) == 6:  # the axis
+            small(par, t, state, out)
+        else:
+            large(par, t, state, out)
+
+    return Lanes(step, lay, lambda _: 0.0, size, carried.top, SIZE, carry, effort, lambda _: room, begin, show)
 
 
 @register_jitable
-def no_numbers(rule: Any) -> Any:
-    """Of a rule that is nothing but shares."""
+def _no_numbers(rule: Any) -> Any:
     return (0.0,)
 
 
 def iterated(  # noqa: C901  (the loops of one step, read in one piece)
     start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int, *,
-    opened: int, unknowns: int, numbers: Callable[..., Any] = no_numbers, count: int = 1,
+    opened: int, unknowns: int, numbers: Callable[..., Any] = _no_numbers, count: int = 1,
     begin: Callable[..., Any] = no_carry, carry: int = 1,
 ) -> Lanes:  # fmt: skip
     """An iterated map of a body in lanes, from the parts of which its `turn` is made.
@@ -272,7 +242,7 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
         return body(*top_of(table, 0, j)), rule_of(table, tops, j), carried(block, CARRY, j), row[j]
 
     @register_jitable
-    def begun(block, table, row, j):  # type: ignore[no-untyped-def]
+    def prepare(block, table, row, j):  # type: ignore[no-untyped-def]
         par, rule, carry, h = given(block, table, row, j)
         _, e, L = entered(block, j)
         fixed, x = start(par, rule, e, L, carry, h)
@@ -302,7 +272,7 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
     def part(block, table, row):  # type: ignore[no-untyped-def]
         wide_vectors()
         for j in range(W):
-            begun(block, table, row, j)
+            prepare(block, table, row, j)
         for _ in range(most // 2):
             for j in range(W):
                 passed(block, table, row, j)
@@ -321,3 +291,22 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
 
     room = live_at + 1 - first
     return stepped(part, lay, count, 1, carried=SPUN, carry=carry, begin=begin, room=room)
+
+
+def iterated_loop(
+    start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int, *,
+    opened: int, unknowns: int,
+) -> Loop:  # fmt: skip
+    """The loop, for one and in lanes, around a map made of the parts that `iterated` takes; its work are the passes."""
+    lanes = iterated(start, again, close, most, opened=opened, unknowns=unknowns)
+
+    def turn(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
+        fixed, x = start(par, rule, e, L, carry, h)
+        work, ended, lost = 0, False, False
+        while not (ended or lost) and work < most:
+            x, ended, lost = again(par, rule, carry, h, fixed, x)
+            work += 1
+        m, v, dL, carry = close(par, rule, carry, h, fixed, x)
+        return m, v, dL, work, OK if ended and not lost else NOT_CONVERGED
+
+    return lie_loop(turn, lanes=lambda _: lanes)

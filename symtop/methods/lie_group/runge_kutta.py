@@ -19,8 +19,7 @@ of them; p_phi = L_z and the energy drift. With F_j the algebra element at stage
 
 The last is a method for the element U that the solution is the exponential of, U' = dexp^-1_U F; of dexp^-1 two
 brackets suffice for order 4. A table is rows of weights, one row an exponential, so that one kernel steps all three.
-The engines' `rkmk4` acts with SO(3) x R^3 on body rates instead: another group, which keeps |e| and L.e for that body
-alone and turns the spin in its stages.
+The engines' `rkmk4` acts with another group, SO(3) x R^3, on body rates and turns the spin in its stages.
 
 In lanes a kernel compiles for each shape of a table: how many exponentials each stage has, and whether slopes are bent
 back (Munthe-Kaas). The weights are numbers in the table, and those that are 0 are carried out too, in the order of the
@@ -38,11 +37,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.core.simd import wide_vectors
 from symtop.methods.framework.lanes import Lanes, W, column
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group.loop import UNSPUN, entered, give_up, in_both_charts, left, lie_loop, moved, stepped
+from symtop.methods.simd import wide_vectors
 from symtop.methods.splitting.rotor import COSINE, SINE, series
 from symtop.methods.vectors import cross, dot, plus, scaled
 
@@ -106,8 +105,7 @@ TOP: Any = UNSPUN.top
 NUMBERS = (0.0,) * len(TOP._fields)
 
 
-def lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
-    """The weights times the step, share by share."""
+def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
     i = 0
     for share in rule.shares:
         for weight in rule.weights:
@@ -186,12 +184,7 @@ def _of_shape(counts: tuple[int, ...], bent: bool) -> Lanes:
             give_up(block, j, max(far, too_far) != 0.0)
 
     each = sum(counts) * stages
-    return stepped(part, lay, 0, each, carried=UNSPUN, effort=lambda rule: len(rule.counts) * len(rule.shares))
-
-
-def in_lanes(rule: Any) -> Lanes:
-    """The lanes of a table."""
-    return _of_shape(tuple(int(count) for count in rule.counts), rule.bent != 0.0)
+    return stepped(part, _lay, 0, each, carried=UNSPUN, effort=lambda rule: len(rule.counts) * len(rule.shares))
 
 
 class LieTable(NamedTuple):
@@ -205,13 +198,11 @@ class LieTable(NamedTuple):
 
 @register_jitable
 def _store(slopes: Any, i: int, w: Any, f: Any) -> None:
-    """Write an element of the algebra into row i."""
     for k in range(3):
         slopes[i, k], slopes[i, 3 + k] = w[k], f[k]
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """Working space for the elements of the stages."""
+def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return np.empty((len(rule.counts), 6))
 
 
@@ -222,8 +213,7 @@ def turn(par: Any, rule: Any, e: Any, L: Any, slopes: Any, h: float) -> Any:
     _store(slopes, 0, scaled(1.0 / par.I1, L), f0)
     made = 0.0, NOUGHT, e, NOUGHT
     for i in range(1, stages + 1):
-        made = 0.0, NOUGHT, e, NOUGHT
-        w, f = NOUGHT, NOUGHT
+        made, w, f = (0.0, NOUGHT, e, NOUGHT), NOUGHT, NOUGHT
         for _ in range(int(rule.counts[i - 1])):
             w, f = NOUGHT, NOUGHT
             for j in range(i):
@@ -240,7 +230,7 @@ def turn(par: Any, rule: Any, e: Any, L: Any, slopes: Any, h: float) -> Any:
     return made[0], made[1], made[3], stages, OK
 
 
-march = lie_loop(turn, begin, in_lanes)
+march = lie_loop(turn, _begin, lambda rule: _of_shape(tuple(map(int, rule.counts)), rule.bent != 0.0))
 
 
 def lie_runge_kutta(

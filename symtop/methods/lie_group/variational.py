@@ -33,10 +33,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.plan import NOT_CONVERGED, OK
+from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, iterated, lie_loop, moved
+from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, iterated_loop, moved
 from symtop.methods.splitting.coefficients import SUZUKI_4
 from symtop.methods.vectors import cross, dot, plus, scaled
 
@@ -104,38 +103,11 @@ def _of_k(par: Any, A: float, x: Any) -> Any:
     return 1.0, par.I1 + x[0], A / (par.I3 + x[0])
 
 
-class Equation(NamedTuple):
-    """The equation for one number, in functions of what a holds along the axis and of the square of what lies across.
-
-    first(par, A, square) -> x
-    after(par, A, square, x) -> (x, ended, lost)      one iteration
-    rates(par, A, x) -> (n, i, x)
-    """
-
-    first: Callable[..., Any]
-    after: Callable[..., Any]
-    rates: Callable[..., Any]
-
-
-RIGID_BODY, RETRACTION = Equation(_one, _next_n, _of_n), Equation(_interval, _next_k, _of_k)
-
-
-def _solving(equation: Equation) -> Callable[..., Any]:
-    """``(par, A, square)`` to n, i and x, iterations, and did they converge."""
-    first, after, rates = equation
-
-    def solve(par, A, square):  # type: ignore[no-untyped-def]
-        x = first(par, A, square)
-        for k in range(MOST):
-            x, ended, lost = after(par, A, square, x)
-            if ended or lost:
-                return (*rates(par, A, x), k + 1, not lost)
-        return (*rates(par, A, x), MOST, False)
-
-    return register_jitable(solve)
-
-
-_moser_veselov, _euler_poincare = _solving(RIGID_BODY), _solving(RETRACTION)
+# The equation for one number, in functions of what a holds along the axis and of the square of what lies across:
+#     first(par, A, square) -> x
+#     after(par, A, square, x) -> (x, ended, lost)      one iteration
+#     rates(par, A, x) -> (n, i, x)
+RIGID_BODY, RETRACTION = (_one, _next_n, _of_n), (_interval, _next_k, _of_k)
 
 
 @register_jitable
@@ -157,22 +129,8 @@ def _rotated(par: Any, e: Any, across: Any, half: float, n: float, i: float, x: 
     return m, v, plus(kick, half, gravity(par, plus(e, 1.0, moved(m, v, e))))
 
 
-def turn(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
-    """One step; the work counted is the number of Newton iterations."""
-    half = 0.5 * h
-    across, A = _kicked(par, e, L, half)
-    square = dot(across, across)
-    if rule.kind == MOSER_VESELOV:
-        n, i, x, work, converged = _moser_veselov(par, A, square)
-    else:
-        n, i, x, work, converged = _euler_poincare(par, A, square)
-    m, v, dL = _rotated(par, e, across, half, n, i, x)
-    return m, v, dL, work, OK if converged else NOT_CONVERGED
-
-
-def _side_by_side(equation: Equation, unknowns: int) -> Lanes:
-    """The same step in lanes, with so many numbers in x."""
-    first, after, rates = equation
+def _loop(first: Callable[..., Any], after: Callable[..., Any], rates: Callable[..., Any], unknowns: int) -> Loop:
+    """The step by one of the two equations, with so many numbers in x: for one, and in lanes."""
 
     def start(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
         across, A = _kicked(par, e, L, 0.5 * h)
@@ -186,13 +144,10 @@ def _side_by_side(equation: Equation, unknowns: int) -> Lanes:
         n, i, along = rates(par, opened[6], x)
         return (*_rotated(par, opened[:3], opened[3:6], 0.5 * h, n, i, along), carry)
 
-    return iterated(start, again, close, MOST, opened=8, unknowns=unknowns)
+    return iterated_loop(start, again, close, MOST, opened=8, unknowns=unknowns)
 
 
-_LANES = {MOSER_VESELOV: _side_by_side(RIGID_BODY, 1), EULER_POINCARE: _side_by_side(RETRACTION, 3)}
-
-
-march = lie_loop(turn, lanes=lambda rule: _LANES[rule.kind])
+MARCH = {MOSER_VESELOV: _loop(*RIGID_BODY, 1), EULER_POINCARE: _loop(*RETRACTION, 3)}
 
 
 def lie_variational(name: str, rule: Variational, order: int, summary: str, reference: str) -> Integrator:
@@ -200,7 +155,7 @@ def lie_variational(name: str, rule: Variational, order: int, summary: str, refe
     return Integrator(
         name=name, family="discrete-lagrangian", summary=summary, reference=reference, order=order, explicit=False,
         symplectic=True, symmetric=True, conserves=frozenset({"p_phi", "p_psi", "axis_length"}),
-        solvers=in_both_charts(march, rule, SPUN, 1, implicit=True), needs="kicks", general=True,
+        solvers=in_both_charts(MARCH[rule.kind], rule, SPUN, 1, implicit=True), needs="kicks", general=True,
     )  # fmt: skip
 
 

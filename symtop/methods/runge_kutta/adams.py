@@ -5,7 +5,7 @@ and the modified divided differences phi_1 = f_n, phi_{i+1} = phi_i - phi*_i (on
 
     p = y_n + h sum_{i<=k} g_i phi*_i,    d = f(p) - sum_{i<=k} phi*_i,    y_{n+1} = p + h g_{k+1} d,    f(y_{n+1})
     g_i = w_i1,    w_1q = 1/q,    w_2q = 1/(q (q+1)),    w_{i+1,q} = w_iq - alpha_i w_{i,q+1}
-    error of the step h |g_k - g_{k+1}| |d|,    of the order k - j at steps of equal length  h sigma |gamma*| |phi_{k+1-j}|
+    error of the step: h |g_k - g_{k+1}| |d|;    with order j and steps of one length: h sigma_j |gamma*_j phi_{j+1}|
 
 It predicts with order k = 1 .. 12 and corrects with order k + 1. The run starts with order 1 and raises order and step
 together until an error says otherwise; then the order is the one with the least error, raised only after k + 1 steps of

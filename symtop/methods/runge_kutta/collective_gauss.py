@@ -17,35 +17,25 @@ energy is of degree four in (g, r) and stays bounded. So this is `gauss` with wh
 what it has, the energy. The spin of the body is a constant rate and is added at samples.
 
 The stages are swept as those of `gauss` are, with the same tables, from the slope at the start of the step and until
-the correction no longer falls: 7 to 12 sweeps at 120 to 400 steps a nutation. Sweeps that do not converge end the run.
+the correction no longer falls. Sweeps that do not converge end the run.
 Sources: Ohsawa, SIGMA 15 (2019) 083 (arXiv:1907.07819), for the map T*C^2 -> se(3)*; McLachlan, Modin, Verdier,
 Nonlinearity 27 (2014) 1525 (collective integrators).
 """
 
 import functools
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Later
-from symtop.methods.framework.registry import Array, Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group.loop import UNSPUN, in_both_charts, lie_loop
-from symtop.methods.runge_kutta.gauss import ROUND_OFF, SWEEPS, gauss_rule, stage_weights
+from symtop.methods.runge_kutta.gauss import ROUND_OFF, SWEEPS, gauss_rule, packed, stage_weights
 from symtop.methods.vectors import product
 
-STAGES = (1, 2, 3)
 ORIGIN = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-
-
-class Collective(NamedTuple):
-    """The table of a Gauss method, and the parts that a step is composed of."""
-
-    mu: Array  # (s, s), mu + mu^T = 1 exactly
-    b: Array  # (s,)
-    shares: tuple[float, ...] = (1.0,)
 
 
 @register_jitable
@@ -69,9 +59,8 @@ def _field(par: Any, e: Any, y: Any) -> Any:
     )  # fmt: skip
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """Working space: the increments of the stages, and a column for the weights."""
-    return np.empty((len(rule.b), 9))
+def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+    return np.empty((len(rule.b), 9))  # the increments of the stages, and a column for the weights
 
 
 @register_jitable
@@ -123,28 +112,12 @@ def turn(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
     return step[0], (step[1], step[2], step[3]), dL, effort, outcome
 
 
-march = lie_loop(turn, begin)
-
-
-def _table(stages: int) -> Collective:
-    rule = gauss_rule(stages)
-    return Collective(rule.mu, rule.b)
-
-
-@register_jitable
-def _opened(rows: Any) -> Collective:
-    s = rows.shape[1]
-    return Collective(rows[:s], rows[s], (1.0,))
-
-
-def _packed(rule: Collective) -> tuple[Callable[[Any], Collective], Array]:
-    """How a rule travels into compiled code, as `gauss.packed`."""
-    return _opened, np.vstack([rule.mu, rule.b])
+march = lie_loop(turn, _begin)
 
 
 def collective_gauss(stages: int) -> Integrator:
     """The collective Gauss method with so many stages, named after its order."""
-    rule = Later(functools.partial(_table, stages), _packed)
+    rule = Later(functools.partial(gauss_rule, stages), packed)
     return Integrator(
         name=f"collective-gauss-{2 * stages}",
         family="lie-group",
@@ -163,4 +136,4 @@ def collective_gauss(stages: int) -> Integrator:
 
 def built_in() -> list[Integrator]:
     """collective-gauss-2, -4 and -6."""
-    return [collective_gauss(stages) for stages in STAGES]
+    return [collective_gauss(stages) for stages in (1, 2, 3)]

@@ -8,12 +8,11 @@ are autonomous, so that c = sum_j a_ij serves only to check what a user gives.
 
 `rk4` is Kutta's classical method: order 4, four evaluations of f a step. No explicit Runge-Kutta method is symplectic
 or symmetric: the errors of energy and of every constant that is not linear in the state grow linearly with time. L_z =
-p_phi is linear in (e, L) and in (q, L) and stays; in angles nothing does. Not to be confused with `rk45`, which chooses
-its steps, nor with Gauss methods, which are implicit and keep what rk4 loses.
+p_phi is linear in (e, L) and in (q, L) and stays; in angles nothing does.
 
 In lanes a step is one loop over the lanes. Its stages and the sums of slopes are written out, term by term in the order
-of the kernel for one: slopes stay in registers as far as these reach (with a loop for each stage, rk4 takes 1.2 times
-as long in the space frame). The table holds h a, row by row, and h b. A kernel compiles for each number of stages.
+of the kernel for one: slopes stay in registers as far as these reach. The table holds h a, row by row, and h b. A
+kernel compiles for each number of stages.
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.1.
 """
 
@@ -28,31 +27,24 @@ from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError, row
 from symtop.core.jit import register_jitable, set_item
-from symtop.core.simd import wide_vectors
 from symtop.methods.framework.angles import BareTop
 from symtop.methods.framework.equations import FORMULATIONS, Formulation
-from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, W, column, put
-from symtop.methods.framework.loop import Loop, kernel_loop, no_carry
+from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop
+from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 
 
-def lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
-    """h a and h b of one member in the order in which a step reads them."""
+def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
     n = len(rule.b)
     weights = n * (n - 1) // 2
     for i in range(weights):
         numbers[i] = h * rule.a[i]
     for i in range(n):
         numbers[weights + i] = h * rule.b[i]
-
-
-def read(numbers: Any) -> Any:
-    """What `observe` sees of the rule, which asks for nothing."""
-    return numbers
 
 
 def _sum(add: Callable[..., Any], terms: int, weights: int) -> Callable[..., Any]:
@@ -109,9 +101,8 @@ def explicit_in_lanes(
                 put(block, d, j, low)
                 put(block, step_at, j, step)
 
-        return Lanes(
-            step, lay, read, lambda _: count * (count + 1) // 2, top, d, 1, effort=lambda _: count, begin=no_carry
-        )
+        size = count * (count + 1) // 2
+        return Lanes(step, _lay, lambda _: 0.0, lambda _: size, top, d, 1, lambda _: count, begin=no_carry)
 
     return lambda rule: lanes(len(rule.b))
 
@@ -146,7 +137,7 @@ def row_of(slopes: Any, i: int, like: Any) -> Any:
 
 @register_jitable
 def add(place: Any, slope: Any, weight: float) -> Any:
-    """place + weight slope. With the stages as the inner loop rk4 takes 1.6 times as long."""
+    """place + weight slope."""
     for m in range(len(place)):
         place = set_item(place, m, place[m] + weight * slope[m])
     return place
@@ -184,21 +175,13 @@ def weighted(weights: Any, state: Any, slopes: Any, h: float) -> Any:
     return step
 
 
-@register_jitable
-def explicit_step(field: Any, par: Any, rule: Any, state: Any, slopes: Any, h: float) -> Any:
-    """Increment of one step; `slopes` is working space, shape (stages, dimension)."""
-    store(slopes, 0, field(par, state))
-    later_stages(field, par, rule.a, len(rule.b), state, slopes, h)
-    return weighted(rule.b, state, slopes, h)
-
-
 def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """Working space for the slopes of any tableau; as fast as C that knows the number of stages (`make bench`)."""
+    """Working space for the slopes of any tableau, (stages, dimension)."""
     return np.empty((len(rule.b), len(state)))
 
 
 def _loop(form: Formulation, top: Any, dimension: int) -> Loop:
-    """The loop on states of one formulation; the work counted is the number of force evaluations."""
+    """The work counted is the number of force evaluations."""
     field, ended_at = form.field, form.ended
 
     @register_jitable
@@ -206,7 +189,9 @@ def _loop(form: Formulation, top: Any, dimension: int) -> Loop:
         return ended_at(plus(state, step))
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        step = explicit_step(field, par, rule, state, carry, h)
+        store(carry, 0, field(par, state))
+        later_stages(field, par, rule.a, len(rule.b), state, carry, h)
+        step = weighted(rule.b, state, carry, h)
         return step, carry, len(rule.b), ended(state, step)
 
     lanes = explicit_in_lanes(field, add, ended, top=top, dimension=dimension)

@@ -16,11 +16,10 @@ Murua, Numer. Algorithms 76 (2017) 861); the weights h b_i sum to h; the driver 
 the iteration runs until its correction no longer falls, never to a tolerance, whose remainder would have a sign.
 
 *Sweeps.* The iteration is the plain one, y_i = y + sum_j mu_ij L_j with the newest L_j, started from the polynomial of
-the last step: 4 to 14 sweeps at 60 to 240 steps a nutation. Solving each stage's own equation in closed form (a Cayley
-transform) halves the sweeps of large steps, is no faster and loses 20 times more to rounding. Sweeps converge up to
-steps of 0.15 nutations (s = 1) to 0.48 (s = 6) in the scene `spheroid`: a limit of the sweep, not of the method. Where
-its corrections leave the line to rounding within 100 sweeps, Newton's iteration takes over, and the choice hangs on
-this step alone. A step that Newton does not solve either ends the run as `not_converged`.
+the last step: 4 to 14 sweeps at 60 to 240 steps a nutation. They converge up to steps of 0.15 nutations (s = 1) to 0.48
+(s = 6) in the scene `spheroid`: a limit of the sweep, not of the method. Where its corrections leave the line to
+rounding within 100 sweeps, Newton's iteration takes over, and the choice hangs on this step alone. A step that Newton
+does not solve either ends the run as `not_converged`.
 
 *Newton.* L' is linear in e alone, so that the increments of e give those of L exactly; what remains are 3 s equations
 for the x_i, the increments of e, quadratic in them. With w_i = h b_i, nu = mu diag(w) mu and e_i, L_i at the stage,
@@ -28,15 +27,14 @@ for the x_i, the increments of e, quadratic in them. With w_i = h b_i, nu = mu d
     dx_i - (w_i/I1) sum_k (mu_ik L_i x dx_k + mgl nu_ik ((z.e_i) dx_k - z (e_i.dx_k))) = w_i L_i x e_i/I1 - x_i
 
 is solved by elimination with pivots, 18 x 18 at most. The increments of a follow with L_i given: the same equations
-without mgl, now linear. Newton starts from e_i = e, since the polynomial of the step before says nothing about a step
-so large. Where this does not converge in 12 iterations, the solution is followed from a tenth of the step to all of it,
-each time 1.09 times further. Of steps h omega = 2, 5 and 10 from 1000 states of each of 11 scenes every one is solved,
-the first way 100 %, 94 % and 74 % of them. What stays unsolved has a path that turns back before the whole step: slow
-tops that swing widely, at steps of a nutation and more.
+without mgl, now linear. Newton starts from e_i = e. Where this does not converge in 12 iterations, the solution is
+followed from a tenth of the step to all of it, each time 1.09 times further. Of steps h omega = 2, 5 and 10 from 1000
+states of each of 11 scenes every one is solved, the first way 100 %, 94 % and 74 % of them. What stays unsolved has a
+path that turns back before the whole step: slow tops that swing widely, at steps of a nutation and more.
 
-*Lanes.* A lane whose sweeps have ended keeps its L_i by selection. One whose corrections do not fall to rounding is
-given up: alone, Newton takes over. Stages stand outside and lanes inside, each stage a loop of its own with the numbers
-of its row as constants, for a place in `block` that hangs on a variable is no vector.
+*Lanes.* A lane whose sweeps have ended keeps its L_i by selection; one whose corrections do not fall to rounding is
+given up. Each stage is a loop of its own with the numbers of its row as constants, for a place in `block` that hangs on
+a variable is no vector.
 
 No step is too large for stability. The methods are A-stable, |R(iy)| = 1; and at a steady precession, where the reduced
 energy is least, small nutations cannot grow at any step, because the energy is kept. What a large step loses is the
@@ -53,22 +51,14 @@ import numpy as np
 
 from symtop.core.jit import register_jitable, set_item
 from symtop.core.multiprecision import context
-from symtop.core.simd import wide_vectors
-from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework import space
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
-from symtop.methods.framework.loop import Loop, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Later
 from symtop.methods.framework.registry import Array, Integrator
-from symtop.methods.framework.space import (
-    SpaceTop,
-    field_axis,
-    field_frame,
-    frame_to_attitude,
-    observe_axis,
-    on_axis,
-    on_frame,
-)
+from symtop.methods.framework.space import SpaceTop, field_axis, field_frame, observe_axis
+from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 
 ENOUGH = 1e-9  # a correction in units of |e| = 1, whose square is below rounding
@@ -178,10 +168,7 @@ def _twice(work: Any, dimension: int, stages: int) -> None:
 
 @register_jitable
 def solve_stages(field: Any, par: Any, state: Any, work: Any, stages: int) -> Any:
-    """Solve a step in the array of `symtop.methods.runge_kutta.gauss.working_space`: iterations, and did they converge.
-
-    `_iterate` stands here once, because all of it is inlined: three times, compilation takes seconds longer.
-    """
+    """Solve a step in the array of `working_space`: iterations, and did they converge. `_iterate` is inlined: once."""
     effort, rung, first, mgl, grown = 0, RUNGS, 0, par.mgl, False
     _twice(work, len(state), stages)
     for i in range(stages):
@@ -204,155 +191,6 @@ def solve_stages(field: Any, par: Any, state: Any, work: Any, stages: int) -> An
                     work[i, m] = 0.0
 
 
-Row = tuple[float, ...]
-
-
-def _after(first: Any, then: Any) -> Any:
-    """Both, one after the other."""
-
-    @register_jitable
-    def both(block, table):  # type: ignore[no-untyped-def]
-        wide_vectors()
-        first(block, table)
-        then(block, table)
-
-    return both
-
-
-def swept(  # noqa: C901  (the loops of one step, read in one piece)
-    field: Callable[..., Any], weights: Callable[..., Any], unit: Callable[..., Any], bound: Callable[..., Any],
-    mu: tuple[Row, ...], predict: tuple[Row, ...], *,
-    top: Any, dimension: int, still: int, most: int, round_off: float,
-) -> Lanes:  # fmt: skip
-    """A Gauss method in lanes: `mu` and `predict` as `gauss.GaussRule` has them.
-
-    ``weights(rule, h, out)`` fills in the h b_i, ``unit(par, state)`` is 1/|L|, and a correction above
-    ``bound(sweeps)`` that does not fall has lost its way. Component `still` of a state never moves.
-    """
-    stages, zeros, numbers = len(mu), (0.0,) * dimension, (0.0,) * len(top._fields)
-    tops, flag, work, carry_at = len(numbers), 3 * dimension, 3 * dimension + 1, 3 * dimension + 2
-    carry = stages * dimension + 1  # the L_i and the unit
-    unit_at = carry_at + carry - 1
-    gap_at, pull_at, last_at, live_at = range(unit_at + 1, unit_at + 5)
-    nodes, carried = (0.0,) * stages, (0.0,) * carry
-
-    def ahead(m: int) -> Any:
-        at = carry_at + m
-
-        @register_jitable
-        def continued(block, table):  # type: ignore[no-untyped-def]
-            wide_vectors()
-            for j in range(W):
-                last = nodes
-                for q in range(stages):
-                    last = set_item(last, q, block[(at + q * dimension) * W + j])
-                for i in range(stages):
-                    total = 0.0
-                    for q in range(stages):
-                        total += predict[i][q] * last[q]
-                    block[(at + i * dimension) * W + j] = total
-
-        return continued
-
-    def stage(i: int) -> Any:
-        row, own = mu[i], carry_at + i * dimension
-
-        @register_jitable
-        def renewed(block, table):  # type: ignore[no-untyped-def]
-            wide_vectors()
-            for j in range(W):
-                state, place = column(block, 0, j, zeros), zeros
-                for q in range(stages):
-                    for m in range(dimension):
-                        if m != still:
-                            step = row[q] * block[(carry_at + q * dimension + m) * W + j]
-                            place = set_item(place, m, place[m] + step)
-                for m in range(dimension):
-                    place = set_item(place, m, state[m] + place[m])
-                slope = field(top(*column(table, 0, j, numbers)), place)
-                weight, live = table[(tops + i) * W + j], block[live_at * W + j] != 0.0
-                gap = 0.0 if i == 0 else block[gap_at * W + j]
-                pull = 0.0 if i == 0 else block[pull_at * W + j]
-                for m in range(dimension):
-                    if m != still:
-                        old, value = block[(own + m) * W + j], weight * slope[m]
-                        change = abs(value - old)
-                        if 3 <= m < 6:
-                            pull = max(pull, change)
-                        else:
-                            gap = max(gap, change)
-                        block[(own + m) * W + j] = value if live else old
-                block[gap_at * W + j] = gap
-                block[pull_at * W + j] = pull
-
-        return renewed
-
-    moving = [m for m in range(dimension) if m != still]
-    extrapolate, sweep = ahead(moving[0]), stage(0)
-    for m in moving[1:]:
-        extrapolate = _after(extrapolate, ahead(m))
-    for i in range(1, stages):
-        sweep = _after(sweep, stage(i))
-
-    @register_jitable
-    def judge(block, j, largest):  # type: ignore[no-untyped-def]
-        correction = max(block[gap_at * W + j], block[pull_at * W + j] * block[unit_at * W + j])
-        live, falls = block[live_at * W + j], 0.0 < correction < block[last_at * W + j]
-        goes_on = falls or (correction >= round_off and correction <= largest)
-        good = goes_on or correction < round_off
-        block[work * W + j] += live
-        block[last_at * W + j] = correction
-        block[flag * W + j] = block[flag * W + j] if good or live == 0.0 else 1.0
-        block[live_at * W + j] = live if goes_on else 0.0
-
-    @register_jitable
-    def finish(block, j):  # type: ignore[no-untyped-def]
-        step = zeros
-        for i in range(stages):
-            for m in range(dimension):
-                step = set_item(step, m, step[m] + block[(carry_at + i * dimension + m) * W + j])
-        healthy = np.isfinite(step[0]) and block[live_at * W + j] == 0.0
-        moved, low = accumulate(column(block, 0, j, zeros), column(block, dimension, j, zeros), step)
-        put(block, 0, j, moved)
-        put(block, dimension, j, low)
-        put(block, 2 * dimension, j, step)
-        block[flag * W + j] = block[flag * W + j] if healthy else 1.0
-
-    def step(block, table):  # type: ignore[no-untyped-def]
-        wide_vectors()
-        extrapolate(block, table)
-        for j in range(W):
-            block[last_at * W + j] = np.inf
-            block[live_at * W + j] = 1.0 - block[flag * W + j]
-        effort = 0
-        while effort < most:
-            sweep(block, table)
-            effort += 1
-            largest = bound(effort)
-            for j in range(W):
-                judge(block, j, largest)
-            if none_left(block, live_at):
-                break
-        for j in range(W):
-            finish(block, j)
-
-    def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
-        weights(rule, h, numbers)
-
-    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        shares, slope, values = np.empty(stages), field(par, state), carried
-        weights(rule, h, shares)
-        for i in range(stages):
-            for m in range(dimension):
-                values = set_item(values, i * dimension + m, shares[i] * slope[m])
-        return set_item(values, carry - 1, unit(par, state))
-
-    def read(numbers):  # type: ignore[no-untyped-def]
-        return 0.0
-
-    return Lanes(step, lay, read, lambda _: stages, top, dimension, carry, room=lambda _: 4, begin=begin)
-
-
 STAGES = (1, 2, 3, 4, 5, 6)
 DIGITS = 40  # of the multiprecision that coefficients are computed in
 SWEEPS = 100  # most of them in a step; 14 are the most that a step of sensible size takes
@@ -368,16 +206,17 @@ class GaussRule(NamedTuple):
     mu: Array  # (s, s), mu + mu^T = 1 exactly
     b: Array  # (s,)
     predict: Array  # (s, s): the last step's L_j, continued to the next step's L_i
+    shares: tuple[float, ...] = (1.0,)  # the parts of a step of `collective_gauss`, as `lie_group.loop` asks for them
 
 
 @register_jitable
 def _opened(rows: Any) -> GaussRule:
     s = rows.shape[1]
-    return GaussRule(rows[:s], rows[s], rows[s + 1 :])
+    return GaussRule(rows[:s], rows[s], rows[s + 1 :], (1.0,))
 
 
 def packed(rule: GaussRule) -> tuple[Callable[[Any], GaussRule], Array]:
-    """How a rule travels into compiled code: as one array, which a call looks at in a third of the time of three."""
+    """How a rule travels into compiled code: as one array, which a call takes sooner than three."""
     return _opened, np.vstack([rule.mu, rule.b, rule.predict])
 
 
@@ -471,9 +310,8 @@ def farthest(sweeps: int) -> float:
 def gauss_step(field: Any, par: Any, state: Any, work: Any) -> Any:  # noqa: C901  (one loop, read in one piece)
     """Increment of one step, sweeps and iterations of Newton that it took, and the outcome.
 
-    Sums run over the stages outside and the components inside: 1.3 times faster than the other way round. All of it is
-    one function, for an array that is handed to another one is counted once more. The largest correction is kept for L
-    and for the unit vectors, not for each component, for which there are not registers enough.
+    All of it is one function, for an array that is handed to another one is counted once more. The largest correction
+    is kept for L and for the unit vectors, not for each component, for which there are not registers enough.
     """
     stages, dimension = len(work) // 7, len(state)
     nothing = state
@@ -535,6 +373,149 @@ def gauss_step(field: Any, par: Any, state: Any, work: Any) -> Any:  # noqa: C90
     return step, effort, outcome if np.isfinite(step[0]) else NOT_CONVERGED
 
 
+Row = tuple[float, ...]
+
+
+def _after(first: Any, then: Any) -> Any:
+    """Both, one after the other."""
+
+    @register_jitable
+    def both(block, table):  # type: ignore[no-untyped-def]
+        wide_vectors()
+        first(block, table)
+        then(block, table)
+
+    return both
+
+
+def _swept(  # noqa: C901  (the loops of one step, read in one piece)
+    field: Callable[..., Any], mu: tuple[Row, ...], predict: tuple[Row, ...], dimension: int
+) -> Lanes:
+    """A Gauss method in lanes: `mu` and `predict` as `GaussRule` has them."""
+    stages, zeros, numbers = len(mu), (0.0,) * dimension, (0.0,) * len(SpaceTop._fields)
+    tops, flag, work, carry_at = len(numbers), 3 * dimension, 3 * dimension + 1, 3 * dimension + 2
+    carry = stages * dimension + 1  # the L_i and the unit
+    unit_at = carry_at + carry - 1
+    gap_at, pull_at, last_at, live_at = range(unit_at + 1, unit_at + 5)
+    nodes, carried = (0.0,) * stages, (0.0,) * carry
+
+    def ahead(m: int) -> Any:
+        at = carry_at + m
+
+        @register_jitable
+        def continued(block, table):  # type: ignore[no-untyped-def]
+            wide_vectors()
+            for j in range(W):
+                last = nodes
+                for q in range(stages):
+                    last = set_item(last, q, block[(at + q * dimension) * W + j])
+                for i in range(stages):
+                    total = 0.0
+                    for q in range(stages):
+                        total += predict[i][q] * last[q]
+                    block[(at + i * dimension) * W + j] = total
+
+        return continued
+
+    def stage(i: int) -> Any:
+        row, own = mu[i], carry_at + i * dimension
+
+        @register_jitable
+        def renewed(block, table):  # type: ignore[no-untyped-def]
+            wide_vectors()
+            for j in range(W):
+                state, place = column(block, 0, j, zeros), zeros
+                for q in range(stages):
+                    for m in range(dimension):
+                        if m != STILL:
+                            step = row[q] * block[(carry_at + q * dimension + m) * W + j]
+                            place = set_item(place, m, place[m] + step)
+                for m in range(dimension):
+                    place = set_item(place, m, state[m] + place[m])
+                slope = field(SpaceTop(*column(table, 0, j, numbers)), place)
+                weight, live = table[(tops + i) * W + j], block[live_at * W + j] != 0.0
+                gap = 0.0 if i == 0 else block[gap_at * W + j]
+                pull = 0.0 if i == 0 else block[pull_at * W + j]
+                for m in range(dimension):
+                    if m != STILL:
+                        old, value = block[(own + m) * W + j], weight * slope[m]
+                        change = abs(value - old)
+                        if 3 <= m < 6:
+                            pull = max(pull, change)
+                        else:
+                            gap = max(gap, change)
+                        block[(own + m) * W + j] = value if live else old
+                block[gap_at * W + j] = gap
+                block[pull_at * W + j] = pull
+
+        return renewed
+
+    moving = [m for m in range(dimension) if m != STILL]
+    extrapolate, sweep = ahead(moving[0]), stage(0)
+    for m in moving[1:]:
+        extrapolate = _after(extrapolate, ahead(m))
+    for i in range(1, stages):
+        sweep = _after(sweep, stage(i))
+
+    @register_jitable
+    def judge(block, j, largest):  # type: ignore[no-untyped-def]
+        correction = max(block[gap_at * W + j], block[pull_at * W + j] * block[unit_at * W + j])
+        live, falls = block[live_at * W + j], 0.0 < correction < block[last_at * W + j]
+        goes_on = falls or (correction >= ROUND_OFF and correction <= largest)
+        good = goes_on or correction < ROUND_OFF
+        block[work * W + j] += live
+        block[last_at * W + j] = correction
+        block[flag * W + j] = block[flag * W + j] if good or live == 0.0 else 1.0
+        block[live_at * W + j] = live if goes_on else 0.0
+
+    @register_jitable
+    def finish(block, j):  # type: ignore[no-untyped-def]
+        step = zeros
+        for i in range(stages):
+            for m in range(dimension):
+                step = set_item(step, m, step[m] + block[(carry_at + i * dimension + m) * W + j])
+        healthy = np.isfinite(step[0]) and block[live_at * W + j] == 0.0
+        moved, low = accumulate(column(block, 0, j, zeros), column(block, dimension, j, zeros), step)
+        put(block, 0, j, moved)
+        put(block, dimension, j, low)
+        put(block, 2 * dimension, j, step)
+        block[flag * W + j] = block[flag * W + j] if healthy else 1.0
+
+    def step(block, table):  # type: ignore[no-untyped-def]
+        wide_vectors()
+        extrapolate(block, table)
+        for j in range(W):
+            block[last_at * W + j] = np.inf
+            block[live_at * W + j] = 1.0 - block[flag * W + j]
+        effort = 0
+        while effort < SWEEPS:
+            sweep(block, table)
+            effort += 1
+            largest = farthest(effort)
+            for j in range(W):
+                judge(block, j, largest)
+            if none_left(block, live_at):
+                break
+        for j in range(W):
+            finish(block, j)
+
+    def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
+        stage_weights(rule, h, numbers)
+
+    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
+        shares, slope, values = np.empty(stages), field(par, state), carried
+        stage_weights(rule, h, shares)
+        for i in range(stages):
+            for m in range(dimension):
+                values = set_item(values, i * dimension + m, shares[i] * slope[m])
+        return set_item(values, carry - 1, momentum_unit(par, state))
+
+    def read(numbers):  # type: ignore[no-untyped-def]
+        return 0.0
+
+    return Lanes(step, lay, read, lambda _: stages, SpaceTop, dimension, carry, room=lambda _: 4, begin=begin)
+
+
 def _loop(field: Any, dimension: int) -> Loop:
     """The loop on states that move by `field`, with L in the components 3 to 5; it counts sweeps and iterations."""
 
@@ -547,10 +528,7 @@ def _loop(field: Any, dimension: int) -> Loop:
 
     @functools.cache
     def of_rows(mu: Any, predict: Any) -> Lanes:
-        return swept(
-            field, stage_weights, momentum_unit, farthest, mu, predict,
-            top=SpaceTop, dimension=dimension, still=STILL, most=SWEEPS, round_off=ROUND_OFF,
-        )  # fmt: skip
+        return _swept(field, mu, predict, dimension)
 
     def in_lanes(rule: GaussRule) -> Lanes | None:
         if len(rule.b) > IN_LANES[dimension]:
@@ -565,15 +543,16 @@ march_axis, march_frame = _loop(field_axis, 6), _loop(field_frame, 9)
 
 def gauss(stages: int) -> Integrator:
     """The Gauss method with 1 to 6 stages, named after its order; its coefficients are computed at the first run."""
-
     rule = Later(functools.partial(gauss_rule, stages), packed)
     return Integrator(
         name=f"gauss-{2 * stages}",
         family="runge-kutta",
         summary=f"Gauss collocation with {stages} stage{'s' if stages > 1 else ''} on the space-frame equations",
         solvers={
-            "axis": FixedStep(march_axis, rule, on_axis, stages, implicit=True),
-            "attitude": FixedStep(march_frame, rule, on_frame, stages, implicit=True, present=frame_to_attitude),
+            "axis": FixedStep(march_axis, rule, space.on_axis, stages, implicit=True),
+            "attitude": FixedStep(
+                march_frame, rule, space.on_frame, stages, implicit=True, present=space.frame_to_attitude
+            ),
         },
         order=2 * stages,
         explicit=False,

@@ -24,8 +24,7 @@ from typing import Any
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import kernel_loop, no_carry
+from symtop.methods.framework.loop import FixedStep, kernel_loop, no_carry
 from symtop.methods.framework.plan import OUTCOMES, Run
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
@@ -56,14 +55,13 @@ def _axis_step(par: Any, e: Any, L: Any, h: float) -> Any:
     return d, (-c * (2.0 * e[1] + d[1]), c * (2.0 * e[0] + d[0]), 0.0)
 
 
-def increment_axis(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (e, L); the work counted is one system of linear equations."""
+def _increment_axis(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     d, D = _axis_step(par, (state[0], state[1], state[2]), (state[3], state[4], state[5]), h)
     return (*d, *D), carry, 1, finite_outcome(d[0] + d[1] + d[2])
 
 
-def increment_frame(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (e, L, a): a is turned by the same rule, with L known at both ends."""
+def _increment_frame(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
+    """a is turned by the same rule, with L known at both ends."""
     L, a = (state[3], state[4], state[5]), (state[6], state[7], state[8])
     d, D = _axis_step(par, (state[0], state[1], state[2]), L, h)
     half = scaled(0.5 * h / par.I1, L)
@@ -73,8 +71,8 @@ def increment_frame(par: Any, rule: Any, state: Any, carry: Any, h: float) -> An
     return (*d, *D, *b), carry, 1, finite_outcome(d[0] + d[1] + d[2] + b[0] + b[1] + b[2])
 
 
-def observe_frame(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
-    """p_phi and p_psi of the attitude that is shown, whose axis has the length one."""
+def _observe_frame(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+    """The axis of the attitude that is shown has the length one."""
     p_phi, p_psi = observe_axis(par, rule, before, dstate, h)
     e = before[0] + dstate[0], before[1] + dstate[1], before[2] + dstate[2]
     return p_phi, p_psi / math.sqrt(dot(e, e))
@@ -89,8 +87,8 @@ def _attitude_shown(par: Any, t: float, y: Any) -> Any:
     return frame_sample(par, t, (*e, y[3], y[4], y[5], *a))
 
 
-march_axis = kernel_loop(no_carry, increment_axis, observe_axis)
-march_frame = kernel_loop(no_carry, increment_frame, observe_frame)
+march_axis = kernel_loop(no_carry, _increment_axis, observe_axis)
+march_frame = kernel_loop(no_carry, _increment_frame, _observe_frame)
 
 
 class Onward(FixedStep):

@@ -31,8 +31,7 @@ from symtop.core.jit import combined, compile_kernel, register_jitable, set_item
 from symtop.methods.framework.adaptive import Adaptive, Loop as AdaptiveLoop
 from symtop.methods.framework.angles import LEAST_TOLERANCE
 from symtop.methods.framework.equations import FORMULATIONS
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import Loop, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import Body, Start, as_it_steps
 from symtop.methods.framework.registry import Integrator

@@ -7,7 +7,7 @@
 phi and psi move in the kick because V depends on p_phi and p_psi. Explicit, symplectic, keeps both momenta exactly,
 one sine and one cosine a force. Kick-drift-kick with (1/2, 1, 1/2) is Stormer-Verlet: order 2, stable for h omega < 2.
 It is not the trapezoidal discrete Lagrangian, which is implicit, and not the splitting on the attitude, whose drift is
-the exact free top (`splitting_space`): here the centrifugal potential is in the kick, and it is singular at both poles.
+the exact free top (`splitting.space`): here the centrifugal potential is in the kick, and it is singular at both poles.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, sections I.1.4 and II.5.
 """
 
@@ -18,10 +18,9 @@ import numpy as np
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome
-from symtop.methods.framework.lanes import Lanes
 from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.registry import Array
-from symtop.methods.splitting.loop import Composition, compose, composed, stages
+from symtop.methods.splitting.loop import compose, composed, stages
 from symtop.model.charts import View
 from symtop.model.top import Momenta, half_angle_force
 
@@ -52,13 +51,12 @@ def scale(rule: Any, top: Any, at: Any, h: float) -> Any:
     return stages(rule, h / top.I1, h, 0.0, 0.0)
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """The force at the start."""
+def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return force_angles(par, state, (0.0, 0.0, 0.0, 0.0))
 
 
-def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (theta, p_theta, phi, psi); the work counted is the number of force evaluations."""
+def _increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
+    """The work counted is the number of force evaluations."""
     step, force = compose(force_angles, kick_angles, drift_angles, par, rule, state, carry)
     return step, force, rule.forces, chart_outcome(state[0] + step[0])
 
@@ -90,24 +88,16 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
 
 @register_jitable
 def _drift_in_lanes(state: Any, step: Any, tau: float) -> Any:
-    """Free flight, which has no branch."""
     return drift_angles(None, state, step, tau), True
 
 
 @register_jitable
 def _ended(state: Any, step: Any) -> int:
-    """Is theta still a point of the chart?"""
     return chart_outcome(state[0] + step[0])
 
 
 _LANES = composed(force_angles, kick_angles, _drift_in_lanes, _ended, top=ReducedTop, dimension=4, carry=3)
-
-
-def _in_lanes(rule: Composition) -> Lanes:
-    return _LANES
-
-
-march = kernel_loop(begin, increment, observe, lanes=_in_lanes)
+march = kernel_loop(_begin, _increment, observe, lanes=lambda _: _LANES)
 
 
 def verlet_energy(seen: View, momenta: Momenta, h: float) -> Array:

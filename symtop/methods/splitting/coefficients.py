@@ -8,10 +8,9 @@ Three shapes:
     kick_first     b_0 .. b_n with neither end zero, n forces a step
     drift_first    b_0 = b_n = 0: n - 1 forces and n drifts a step
 
-Only the outer coefficients are written down, as published. The inner ones close the sum: a sum that is wrong by one
-rounding is a systematic error, it runs the clock too fast. Every method of quadrature order p has
-sum_i b_i t_i^k = 1/(k + 1) for k < p, t_i the sum of the drifts before kick i, whatever the two flows are; that is what
-the first number of a generalised order (8, 6, 4) says [McLachlan, BIT 35 (1995) 258].
+Only the outer coefficients are written down, as published; the inner ones close the sum. Every method of quadrature
+order p has sum_i b_i t_i^k = 1/(k + 1) for k < p, t_i the sum of the drifts before kick i, whatever the two flows are:
+the first number of a generalised order (8, 6, 4) [McLachlan, BIT 35 (1995) 258].
 """
 
 import math
@@ -83,7 +82,7 @@ METHODS = {
         STRANG, "hairer-lubich-wanner-2003", "kick-drift-kick splitting of the reduced Hamiltonian", "angles"),
     "stormer-verlet-yoshida-4": Splitting(YOSHIDA_4, "yoshida-1990", "three Stormer-Verlet steps", "angles"),
     "stormer-verlet-suzuki-4": Splitting(SUZUKI_4, "suzuki-1990", "five Stormer-Verlet steps", "angles"),
-    "stormer-verlet-blanes-moan-6": Splitting(  # up to five times more accurate here than the table of srkn-14-6
+    "stormer-verlet-blanes-moan-6": Splitting(  # more accurate here than the table of srkn-14-6
         BLANES_MOAN_11, "blanes-moan-2002",
         "Runge-Kutta-Nystrom splitting of the reduced Hamiltonian, 11 forces", "angles"),
     "strang": Splitting(STRANG, "touma-wisdom-1994", "free top and gravity kicks, one force"),

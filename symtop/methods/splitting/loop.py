@@ -8,8 +8,8 @@ A force is evaluated only where it is kicked with, and the one at the end of a s
 kick-first table with n drifts costs n forces and a drift-first one n - 1, but n drifts: its last drift and the first of
 the next step are not merged.
 
-The kernels see no h: `stages` multiplies the tables out before a run, each row closed to the product that its sum
-stands for. A sum that is wrong by one rounding is a clock that runs fast by 1e-16 in every step.
+The kernels see no h: `stages` multiplies the tables out before a run, each row closed to the product of its sum, or the
+clock would run fast by 1e-16 in every step.
 
 In lanes, kick, drift and force of a stage are one loop over the lanes; the last kick and the sums are another. A kick
 or a force that a table leaves out is carried out with the coefficient 0, which changes no bit. The coefficients lie in
@@ -24,11 +24,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.core.jit import register_jitable, set_item, times, to_fixed_tuple, with_item
-from symtop.core.simd import wide_vectors
+from symtop.core.jit import register_jitable, set_item, to_fixed_tuple
 from symtop.methods.framework.lanes import Lanes, W, column, put
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.preparation import as_fields
+from symtop.methods.simd import times, wide_vectors, with_item
 from symtop.methods.vectors import accumulate
 
 SHORT = 2  # drifts
@@ -47,7 +47,7 @@ class Composition(NamedTuple):
 
 @functools.cache
 def _opened(n: int) -> Callable[[Any], Composition]:
-    """From the numbers of a composition with n drifts, in a row, to the composition, in compiled code."""
+    """From the numbers in a row to a composition with n drifts, in compiled code."""
     m, end = n + 1, 3 * n + 2
 
     @register_jitable
@@ -70,7 +70,7 @@ def packed(rule: Any) -> tuple[Callable[[Any], Composition], NDArray[np.float64]
     """How a composition travels into compiled code: what opens an array of numbers, and the array.
 
     A call looks at every number of a tuple, and at an array as a whole. Short tables are tuples inside, longer ones are
-    rows of the array, so that one kernel is compiled for all of them: their steps take as long as with tuples, to 1 %.
+    rows of the array, so that one kernel is compiled for all of them.
     """
     drift, kick, gradient = rule[:3]
     opened = _opened(len(drift)) if len(drift) <= SHORT else _of_any_length
@@ -96,10 +96,7 @@ class Stages(NamedTuple):
 
 @register_jitable
 def close(values: Any, total: float) -> Any:
-    """`coefficients.exact_sum` of a row in a kernel: what is missing from `total` goes to the middle.
-
-    The sum of Knuth's two-sums and of what they round off is that of `math.fsum` but for 1e-16 of the surplus itself.
-    """
+    """`exact_sum` of a row in a kernel, by Knuth's two-sums: as `math.fsum` but for 1e-16 of the surplus itself."""
     high, low, n = -total, 0.0, len(values)
     for i in range(n):
         moved = high + values[i]
@@ -121,7 +118,7 @@ def stages(rule: Any, drift: float, kick: float, bend: float, boost: float) -> A
 
 
 def closed(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float]) -> Composition:
-    """A composition whose sums are exactly 1, and what it costs."""
+    """A composition whose sums are exactly 1."""
     forces = sum(b != 0.0 for b in kick) - (kick[0] != 0.0 and kick[-1] != 0.0)
     return Composition(exact_sum(drift), exact_sum(kick), tuple(gradient), forces)
 

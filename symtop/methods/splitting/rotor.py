@@ -51,7 +51,7 @@ def cayley(square: float, half: float) -> Any:
 
 @register_jitable
 def near(square: float, half: float) -> Any:
-    """s and m for an angle below 2: no root, no division, no pole at L = 0, 1.6 times the speed of sine and cosine."""
+    """s and m for an angle below 2: no root, no division, no pole at L = 0."""
     return half * series(square, SINE), -square * series(square, COSINE)
 
 

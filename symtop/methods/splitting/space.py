@@ -3,21 +3,19 @@
     kick(b h):   L += b h mgl (-e_y, e_x, 0),  with a gradient c:  b mgl -> b mgl - 2 c h^2 mgl^2 e_z / I1
     drift(a h):  e <- R e,  q <- r q,  R the rotation about L by the angle a h |L| / I1 and r its quaternion
 
-The drift is the exact free symmetric top, so what is left of the error is gravity's: in a fast top it is 100 times
-smaller than Stormer-Verlet's. The body's own spin ``q <- q exp(twist h k/2)`` commutes with every r and leaves e alone;
-it is exact for any time and is therefore added where a sample is shown, not in the step. Both halves are flows on
-T*SU(2), so any composition is symplectic there and Lie-Poisson in (e, L); L_z is not touched by either and L.e by
-rounding alone. {V, {V, {V, T}}} = 0 (T is quadratic in L), so Runge-Kutta-Nystrom tables apply, and
-{V, {V, T}} = mgl^2 sin^2(theta) / I1 is the force gradient.
+The drift is the exact free symmetric top, so what is left of the error is gravity's. The body's own spin ``q <- q
+exp(twist h k/2)`` commutes with every r and leaves e alone; it is exact for any time and is therefore added where a
+sample is shown, not in the step. Both halves are flows on T*SU(2), so any composition is symplectic there and
+Lie-Poisson in (e, L); L_z is not touched by either and L.e by rounding alone. {V, {V, {V, T}}} = 0 (T is quadratic in
+L), so Runge-Kutta-Nystrom tables apply, and {V, {V, T}} = mgl^2 sin^2(theta) / I1 is the force gradient.
 
 With x = (a h/2 I1) |L| half the angle, s = sin(x)/|L|, w = cos(x) and m = w - 1, no increment is a difference of
 large numbers:
 
     dq = m q + s L q,       de = 2 s (w L x e + s L x (L x e))
 
-Rounding makes w^2 + s^2 L^2 = 1 + 1e-17, the same in every step of a steady motion, and |e| and |q| would drift
-(1e-11 in 1e6 steps was seen). So each drift adds to its s or m what the length lacks at that moment. The correction
-turns nothing but about L: L.e does not notice, while rescaling e itself would hand the drift over to p_psi.
+Rounding makes w^2 + s^2 L^2 = 1 + 1e-17, the same in every step of a steady motion, and |e| and |q| would drift. So
+each drift adds to its s or m what the length lacks at that moment, a turn about L that leaves L.e alone.
 
 A *Cayley* drift has s = tau/sqrt(1 + tau^2 L^2), w = 1/sqrt(1 + tau^2 L^2) instead, tau = h/2 I1: a rotation about L
 by a nearby angle that depends on |L| only, so symplectic too. Kick-drift-kick with it is an integrable map, that of the
@@ -37,7 +35,7 @@ Sources: Touma, Wisdom, Astron. J. 107 (1994) 1189 (splitting); Bobenko, Suris, 
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -82,10 +80,7 @@ def mean_square_momentum(top: Any, at: Any) -> float:
 
 @shared
 def tangent_scale(top: Any, start: Any, h: float) -> float:
-    """tan(x)/x with x = h Lm/2 I1: a Cayley drift with tau = (h/2 I1) times this turns |L| = Lm by the exact angle.
-
-    Lm is the root of the mean of |L|^2 over a nutation, which is known in closed form.
-    """
+    """tan(x)/x, x = h Lm/2 I1: a Cayley drift with tau = (h/2 I1) times this is exact at Lm, Lm^2 = mean |L|^2."""
     x = 0.5 * h * math.sqrt(mean_square_momentum(top, start)) / top.I1
     return math.tan(x) / x if x > 0.0 else 1.0
 
@@ -133,27 +128,8 @@ def turn_axis(state: Any, step: Any, s: float, m: float) -> Any:
 
 
 @register_jitable
-def drift_axis(rule: Any, state: Any, step: Any, half: float) -> Any:
-    """Free rotation."""
-    s, m = rotor(rule, half_square(state, step, half), half)
-    return turn_axis(state, step, s, m)
-
-
-@register_jitable
-def ended_axis(state: Any, step: Any) -> int:
-    """Is the step finite?"""
+def _ended_axis(state: Any, step: Any) -> int:
     return finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4])
-
-
-def begin_axis(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """The axis at the start."""
-    return force_axis(par, state, (0.0, 0.0, 0.0))
-
-
-def increment_axis(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (e, L); the work counted is the number of kicks with a new axis."""
-    step, axis = compose(force_axis, kick_space, drift_axis, par, rule, state, carry)
-    return step, axis, rule.forces, ended_axis(state, step)
 
 
 @register_jitable
@@ -164,19 +140,14 @@ def process_axis(s: float, x: float, y: float, z: float, Lx: float, Ly: float, L
     return x / D, y / D, (z * c + d) / D, D * Lx - d * Lz * x, D * Ly - d * Lz * y, Lz
 
 
-def enter_axis(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """The start in the variables of a processed method."""
-    return state if rule.boost == 0.0 else process_axis(rule.boost, *state)
-
-
-def present_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """Back from the variables of a processed method."""
-    return state if rule.boost == 0.0 else process_axis(-rule.boost, *state)
+@register_jitable
+def _no_spin(par: Any, state: Any, t: float) -> Any:
+    return state
 
 
 @register_jitable
 def force_attitude(par: Any, state: Any, step: Any) -> Any:
-    """The present axis: what a kick needs."""
+    """The present axis."""
     return axis_of(state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3])
 
 
@@ -196,27 +167,8 @@ def turn_attitude(state: Any, step: Any, s: float, m: float) -> Any:
 
 
 @register_jitable
-def drift_attitude(rule: Any, state: Any, step: Any, half: float) -> Any:
-    """Free rotation, without the spin about the body's axis."""
-    s, m = rotor(rule, half_square(state, step, half), half)
-    return turn_attitude(state, step, s, m)
-
-
-@register_jitable
-def ended_attitude(state: Any, step: Any) -> int:
-    """Is the step finite?"""
+def _ended_attitude(state: Any, step: Any) -> int:
     return finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4] + step[5])
-
-
-def begin_attitude(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """The axis at the start."""
-    return force_attitude(par, state, (0.0, 0.0, 0.0, 0.0))
-
-
-def increment_attitude(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (q, L); the work counted is the number of kicks with a new axis."""
-    step, axis = compose(force_attitude, kick_space, drift_attitude, par, rule, state, carry)
-    return step, axis, rule.forces, ended_attitude(state, step)
 
 
 @register_jitable
@@ -230,35 +182,50 @@ def process_attitude(s: float, w: float, x: float, y: float, z: float, Lx: float
     return up * w, down * x, down * y, up * z, D * Lx - d * Lz * ex, D * Ly - d * Lz * ey, Lz
 
 
-def enter_attitude(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """The start in the variables of a processed method."""
-    return state if rule.boost == 0.0 else process_attitude(rule.boost, *state)
+class Kernel(NamedTuple):
+    """What `kernel_loop` takes of a chart, and how a rule runs in lanes."""
+
+    begin: Callable[..., Any]
+    increment: Callable[..., Any]
+    enter: Callable[..., Any]
+    present: Callable[..., Any]
+    lanes: Callable[[Composition], Lanes]
 
 
-def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """The spin since the start, and back from the variables of a processed method."""
-    if rule.boost != 0.0:
-        state = process_attitude(-rule.boost, *state)
-    return with_spin(par, state, k * h)
-
-
-def _in_lanes(force: Any, turned: Any, ended: Any, dimension: int) -> Callable[[Composition], Lanes]:
-    """What runs a rule in lanes: one kernel for each rotation."""
+def _kernel(force: Any, turned: Any, ended: Any, process: Any, spun: Any, dimension: int) -> Kernel:
+    """The functions of a chart; `process` is the flow of G, `spun` adds the spin to a sample."""
+    zeros = (0.0,) * dimension
     exact, cayley = (
         composed(force, kick_space, drift, ended, top=SpaceTop, dimension=dimension, carry=3, still=1)
         for drift in without_branch(turned)
     )
-    return lambda rule: exact if rule.turn == EXACT else cayley
+
+    @register_jitable
+    def drift(rule, state, step, half):  # type: ignore[no-untyped-def]
+        s, m = rotor(rule, half_square(state, step, half), half)
+        return turned(state, step, s, m)
+
+    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
+        return force(par, state, zeros)
+
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        """The work counted is the number of kicks with a new axis."""
+        step, axis = compose(force, kick_space, drift, par, rule, state, carry)
+        return step, axis, rule.forces, ended(state, step)
+
+    def enter(par, rule, state, h):  # type: ignore[no-untyped-def]
+        return state if rule.boost == 0.0 else process(rule.boost, *state)
+
+    def present(par, rule, state, k, h):  # type: ignore[no-untyped-def]
+        return spun(par, state if rule.boost == 0.0 else process(-rule.boost, *state), k * h)
+
+    return Kernel(begin, increment, enter, present, lambda rule: exact if rule.turn == EXACT else cayley)
 
 
-march_axis = kernel_loop(
-    begin_axis, increment_axis, observe_axis, enter_axis, present_axis,
-    lanes=_in_lanes(force_axis, turn_axis, ended_axis, 6),
-)  # fmt: skip
-march_attitude = kernel_loop(
-    begin_attitude, increment_attitude, observe_attitude, enter_attitude, present_attitude,
-    lanes=_in_lanes(force_attitude, turn_attitude, ended_attitude, 7),
-)  # fmt: skip
+AXIS = _kernel(force_axis, turn_axis, _ended_axis, process_axis, _no_spin, 6)
+ATTITUDE = _kernel(force_attitude, turn_attitude, _ended_attitude, process_attitude, with_spin, 7)
+march_axis = kernel_loop(*AXIS[:2], observe_axis, *AXIS[2:4], lanes=AXIS.lanes)
+march_attitude = kernel_loop(*ATTITUDE[:2], observe_attitude, *ATTITUDE[2:4], lanes=ATTITUDE.lanes)
 
 
 def strang_energy(seen: View, momenta: Momenta, h: float) -> Array:

@@ -4,15 +4,12 @@
     attitude:  q' = (L q / I1 + (1/I3 - 1/I1) p_psi q k)/2,  L' as above with e = q k q*    seven variables
     angles:    the Euler-Lagrange equations, with poles (see `euler_lagrange`)               six variables
 
-All constants, |e| = 1, L.e = p_psi, L_z = p_phi and the energy, are linear or quadratic in (e, L). The axis chart is
-three times cheaper than the attitude chart and is used whenever nobody asks for the spin angle. The order follows
-from the tolerance (about 20 in double); the step from the size of the series' last terms. Asking for a
-hundredth of the rounding unit removes the truncation bias that makes energy drift linearly at tolerance eps.
+The order follows from the tolerance (about 20 in double), the step from the size of the series' last terms. Asking for
+a hundredth of the rounding unit removes the truncation bias that makes energy drift linearly at tolerance eps.
 `taylor` works in double, `taylor-longdouble` and `taylor-quad` with mantissas of 64 and 113 bits: they show what the
 method does without rounding, and `symtop.reference` is made by the same function. A Taylor step of order n computes n
-derivatives of the state; `force_evaluations` counts them.
-The registry has the two charts without poles. In angles the method would be the first choice for whoever observes the
-nutation or the attitude, and it is neither the fastest there nor safe: the study of charts makes a record for itself.
+derivatives of the state; `force_evaluations` counts them. The registry has the two charts without poles; the study of
+charts makes a record in angles for itself.
 Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
 """
 
@@ -66,15 +63,12 @@ def equations(chart: str) -> list[Any]:
     return [*zip(axis, motion, strict=True), *zip(momentum, [-mgl * y, mgl * x, 0.0 * x], strict=True)]
 
 
-Read = Callable[[SymmetricTop, Array, Array], tuple[Array, Array, Array]]  # (top, times, states)
-
-
 class Arithmetic(NamedTuple):
-    """A floating-point type that heyoka offers."""
+    """A floating-point type of heyoka."""
 
     kind: Any  # converts a decimal string
     epsilon: float
-    compact: bool  # unrolled code in quadruple precision takes 20 times longer to build and runs no faster
+    compact: bool  # unrolled code in quadruple precision takes long to build and runs no faster
 
 
 def arithmetic(precision: str) -> Arithmetic:
@@ -106,10 +100,7 @@ def _idle(chart: str, precision: str, tolerance: float) -> list[Any]:
 
 @functools.lru_cache(maxsize=256)
 def start_numbers(chart: str, precision: str, top: SymmetricTop, at: Angles) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    """State and parameters of a start, correctly rounded to the working precision from its exact doubles.
-
-    Momenta that were rounded to double first would move theta(8) by 5e-15 in the first scene.
-    """
+    """State and parameters of a start, correctly rounded; in double theta(8) would move by 5e-15."""
     kind, mp = arithmetic(precision).kind, context(START_DIGITS)
     theta, phi, psi, *rates = (mp.mpf(getattr(at, name)) for name in at.__slots__)
     if chart == "angles":
@@ -138,10 +129,7 @@ class Flight(NamedTuple):
 def propagate(
     chart: str, precision: str, tolerance: float, top: SymmetricTop, start: Angles, times: Array, most: int = 0
 ) -> Flight:
-    """heyoka's states at increasing times, in the working precision; the one place where heyoka is run.
-
-    After `most` steps (0: never) it stops, and the states end at the last time that was reached.
-    """
+    """heyoka's states, in the working precision, at increasing times, or those reached in `most` steps."""
     idle, kind = _idle(chart, precision, tolerance), arithmetic(precision).kind
     try:
         integrator = idle.pop()  # in one instruction: another thread may be here, too
@@ -159,11 +147,8 @@ def propagate(
     return Flight(states[grid.size - times.size :], int(steps), order, outcome.name)
 
 
-def solver(chart: str, precision: str, read: Read | None = None) -> Solver:
-    """A solver of the registry in one chart and one arithmetic; samples are rounded to double.
-
-    In angles, `read` makes states of the chart and both momenta of the states that were integrated.
-    """
+def solver(chart: str, precision: str, read: Callable[..., tuple[Array, Array, Array]] | None = None) -> Solver:
+    """A solver of one chart and precision, samples in double; in angles, `read(top, times, states)` adds momenta."""
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         most = max(1, int(min(plan.most(MOST_STEPS[precision]), sys.maxsize)))  # infinity is a budget, too
@@ -187,14 +172,13 @@ def solver(chart: str, precision: str, read: Read | None = None) -> Solver:
 def _padded(values: Any, size: int) -> Array:
     """Values as doubles, and NaN for the times that were not reached."""
     if len(values) == size and values.dtype == np.float64:
-        whole: Array = values  # of a run's own: no copy
-        return whole
+        return values  # type: ignore[no-any-return]  # of a run's own: no copy
     padded = np.full((size, *values.shape[1:]), np.nan)
     padded[: len(values)] = values
     return padded
 
 
-# beyond double there are no vector units, and quadruple precision is software: a step costs 12 and 500 times as much
+# beyond double there are no vector units, and quadruple precision is software
 _SUMMARIES = {
     "double": "heyoka's Taylor series on the space-frame equations, without poles",
     "longdouble": "heyoka's Taylor series in 80-bit arithmetic, samples rounded to double",
@@ -211,9 +195,18 @@ def built_in() -> list[Integrator]:
     wide = ["longdouble"] if np.finfo(np.longdouble).eps < EPSILON else []
     quad = ["quad"] if hasattr(hy, "real128") else []
     return [
-        _entry(precision, {chart: solver(chart, precision) for chart in ("axis", "attitude")})
+        Integrator(
+            name="taylor" if precision == "double" else f"taylor-{precision}",
+            family="taylor", summary=_SUMMARIES[precision],
+            solvers={chart: solver(chart, precision) for chart in ("axis", "attitude")},
+            control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
+            least_tolerance=arithmetic(precision).epsilon / 1000.0,
+            default_tolerance=arithmetic(precision).epsilon / 100.0,
+            reference="biscani-izzo-2021", needs="expression", general=True, inner_loop="heyoka", precision=precision,
+            speed=0.002 if precision == "quad" else 1.0,
+        )
         for precision in ("double", *wide, *quad)
-    ]
+    ]  # fmt: skip
 
 
 def missing() -> dict[str, str]:
@@ -221,21 +214,4 @@ def missing() -> dict[str, str]:
     if importlib.util.find_spec("heyoka") is not None:
         return {}
     reason = "needs the package heyoka, which has wheels for Linux only (elsewhere: conda-forge)"
-    names = ["taylor", *(f"taylor-{precision}" for precision in _SUMMARIES if precision != "double")]
-    return {name: f"{name} {reason}" for name in names}
-
-
-def _entry(precision: str, solvers: dict[str, Solver]) -> Integrator:
-    epsilon = arithmetic(precision).epsilon
-    return Integrator(
-        name="taylor" if precision == "double" else f"taylor-{precision}",
-        family="taylor",
-        summary=_SUMMARIES[precision],
-        solvers=solvers,
-        control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
-        least_tolerance=epsilon / 1000.0,
-        default_tolerance=epsilon / 100.0,
-        reference="biscani-izzo-2021", needs="expression", general=True, inner_loop="heyoka",
-        precision=precision,
-        speed=0.002 if precision == "quad" else 1.0,
-    )  # fmt: skip
+    return {name: f"{name} {reason}" for name in ("taylor", "taylor-longdouble", "taylor-quad")}

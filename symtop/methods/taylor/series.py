@@ -8,7 +8,7 @@
 
 c1 and c0 are constants of the motion, so that the equation of w is linear with the coefficient u, and that of u knows u
 alone. With y = w/(h mgl), a = h/I1, m = h mgl, P = a p_phi and S_n = [Re y_n, Im y_n, u_n] the coefficients of
-(t/h)^n, an order is one product of u with all three, in one register (`symtop.core.simd`):
+(t/h)^n, an order is one product of u with all three, in one register (`symtop.methods.simd`):
 
     S_{n+2} = [1, 1, 3] (kappa (sum_{0<j<n} u_j S_{n-j} + u_0 S_n) + u_n G)/((n+1)(n+2)) + [-P, P] swap(S_{n+1})/(n+2)
     G = [a Re w, a Im w, 2 kappa u_0 - c1/3]        (u_0 S_n only of y),        S_1 = [-Im z, Re z, a Im(conj(w) z)]
@@ -16,7 +16,7 @@ alone. With y = w/(h mgl), a = h/I1, m = h mgl, P = a p_phi and S_n = [Re y_n, I
 
 N (N - 1)/2 fused products for the order N, 190 for N = 20, where a general compiler of Taylor series takes six scalar
 products, 3 N^2. Three traps. c1 and c0 are those of the *present* state: constants of the start make it unstable.
-kappa = a m is applied as two products: rounded, it drives the energy away 5 times as fast. And L from w'/(i mgl) loses
+kappa = a m is applied as two products: rounded, it drives the energy away. And L from w'/(i mgl) loses
 digits where gravity is weak, so that y carries L and z comes from its slope.
 
 *The attitude*: the half angles beside the axis, by the same heights.
@@ -61,24 +61,15 @@ from numba.extending import intrinsic
 from symtop.core.errors import SymtopError, whole
 from symtop.core.jit import compile_kernel, register_jitable, set_item
 from symtop.core.numbers import EPSILON
-from symtop.core.simd import Components, Vectors
+from symtop.methods.framework import space
 from symtop.methods.framework.adaptive import Adaptive
-from symtop.methods.framework.fixed_step import FixedStep
 from symtop.methods.framework.lanes import Lanes, one_loop
-from symtop.methods.framework.loop import Loop, kernel_loop, no_carry
+from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import Body, Scaled, Start
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.framework.space import (
-    SpaceTop,
-    axis_of,
-    finite_outcome,
-    observe_attitude,
-    observe_axis,
-    on_attitude,
-    on_axis,
-    with_spin,
-)
+from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, with_spin
+from symtop.methods.simd import Components, Vectors
 from symtop.methods.vectors import accumulate
 
 
@@ -89,8 +80,7 @@ class Scale(NamedTuple):
     pull: float = 1.0  # m = h mgl
 
 
-def scale(rule: Any, top: Any, at: Any, h: float) -> Any:
-    """The step of one run."""
+def _scale(rule: Any, top: Any, at: Any, h: float) -> Any:
     return Scale(h / top.I1, h * top.mgl)
 
 
@@ -184,8 +174,7 @@ def axis_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..., A
 
         return types.UniTuple(types.float64, 7)(state, a, m), emit
 
-    compiled: Callable[..., Any] = intrinsic(series)
-    return compiled
+    return intrinsic(series)  # type: ignore[no-any-return]
 
 
 def _first_halves(v: Vectors, q: Any, w: Any, a: Any, P: Any) -> tuple[Any, Any]:
@@ -251,8 +240,7 @@ def attitude_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..
 
         return types.UniTuple(types.float64, 8)(state, a, m), emit
 
-    compiled: Callable[..., Any] = intrinsic(series)
-    return compiled
+    return intrinsic(series)  # type: ignore[no-any-return]
 
 
 def present(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
@@ -302,24 +290,14 @@ def _loop(
     return loop
 
 
-march_axis = _loop(axis_sum, 6, observe_axis)
-march_attitude = _loop(attitude_sum, 7, observe_attitude, present=present)
+march_axis = _loop(axis_sum, 6, space.observe_axis)
+march_attitude = _loop(attitude_sum, 7, space.observe_attitude, present=present)
 
 
 ORDERS = (8, 12, 16, 20)
 BLOCK = 1_000_000  # series between returns to Python
 SERIES = 200_000_000  # of one run: about half a minute
 ACCEPTED, SAFETY, GROW, EARLIER = 4.0, 0.95, 4.0, 0.25
-
-
-class Chart(NamedTuple):
-    """What a chart's series and samples are."""
-
-    numbers: Callable[..., Any]
-    series: Callable[[int], Callable[..., Any]]
-    sample: Callable[..., Any]  # (par, state, t)
-    axis: Callable[..., Any]  # of the first components of a state
-    size: int
 
 
 @register_jitable
@@ -337,9 +315,9 @@ def _of_quaternion(state: Any) -> Any:
     return axis_of(state[0], state[1], state[2], state[3])
 
 
-CHARTS = {
-    "axis": Chart(on_axis.numbers, axis_sum, _as_summed, _first_three, 6),
-    "attitude": Chart(on_attitude.numbers, attitude_sum, with_spin, _of_quaternion, 7),
+CHARTS: dict[str, tuple[Any, ...]] = {  # preparation, series, sample(par, state, t), axis of a state
+    "axis": (space.on_axis, axis_sum, _as_summed, _first_three),
+    "attitude": (space.on_attitude, attitude_sum, with_spin, _of_quaternion),
 }
 
 
@@ -350,14 +328,14 @@ def order_for(tolerance: float) -> int:
 
 @functools.cache
 def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int, int]]:  # noqa: C901
-    """The loop of one order in one chart, compiled when it is first used.
+    """The loop of one order in one chart as `adaptive` takes it, compiled; it counts the series of its steps.
 
-    It is a loop as `adaptive` takes it, from the place (state, its low half, time, its low half, step), and counts
-    the series of its steps.
+    The place is (state, its low half, time, its low half, step).
     """
-    prepare, series_of, sample, axis, size = CHARTS[chart]
-    series = series_of(order)
+    preparation, series_of, sample, axis = CHARTS[chart]
+    prepare, size, series = preparation.numbers, preparation.size, series_of(order)
 
+    @register_jitable
     def terms(state, body, h):  # type: ignore[no-untyped-def]
         out = series(state, h / body.I1, h * body.mgl)
         dstate = state
@@ -365,8 +343,6 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
             dstate = set_item(dstate, i, out[i])
         last = max(math.sqrt(out[size - 1]), EARLIER * math.sqrt(out[size]))
         return set_item(dstate, size - 1, 0.0), last
-
-    register_jitable(terms)
 
     def run(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]  # noqa: C901
         body = Body(*numbers[:3])
@@ -417,18 +393,16 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
         place[2 * size], place[2 * size + 1], place[2 * size + 2] = t, rest, h
         return seen, steps, effort, outcome
 
-    compiled: Callable[..., tuple[int, int, int, int]] = compile_kernel(run)
-    return compiled
+    return compile_kernel(run)  # type: ignore[no-any-return]
 
 
 def solver(chart: str) -> Adaptive:
     """A solver of the registry in one chart."""
-    size = CHARTS[chart].size
-
-    def loop(tolerance: float) -> Callable[..., tuple[int, int, int, int]]:
-        return march_adaptive(chart, order_for(tolerance))
-
-    return Adaptive(loop, size, 2 * size + 3, 2 * size, SERIES, BLOCK, order_for)
+    size = CHARTS[chart][0].size
+    return Adaptive(
+        lambda tolerance: march_adaptive(chart, order_for(tolerance)),
+        size, 2 * size + 3, 2 * size, SERIES, BLOCK, order_for,
+    )  # fmt: skip
 
 
 DEFAULT_ORDER = 16
@@ -439,14 +413,13 @@ def series(name: str, order: int = DEFAULT_ORDER) -> Integrator:
     order = whole("order", order, ORDERS[0])
     if order not in ORDERS:
         raise SymtopError(f"order must be one of {', '.join(map(str, ORDERS))}, not {order!r}")
-    rule = Scaled(Scale(), scale)
+    rule = Scaled(Scale(), _scale)
     return Integrator(
-        name=name,
-        family="taylor",
+        name=name, family="taylor",
         summary=f"Taylor series on the space-frame equations, order {order}, by products of vectors",
         solvers={
-            "axis": FixedStep(march_axis(order), rule, on_axis, order, implicit=False),
-            "attitude": FixedStep(march_attitude(order), rule, on_attitude, order, implicit=False),
+            "axis": FixedStep(march_axis(order), rule, space.on_axis, order, implicit=False),
+            "attitude": FixedStep(march_attitude(order), rule, space.on_attitude, order, implicit=False),
         },
         order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi"}),
         reference="biscani-izzo-2021", needs="this-top", general=False, inner_loop="vector registers",
@@ -456,13 +429,11 @@ def series(name: str, order: int = DEFAULT_ORDER) -> Integrator:
 def built_in() -> list[Integrator]:
     """`series` and `series-adaptive`."""
     adaptive = Integrator(
-        name="series-adaptive",
-        family="taylor",
+        name="series-adaptive", family="taylor",
         summary="Taylor series on the space-frame equations with order and steps of a tolerance, compiled",
         solvers={chart: solver(chart) for chart in CHARTS},
         control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi"}),
-        least_tolerance=EPSILON / 1000.0,
-        default_tolerance=EPSILON / 10.0,
+        least_tolerance=EPSILON / 1000.0, default_tolerance=EPSILON / 10.0,
         reference="biscani-izzo-2021", needs="this-top", general=False, inner_loop="vector registers",
     )  # fmt: skip
     return [series("series"), adaptive]

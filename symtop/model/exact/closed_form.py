@@ -12,24 +12,23 @@ the axis is near and one to the pole that it is far from; up to a common real fa
     m >  1/2    near = cosh s P + i sinh s P, far = P + i sinh 2s P,   s = pi K x/2K',  C = cosh 2s,  nome exp(-pi K/K')
 
 The second line is Jacobi's imaginary transformation. The nome is at most exp(-pi) = 0.043 either way: the first dropped
-term is below 1e-19, m -> 1 is no special case, and m = 0 is trigonometry. As abs(x) <= 1/2, everything is relatively
-accurate at both turning points, however closely the axis grazes a pole there. Then
+term is below 1e-19, and m -> 1 is no special case. As abs(x) <= 1/2, everything is relatively accurate at both turning
+points, however closely the axis grazes a pole there. Then
 
     theta = 2 atan2(abs B, abs A),        (phi +- psi)/2 = mean rate t + (argument - its mean growth) + const,
     theta' sin theta = const theta_1(2z)/theta_4(z)^4,        u - u1, u2 - u = const theta_k(z)^2/theta_4(z)^2.
 
 The phase and the secular angles are products of t with rates of two doubles, so that the error of theta does not grow
-with time, and that of phi and psi only as their last digit does. No special functions, and nothing is expanded in the
-amplitude: not to be confused with the small-nutation approximation. Constants: `symtop.model.exact.constants`, and in
-40 digits `symtop.model.exact.digits`; evaluation: `symtop.model.exact.samples`. Sources: Klein and Sommerfeld, Theory
-of the Top, chapter 6; Whittaker and Watson, A Course of Modern Analysis, chapter 21.
+with time, and that of phi and psi only as their last digit does. Nothing is expanded in the amplitude. Constants:
+`symtop.model.exact.constants`, and in 40 digits `symtop.model.exact.digits`; evaluation: `symtop.model.exact.samples`.
+Sources: Klein and Sommerfeld, Theory of the Top, chapter 6; Whittaker and Watson, A Course of Modern Analysis, 21.
 
 Both classes loop over their members with the same compiled functions, so that a member has the bits of its own closed
-form. The functions release the interpreter's lock and write to arrays of their own: threads may share the work.
+form; the functions release the interpreter's lock, and threads may share the work.
 """
 
 from functools import cached_property
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,31 +38,12 @@ from symtop.core.lazy_kernel import LazyKernel
 from symtop.core.numbers import real_numbers
 from symtop.model import charts
 from symtop.model.charts import Array
-from symtop.model.exact import layout as at
+from symtop.model.exact import layout as at, samples
 from symtop.model.exact.constants import DONE, OUT_OF_RANGE, UNMET, UNRESOLVED, all_constants
 from symtop.model.exact.digits import Motion
-from symtop.model.exact.samples import (
-    AXIS,
-    LONGEST_TIME,
-    MOMENTUM,
-    MOTION,
-    QUATERNION,
-    ROWS,
-    RUN,
-    STATE,
-    TURNS,
-    WIDTHS,
-    all_gaps,
-    all_samples,
-)
 from symtop.model.top import LARGEST, NUMBERS, Angles, SymmetricTop, flat
 
-ARITHMETIC = {
-    at.EXACTLY: "double",
-    at.DOUBLE_DOUBLE: "double-double",
-    at.QUAD_DOUBLE: "quad-double",
-    at.DIGITS: "40 digits",
-}
+ARITHMETIC = ("double", "double-double", "quad-double", "40 digits")  # by `layout.EXACTLY`, `layout.DOUBLE_DOUBLE`, ...
 REASONS = {
     DONE: "",
     OUT_OF_RANGE: "the data or the turning points leave the range in which squares of doubles keep their digits",
@@ -74,8 +54,10 @@ DIGITS_ERROR = 1e-40  # relative, of constants from 40 digits
 
 # seconds: interpreted, a form 5e-4 and a sample 1e-5; compiling 10 s and 2 s of processor time, loading 0.3 s
 _build = LazyKernel(all_constants, "(float64[:, ::1], float64[:, ::1])", patience=10.0)
-_fill = LazyKernel(all_samples, "(float64[:, ::1], float64[:, ::1], int64, float64[:, :, ::1])", patience=2.0)
-_compare = LazyKernel(all_gaps, "(float64[:, ::1], float64[:, ::1], float64[:, :, :], float64[:, ::1])", patience=2.0)
+_fill = LazyKernel(samples.all_samples, "(float64[:, ::1], float64[:, ::1], int64, float64[:, :, ::1])", patience=2.0)
+_compare = LazyKernel(
+    samples.all_gaps, "(float64[:, ::1], float64[:, ::1], float64[:, :, :], float64[:, ::1])", patience=2.0
+)
 FORM_SECONDS, SAMPLE_SECONDS = 5e-4, 1e-5
 
 
@@ -87,74 +69,45 @@ class Provenance(NamedTuple):
     reason: str  # why 40 digits were needed, or empty
 
 
-Number = TypeVar("Number", float, Array)  # of one top, and (n,) of many
+def _constant(place: int, words: str) -> property:
+    """A property that reads one constant of a form, or of each of many."""
+    return property(lambda form: form._constant(place), doc=words)
 
 
-class _Form(Generic[Number]):
-    """What one closed form and many have in common: constants, and views of the motion at given times.
+class _Form:
+    """Constants and views of the motion; shapes are those of a `ClosedForm`, with the member first in `ClosedForms`."""
 
-    Shapes are those of a `ClosedForm`; those of many `ClosedForms` begin with the member.
-    """
-
-    def _constant(self, place: int) -> Number:
-        raise NotImplementedError
+    energy = _constant(at.ENERGY, "Total energy, p_psi^2/2 I3 included.")
+    p_phi = _constant(at.P_PHI, "Momentum conjugate to phi.")
+    p_psi = _constant(at.P_PSI, "Momentum conjugate to psi.")
+    nutation_period = _constant(
+        at.PERIOD, "Time from one turning point of a kind to the next; infinite without a next."
+    )
+    phi_per_period = _constant(at.PHI_PER_PERIOD, "Mean precession in a nutation period, radians.")
+    psi_per_period = _constant(at.PSI_PER_PERIOD, "Mean growth of psi in a nutation period, radians.")
+    precession_rate = _constant(at.PHI_LINE, "Mean of phi' over a nutation, radians per unit time.")
 
     def _view(self, times: ArrayLike, view: int) -> Array:
         raise NotImplementedError
 
-    @property
-    def energy(self) -> Number:
-        """Total energy, p_psi^2/2 I3 included."""
-        return self._constant(at.ENERGY)
-
-    @property
-    def p_phi(self) -> Number:
-        """Momentum conjugate to phi."""
-        return self._constant(at.P_PHI)
-
-    @property
-    def p_psi(self) -> Number:
-        """Momentum conjugate to psi."""
-        return self._constant(at.P_PSI)
-
-    @property
-    def nutation_period(self) -> Number:
-        """Time from one turning point of a kind to the next; infinite where there is no next."""
-        return self._constant(at.PERIOD)
-
-    @property
-    def phi_per_period(self) -> Number:
-        """Mean precession in a nutation period, radians."""
-        return self._constant(at.PHI_PER_PERIOD)
-
-    @property
-    def psi_per_period(self) -> Number:
-        """Mean growth of psi in a nutation period, radians."""
-        return self._constant(at.PSI_PER_PERIOD)
-
-    @property
-    def precession_rate(self) -> Number:
-        """Mean of phi' over a nutation, radians per unit time."""
-        return self._constant(at.PHI_LINE)
-
     def quaternion(self, times: ArrayLike) -> Array:
         """Attitude (w, x, y, z), body to space, shape (..., 4); continuous in time, through poles as well."""
-        return self._view(times, QUATERNION)
+        return self._view(times, samples.QUATERNION)
 
     def axis(self, times: ArrayLike) -> Array:
         """Unit vector along the top's axis, shape (..., 3)."""
-        return self._view(times, AXIS)
+        return self._view(times, samples.AXIS)
 
     def momentum(self, times: ArrayLike) -> Array:
         """Angular momentum L in the space frame, shape (..., 3), in units of I1 times a rate."""
-        return self._view(times, MOMENTUM)
+        return self._view(times, samples.MOMENTUM)
 
     def state(self, times: ArrayLike) -> Array:
         """Quaternion and angular momentum, shape (..., 7): a state of the attitude chart."""
-        return self._view(times, STATE)
+        return self._view(times, samples.STATE)
 
 
-class ClosedForm(_Form[float]):
+class ClosedForm(_Form):
     """Closed-form motion of `top` from `start` at time 0, all numbers read as exact doubles.
 
     Errors, measured against 50 digits for times up to 1e6: theta 1e-15; phi and psi one unit in the last place plus
@@ -162,14 +115,14 @@ class ClosedForm(_Form[float]):
     finite; so does construction if the axis comes within 1e-145 of a pole that it does not meet.
 
     The constants are double-double numbers. Where a bound says that this is too little they come from quad-double sums,
-    and where that is too little, too, from 40 digits, which takes a thousand times as long: see `provenance`.
+    and where that is too little, too, from 40 digits: see `provenance`.
 
     `nutation_period` is that of small nutations for a steady precession, and infinite where the axis stands on an
     unstable pole or climbs to it for ever; `phi_per_period`, `psi_per_period` are the mean growth over it (0 if the
     mean rate is 0) and `theta_range` the two turning points, radians.
 
     Where the axis passes exactly through a pole, theta' changes sign, and phi and psi jump by pi there and back in
-    turn; `axis`, `quaternion` and `momentum` are smooth. On a pole only phi + psi (phi - psi at pi) has a meaning.
+    turn. On a pole only phi + psi (phi - psi at pi) has a meaning.
     """
 
     def __init__(self, top: SymmetricTop, start: Angles) -> None:
@@ -185,7 +138,7 @@ class ClosedForm(_Form[float]):
     @property
     def provenance(self) -> Provenance:
         """The arithmetic that served for the constants, the bound that it left, and why it was not a shorter one."""
-        kind = float(self._constants[at.ARITHMETIC])
+        kind = int(self._constants[at.ARITHMETIC])
         error = DIGITS_ERROR if kind == at.DIGITS else float(self._constants[at.RATE_ERROR])
         return Provenance(ARITHMETIC[kind], error, REASONS[int(self._constants[at.STATUS])])
 
@@ -197,22 +150,20 @@ class ClosedForm(_Form[float]):
     def __call__(self, times: ArrayLike) -> Motion[Array]:
         """Angles and rates at `times`; every field has their shape."""
         flat_times, shape = _in_a_row(times)
-        motion = fill(self._all, flat_times, MOTION)[0]
+        motion = fill(self._all, flat_times, samples.MOTION)[0]
         return Motion(*motion) if len(shape) == 1 else Motion(*(row.reshape(shape) for row in motion))
 
     def turns(self, times: Array) -> Array:
-        """phi and psi alone (2, n) at a row of times, with the bits of a call, at two thirds of its cost."""
-        rows: Array = fill(self._all, _in_a_row(times)[0], TURNS)[0]
-        return rows
+        """phi and psi alone (2, n) at a row of times, with the bits of a call."""
+        return np.asarray(fill(self._all, _in_a_row(times)[0], samples.TURNS)[0])
 
     def axis_distance(self, times: Array, axes: Array) -> Array:
         """Angles between axes (n, 3) and the top's at times (n,), rad, shape (n,)."""
-        apart: Array = distances(self._all, _in_a_row(times)[0], axes[None])[0]
-        return apart
+        return np.asarray(distances(self._all, _in_a_row(times)[0], axes[None])[0])
 
     def run(self, times: Array) -> tuple[Array, Array, Array]:
         """States (n, 7) at a row of times, with p_phi = L_z and p_psi = L.e read off them."""
-        values = fill(self._all, _in_a_row(times)[0], RUN)[0]
+        values = fill(self._all, _in_a_row(times)[0], samples.RUN)[0]
         return values[:, :7], values[:, 7], values[:, 8]
 
     def _constant(self, place: int) -> float:
@@ -221,7 +172,7 @@ class ClosedForm(_Form[float]):
     def _view(self, times: ArrayLike, view: int) -> Array:
         flat_times, shape = _in_a_row(times)
         values = fill(self._all, flat_times, view)
-        return values[0] if len(shape) == 1 else values.reshape(*shape, WIDTHS[view])
+        return values[0] if len(shape) == 1 else values.reshape(*shape, samples.WIDTHS[view])
 
 
 def compile_now() -> None:
@@ -254,12 +205,12 @@ def fill(constants: Array, times: Array, view: int) -> Array:
 
     Raises `SymtopError` for a time that is not finite.
     """
-    count, width = times.shape[1], WIDTHS[view]
-    out = np.empty((len(constants), width, count) if view in ROWS else (len(constants), count, width))
+    count, width = times.shape[1], samples.WIDTHS[view]
+    out = np.empty((len(constants), width, count) if view in samples.ROWS else (len(constants), count, width))
     if _fill.ready(SAMPLE_SECONDS * len(constants) * count):
         bad = _fill.compiled(constants, times, view, out)
     else:
-        bad = all_samples(constants.tolist(), times.tolist(), view, out)
+        bad = samples.all_samples(constants.tolist(), times.tolist(), view, out)
     _within_range(times, bad)
     return out
 
@@ -267,7 +218,7 @@ def fill(constants: Array, times: Array, view: int) -> Array:
 def distances(constants: Array, times: Array, axes: Array) -> Array:
     """Angles (n, samples) between axes (n, samples, 3) and those of n tops, rad; times as in `fill`."""
     if not _compare.ready(SAMPLE_SECONDS * axes.size / 3):
-        return charts.axis_distance(axes, fill(constants, times, AXIS))
+        return charts.axis_distance(axes, fill(constants, times, samples.AXIS))
     out = np.empty(axes.shape[:2])
     _within_range(times, _compare.compiled(constants, times, axes, out))
     return out
@@ -276,9 +227,8 @@ def distances(constants: Array, times: Array, axes: Array) -> Array:
 def _within_range(times: Array, bad: int) -> None:
     """Refuse the time at the place `bad`; -1 is none."""
     if bad >= 0:
-        raise SymtopError(
-            f"times must be finite numbers of at most {LONGEST_TIME:g} in size, not {float(times.flat[bad])!r}"
-        )
+        words = f"times must be finite numbers of at most {samples.LONGEST_TIME:g} in size"
+        raise SymtopError(f"{words}, not {float(times.flat[bad])!r}")
 
 
 def _in_a_row(times: ArrayLike) -> tuple[Array, tuple[int, ...]]:
@@ -288,13 +238,13 @@ def _in_a_row(times: ArrayLike) -> tuple[Array, tuple[int, ...]]:
     return (row if row.flags.writeable else row.copy()), array.shape
 
 
-class ClosedForms(_Form[Array]):
+class ClosedForms(_Form):
     """Closed-form motions of n tops from rows (n, 9) of `NUMBERS`, as `symtop.model.top.flat` puts them together.
 
-    What `ClosedForm` says of a top is an array here, the first dimension the member. Times are a row for all members or
-    an array (n, samples). `constants` are laid out as `symtop.model.exact.layout` says. `refused` holds the
-    reason of each member whose axis comes so close to a pole that no form in doubles exists; what is asked of it is
-    NaN. Raises `SymtopError` for a row that is no top or no start.
+    What `ClosedForm` has of a top is an array here, the first dimension the member. Times are a row for all members or
+    an array (n, samples). `constants` are laid out as in `symtop.model.exact.layout`. A member whose axis comes so
+    close to a pole that no form in doubles exists is NaN, and `refused` holds the reason. Raises `SymtopError` for a
+    row that is no top or no start.
     """
 
     def __init__(self, numbers: ArrayLike) -> None:
@@ -316,7 +266,7 @@ class ClosedForms(_Form[Array]):
     @cached_property
     def arithmetic(self) -> list[str]:
         """The arithmetic that served for the constants of each member; empty if it was refused."""
-        return [ARITHMETIC.get(kind, "") for kind in self.constants[:, at.ARITHMETIC].tolist()]
+        return [ARITHMETIC[int(kind)] if kind >= 0.0 else "" for kind in self.constants[:, at.ARITHMETIC].tolist()]
 
     @property
     def theta_range(self) -> Array:
@@ -325,16 +275,16 @@ class ClosedForms(_Form[Array]):
 
     def __call__(self, times: ArrayLike) -> Motion[Array]:
         """Angles and rates at `times`, each (n, samples)."""
-        return Motion(*self._view(times, MOTION).swapaxes(0, 1))
+        return Motion(*self._view(times, samples.MOTION).swapaxes(0, 1))
 
     def turns(self, times: ArrayLike) -> tuple[Array, Array]:
         """phi and psi alone, each (n, samples), with the bits of a call."""
-        phi, psi = self._view(times, TURNS).swapaxes(0, 1)
+        phi, psi = self._view(times, samples.TURNS).swapaxes(0, 1)
         return phi, psi
 
     def run(self, times: ArrayLike) -> tuple[Array, Array]:
         """States (n, samples, 7), and p_phi = L_z and p_psi = L.e read off them, (n, samples, 2)."""
-        values = self._view(times, RUN)
+        values = self._view(times, samples.RUN)
         return values[..., :7], values[..., 7:]
 
     def _constant(self, place: int) -> Array:
@@ -344,9 +294,8 @@ class ClosedForms(_Form[Array]):
         given = real_numbers("times", times)
         rows = np.atleast_2d(given)
         if rows.ndim != 2 or (len(rows) != len(self) and given.ndim != 1):
-            raise SymtopError(
-                f"times must be a row for all members or have the shape ({len(self)}, samples), not {given.shape}"
-            )
+            words = f"times must be a row for all members or have the shape ({len(self)}, samples)"
+            raise SymtopError(f"{words}, not {given.shape}")
         return fill(self.constants, rows if rows.flags.writeable else rows.copy(), view)
 
 

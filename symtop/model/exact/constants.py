@@ -2,11 +2,10 @@
 
     data -> sums -> turning points (`turning_points`) -> half-angle functions (`elliptic`) -> frames, rates and lags
 
-Choice of arithmetic. The turning points carry bounds of relative errors. If a rate may be wrong by more than `RATE` or
-a value by more than `VALUE`, the sums are formed again in quad-double; if that does not do either, or if the data lie
-where squares leave the range of doubles, the answer is a status and the caller takes 40 digits. A rate good to 1e-28
-has the phase right to 1e-16 after 1e12 radians. At the end the form is evaluated at time 0 and compared with the start:
-a wrong constant, whatever its cause, shows there.
+The turning points carry bounds of relative errors. If a rate may be wrong by more than `RATE` or a value by more than
+`VALUE`, the sums are formed again in quad-double; if that is not enough, or if squares leave the range of doubles, the
+answer is a status and the caller takes 40 digits. A rate good to 1e-28 has the phase right to 1e-16 after 1e12 radians.
+At the end the form is evaluated at time 0 and compared with the start: a wrong constant shows there.
 
 Of a moving axis, with growth = d(phi +- psi)/dt less its drift,
 
@@ -61,18 +60,7 @@ from symtop.model.exact.elliptic import (
     value,
 )
 from symtop.model.exact.samples import halves
-from symtop.model.exact.turning_points import (
-    GRAIN,
-    Data,
-    Exact,
-    Sums,
-    TurningPoints,
-    exact_zeros,
-    long_sums,
-    short_sums,
-    turning_points,
-    unknown_points,
-)
+from symtop.model.exact.turning_points import GRAIN, RATE, VALUE, Data, Exact, Sums, TurningPoints, choose, exact_zeros
 
 LEAST_GAP, LEAST_SWING = 1e-280, 1e-130  # of distances from a pole, of u2 - u1
 DONE, OUT_OF_RANGE, UNRESOLVED, UNMET = range(4)  # what became of the constants
@@ -103,21 +91,18 @@ def put_line(out: Any, place: int, rate: DoubleDouble, start: DoubleDouble) -> N
 @shared
 def put_turns(out: Any, place: int, rate: DoubleDouble, start: DoubleDouble) -> None:
     """A line of angles in turns, its start to within whole turns."""
-    begun = mul(start, PER_TURN)
-    put_line(out, place, mul(rate, PER_TURN), add_double(begun, -whole_part(begun[0])))
+    turns = mul(start, PER_TURN)
+    put_line(out, place, mul(rate, PER_TURN), add_double(turns, -whole_part(turns[0])))
 
 
 @shared
 def _frame(
-    out: Any,
-    place: int,
-    near: Half,
-    far: Half,
-    distances: tuple[DoubleDouble, DoubleDouble],  # from the pole near the turning point, and from the other
-    depth: DoubleDouble,  # abs(u - u at the turning point) = depth angle^2
+    out: Any, place: int, near: Half, far: Half, least: DoubleDouble, most: DoubleDouble, depth: DoubleDouble
 ) -> None:
-    """The half-angle functions about a turning point, scaled to the moduli that they have there."""
-    least, most = distances
+    """The half-angle functions about a turning point, scaled to the moduli that they have there.
+
+    It is at `least` from the pole that it is near and at `most` from the other; abs(u - u there) = depth angle^2.
+    """
     if least[0] == 0.0:
         near_unit = div(root(scaled(depth, 0.5)), total(near.near_imag))
     else:
@@ -132,10 +117,9 @@ def _frame(
 
 
 @shared
-def _begun(
+def _argument_at_start(
     half: Half, near: bool, hyperbolic: bool, sine: DoubleDouble, cosine: DoubleDouble, twice: DoubleDouble
 ) -> DoubleDouble:
-    """The argument of a half-angle function at the start."""
     if near:
         real, imag = mul(cosine, value(half.near_real, twice)), mul(sine, value(half.near_imag, twice))
     elif hyperbolic:
@@ -209,8 +193,8 @@ def move(data: Data, sums: Sums, exact: Exact, points: TurningPoints, out: Any) 
         place = mul(angle, scaled(PER_PI, 2.0))
         twice = add_double(scaled(square(sine), -2.0), 1.0)
     rising = -1.0 if (data.theta_dot if upright else -data.theta_dot) > 0.0 else 1.0  # the sign of u'
-    begun = scaled(sub(ONE, place), rising) if late else scaled(place, rising)
-    put_line(out, at.QUARTERS, per_time, begun)
+    elapsed = scaled(sub(ONE, place), rising) if late else scaled(place, rising)
+    put_line(out, at.QUARTERS, per_time, elapsed)
     at_floor = sn2[0] == 0.0
     out[at.FLOOR_SIGN] = 1.0 if (rising > 0.0 and sn2[0] > 0.0) or (at_floor and data.theta_dot >= 0.0) else -1.0
 
@@ -220,11 +204,11 @@ def move(data: Data, sums: Sums, exact: Exact, points: TurningPoints, out: Any) 
     growth_down = growth_up = lag_down = lag_up = ZERO
     if sign_down != 0.0:
         growth_down = add(div(sums.twist_down, points.d2), scaled(mul(turn, lower.turning), 2.0 * sign_down))
-        argument = _begun(lower, not late, hyperbolic, sine, cosine, twice)
+        argument = _argument_at_start(lower, not late, hyperbolic, sine, cosine, twice)
         lag_down = scaled(sub(argument, mul(lower.growth, place)), side * sign_down)
     if sign_up != 0.0:
         growth_up = add(div(sums.twist_up, points.e1), scaled(mul(turn, upper.turning), 2.0 * sign_up))
-        argument = _begun(upper, late, hyperbolic, sine, cosine, twice)
+        argument = _argument_at_start(upper, late, hyperbolic, sine, cosine, twice)
         lag_up = scaled(sub(argument, mul(upper.growth, place)), side * sign_up)
 
     out[at.SIGN_DOWN], out[at.SIGN_UP], out[at.MAY_STOP] = sign_down, sign_up, 1.0 if sign_down * sign_up < 0.0 else 0.0
@@ -236,8 +220,8 @@ def move(data: Data, sums: Sums, exact: Exact, points: TurningPoints, out: Any) 
     _put(out, at.BEND, warp, ONE)
     low_depth = mul(swing, square(stretch))
     high_depth = mul(low_depth, m1)
-    _frame(out, at.FLOOR, lower, upper, (points.d1, points.e1), low_depth)
-    _frame(out, at.CROWN, upper, lower, (points.e2, points.d2), high_depth)
+    _frame(out, at.FLOOR, lower, upper, points.d1, points.e1, low_depth)
+    _frame(out, at.CROWN, upper, lower, points.e2, points.d2, high_depth)
     quick = div(omega, mul(stretch, bend))
     twist_down = ZERO if exact.through_down else sums.twist_down
     twist_up = ZERO if exact.through_up else sums.twist_up
@@ -255,7 +239,7 @@ def move(data: Data, sums: Sums, exact: Exact, points: TurningPoints, out: Any) 
     return DONE, Mean(div(scaled(quarter, 2.0), omega), growth_down, growth_up, lag_down, lag_up)
 
 
-RATE, VALUE, SERIES = 1e-28, 1e-18, 1e-30  # the last: what nome, period and mean rates add (measured 3e-31)
+SERIES = 1e-30  # what nome, period and mean rates add to the relative error of a rate (measured 3e-31)
 SMALLEST, LARGEST = 1e-60, 1e40  # of any number given that is not zero
 LEAST_ANGLE, LARGEST_ANGLE = 1e-142, 1e12  # of theta, and of phi and psi
 
@@ -320,12 +304,8 @@ def _meets(data: Data, phi: float, psi: float, speed: float, c: Any) -> bool:
     """Does the form begin where it should, to rounding, in attitude, theta' and phi' sin theta?"""
     cosine, ax, ay, sine, bx, by, nod, rate = halves(c, 0.0)
     ahead, behind, x, y = 0.5 * (phi + psi), 0.5 * (phi - psi), math.cos(0.5 * data.theta), math.sin(0.5 * data.theta)
-    gap = max(
-        abs(cosine * ax - x * math.cos(ahead)),
-        abs(cosine * ay - x * math.sin(ahead)),
-        abs(sine * bx - y * math.cos(behind)),
-        abs(sine * by - y * math.sin(behind)),
-    )
+    sum_gap = max(abs(cosine * ax - x * math.cos(ahead)), abs(cosine * ay - x * math.sin(ahead)))
+    gap = max(sum_gap, abs(sine * bx - y * math.cos(behind)), abs(sine * by - y * math.sin(behind)))
     if sine < 0.0 and cosine >= 0.0:
         nod = -nod
     across = 2.0 * x * y
@@ -334,24 +314,6 @@ def _meets(data: Data, phi: float, psi: float, speed: float, c: Any) -> bool:
         off = max(abs(nod - data.theta_dot), abs((rate - data.phi_dot) * across))
     spread = abs(data.theta_dot) + abs(data.phi_dot * across) + abs(c[at.P_PSI] / data.I1) + 0.1 * speed
     return gap <= 4e-15 + 4e-16 * (abs(ahead) + abs(behind)) and off <= 1e-13 * spread
-
-
-@shared
-def _chosen(data: Data, exact: Exact) -> tuple[float, Sums, TurningPoints]:
-    """The arithmetic that the data ask for, the sums in it and the turning points."""
-    sums = short_sums(data)
-    if exact.separatrix:
-        return at.EXACTLY, sums, unknown_points()
-    if exact.rests:
-        size = 2.0 * sums.lead[0] + sums.a[0] * sums.a[0]
-        if data.theta == 0.0 and not abs(sums.k2[0]) > 1e-12 * size:  # next to the threshold of sleep
-            return at.QUAD_DOUBLE, long_sums(data), unknown_points()
-        return at.DOUBLE_DOUBLE, sums, unknown_points()
-    points = turning_points(sums, exact, data.theta_dot)
-    if points.rate_error < RATE and points.value_error < VALUE:
-        return at.DOUBLE_DOUBLE, sums, points
-    sums = long_sums(data)
-    return at.QUAD_DOUBLE, sums, turning_points(sums, exact, data.theta_dot)
 
 
 @shared
@@ -368,10 +330,8 @@ def _lines(data: Data, phi: float, psi: float, a: DoubleDouble, mean: Mean, out:
     if not upright:
         psi_rate, psi_start = neg(psi_rate), neg(psi_start)
     out[at.PERIOD] = mean.period[0]
-    out[at.PHI_PER_PERIOD], out[at.PSI_PER_PERIOD] = (
-        _per_period(phi_rate, mean.period),
-        _per_period(psi_rate, mean.period),
-    )
+    out[at.PHI_PER_PERIOD] = _per_period(phi_rate, mean.period)
+    out[at.PSI_PER_PERIOD] = _per_period(psi_rate, mean.period)
     put_line(out, at.PHI_LINE, phi_rate, phi_start)
     put_line(out, at.PSI_LINE, psi_rate, psi_start)
     put_turns(out, at.PHI_TURNS, phi_rate, phi_start)
@@ -380,28 +340,18 @@ def _lines(data: Data, phi: float, psi: float, a: DoubleDouble, mean: Mean, out:
 
 
 @shared
-def motion_constants(
-    I1: float,
-    I3: float,
-    mgl: float,
-    theta: float,
-    phi: float,
-    psi: float,
-    theta_dot: float,
-    phi_dot: float,
-    psi_dot: float,
-    out: Any,
-) -> int:
-    """Fill in the constants; a status, `DONE` if they can be relied on."""
-    data = Data(I1, I3, mgl, theta, theta_dot, phi_dot, psi_dot)
+def motion_constants(numbers: Any, out: Any) -> int:
+    """Fill in the constants of a row of `symtop.model.top.NUMBERS`; a status, `DONE` if they can be relied on."""
+    data = Data(numbers[0], numbers[1], numbers[2], numbers[3], numbers[6], numbers[7], numbers[8])
+    phi, psi = numbers[4], numbers[5]
     if not _in_range(data, phi, psi):
         return OUT_OF_RANGE
     exact = exact_zeros(data)
-    arithmetic, sums, points = _chosen(data, exact)
+    arithmetic, sums, points = choose(data, exact)
     for place in range(at.SIZE):
         out[place] = 0.0
-    out[at.ARITHMETIC], out[at.UPRIGHT], out[at.I1] = arithmetic, 1.0 if mgl >= 0.0 else 0.0, I1
-    out[at.P_PSI], out[at.W3] = sums.p_psi[0], div(sums.p_psi, (I3, 0.0))[0]
+    out[at.ARITHMETIC], out[at.UPRIGHT], out[at.I1] = arithmetic, 1.0 if data.mgl >= 0.0 else 0.0, data.I1
+    out[at.P_PSI], out[at.W3] = sums.p_psi[0], div(sums.p_psi, (data.I3, 0.0))[0]
     out[at.ENERGY], out[at.P_PHI] = _conserved(data, sums)
     status, mean = DONE, Mean((math.inf, 0.0), ZERO, ZERO, ZERO, ZERO)
     if exact.separatrix:
@@ -425,7 +375,6 @@ def all_constants(rows: Any, out: Any) -> int:
     """The constants of n tops, of rows (n, 9) of their numbers, with statuses; how many are not to be relied on."""
     failed = 0
     for i in range(len(rows)):
-        one, c = rows[i], out[i]
-        c[at.STATUS] = motion_constants(one[0], one[1], one[2], one[3], one[4], one[5], one[6], one[7], one[8], c)
-        failed += 1 if c[at.STATUS] != DONE else 0
+        out[i][at.STATUS] = motion_constants(rows[i], out[i])
+        failed += 1 if out[i][at.STATUS] != DONE else 0
     return failed

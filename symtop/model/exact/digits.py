@@ -15,24 +15,20 @@ each an integral of the third kind, int dtau/d = Pi(n; tau)/d1 with n = (d1 - d2
 at u1 and u2. Carlson's form Pi = s RF(c^2, D, 1) + (n/3) s^3 RJ(c^2, D, 1, d/d1), D = m1 + m c^2, has no cancellation
 near a pole. A hanging top (mgl < 0) is the standing one seen upside down: theta -> pi - theta, psi -> -psi.
 
-Degenerate tops. The coefficients of u'^2 about the starting point are sums of a rational number, kept as an exact
-fraction, and a multiple of cos theta. One that vanishes is therefore known to vanish (an axis that passes through a
-pole, a start on a turning point, a steady precession); every other gap between roots is a nonzero number that enough
-digits resolve, and the precision is doubled until they do. Data next to a separatrix have a large, finite period. The
-only separatrix (m = 1) that rational data can name starts at theta = 0 in a hanging top without twist, where cos theta
-is rational, too: theta'^2 I1 = 4 abs(mgl), and theta = 4 atan tanh(g t/2) from then on, g = Omega = sqrt(abs(mgl)/I1).
+Degenerate tops. The coefficients of u'^2 about the starting point are sums of an exact fraction and a multiple of
+cos theta. One that vanishes is therefore known to vanish (an axis that passes through a pole, a start on a turning
+point, a steady precession); every other gap between roots is a nonzero number that enough digits resolve, and the
+precision is doubled until they do. The only separatrix (m = 1) that rational data can name starts at theta = 0 in a
+hanging top without twist: theta'^2 I1 = 4 abs(mgl), and theta = 4 atan tanh(g t/2), g = Omega = sqrt(abs(mgl)/I1).
 
 Conventions where angles are singular. If the axis passes exactly through a pole, the twist there is 0, its term is
 dropped, and phi and psi jump by pi there and back in turn. If the axis stands on a pole only phi + psi (phi - psi
 at the lower one) has a meaning, and the other twist alone gives phi' = +-a/2.
 
 Inputs are read without rounding: a float is the exact binary fraction it stores, a string the exact decimal it shows.
-`precise_constants` rounds a form once to the constants of `symtop.model.exact.closed_form`, which are checked against
-them and fall back on them.
-
-Sources: Klein and Sommerfeld, Theory of the Top, chapter 6 (theta functions); Goldstein, Classical Mechanics,
-section 5.7; Carlson, Numerical Algorithms 10 (1995) 13. Not a numerical integration: the error does not grow with
-time, except that a time of 10^k periods costs k of the 30 guard digits.
+`precise_constants` rounds a form once to the constants of `symtop.model.exact.closed_form`. The error does not grow
+with time, except that a time of 10^k periods costs k of the 30 guard digits. Sources: Klein and Sommerfeld, Theory of
+the Top, chapter 6; Goldstein, Classical Mechanics, section 5.7; Carlson, Numerical Algorithms 10 (1995) 13.
 """
 
 from collections.abc import Iterable, Sequence
@@ -52,9 +48,8 @@ def rationals(top: SymmetricTop | Sequence[Any], start: Angles | Sequence[Any]) 
     body = [top.I1, top.I3, top.mgl] if isinstance(top, SymmetricTop) else list(top)
     state = [getattr(start, name) for name in NUMBERS[3:]] if isinstance(start, Angles) else list(start)
     if len(body) != 3 or len(state) != 6:
-        raise SymtopError(
-            f"the closed form takes (I1, I3, mgl) and six angles and rates, not {len(body)} and {len(state)} numbers"
-        )
+        counts = f"{len(body)} and {len(state)} numbers"
+        raise SymtopError(f"the closed form takes (I1, I3, mgl) and six angles and rates, not {counts}")
     values = [rational(name, value) for name, value in zip(NUMBERS, [*body, *state], strict=True)]
     SymmetricTop(*map(float, values[:3]))
     Angles(*map(float, values[3:]))
@@ -104,8 +99,6 @@ def quadratic_roots(ctx: Any, c0: Any, c1: Any, c2: Any) -> list[Any]:
 
 
 GUARD_DIGITS, MOST_DIGITS = 30, 20_000  # the latter resolves relative gaps between roots down to 1e-5000
-
-
 Number = TypeVar("Number")
 
 
@@ -147,13 +140,13 @@ class PreciseForm:
     """Closed-form motion to `digits` significant digits.
 
     `top` is a `SymmetricTop` or a sequence (I1, I3, mgl), `start` an `Angles` or a sequence (theta, phi, psi, theta',
-    phi', psi'); their entries may be floats (read as exact doubles), integers, fractions, decimal strings (read as
-    exact decimals) or mpf. Raises `SymtopError` for values outside the model.
+    phi', psi'); entries may be floats, integers, fractions, decimal strings or mpf. Raises `SymtopError` for values
+    outside the model.
 
     Constants: `a`, `b`, `alpha`, `beta`, `energy`, `p_phi`, `p_psi`, `roots` (ascending; a free top has one at
     infinity), `m`, `K`, `Omega`, `nutation_period` (that of small nutations for a steady precession, infinite where
-    none exists), `phi_per_period`, `psi_per_period`, `theta_range`. They are numbers of the private mpmath context
-    `ctx`, whose precision is the working one. For mgl < 0 `curve` is that of the top upside down, and `facing` is -1.
+    none exists), `phi_per_period`, `psi_per_period`, `theta_range`: numbers of the private mpmath context `ctx`. For
+    mgl < 0 `curve` is that of the top upside down, and `facing` is -1.
     """
 
     def __init__(self, top: SymmetricTop | Sequence[Any], start: Angles | Sequence[Any], digits: int = 30) -> None:
@@ -167,9 +160,8 @@ class PreciseForm:
         while not self._resolve(body, state):
             self.ctx.dps *= 2
             if self.ctx.dps > MOST_DIGITS:
-                raise SymtopError(
-                    f"the turning points must be separable with {MOST_DIGITS} digits; these values are too extreme"
-                )
+                words = f"the turning points must be separable with {MOST_DIGITS} digits"
+                raise SymtopError(f"{words}; these values are too extreme")
         self._set_periods(body, state)
         self._last: tuple[Fraction, tuple[Any, Any, Any, Any, Any]] | None = None  # a time and its state
 
@@ -245,7 +237,7 @@ class PreciseForm:
         sn, cn = rising * ctx.sqrt(curve.start_sn2), ctx.sqrt(curve.start_cn2)
         self.tau0 = self._integral(None, sn, cn)
         self._complete = [self._integral(pole, ctx.one, ctx.zero) for pole in curve[:2]]  # 0 on the separatrix
-        self._begun = [self._integral(pole, sn, cn) for pole in curve[:2]]
+        self._at_start = [self._integral(pole, sn, cn) for pole in curve[:2]]
         # Through a pole the half-angle sine is continued with its sign, positive at the start; cn >= 0 there.
         self.floor_sign = 1 if sn > 0 or (sn == 0 and theta_dot >= 0) else -1
 
@@ -253,8 +245,8 @@ class PreciseForm:
         growth = [factor * whole_turn / self.K for factor, whole_turn in zip(factors, self._complete, strict=True)]
         self.mean_rates = (self.drift + growth[0], growth[1] - self.drift)  # of phi + psi and phi - psi
         self.lags0 = tuple(  # by how much they are ahead of their means at time 0, counted from a moment with u = u1
-            (factor * begun - self.tau0 * mean) / self.Omega if factor and self.Omega else ctx.zero
-            for factor, begun, mean in zip(factors, self._begun, growth, strict=True)
+            (factor * first - self.tau0 * mean) / self.Omega if factor and self.Omega else ctx.zero
+            for factor, first, mean in zip(factors, self._at_start, growth, strict=True)
         )
         self.phi_rate = (growth[0] + growth[1]) / 2
         self.psi_rate = self.facing * (self.drift + (growth[0] - growth[1]) / 2)
@@ -308,7 +300,6 @@ class PreciseForm:
         return last[1]
 
     def _after(self, elapsed: Any) -> tuple[Any, Any, Any, Any, Any]:
-        """`_state` at that time."""
         ctx, curve = self.ctx, self.curve
         if curve.swing == 0:
             angles = [angle + rate * elapsed for angle, rate in zip(self.angles0, self.mean_rates, strict=True)]
@@ -325,7 +316,7 @@ class PreciseForm:
             (curve.floor, self.drift, sn, side * self.floor_sign, curve.floor.low, curve.floor.high),
             (curve.crown, -self.drift, cn, side, curve.crown.high, curve.crown.low),
         )):  # fmt: skip
-            gained = 2 * turns * self._complete[i] + self._integral(pole, sn, cn) - self._begun[i]
+            gained = 2 * turns * self._complete[i] + self._integral(pole, sn, cn) - self._at_start[i]
             turned = pole.twist / pole.low * gained / self.Omega if pole.twist else 0
             angles.append(self.angles0[i] + drift * elapsed + turned)
             through = sign * ctx.sqrt(most / 2)
@@ -396,16 +387,14 @@ def precise_constants(top: SymmetricTop, start: Angles, form: PreciseForm | None
     out[at.ARITHMETIC], out[at.UPRIGHT], out[at.I1] = at.DIGITS, form.facing > 0, top.I1
     out[at.P_PSI], out[at.W3] = float(form.p_psi), float(form.p_psi / form.I3)
     out[at.ENERGY], out[at.P_PHI] = float(form.energy), float(form.p_phi)
-    out[at.PERIOD] = float(form.nutation_period)
+    out[at.PERIOD], out[[at.THETA_LOW, at.THETA_HIGH]] = float(form.nutation_period), [*map(float, form.theta_range)]
     out[at.PHI_PER_PERIOD], out[at.PSI_PER_PERIOD] = float(form.phi_per_period), float(form.psi_per_period)
-    out[at.THETA_LOW], out[at.THETA_HIGH] = float(form.theta_range[0]), float(form.theta_range[1])
     if form.climbs:
         out[at.KIND], out[at.SCALE], out[at.FLOOR_SIGN] = at.CLIMBS, float(form.Omega), float(form.floor_sign)
     elif curve.swing:
         if any(0 < gap < 1e-290 for gap in (curve.floor.low, curve.crown.high, curve.m1)):
-            raise SymtopError(
-                f"the axis must meet a pole or miss it by 1e-145 (PreciseForm takes less), not as {start!r}"
-            )
+            words = "the axis must meet a pole or miss it by 1e-145 (PreciseForm takes less)"
+            raise SymtopError(f"{words}, not as {start!r}")
         _expand(form, out)
     else:
         rest = (ctx.sqrt(curve.floor.low / 2), ctx.sqrt(curve.crown.low / 2), form.phi_rate)
@@ -416,11 +405,9 @@ def precise_constants(top: SymmetricTop, start: Angles, form: PreciseForm | None
     turn = 2 * ctx.pi
     _put_line(out, at.PHI_LINE, form.phi_rate, phi0)
     _put_line(out, at.PSI_LINE, form.psi_rate, psi0)
-    halves = ((rate / 2, start) for rate, start in zip(form.mean_rates, leading, strict=True))
-    for place, (rate, begun) in zip(
-        (at.PHI_TURNS, at.DOWN_TURNS, at.UP_TURNS), ((form.phi_rate, phi0), *halves), strict=True
-    ):
-        _put_line(out, place, rate / turn, begun / turn - ctx.nint(begun / turn))
+    rates = form.phi_rate, form.mean_rates[0] / 2, form.mean_rates[1] / 2
+    for place, rate, angle in zip((at.PHI_TURNS, at.DOWN_TURNS, at.UP_TURNS), rates, (phi0, *leading), strict=True):
+        _put_line(out, place, rate / turn, angle / turn - ctx.nint(angle / turn))
     return out
 
 

@@ -4,16 +4,16 @@
 
     q = eps + 2 eps^5 + 15 eps^9 + 150 eps^13 + ...,      theta_3 = 1 + 2 q + 2 q^4 + ...,      K = (pi/2) theta_3^2.
 
-For m > 1/2 everything is done with 1 - m in place of m, and the roles of the real and the imaginary argument are
-exchanged (Jacobi); the nome is at most exp(-pi) either way. A number given as sn : cn, up to a common factor, is found
-by Newton in double and one step whose residual is in double-double, from
+For m > 1/2 everything is done with 1 - m in place of m, and the real and the imaginary argument change places (Jacobi);
+the nome is at most exp(-pi) either way. A number given as sn : cn, up to a common factor, is found by Newton in double
+and one step whose residual is in double-double, from
 
     sn s theta_2(z) = cn theta_1(z)                                   z = pi tau/2K,     `real_argument`
     sn theta_4(i y) = cn kappa (sinh y - q^2 sinh 3y + ...)           unknown sinh y,    `imaginary_argument`
 
 with sn, cn in the second line those of the complementary modulus and kappa = theta_3/(1 + q^2 + q^6 + ...). The
 residual is sn cn' - cn sn', the sine of a difference of amplitudes: the root keeps all its digits for y -> 0, for
-y -> pi K'/2K (cn -> 0) and for m -> 0. No arithmetic-geometric mean, no integrals of Carlson.
+y -> pi K'/2K (cn -> 0) and for m -> 0.
 
 *Half-angle functions* about the turning points. A pole at the height y (a zero of 1 + u or 1 - u at an imaginary time)
 belongs to a function that is, up to a factor,
@@ -22,21 +22,20 @@ belongs to a function that is, up to a factor,
     m >  1/2    near it     cosh s P + i sinh s P,    far from it   P + i sinh s cosh s P,         P in cosh 2s
 
 where P are cubics: theta series of four terms, with w_n = q^(n(n+1)) and the functions of y as weights. The argument
-near the pole grows by exactly the angle `growth` in a quarter period; what the *mean rate* exceeds the rate at the far
-turning point by is `turning`, in units of (quarter periods a time) pi for m <= 1/2 and 2 for m > 1/2,
+near the pole grows by `growth` in a quarter period; the mean rate less that at the far turning point is `turning`, in
+units of (quarter periods a time) pi for m <= 1/2 and 2 for m > 1/2,
 
     m <= 1/2    sum w_n ((n+1) e^-(2n+1)y - n e^(2n+1)y) / sum w_n cosh (2n+1)y
     m >  1/2    pi/2 - y - bow T,     T = d arg theta_4(y + i s)/ds at s = 0,     bow = pi K/2K',
 
-both positive, so that the sum of the two has no cancellation.
+both positive, without cancellation.
 
 *Weierstrass's function* of a nutation at a step h, in double, and the integrals that go with it:
 
     wp'^2 = 4 wp^3 - g2 wp - g3 = 4 (wp - e1)(wp - e2)(wp - e3),   e1 >= e2 >= e3,   e1 + e2 + e3 = 0
 
 Along the motion of a top wp swings between e3 and e2 with the period T of the nutation; at a real time h it lies above
-e1. The exact step needs the three differences wp(h) - e_i alone: for 0 < h <= T/2 and b < e1, with Carlson's symmetric
-integrals of the first and the third kind,
+e1. For 0 < h <= T/2 and b < e1, with Carlson's symmetric integrals of the first and the third kind,
 
     h = R_F(wp - e1, wp - e2, wp - e3),     int_0^h dt/(wp(t) - b) = R_J(wp - e1, wp - e2, wp - e3, wp - b)/3.
 
@@ -44,8 +43,8 @@ The differences come from Jacobi's functions of w h, w^2 = e1 - e3, by Gauss's a
 
     wp - e1 = (w cn/sn)^2,    wp - e2 = (w dn/sn)^2,    wp - e3 = (w/sn)^2,    T = 2 K/w
 
-wp(h) depends on g2 and g3 smoothly, so that a double root costs no digits although e1 - e2 or e2 - e3 is then known to
-half of them only. Relative errors, measured on random cubics: wp 1e-15, R_J 6e-16.
+wp(h) depends on g2 and g3 smoothly, so that a double root costs no digits. Relative errors, measured on random cubics:
+wp 1e-15, R_J 6e-16.
 Sources: Whittaker and Watson, A Course of Modern Analysis, chapters 20 to 22; Carlson, Numer. Algorithms 10 (1995) 13.
 """
 
@@ -297,15 +296,9 @@ def trigonometric_half(sinh: DoubleDouble, cosh: DoubleDouble, nome: Nome) -> Ha
             excess = add(excess, mul(nome.q12, sub(scaled(shrunk7, 4.0), mul_double(grown7, 3.0))))
             ninth = 5.0 * shrunk7[0] * shrunk2[0] - 4.0 * grown7[0] * grown2[0]
             excess = add_double(excess, nome.q20 * ninth)
-    far = _odd_cosines(cosh, b1, b2, b3)
-    return Half(
-        _odd_cosines(sinh, neg(a1), a2, neg(a3)),
-        odd_sines(cosh, neg(b1), b2, neg(b3)),
-        far,
-        odd_sines(sinh, a1, a2, a3),
-        div(add(shrunk, excess), add_double(total(far), last)),
-        HALF_PI,
-    )
+    near, near_imag = _odd_cosines(sinh, neg(a1), a2, neg(a3)), odd_sines(cosh, neg(b1), b2, neg(b3))
+    far, far_imag = _odd_cosines(cosh, b1, b2, b3), odd_sines(sinh, a1, a2, a3)
+    return Half(near, near_imag, far, far_imag, div(add(shrunk, excess), add_double(total(far), last)), HALF_PI)
 
 
 @shared
@@ -324,14 +317,10 @@ def hyperbolic_half(y: DoubleDouble, s: DoubleDouble, c: DoubleDouble, nome: Nom
     far_imag = _even_sines(mul(e1, sin2), neg(mul(e2, sin4)), mul(e3, sin6))
     lift = add_double(total(far), 2.0 * nome.q16 * cos8)
     tilt = add_double(total(far_imag), -16.0 * nome.q16 * sin8)
-    return Half(
-        _odd_cosines(s, neg(mul(nome.q2, s1)), mul(nome.q6, s2), neg(mul(nome.q12, s3))),
-        odd_sines(c, neg(mul(nome.q2, d1)), mul(nome.q6, d2), neg(mul(nome.q12, d3))),
-        far,
-        far_imag,
-        sub(sub(HALF_PI, y), mul(bow, div(tilt, lift))),
-        sub(HALF_PI, y),
-    )
+    near = _odd_cosines(s, neg(mul(nome.q2, s1)), mul(nome.q6, s2), neg(mul(nome.q12, s3)))
+    near_imag = odd_sines(c, neg(mul(nome.q2, d1)), mul(nome.q6, d2), neg(mul(nome.q12, d3)))
+    growth = sub(HALF_PI, y)
+    return Half(near, near_imag, far, far_imag, sub(growth, mul(bow, div(tilt, lift))), growth)
 
 
 SMALL = 1e-9  # an argument w h below which sn, cn and dn are w h, 1 and 1

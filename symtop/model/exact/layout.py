@@ -1,7 +1,4 @@
-"""Where each constant of the closed form stands in its array.
-
-The array is flat because a compiled function takes it ten times as fast as a NamedTuple of its parts.
-"""
+"""Where each constant of the closed form stands in its array, which compiled code takes faster than a NamedTuple."""
 
 KIND, UPRIGHT, P_PSI, W3, I1, PERIOD, PHI_PER_PERIOD, PSI_PER_PERIOD, THETA_LOW, THETA_HIGH = range(10)
 SIGN_DOWN, SIGN_UP, FLOOR_SIGN, TWIST_DOWN, TWIST_UP, MAY_STOP, HYPERBOLIC, SCALE = range(10, 18)

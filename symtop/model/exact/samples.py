@@ -191,7 +191,6 @@ def _turns(c: Constants, t: float, seen: Wave) -> tuple[float, float]:
 
 @inlined
 def _motion(c: Constants, t: float) -> tuple[float, float, float, float, float, float]:
-    """Angles and rates."""
     seen = wave(c, t)
     phi, psi = _turns(c, t, seen)
     upright = c[at.UPRIGHT] > 0.0
@@ -205,7 +204,6 @@ def _motion(c: Constants, t: float) -> tuple[float, float, float, float, float, 
 
 @inlined
 def _axis(c: Constants, t: float) -> tuple[float, float, float]:
-    """Unit vector along the axis."""
     down, dx, dy, down_lag, up, ux, uy, up_lag, _, _ = wave(c, t)
     x, y = _unit(c, at.PHI_TURNS, t, dx * ux - dy * uy, dx * uy + dy * ux, down_lag + up_lag)
     cosine, sine = (down, up) if c[at.UPRIGHT] > 0.0 else (up, down)

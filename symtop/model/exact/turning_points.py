@@ -10,10 +10,9 @@ Upright picture: a hanging top (mgl < 0) is the standing one with its poles exch
     u'^2 = -twist_up^2 + k1 t + k2 t^2 + lead t^3,     t = u - 1,
     d(u'^2)/du at the start = 2 [up down (I3 phi' psi' - mgl - l phi' cos)/I1 - cos theta'^2].
 
-Only N, S, p_psi, D, k1, k2 and the slope can cancel. Each is formed in double-double or quad-double, without a division
-before its sum, times I1 or I1^2, and carries the bound `grain` times the sum of its terms' sizes, plus one rounding to
-double-double. Products of two of the data are exact, as are I1 - I3 and psi' +- phi'. Near a pole the first form of S
-(or N) does not cancel.
+Only N, S, p_psi, D, k1, k2 and the slope can cancel, but near a pole the first form of S (or N) does not. Each is
+formed without a division before its sum, times I1 or I1^2, and carries the bound `grain` times the sum of its terms'
+sizes, plus one rounding to double-double. Products of two of the data are exact, as are I1 - I3 and psi' +- phi'.
 
 With the roots u1 <= u2 <= 1 <= u3 of u'^2 = lead (u - u1)(u - u2)(u - u3) and x = u - u(0), the distances are
 d1, d2 = 1 + u1, 1 + u2; e1, e2 = 1 - u1, 1 - u2; g3 = u3 - 1:
@@ -29,35 +28,43 @@ d1, d2 = 1 + u1, 1 + u2; e1, e2 = 1 - u1, 1 - u2; g3 = u3 - 1:
     stiffness  = lead (u3 - u1) = L - lead x1 = 4 Omega^2,      gap = lead (u3 - u2) = lead (g3 + e2)
     m          = lead swing/stiffness,      1 - m = gap/stiffness
 
-In products with `lead` all of it stays finite for a free top. Bounds of the relative errors are carried along from
-those of the sums: `rate_error` of what a phase grows with, `value_error` of what is only used as a double. They are
-bounds to first order, infinite where a distance is not told from zero.
+In products with `lead` all of it stays finite for a free top. Bounds of the relative errors follow from those of the
+sums, to first order: `rate_error` of what a phase grows with, `value_error` of what is only used as a double. They are
+infinite where a distance is not told from zero.
 """
 
 import math
 from typing import NamedTuple
 
 from symtop.core.jit_functions import inlined, shared, two_product
-from symtop.model.exact import quad_double as qd
+from symtop.model.exact import layout as at
 from symtop.model.exact.double_double import (
     ZERO,
     DoubleDouble,
+    Number,
     add,
     add_double,
     div,
+    doubled,
+    like,
+    minus,
     mul,
+    narrowed,
     neg,
+    plus,
+    quad_sincos,
     root,
     scaled,
     sincos,
     square,
     sub,
+    times,
     two_sum,
 )
-from symtop.model.exact.quad_double import doubled, like, minus, narrowed, plus, times
 
 GRAIN = 1e-31  # relative error of a few operations in double-double
 GRAIN4 = 1e-61  # in quad-double, with three digits to spare
+RATE, VALUE = 1e-28, 1e-18  # of relative errors, beyond which a longer arithmetic is taken
 
 
 class Data(NamedTuple):
@@ -95,7 +102,7 @@ class Sums(NamedTuple):
 
 
 @shared
-def _sums(data: Data, sine: qd.Number, cosine: qd.Number, grain: float) -> Sums:
+def _sums(data: Data, sine: Number, cosine: Number, grain: float) -> Sums:
     """The sums in the arithmetic of `sine` and `cosine`, those of theta/2."""
     I1, I3, mgl, theta, theta_dot, phi_dot, psi_dot = data
     upright = mgl >= 0.0
@@ -151,25 +158,18 @@ def _sums(data: Data, sine: qd.Number, cosine: qd.Number, grain: float) -> Sums:
     energies = kinetic[0] + lead[0] * up[0]
     k1_terms, k2_terms = energies + abs(a[0] * twist_up[0]), 2.0 * lead[0] + energies + a[0] * a[0]
     pushes = up[0] * down[0] * (abs(swung[0] * psi_dot) + weight + abs(leaning[0])) + abs(fall[0])
+    up_error = twist_error + GRAIN * abs(twist_up[0])
+    down_error = down[0] * under_error / I1 + GRAIN * abs(twist_down[0])
+    k1_terms = grain * k1_terms + abs(a[0]) * twist_error + abs(twist_up[0]) * p_error / I1
+    k1_error = 2.0 * k1_terms + GRAIN * abs(first[0])
+    k2_error = grain * k2_terms + 2.0 * abs(a[0]) * p_error / I1 + GRAIN * abs(second[0])
+    slope_error, p_error = 2.0 * grain * pushes / I1 + GRAIN * abs(third[0]), p_error + GRAIN * abs(p_psi[0])
+    a, third = (a, third) if upright else (neg(a), neg(third))
+    near, far, momentum = narrowed(up), narrowed(down), narrowed(p_psi)
     return Sums(
-        narrowed(up),
-        narrowed(down),
-        twist_up,
-        twist_down,
-        a if upright else neg(a),
-        narrowed(p_psi),
-        kinetic,
-        lead,
-        first,
-        second,
-        third if upright else neg(third),
-        twist_error + GRAIN * abs(twist_up[0]),
-        down[0] * under_error / I1 + GRAIN * abs(twist_down[0]),
-        p_error + GRAIN * abs(p_psi[0]),
-        2.0 * (grain * k1_terms + abs(a[0]) * twist_error + abs(twist_up[0]) * p_error / I1) + GRAIN * abs(first[0]),
-        grain * k2_terms + 2.0 * abs(a[0]) * p_error / I1 + GRAIN * abs(second[0]),
-        2.0 * grain * pushes / I1 + GRAIN * abs(third[0]),
-    )
+        near, far, twist_up, twist_down, a, momentum, kinetic, lead, first, second, third,
+        up_error, down_error, p_error, k1_error, k2_error, slope_error,
+    )  # fmt: skip
 
 
 @shared
@@ -182,11 +182,8 @@ def short_sums(data: Data) -> Sums:
 @shared
 def long_sums(data: Data) -> Sums:
     """The sums in quad-double, rounded to double-double."""
-    sine, cosine = qd.sincos(0.5 * data.theta)
+    sine, cosine = quad_sincos(0.5 * data.theta)
     return _sums(data, sine, cosine, GRAIN4)
-
-
-# --------------------------------------------------------------------------------------------- what vanishes exactly
 
 
 class Exact(NamedTuple):
@@ -375,33 +372,23 @@ def turning_points(sums: Sums, exact: Exact, theta_dot: float) -> TurningPoints:
     gap = add(roots.bend, mul(sums.lead, e2))
     if not (gap[0] > 0.0 and (d1[0] > 0.0 or exact.through_down) and (e2[0] > 0.0 or roots.passes_up)):
         return unknown_points()
-    distances = _Distances(d1[0], d2[0], e1[0], e2[0], stiffness[0], gap[0])
+    distances = d1[0], d2[0], e1[0], e2[0], stiffness[0], gap[0]
     rate, value = _bounds(sums, exact, roots, distances)
     swing, bend, passes_up = roots.swing, roots.bend, roots.passes_up
     return TurningPoints(d1, d2, e1, e2, swing, stiffness, bend, gap, roots.x1, roots.x2, passes_up, rate, value)
 
 
-class _Distances(NamedTuple):
-    """High parts of the distances from the poles, of the stiffness and of the gap."""
-
-    d1: float
-    d2: float
-    e1: float
-    e2: float
-    stiffness: float
-    gap: float
-
-
 @shared
-def _bounds(sums: Sums, exact: Exact, roots: _Roots, at: _Distances) -> tuple[float, float]:
+def _bounds(sums: Sums, exact: Exact, roots: _Roots, distances: tuple[float, ...]) -> tuple[float, float]:
     """Bounds of the relative errors of rates and of values; r_ is a relative error, error_ an absolute one."""
+    d1, d2, e1, e2, stiffness, gap = distances  # high parts
     lead, third, total, swing = sums.lead[0], roots.third[0], roots.total[0], roots.swing[0]
     r_up = 0.0 if exact.through_up else sums.twist_up_error / abs(sums.twist_up[0])
     r_down = 0.0 if exact.through_down else sums.twist_down_error / abs(sums.twist_down[0])
     r_third, r_full = 0.0, GRAIN
     if third > 0.0:
         w_error = 2.0 * r_up * sums.twist_up[0] * sums.twist_up[0] / third
-        r_third = GRAIN + (sums.k1_error + sums.k2_error * third + w_error) / (at.gap * (third + at.e1))
+        r_third = GRAIN + (sums.k1_error + sums.k2_error * third + w_error) / (gap * (third + e1))
         r_full += r_third * third / (sums.up[0] + third)
     r_product = GRAIN + r_full
     error_total = (sums.slope_error + lead * roots.product[0] * r_product) / roots.full[0] + abs(total) * r_product
@@ -411,16 +398,34 @@ def _bounds(sums: Sums, exact: Exact, roots: _Roots, at: _Distances) -> tuple[fl
     error_x1, error_x2 = -r_long * roots.x1[0], error_long
     if total > 0.0:
         error_x1, error_x2 = error_long, r_long * roots.x2[0]
-    r_d2, r_e1 = GRAIN + error_x2 / at.d2, GRAIN + error_x1 / at.e1
+    r_d2, r_e1 = GRAIN + error_x2 / d2, GRAIN + error_x1 / e1
     r_d1 = r_e2 = 0.0
     if not exact.through_down:
         by_twist = -roots.x1[0] > 0.5 * sums.down[0]
-        r_d1 = 2.0 * r_down + r_d2 + r_full if by_twist else GRAIN + error_x1 / at.d1
+        r_d1 = 2.0 * r_down + r_d2 + r_full if by_twist else GRAIN + error_x1 / d1
     if not roots.passes_up:
-        r_e2 = GRAIN + error_x2 / at.e2
+        r_e2 = GRAIN + error_x2 / e2
         if roots.x2[0] > 0.5 * sums.up[0]:
             r_e2 = sums.k1_error / abs(sums.k1[0]) + r_e1 if exact.through_up else 2.0 * r_up + r_e1 + r_third
-    r_gap = (r_third * roots.bend[0] + r_e2 * lead * at.e2) / at.gap if lead > 0.0 else GRAIN
-    r_stiffness = r_full + lead * error_x1 / at.stiffness
+    r_gap = (r_third * roots.bend[0] + r_e2 * lead * e2) / gap if lead > 0.0 else GRAIN
+    r_stiffness = r_full + lead * error_x1 / stiffness
     r_p = sums.p_psi_error / abs(sums.p_psi[0]) if sums.p_psi[0] != 0.0 else 0.0
     return max(r_gap, r_d2, r_e1, r_stiffness), max(r_swing, r_d1, r_e2, r_up, r_down, r_p)
+
+
+@shared
+def choose(data: Data, exact: Exact) -> tuple[float, Sums, TurningPoints]:
+    """The arithmetic that the data ask for, the sums in it and the turning points."""
+    sums = short_sums(data)
+    if exact.separatrix:
+        return at.EXACTLY, sums, unknown_points()
+    if exact.rests:
+        size = 2.0 * sums.lead[0] + sums.a[0] * sums.a[0]
+        if data.theta == 0.0 and not abs(sums.k2[0]) > 1e-12 * size:  # next to the threshold of sleep
+            return at.QUAD_DOUBLE, long_sums(data), unknown_points()
+        return at.DOUBLE_DOUBLE, sums, unknown_points()
+    points = turning_points(sums, exact, data.theta_dot)
+    if points.rate_error < RATE and points.value_error < VALUE:
+        return at.DOUBLE_DOUBLE, sums, points
+    sums = long_sums(data)
+    return at.QUAD_DOUBLE, sums, turning_points(sums, exact, data.theta_dot)

@@ -14,6 +14,7 @@ import functools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,16 +25,15 @@ from symtop.core.errors import SymtopError
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.numbers import GOLDEN
 from symtop.core.parallel import heed
-from symtop.core.simd import wide_vectors
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.lanes import W, column, put
-from symtop.methods.framework.many import Many, members_of
+from symtop.methods.framework.lanes import Many, W, column, members_of, put
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, OUTCOMES, Plan
 from symtop.methods.framework.preparation import Body, Start
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
+from symtop.methods.simd import wide_vectors
 from symtop.model import charts, top as model
 from symtop.model.charts import View
 from symtop.model.exact.closed_form import ClosedForms
@@ -190,18 +190,6 @@ def _distinct(steps: int, places: Any, marks: Any) -> int:
     return count
 
 
-class _Top(NamedTuple):
-    """The tops of a chunk with the names of `SymmetricTop`, each (n, 1)."""
-
-    I1: Array
-    I3: Array
-    mgl: Array
-
-    def reduced_energy(self, *state: Array) -> Any:
-        """`SymmetricTop.reduced_energy` of rows of states."""
-        return SymmetricTop.reduced_energy(self, *state)  # type: ignore[arg-type]
-
-
 class _Runs(NamedTuple):
     """The runs of a chunk."""
 
@@ -295,17 +283,13 @@ class Job:
             done, ended = solver.many(self.numbers, self.tolerance, plan.times, plan.counts, self.budget)
             return _Runs(done.states, done.momenta, done.steps, done.work, 0 * done.work, done.outcome, ended)
         if solver is exact.solve:
-            states, momenta = exact.solve_many(self.numbers, np.nan_to_num(plan.times))
+            states, momenta = ClosedForms(self.numbers).run(np.nan_to_num(plan.times))
             none = np.zeros(len(self.numbers), dtype=np.int64)
             return _Runs(states, momenta, none, plan.counts, none, none, self.horizon)
         return self._in_turn(plan)
 
     def _in_turn(self, plan: Schedule) -> _Runs:
-        """The same by one call of a solver for each member.
-
-        A member fails alone if it starts on a pole, where the angles chart ends, if its numbers leave the range of the
-        arithmetic that a solver in Python does (`ArithmeticError`), and if the solver raises anything else.
-        """
+        """The same by one call of a solver for each member; one fails alone whatever its solver raises."""
         n = len(plan.counts)
         states = np.full((n, self.samples, charts.DIMENSIONS[self.chart]), np.nan)
         momenta, (steps, evaluations, iterations, outcome) = (
@@ -344,7 +328,8 @@ class Job:
 
     def _observables(self, runs: _Runs, times: Array) -> dict[str, Array]:
         """Of what a `Trajectory` shows of one run, what is asked for, of all."""
-        top: Any = _Top(*(self.numbers[:, k : k + 1] for k in range(3)))
+        top: Any = SimpleNamespace(**{name: self.numbers[:, k : k + 1] for k, name in enumerate(("I1", "I3", "mgl"))})
+        top.reduced_energy = functools.partial(SymmetricTop.reduced_energy, top)  # of all tops at once
         view = View(self.chart, top, runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
         columns = {name: getattr(view, name) for name in self.shown}
         turned = [name for name in ("phi", "psi") if name in self.shown and self.chart != "angles"]
@@ -367,7 +352,7 @@ def sampled(solver: FixedStep, numbers: Array, plan: Schedule) -> Many:
         solver.many(numbers[rows], plan.step_size[rows], plan.marks[rows, :count])
         for rows, count in zip(groups, counts, strict=True)
     ]
-    done = Many.begun(len(numbers), plan.marks.shape[1], parts[0].states.shape[2])
+    done = Many.empty(len(numbers), plan.marks.shape[1], parts[0].states.shape[2])
     for rows, count, part in zip(groups, counts, parts, strict=True):
         done.states[rows, :count], done.momenta[rows, :count] = part.states, part.momenta
         done.steps[rows], done.work[rows], done.outcome[rows] = part[2:]
@@ -375,7 +360,7 @@ def sampled(solver: FixedStep, numbers: Array, plan: Schedule) -> Many:
 
 
 def _whole(runs: _Runs, plan: Schedule) -> _Runs:
-    """A run that shows a state that is not finite and says nothing of it ends there, as in `simulation`."""
+    """A run that shows a state that is not finite, and reports nothing of it, ends there, as in `simulate`."""
     if np.isfinite(runs.states.sum()):  # a tenth of the time
         return runs
     finite = np.isfinite(runs.states).all(axis=2) | np.isnan(plan.times)

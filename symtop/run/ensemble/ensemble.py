@@ -9,7 +9,7 @@ import warnings
 import zipfile
 from collections.abc import Callable, Generator, Iterable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import netCDF4
 import numpy as np
@@ -17,7 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from symtop.core import cluster, netcdf
+from symtop.core import netcdf
 from symtop.core.code_hash import digest, hashed, packages
 from symtop.core.errors import SymtopError, SymtopWarning, boolean, check_replaceable, file_path, positive, whole
 from symtop.core.files import locked
@@ -29,6 +29,7 @@ from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
+from symtop.run import cluster
 from symtop.run.ensemble.chunks import CHUNK, CHUNK_STEPS, RAISED, SHOWN, Job, as_dataset, nutation_periods, same_times
 from symtop.run.ensemble.inputs import Members, called, for_each, read_members
 from symtop.run.guard import MOST_STEPS
@@ -60,12 +61,12 @@ def ensemble(
 
     Dimensions ``member``, ``time``, ``component`` (x, y, z). Variables as `simulate` has them: ``theta``, ``phi``,
     ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, or those of them that `variables`
-    names (``phi`` and ``psi`` of the space frame take the closed form, 12 microseconds a member); for each member
-    ``outcome``, ``steps``, ``force_evaluations``, ``newton_iterations``, ``reached_time``, ``step_size``, ``horizon``,
-    ``dithered``. ``time`` is a row where all members are sampled at the same times, and otherwise an array over
-    ``member`` and ``time``; ``data.isel(member=i)`` has a row either way. A member of fewer steps than `samples` shows
-    every step, and the rest of its row is NaN. Labels of members, a coordinate ``member``, are kept, and what is given
-    for each as a DataArray with such labels is taken by label.
+    names (``phi`` and ``psi`` of the space frame take the closed form); for each member ``outcome``, ``steps``,
+    ``force_evaluations``, ``newton_iterations``, ``reached_time``, ``step_size``, ``horizon``, ``dithered``. ``time``
+    is a row where all members are sampled at the same times, and otherwise an array over ``member`` and ``time``;
+    ``data.isel(member=i)`` has a row either way. A member of fewer steps than `samples` shows every step, and the rest
+    of its row is NaN. Labels of members, a coordinate ``member``, are kept, and what is given for each as a DataArray
+    with such labels is taken by label.
 
     A member that fails fails alone: its samples are NaN from there, ``outcome`` says why. One that starts on a pole has
     left the angles chart at once, and one on which somebody's solver raises an exception has "raised": a warning
@@ -76,8 +77,7 @@ def ensemble(
     Work is done on as many `threads` as there are cores, or by the workers of the dask cluster at the address
     `scheduler`. The attribute ``execution`` says how members were run: in "lanes", 32 side by side, where the method
     can. With a `path`, members go to that netCDF file as they are computed, in memory that does not grow with
-    `samples`: 0.25 kB a member for its nine numbers, its plan and their copies, beside the 0.13 of a population. The
-    same call resumes one that was killed, to the same file, and the dataset reads from the file what it is asked for.
+    `samples` (0.4 kB a member). The same call resumes one that was killed, to the same file, and the dataset is lazy.
 
     Raises SymtopError for arguments that make no sense, for members that are no top or no start, by number, and for a
     path to which another process is writing.
@@ -90,8 +90,9 @@ def ensemble(
     if path is None:
         _check_memory(n, count, shown)
     limit = None if budget is None else positive("budget", budget)
-    settings = _Settings(step_size, per_nutation, tolerance, horizon, nutations)
-    job = _job(read, method, chart, settings, count, limit, shown)
+    names, values = ("step_size", "per_nutation", "horizon", "nutations"), (step_size, per_nutation, horizon, nutations)
+    settings = {name: value for name, value in zip(names, values, strict=True) if value is not None}
+    job = _job(read, method, chart, settings, tolerance, count, limit, shown)
     if scheduler is not None:
         cluster.check_sent(scheduler, job.part(slice(0, 1)), method.name)
     chunks = list(job.chunks())
@@ -167,79 +168,60 @@ def _check_memory(n: int, samples: int, shown: tuple[str, ...]) -> None:
     """Refuse a dataset that does not fit into memory."""
     values = n * samples * (1 + sum({"axis": 3, "quaternion": 4}.get(name, 1) for name in shown))
     if values > MOST_VALUES:
-        raise SymtopError(
-            f"{n} members with {samples} samples are {values:.3g} numbers, more than the {MOST_VALUES:.3g} that are "
-            f"kept in memory: give a path to stream them to a netCDF file, fewer samples, or fewer variables"
-        )
-
-
-class _Settings(NamedTuple):
-    """The arguments of an ensemble as they were given: one for all members, one for each, or none."""
-
-    step_size: object
-    per_nutation: object
-    tolerance: object
-    horizon: object
-    nutations: object
-
-    def check(self, method: Integrator) -> None:
-        """Refuse settings that exclude each other or are not what the method has."""
-        for one, other in (("step_size", "per_nutation"), ("horizon", "nutations")):
-            if getattr(self, one) is not None and getattr(self, other) is not None:
-                raise SymtopError(f"give {one} or {other}, not both", one, other)
-        name = "step_size" if self.per_nutation is None else "per_nutation"
-        check_control(method, getattr(self, name), self.tolerance, name)
-        if method.fixed_step and getattr(self, name) is None:
-            words = "has a fixed step and needs step_size or per_nutation"
-            raise SymtopError(f"{method.name} {words}", "step_size", "per_nutation")
+        size = f"{n} members with {samples} samples are {values:.3g} numbers, more than the {MOST_VALUES:.3g} that are"
+        remedy = "give a path to stream them to a netCDF file, fewer samples, or fewer variables"
+        raise SymtopError(f"{size} kept in memory: {remedy}")
 
 
 def _job(
-    members: Members, method: Integrator, chart: str, given: _Settings, samples: int, budget: float | None,
-    shown: tuple[str, ...],
+    members: Members, method: Integrator, chart: str, given: dict[str, Any], tolerance: object, samples: int,
+    budget: float | None, shown: tuple[str, ...],
 ) -> Job:  # fmt: skip
-    """The job of an integrator, checked."""
-    given.check(method)
-    numbers, horizon, names, n = members.numbers, members.horizon, members.names, len(members.numbers)
-    by_period = given.per_nutation is not None or given.nutations is not None
-    period = _periods(numbers, names) if by_period else None
-    if period is not None and given.nutations is not None:
+    """The job of an integrator, from settings that are checked here."""
+    for one, other in (("step_size", "per_nutation"), ("horizon", "nutations")):
+        if one in given and other in given:
+            raise SymtopError(f"give {one} or {other}, not both", one, other)
+    control = "per_nutation" if "per_nutation" in given else "step_size"
+    check_control(method, given.get(control), tolerance, control)
+    if method.fixed_step and control not in given:
+        words = "has a fixed step and needs step_size or per_nutation"
+        raise SymtopError(f"{method.name} {words}", "step_size", "per_nutation")
+    numbers, names, n = members.numbers, members.names, len(members.numbers)
+    period = nutation_periods(numbers) if "per_nutation" in given or "nutations" in given else None
+    for i in np.flatnonzero(~np.isfinite(period))[:1] if period is not None else ():
+        words = f"per_nutation and nutations count nutation periods, and that of {called(names, i)} is endless"
+        raise SymtopError(words, "per_nutation", "nutations")
+    horizon = _horizons(members, given, period)
+    steps = bounds = None
+    if method.fixed_step:
+        step = for_each(control, given[control], n, names)
+        step = step if period is None or control == "step_size" else _parts(period, step, horizon, names)
+        steps = _steps(step, horizon, budget or MOST_STEPS, names)
+    elif method.adaptive:
+        period = nutation_periods(numbers) if period is None else period
+        bounds = _tolerances(method, tolerance, members, horizon, period)
+    return Job(method, chart, numbers, horizon, steps, bounds, samples, budget, shown, period, names)
+
+
+def _horizons(members: Members, given: dict[str, Any], period: Array | None) -> Array:
+    """The horizon of each member: given, so many periods, or its own."""
+    horizon, names, n = members.horizon, members.names, len(members.numbers)
+    if "horizon" in given:
+        horizon = for_each("horizon", given["horizon"], n, names)
+    elif period is not None and "nutations" in given:
         with np.errstate(over="ignore"):  # an infinite horizon is refused below
-            horizon = for_each("nutations", given.nutations, n, names) * period
-    elif given.horizon is not None:
-        horizon = for_each("horizon", given.horizon, n, names)
+            horizon = for_each("nutations", given["nutations"], n, names) * period
     if horizon is None:
         words = "give horizon or nutations: these members have no horizon of their own"
         raise SymtopError(words, "horizon", "nutations")
     horizon_of(float(horizon.min()))
     for i in np.flatnonzero(horizon > LONGEST_TIME)[:1]:
-        if given.nutations is not None:
+        if "nutations" in given:
             words = f"they take {called(names, i)} beyond a time of {LONGEST_TIME:g}"
             raise SymtopError(f"nutations must be fewer: {words}", "nutations")
         words = f"not {horizon[i]!s} as of {called(names, i)}"
         raise SymtopError(f"horizon must be at most {LONGEST_TIME:g}, {words}", "horizon")
-    steps = bounds = None
-    if method.fixed_step:
-        if period is not None and given.per_nutation is not None:
-            step = _parts(period, for_each("per_nutation", given.per_nutation, n, names), horizon, names)
-        else:
-            step = for_each("step_size", given.step_size, n, names)
-        steps = _steps(step, horizon, budget or MOST_STEPS, names)
-    elif method.adaptive:
-        period = nutation_periods(numbers) if period is None else period
-        bounds = _tolerances(method, given.tolerance, members, horizon, period)
-    return Job(method, chart, numbers, horizon, steps, bounds, samples, budget, shown, period, names)
-
-
-def _periods(numbers: Array, names: Any) -> Array:
-    """Nutation periods; SymtopError for a member that has none."""
-    period = nutation_periods(numbers)
-    for i in np.flatnonzero(~np.isfinite(period))[:1]:
-        words = f"that of {called(names, i)} is endless"
-        raise SymtopError(
-            f"per_nutation and nutations count nutation periods, and {words}", "per_nutation", "nutations"
-        )
-    return period
+    return horizon
 
 
 def _parts(period: Array, counted: Array, horizon: Array, names: Any) -> Array:
@@ -286,15 +268,11 @@ def _tolerances(method: Integrator, tolerance: object, members: Members, horizon
 def _stream(path: Path, job: Job, labels: dict[str, Any], words: dict[str, Any]) -> Iterator["Stream"]:
     """The stream to a file, while nobody else has one; SymtopError if another process does."""
     check_replaceable(path)
-    with locked(_folder(path), wait=False) as ours:
+    folder = path.with_name(f"{path.name}.parts")
+    with locked(folder, wait=False) as ours:
         if not ours:
             raise SymtopError(f"another process is writing {path}: wait until it has ended, or name another path")
-        yield Stream(path, job, labels, words)
-
-
-def _folder(path: Path) -> Path:
-    """Where the chunks of a file are."""
-    return path.with_name(f"{path.name}.parts")
+        yield Stream(path, folder, job, labels, words)
 
 
 class Stream:
@@ -307,9 +285,9 @@ class Stream:
     Nothing is removed or replaced that symtop did not write.
     """
 
-    def __init__(self, path: Path, job: Job, labels: dict[str, Any], attributes: dict[str, Any]) -> None:
-        self.path, self.n, self.labels, self.attributes = path, len(job.numbers), labels, attributes
-        self.folder = _folder(path)
+    def __init__(self, path: Path, folder: Path, job: Job, labels: dict[str, Any], attributes: dict[str, Any]) -> None:
+        self.path, self.folder, self.labels, self.attributes = path, folder, labels, attributes
+        self.n = len(job.numbers)
         identity, stored = _identity(job, labels), self.folder / IDENTITY
         empty = not self.folder.exists() or (self.folder.is_dir() and not any(self.folder.iterdir()))
         if not empty and not stored.is_file():
@@ -335,10 +313,8 @@ class Stream:
         """Put the chunks together; the dataset reads from the file what it is asked for."""
         with self._writing(), netcdf.alone(), netcdf.replacing(self.path) as partial:
             first = self._columns(chunks[0])
-            times = first["time"][0]
-            shared = all(same_times(self._columns(chunk, "time")["time"], times) for chunk in chunks)
-            size = chunks[0].stop
-            labels = {name: values[:size] for name, values in self.labels.items()}
+            shared = all(same_times(self._columns(chunk, "time")["time"], first["time"][0]) for chunk in chunks)
+            labels = {name: values[: chunks[0].stop] for name, values in self.labels.items()}
             pattern = netcdf.describe(as_dataset(first, labels, shared=shared), **self.attributes)
             with contextlib.closing(netCDF4.Dataset(partial, "w")) as file:
                 _lay_out(file, pattern, self.n)

@@ -58,14 +58,11 @@ def read_members(given: "xr.Dataset | Iterable[str | Scene]") -> Members:
         raise SymtopError(f"members must be a dataset or a list of scenes, not {shown(given)}") from None
     if not chosen:
         raise SymtopError("members must be at least one")
-    names = np.array([entry.name for entry in chosen])
-    return Members(
-        np.array([flat(entry.top, entry.start) for entry in chosen]),
-        np.array([entry.horizon for entry in chosen]),
-        max((entry.observes for entry in chosen), key=OBSERVABLES.index),
-        "SI" if all(entry.units == "SI" for entry in chosen) else "",
-        {"scene": names},
-    )
+    numbers = np.array([flat(entry.top, entry.start) for entry in chosen])
+    horizons, names = (np.array([getattr(entry, name) for entry in chosen]) for name in ("horizon", "name"))
+    observes = max((entry.observes for entry in chosen), key=OBSERVABLES.index)
+    units = "SI" if all(entry.units == "SI" for entry in chosen) else ""
+    return Members(numbers, horizons, observes, units, {"scene": names})
 
 
 def _from_dataset(data: xr.Dataset) -> Members:
@@ -76,39 +73,27 @@ def _from_dataset(data: xr.Dataset) -> Members:
     if n == 0:
         raise SymtopError("members must be at least one")
     numbers = np.zeros((n, len(NUMBERS)))
-    for column, name in enumerate(NUMBERS):
+    for name in NUMBERS:
         if name in data:
             if data[name].dims not in ((), ("member",)) or data[name].dtype.kind not in "fiu":
-                raise SymtopError(
-                    f"{name} of members must be numbers over member, or one for all, not {data[name].dtype} "
-                    f"over {', '.join(map(str, data[name].dims)) or 'nothing'}"
-                )
-            numbers[:, column] = data[name].values
+                over = f"{data[name].dtype} over {', '.join(map(str, data[name].dims)) or 'nothing'}"
+                raise SymtopError(f"{name} of members must be numbers over member, or one for all, not {over}")
+            numbers[:, NUMBERS.index(name)] = data[name].values
     _check_names(data)
-    labels = {
-        name: np.broadcast_to(data[name].values.astype(str, copy=False), n)
-        for name in ("scene", "stratum")
-        if name in data
-    }
+    named = [name for name in ("scene", "stratum") if name in data]
+    labels = {name: np.broadcast_to(data[name].values.astype(str, copy=False), n) for name in named}
     if "member" in data.indexes and "member" in data.dims:
         labels["member"] = _plain(data.indexes["member"])
-    return Members(
-        checked_numbers(numbers, labels.get("member")), None, "axis", str(data.attrs.get("units", "")), labels
-    )
+    numbers, units = checked_numbers(numbers, labels.get("member")), str(data.attrs.get("units", ""))
+    return Members(numbers, None, "axis", units, labels)
 
 
 def _check_names(data: xr.Dataset) -> None:
-    """Refuse a variable that looks like one of the nine, which would be zero in its place; others are labels.
-
-    Alike are names that differ in case, in a letter or two or in underscores, and other words for a rate.
-    """
-    for name in map(str, data.variables):
-        if name in NUMBERS or name in WRITTEN:
-            continue
-        kinds = {known.lower(): known for known in NUMBERS}
-        near = [kinds[like] for like in difflib.get_close_matches(name.lower(), kinds, n=1, cutoff=NEAR)]
-        rate = RATE.fullmatch(name.lower())
-        if rate is not None:
+    """Refuse a variable that looks like one of the nine, in case, letters, underscores or another word for a rate."""
+    known = {name.lower(): name for name in NUMBERS}
+    for name in (name for name in map(str, data.variables) if name not in NUMBERS and name not in WRITTEN):
+        near = [known[like] for like in difflib.get_close_matches(name.lower(), known, n=1, cutoff=NEAR)]
+        if (rate := RATE.fullmatch(name.lower())) is not None:
             near = [f"{rate[2] or rate[4]}_dot"]
         if near:
             raise SymtopError(f"members have no variable {name!r}; did you mean {near[0]}?")
@@ -141,10 +126,7 @@ def _aligned(name: str, value: xr.DataArray, n: int, names: NDArray[Any] | None)
 
 
 def for_each(name: str, value: object, n: int, names: NDArray[Any] | None = None) -> Array:
-    """A number above zero for each of n members, of one for all or of a row of them; read-only where it is one.
-
-    A row with labels along ``member`` is put in the order of the members' own labels, `names`.
-    """
+    """A number above zero for each of n members, of one for all (then read-only) or of a row of them, by `names`."""
     if np.ma.is_masked(value):
         raise SymtopError(f"{name} must be numbers without a mask, not a masked array: what is masked has no value")
     if isinstance(value, xr.DataArray):

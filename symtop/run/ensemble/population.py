@@ -23,9 +23,9 @@ counted in 1/g, g = sqrt(abs(mgl)/I1), x = theta/2, and the spin enters as the r
 In all of them, I3/I1 is uniform in (0.02, 1.98), phi and psi in (-pi, pi), every sign is drawn; I1 lies between 2^-10
 and 2^10, g between 2^-6 and 2^6. Quantities that range over octaves are drawn by octave and uniformly within one.
 
-The first n members of a larger population are those of the smaller one, and their bits do not hang on the machine: the
-draws are the raw integers of a Philox generator, a stream that NumPy promises to keep, 16 a member, and everything
-else is made of sums, products, quotients and square roots, sine and cosine of theta included.
+The first n members of a larger population are those of the smaller one, with the same bits on every machine: the draws
+are the raw integers of a Philox generator, a stream that NumPy promises to keep, 16 a member, and everything else is
+made of sums, products, quotients and square roots, sine and cosine of theta included.
 """
 
 import math
@@ -40,10 +40,9 @@ from symtop.core import netcdf
 from symtop.core.errors import one_of, whole
 from symtop.model.top import NUMBERS
 
-MOST = 1e9  # members
-
 Array = NDArray[np.float64]
 
+MOST = 1e9  # members
 DRAWS = 16  # uniform numbers a member: a new quantity must not move those that are there
 BLOCK = 1 << 16  # members drawn at a time
 
@@ -173,12 +172,6 @@ STRATA: dict[str, tuple[float, Callable[[Array], _Start]]] = {
 KINDS = (*STRATA, "all")
 
 
-def _uniform(generator: np.random.Philox, n: int) -> Array:
-    """The next n members' uniform draws (DRAWS, n) in [0, 1), of 53 bits."""
-    integers = generator.random_raw(n * DRAWS) >> np.uint64(11)
-    return np.ascontiguousarray((integers * 2.0**-53).reshape(n, DRAWS).T)
-
-
 def _scaled(start: _Start, draw: Array, mgl: float) -> dict[str, Array]:
     """The variables of members, from starts without units; `mgl` is the sign of gravity."""
     cosine = sine_cosine(start.theta)[1]
@@ -200,9 +193,8 @@ def _scaled(start: _Start, draw: Array, mgl: float) -> dict[str, Array]:
 def _fill(columns: dict[str, Any], draw: Array, kind: str) -> None:
     """Fill in the members of these draws."""
     names, ends = list(STRATA), np.cumsum([share for share, _ in STRATA.values()])[:-1]
-    strata = (
-        np.searchsorted(ends, draw[0], side="right") if kind == "all" else np.full(draw.shape[1], names.index(kind))
-    )
+    strata = np.searchsorted(ends, draw[0], side="right")
+    strata = strata if kind == "all" else np.full_like(strata, names.index(kind))
     for place, name in enumerate(names):
         members = strata == place
         if members.any():
@@ -217,8 +209,7 @@ def population(n: int, *, seed: int = 0, kind: str = "all") -> xr.Dataset:
 
     Variables ``I1``, ``I3``, ``mgl``, ``theta``, ``phi``, ``psi``, ``theta_dot``, ``phi_dot``, ``psi_dot`` (rad and
     any consistent units) and ``stratum``, its name. `kind` is a stratum (slow, fast, grazing, near-separatrix, hanging,
-    sleeping), or "all" for their mixture; `symtop.run.ensemble.population` has the distribution. The same seed gives
-    the same members on every machine, and member i does not depend on n.
+    sleeping), or "all" for their mixture. Member i depends on the seed alone, and not on n or the machine.
 
     Raises SymtopError for arguments that make no sense.
     """
@@ -229,6 +220,8 @@ def population(n: int, *, seed: int = 0, kind: str = "all") -> xr.Dataset:
     columns["stratum"] = np.empty(count, dtype=f"U{max(map(len, STRATA))}")
     for begin in range(0, count, BLOCK):
         part = {name: values[begin : begin + BLOCK] for name, values in columns.items()}
-        _fill(part, _uniform(generator, len(part["I1"])), chosen)
+        integers = generator.random_raw(len(part["I1"]) * DRAWS) >> np.uint64(11)
+        uniform = (integers * 2.0**-53).reshape(-1, DRAWS)  # in [0, 1), of 53 bits
+        _fill(part, np.ascontiguousarray(uniform.T), chosen)
     data = xr.Dataset({name: ("member", values) for name, values in columns.items()})
     return netcdf.describe(data, f"{count} tops of the population {chosen!r}", seed=start, kind=chosen)

@@ -2,12 +2,11 @@
 
 heyoka integrates the space-frame equations in double, long double or quadruple precision (never in angles, which lose
 digits near a pole), at a tolerance of a hundredth of the rounding unit, from a start that is built in 60 digits. The
-closed form, evaluated in `DIGITS` digits at `CHECKS` times, shows the error of that run. The error of an integration
-grows, so the bound at a time t is `SAFETY` times the largest error seen at any check up to the next one after t.
+closed form in `DIGITS` digits at `CHECKS` times shows the error of that run. It grows, so that the bound at a time t is
+`SAFETY` times the largest error at any check up to the next one after t.
 
 `exact-discrete` iterated shares with the others nothing but the start: no series in time, no theta function, no
-integral over the motion. Its own error is what becomes of a last place of mgl at another step size, so that no other
-check is needed for it.
+integral over the motion. Its own error is what becomes of a last place of mgl at another step size.
 """
 
 import functools
@@ -24,6 +23,7 @@ from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
 from symtop.methods.taylor import heyoka
 from symtop.model import charts
+from symtop.model.charts import Array
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 
@@ -31,19 +31,20 @@ CHECKS = 16
 DIGITS = 40
 SAFETY = 8.0
 MAP_STEPS = (4.37, 7.13)  # of the discrete map, a nutation: no two of its constants agree
+MOST_NUTATIONS = 1e4  # that it is iterated over
 
 
 class Checks(NamedTuple):
-    """Largest errors seen up to each check time (running maxima), by quantity."""
+    """Largest errors up to each check time (running maxima), by quantity."""
 
-    times: charts.Array
-    attitude: charts.Array
-    axis: charts.Array
-    phi: charts.Array
-    psi: charts.Array
+    times: Array
+    attitude: Array
+    axis: Array
+    phi: Array
+    psi: Array
 
 
-def integrate(scene: Scene, times: charts.Array, precision: str, chart: str = "attitude") -> tuple[Any, int]:
+def integrate(scene: Scene, times: Array, precision: str, chart: str = "attitude") -> tuple[Any, int]:
     """heyoka's states at increasing times, in the working precision, and the number of steps it took.
 
     Raises SymtopError if it does not reach the last time, as where mgl/I1 is 1e60.
@@ -53,17 +54,12 @@ def integrate(scene: Scene, times: charts.Array, precision: str, chart: str = "a
         flight = heyoka.propagate(chart, precision, tolerance, scene.top, scene.start, times)
     if len(flight.states) < times.size:
         reached = float(times[len(flight.states) - 1]) if len(flight.states) else 0.0
-        raise SymtopError(
-            f"heyoka's integration of {scene.name} in {precision} ends at t = {reached:.6g} ({flight.outcome}); the "
-            "closed form has no such limit"
-        )
+        end = f"ends at t = {reached:.6g} ({flight.outcome}); the closed form has no such limit"
+        raise SymtopError(f"heyoka's integration of {scene.name} in {precision} {end}")
     return flight.states, flight.steps
 
 
-MOST_NUTATIONS = 1e4  # that the discrete map is iterated over
-
-
-def iterated(scene: Scene, times: charts.Array, per_nutation: float = MAP_STEPS[0]) -> tuple[Any, int]:
+def iterate_map(scene: Scene, times: Array, per_nutation: float = MAP_STEPS[0]) -> tuple[Any, int]:
     """Attitudes (w, x, y, z) of the discrete map at times above zero, each a whole number of steps; and all steps."""
     solve = integrator("exact-discrete").solvers["attitude"]
     nutation, attitudes, made = min(scene.nutation_period, scene.horizon), [], 0
@@ -75,15 +71,15 @@ def iterated(scene: Scene, times: charts.Array, per_nutation: float = MAP_STEPS[
     return np.array(attitudes), made
 
 
-def iterated_with_error(scene: Scene, times: charts.Array) -> tuple[Any, charts.Array]:
+def iterate_map_with_error(scene: Scene, times: Array) -> tuple[Any, Array]:
     """Attitudes of the discrete map, and their own error so far: `SAFETY` times what two neighbours differ by.
 
     A neighbour has another step, and mgl a last place up or down: next to a separatrix that is another motion.
     """
-    attitudes, apart = iterated(scene, times)[0], np.zeros(len(times))
+    attitudes, apart = iterate_map(scene, times)[0], np.zeros(len(times))
     for way in (-math.inf, math.inf):
         mgl = math.nextafter(scene.top.mgl, way) if scene.top.mgl else 0.0
-        near = iterated(replace(scene, top=replace(scene.top, mgl=mgl)), times, MAP_STEPS[1])[0]
+        near = iterate_map(replace(scene, top=replace(scene.top, mgl=mgl)), times, MAP_STEPS[1])[0]
         apart = np.maximum(apart, charts.attitude_distance(attitudes, near))
     return attitudes, SAFETY * np.maximum.accumulate(apart)
 
@@ -97,7 +93,7 @@ def have_heyoka() -> bool:
     return True
 
 
-def check_times(scene: Scene, horizon: float) -> charts.Array:
+def check_times(scene: Scene, horizon: float) -> Array:
     """Times of the checks: denser towards the start, the last one at the horizon.
 
     Beside each stands the moment of fastest nutation in the period before it: an error of phase shows there most, and
@@ -119,33 +115,26 @@ def precise_form(top: SymmetricTop, start: Angles, digits: int) -> Any:
     return PreciseForm(top, start, digits)
 
 
-@functools.lru_cache(maxsize=2048)  # 10 ms each; integrations in three precisions have the same checks
+@functools.lru_cache(maxsize=2048)  # integrations in three precisions have the same checks
 def precise_attitude(top: SymmetricTop, start: Angles, digits: int, t: float) -> tuple[Any, ...]:
     """Its attitude at one time."""
     return tuple(precise_form(top, start, digits).quaternion(t))
 
 
-def seen(scene: Scene, times: charts.Array, quaternions: Any, phis: Any, psis: Any) -> Checks:
+def largest_errors(scene: Scene, times: Array, quaternions: Any, phis: Any, psis: Any) -> Checks:
     """Running maxima of the errors of given attitudes and angles, against the closed form in `DIGITS` digits."""
     mp, rows = context(DIGITS + 10), []
-    for t, *components, phi, psi in zip(times, *quaternions.T, phis, psis, strict=True):
+    for t, *numbers in zip(times, *quaternions.T, phis, psis, strict=True):
         precise = precise_attitude(scene.top, scene.start, DIGITS, float(t))
         true = w, x, y, z = tuple(map(mp.convert, precise))  # all digits, in this arithmetic
-        attitude = [_read(mp, value) for value in components]
+        *attitude, phi, psi = [mp.mpf(float(one) if isinstance(one, float) else str(one)) for one in numbers]
         if sum(a * b for a, b in zip(attitude, true, strict=True)) < 0:
             attitude = [-value for value in attitude]
         turn = 2.0 * float(mp.norm([a - b for a, b in zip(attitude, true, strict=True)]))
         tilt = float(mp.norm([a - b for a, b in zip(_axis(attitude), _axis(true), strict=True)]))
         total, difference = mp.atan2(z, w), mp.atan2(y, x)
-        phi_error = _turn(mp, _read(mp, phi), total + difference)
-        rows.append((turn, tilt, phi_error, _turn(mp, _read(mp, psi), total - difference)))
-    table = np.maximum.accumulate(np.array(rows), axis=0)
-    return Checks(times, *table.T)
-
-
-def _read(mp: Any, value: Any) -> Any:
-    """A number of any arithmetic in multiprecision."""
-    return mp.mpf(float(value)) if isinstance(value, float) else mp.mpf(str(value))
+        rows.append((turn, tilt, _turn(mp, phi, total + difference), _turn(mp, psi, total - difference)))
+    return Checks(times, *np.maximum.accumulate(np.array(rows), axis=0).T)
 
 
 def _axis(quaternion: Any) -> tuple[Any, Any, Any]:
@@ -159,14 +148,14 @@ def _turn(mp: Any, angle: Any, true: Any) -> float:
     return abs(float((gap - mp.nint(gap)) * 2 * mp.pi))
 
 
-def envelope(checks: Checks, name: str, times: charts.Array) -> charts.Array:
+def envelope(checks: Checks, name: str, times: Array) -> Array:
     """SAFETY times the largest error at any check up to the first one that is not before t."""
-    values: charts.Array = getattr(checks, name)
+    values: Array = getattr(checks, name)
     after = np.minimum(np.searchsorted(checks.times, times, side="left"), values.size - 1)
     return SAFETY * values[after]
 
 
-def _unwrapped(angle: Any, near: charts.Array) -> Any:
+def _unwrapped(angle: Any, near: Array) -> Any:
     """`angle` on the branch nearest `near`, without rounding 2 pi to double."""
     turns = np.rint((near - angle.astype(np.float64)) / (2.0 * math.pi))
     if angle.dtype == np.float64:
@@ -175,31 +164,31 @@ def _unwrapped(angle: Any, near: charts.Array) -> Any:
     return angle + turns.astype(angle.dtype) * kind("6.283185307179586476925286766559005768394")
 
 
-class Flown(NamedTuple):
-    """heyoka's run through the times that were asked for and those of the checks."""
+class Integration(NamedTuple):
+    """heyoka's run through the given times and those of the checks."""
 
-    grid: charts.Array  # all of them, increasing
-    asked: Any  # places of the former in the grid
-    checked: Any  # and of the latter
+    grid: Array  # all of them, increasing
+    chosen: Any  # places of the given times in the grid
+    checked: Any  # and of those of the checks
     states: Any  # of the attitude, in the working precision
-    seconds: float  # of the integration: to choose the times of the checks takes 5 ms
+    seconds: float  # of the integration alone
 
     @property
     def axes(self) -> Any:
-        """The axis at the times that were asked for."""
-        return charts.axis_from_quaternion(self.states[self.asked, :4])
+        """The axis at the given times."""
+        return charts.axis_from_quaternion(self.states[self.chosen, :4])
 
 
-def flown(scene: Scene, times: charts.Array, precision: str) -> Flown:
-    """The integration behind `integrated`, and nothing of what judges it."""
+def integrate_with_checks(scene: Scene, times: Array, precision: str) -> Integration:
+    """The integration behind `integration_values`, and nothing of what judges it."""
     check = check_times(scene, float(times[-1]))
     grid, place = np.unique(np.concatenate([times, check]), return_inverse=True)
     start = time.perf_counter()
     states, _ = integrate(scene, grid, precision)
-    return Flown(grid, place[: times.size], place[times.size :], states, time.perf_counter() - start)
+    return Integration(grid, place[: times.size], place[times.size :], states, time.perf_counter() - start)
 
 
-def integrated(scene: Scene, run: Flown) -> tuple[dict[str, Any], Checks]:
+def integration_values(scene: Scene, run: Integration) -> tuple[dict[str, Any], Checks]:
     """heyoka's quantities at the times of a run, and their errors at its checks."""
     attitude = run.states[:, :4]
     theta, phi, psi = charts.angles_from_quaternion(attitude)
@@ -212,5 +201,5 @@ def integrated(scene: Scene, run: Flown) -> tuple[dict[str, Any], Checks]:
         "quaternion": attitude,
     }
     at = run.checked
-    checks = seen(scene, run.grid[at], attitude[at], shown["phi"][at], shown["psi"][at])
-    return {name: values[run.asked] for name, values in shown.items()}, checks
+    checks = largest_errors(scene, run.grid[at], attitude[at], shown["phi"][at], shown["psi"][at])
+    return {name: values[run.chosen] for name, values in shown.items()}, checks

@@ -47,15 +47,10 @@ def conditioning(scene: Scene, horizon: float) -> float:
     """Rad by which the axis moves up to the horizon for each of the start, or relative; 1 at least, or NaN.
 
     Where a change displaces the axis by `FAR`, a smaller one is tried, which the start takes less exactly: `LEAST` to a
-    third. What is `unbounded` is displaced by `FAR` even so, and moves by that much at least.
+    third. What the smallest change moves by `FAR` is displaced by `FAR` even so, and moves by that much at least.
     """
     for change in (SMALL, 8.0 * EPSILON, LEAST):
         apart = displacement(scene, change, horizon)
         if not apart > FAR:
             break
     return float(np.maximum(apart / change, 1.0))
-
-
-def unbounded(factor: float) -> bool:
-    """Is a `conditioning` only a lower bound, because the smallest change of the start moves the axis by `FAR`?"""
-    return factor * LEAST > FAR

@@ -51,25 +51,26 @@ from symtop.core.files import cache_root, prune, touch
 from symtop.core.numbers import EPSILON, TINY, real_numbers
 from symtop.methods.taylor import heyoka
 from symtop.model import charts
+from symtop.model.charts import Array
 from symtop.model.exact.closed_form import ClosedForm
-from symtop.model.exact.constants import RATE
+from symtop.model.exact.turning_points import RATE
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
 from symtop.run.reference.independent_checks import (
     CHECKS,
     DIGITS,
     SAFETY,
     Checks,
-    Flown,
+    Integration,
     check_times,
     envelope,
-    flown,
     have_heyoka,
     integrate,
-    integrated,
-    iterated_with_error,
-    seen,
+    integrate_with_checks,
+    integration_values,
+    iterate_map_with_error,
+    largest_errors,
 )
-from symtop.run.reference.sensitivity import conditioning, unbounded
+from symtop.run.reference.sensitivity import FAR, LEAST, conditioning
 from symtop.run.trajectory import dataset
 
 PRECISIONS = ("closed-form", "double", "longdouble", "quad")
@@ -131,7 +132,7 @@ def reference(
     return netcdf.describe(data, f"reference motion of {chosen.name}", chosen.units, **words)
 
 
-def _by_closed_form(scene: Scene, times: charts.Array, certify: str | None) -> tuple[xr.Dataset, dict[str, str]]:
+def _by_closed_form(scene: Scene, times: Array, certify: str | None) -> tuple[xr.Dataset, dict[str, str]]:
     """Values and bounds in double, and words on both."""
     values, known = closed_values(scene, times), certificate(scene, certify)
     bounds = closed_bounds(scene, times, values)
@@ -146,7 +147,7 @@ def _by_closed_form(scene: Scene, times: charts.Array, certify: str | None) -> t
     return _dataset(scene, times, values, bounds), words
 
 
-def _by_integration(scene: Scene, times: charts.Array, precision: str) -> tuple[xr.Dataset, dict[str, str]]:
+def _by_integration(scene: Scene, times: Array, precision: str) -> tuple[xr.Dataset, dict[str, str]]:
     """The same of an integration, from the cache if it is there."""
     distinct, order = np.unique(times, return_inverse=True)
     if distinct.size > MOST_CACHED:
@@ -172,43 +173,40 @@ def conditioned(scene: Scene, horizon: float) -> str:
     if math.isnan(factor):  # a changed start that comes too close to a pole
         return "unknown"
     change, anew = f"{factor:.2g} times a change of the start", "rounding the start anew moves the axis by"
-    if unbounded(factor):
+    if factor * LEAST > FAR:  # the factor is only a lower bound: the smallest change of the start moves the axis so far
         known = "nothing is known of the axis but from these very doubles"
         return f"at least {change}; {anew} {factor * EPSILON:.2g} rad or more: {known}"
     return f"{change}; {anew} {factor * EPSILON:.1g} rad" if factor > ILL else change
 
 
-def _cache_path(scene: Scene, times: charts.Array, precision: str) -> Path:
+def _cache_path(scene: Scene, times: Array, precision: str) -> Path:
     return place(_integration, scene.top, scene.start, precision, CHECKS, DIGITS, SAFETY, data=times.tobytes())
 
 
-def _dataset(
-    scene: Scene, times: charts.Array, columns: dict[str, charts.Array], bounds: dict[str, charts.Array]
-) -> xr.Dataset:
+def _dataset(scene: Scene, times: Array, columns: dict[str, Array], bounds: dict[str, Array]) -> xr.Dataset:
     """Values, bounds and the constants of the motion."""
     form = closed_form(scene)
-    constants = {"energy": form.energy, "p_phi": form.p_phi, "p_psi": form.p_psi}
-    columns = columns | {f"{name}_error_bound": bound for name, bound in bounds.items()}
-    return dataset(times, columns | {name: np.full(times.size, value) for name, value in constants.items()})
+    constants = {name: np.full(times.size, getattr(form, name)) for name in ("energy", "p_phi", "p_psi")}
+    return dataset(times, columns | {f"{name}_error_bound": bound for name, bound in bounds.items()} | constants)
 
 
-def _integration(scene: Scene, times: charts.Array, precision: str) -> xr.Dataset:
-    return judged_integration(scene, times, precision, flown(scene, times, precision))
+def _integration(scene: Scene, times: Array, precision: str) -> xr.Dataset:
+    return judged_integration(scene, times, precision, integrate_with_checks(scene, times, precision))
 
 
-def judged_integration(scene: Scene, times: charts.Array, precision: str, run: Flown) -> xr.Dataset:
+def judged_integration(scene: Scene, times: Array, precision: str, run: Integration) -> xr.Dataset:
     """Values, low halves and bounds at the times of a run, increasing and distinct, as `reference` has them."""
-    values, checks = integrated(scene, run)
+    values, checks = integration_values(scene, run)
     grain = 8.0 * max(heyoka.arithmetic(precision).epsilon, 2.0 * EPSILON**2)  # what a pair of doubles can hold
-    columns: dict[str, charts.Array] = {}
-    for name, (high, low) in {name: _split(value) for name, value in values.items()}.items():
-        columns |= {name: high, f"{name}_lo": low}
+    columns: dict[str, Array] = {}
+    for name, value in values.items():
+        columns[name], columns[f"{name}_lo"] = _split(value)
     bounds = _bounds(times, columns, checks, grain)
     _raise_to_distance(bounds, columns, closed_values(scene, times))
     return _dataset(scene, times, columns, bounds)
 
 
-def _split(values: Any) -> tuple[charts.Array, charts.Array]:
+def _split(values: Any) -> tuple[Array, Array]:
     """High and low halves, each a double."""
     high = values.astype(np.float64)
     if values.dtype == np.float64:
@@ -216,7 +214,7 @@ def _split(values: Any) -> tuple[charts.Array, charts.Array]:
     return high, (values - high.astype(values.dtype)).astype(np.float64)
 
 
-def _bounds(times: charts.Array, shown: dict[str, Any], checks: Checks, grain: float) -> dict[str, charts.Array]:
+def _bounds(times: Array, shown: dict[str, Any], checks: Checks, grain: float) -> dict[str, Array]:
     """Error bounds from the checks."""
     sine = np.maximum(np.sin(shown["theta"]), TINY)
     axis = envelope(checks, "axis", times) + grain
@@ -227,7 +225,7 @@ def _bounds(times: charts.Array, shown: dict[str, Any], checks: Checks, grain: f
     return {"axis": axis, "attitude": attitude, "theta": axis, "phi": turn, "psi": spin}
 
 
-def _raise_to_distance(bounds: dict[str, charts.Array], shown: dict[str, Any], closed: dict[str, Any]) -> None:
+def _raise_to_distance(bounds: dict[str, Array], shown: dict[str, Any], closed: dict[str, Any]) -> None:
     """Where an integration visibly differs from the closed form in double, that distance is its error at that time."""
     distances = {name: np.abs(shown[name] - closed[name]) for name in ("theta", "phi", "psi")}
     distances["axis"] = charts.axis_distance(shown["axis"], closed["axis"])
@@ -239,14 +237,14 @@ def _raise_to_distance(bounds: dict[str, charts.Array], shown: dict[str, Any], c
         bounds[name] = np.where(visible, np.maximum(bounds[name], distance + grain), bounds[name])
 
 
-def closed_values(scene: Scene, times: charts.Array) -> dict[str, Any]:
+def closed_values(scene: Scene, times: Array) -> dict[str, Any]:
     """Angles, axis and quaternion of the closed form, by name."""
     form = closed_form(scene)
     theta, phi, psi, *_ = form(times)
     return {"theta": theta, "phi": phi, "psi": psi, "axis": form.axis(times), "quaternion": form.quaternion(times)}
 
 
-def closed_bounds(scene: Scene, times: charts.Array, values: dict[str, Any]) -> dict[str, charts.Array]:
+def closed_bounds(scene: Scene, times: Array, values: dict[str, Any]) -> dict[str, Array]:
     """Bounds at `times` of the `values` there: radians for theta, axis, attitude, phi and psi."""
     form = closed_form(scene)
     top, spin = form.top, form.p_psi / form.top.I3
@@ -261,7 +259,7 @@ def closed_bounds(scene: Scene, times: charts.Array, values: dict[str, Any]) -> 
     return {name: np.where(wrong, math.pi, bound) for name, bound in bounds.items()} if wrong.any() else bounds
 
 
-def disagreement(form: ClosedForm, times: charts.Array, values: dict[str, Any]) -> charts.Array:
+def disagreement(form: ClosedForm, times: Array, values: dict[str, Any]) -> Array:
     """How far the views are apart at each time, rad, or the integrals from the start's, relative to their terms."""
     axis, (x, y, z) = charts.axis_from_quaternion(values["quaternion"]), values["axis"].T
     apart = np.sqrt(((axis - values["axis"]) ** 2).sum(axis=1))
@@ -275,7 +273,7 @@ def disagreement(form: ClosedForm, times: charts.Array, values: dict[str, Any]) 
     spinning, lifting = 0.5 * form.p_psi**2 / top.I3, top.mgl * z
     energy = np.abs(moving + spinning + lifting - form.energy) / (moving + spinning + abs(top.mgl) + TINY)
     p_phi = np.abs(turning + form.p_psi * z - form.p_phi) / (np.abs(turning) + abs(form.p_psi) + TINY)
-    largest: charts.Array = np.maximum(apart, np.maximum(energy, p_phi))
+    largest: Array = np.maximum(apart, np.maximum(energy, p_phi))
     return largest
 
 
@@ -321,33 +319,30 @@ def certificate(scene: Scene, kind: str | None = None) -> Certificate | None:
     """
     if kind is None:
         return _on_disk(scene, cache_root())
-    wanted = kind if kind != "integration" or have_heyoka() else "discrete-map"
-    data = cached(_path(scene, wanted), lambda: _compared(scene, wanted), None)
     _on_disk.cache_clear()
-    return _read(data)
+    return _stored(scene, kind if kind != "integration" or have_heyoka() else "discrete-map")
+
+
+@functools.lru_cache(maxsize=1024)
+def _on_disk(scene: Scene, _root: Path) -> Certificate | None:
+    return next((_stored(scene, kind) for kind in reversed(KINDS) if _path(scene, kind).is_file()), None)
 
 
 def _path(scene: Scene, kind: str) -> Path:
     return place(_compared, "certificate", kind, scene.top, scene.start)
 
 
-def _read(data: xr.Dataset) -> Certificate:
+def _stored(scene: Scene, kind: str) -> Certificate:
+    """The certificate on disk, or one that is made and put there."""
+    data = cached(_path(scene, kind), lambda: _compared(scene, kind), None)
     return Certificate(*(data[name].item() for name in Certificate._fields))
-
-
-@functools.lru_cache(maxsize=1024)
-def _on_disk(scene: Scene, _root: Path) -> Certificate | None:
-    for kind in reversed(KINDS):
-        if (path := _path(scene, kind)).is_file():
-            return _read(cached(path, functools.partial(_compared, scene, kind), None))
-    return None
 
 
 def _compared(scene: Scene, kind: str) -> xr.Dataset:
     """The comparisons of one scene."""
     times = _times(scene, REACH)
     values = closed_values(scene, times)
-    checks = seen(scene, times, values["quaternion"], values["phi"], values["psi"])
+    checks = largest_errors(scene, times, values["quaternion"], values["phi"], values["psi"])
     bounds = closed_bounds(scene, times, values)
     share = max(float(np.max(getattr(checks, name) / bounds[name])) for name in ("attitude", "axis", "phi", "psi"))
     overlap, map_apart = _against_map(scene) if kind != "digits" else (math.nan, math.nan)
@@ -356,7 +351,7 @@ def _compared(scene: Scene, kind: str) -> xr.Dataset:
     return xr.Dataset({name: ((), value) for name, value in made._asdict().items()})
 
 
-def _times(scene: Scene, nutations: float) -> charts.Array:
+def _times(scene: Scene, nutations: float) -> Array:
     """Times of comparison: up to so many nutations, or to the horizon where there are none."""
     period = scene.nutation_period
     return check_times(scene, nutations * period if math.isfinite(period) else scene.horizon)
@@ -365,7 +360,7 @@ def _times(scene: Scene, nutations: float) -> charts.Array:
 def _against_map(scene: Scene) -> tuple[float, float]:
     """The time of the last comparison with the map, and how far it and the closed form are apart beyond its error."""
     times = _times(scene, OVERLAP)
-    attitudes, own = iterated_with_error(scene, times)
+    attitudes, own = iterate_map_with_error(scene, times)
     gap = charts.attitude_distance(closed_form(scene).quaternion(times), attitudes)
     return float(times[-1]), float(max(np.max(gap - own), 0.0))
 
@@ -376,7 +371,7 @@ def _against_integration(scene: Scene) -> tuple[float, float]:
     states, _ = integrate(scene, times, "longdouble")
     gap = charts.attitude_distance(closed_form(scene).quaternion(times), states[:, :4].astype(float))
     _, phi, psi = charts.angles_from_quaternion(states[:, :4])
-    rounding = seen(scene, times, states[:, :4], phi, psi).attitude  # an unstable motion amplifies its rounding
+    rounding = largest_errors(scene, times, states[:, :4], phi, psi).attitude  # grows where the motion is unstable
     return float(times[-1]), float(max(np.max(gap - 2.0 * rounding), 0.0))
 
 

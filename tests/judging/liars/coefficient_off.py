@@ -3,7 +3,7 @@
 import dataclasses
 
 import symtop
-from symtop.methods.framework.fixed_step import FixedStep
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.space import on_axis
 from symtop.methods.splitting import space
 from symtop.methods.splitting.coefficients import YOSHIDA_4

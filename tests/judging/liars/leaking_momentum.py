@@ -3,8 +3,7 @@
 import dataclasses
 
 import symtop
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import FixedStep, kernel_loop
 from symtop.methods.framework.space import observe_axis, on_axis
 from symtop.methods.splitting import space as family
 from symtop.methods.splitting.coefficients import STRANG
@@ -13,11 +12,11 @@ from symtop.methods.splitting.loop import Stages
 
 def increment(par, rule, state, carry, h):
     """The family's step and a little more."""
-    step, axis, forces, outcome = family.increment_axis(par, rule, state, carry, h)
+    step, axis, forces, outcome = family.AXIS.increment(par, rule, state, carry, h)
     return (step[0], step[1], step[2], step[3], step[4], step[5] + 1e-10), axis, forces, outcome
 
 
-march = kernel_loop(family.begin_axis, increment, observe_axis, family.enter_axis, family.present_axis)
+march = kernel_loop(family.AXIS.begin, increment, observe_axis, family.AXIS.enter, family.AXIS.present)
 
 
 def solve(top, start, plan):

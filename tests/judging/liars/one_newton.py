@@ -7,8 +7,7 @@ import numpy as np
 import symtop
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.angles import chart_outcome, on_angles
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import FixedStep, kernel_loop
 from symtop.methods.lagrangian import discrete_lagrangian as family
 from symtop.methods.lagrangian.discrete_lagrangian import forces, node_sums, opening
 

@@ -2,8 +2,7 @@
 
 import symtop
 from symtop.methods.framework.angles import chart_outcome, on_angles
-from symtop.methods.framework.fixed_step import FixedStep
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import FixedStep, kernel_loop
 from symtop.methods.splitting import angles
 
 

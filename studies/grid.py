@@ -1,7 +1,5 @@
-"""Which scenes and variants a study runs: all that suit its question, but for those that it leaves out for a reason.
-
-A study does not list its scenes or methods, so that one that is added, to the catalogue or by a user, is in every study
-whose question it suits. What a study leaves out, it names with the reason.
+"""Which scenes and variants a study runs: all that suit its question, a user's own too, but for those that it leaves
+out for a reason that it names.
 """
 
 from collections.abc import Callable, Iterable

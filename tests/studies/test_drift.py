@@ -1,19 +1,25 @@
-"""Sentences of the studies of long runs, told other numbers: each says something else."""
+"""The drift study: behaviours, histories, losses of phase and what it costs to keep it, and windows of many runs."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.drift import behaviours, growth, messages, tables, words
-from symtop_studies.drift.runs import run_history
+from symtop_studies.drift import behaviours, figures, growth, messages, study, tables
+from symtop_studies.drift.phase_loss import phase_loss
+from symtop_studies.drift.runs import gauges_of, members, run_history, side_by_side
 from symtop_studies.drift.study import TOLERANCE, cases
+from symtop_studies.drift.tables import ROUNDINGS
 from symtop_studies.drift.variants import charts_table
-from symtop_studies.truth import tables as truth_tables, words as truth_words
 
 import symtop
-from symtop.judging.claims.long_run import KEPT, Constant
-from symtop.measure.conservation import Changed
+from symtop.judging.claims.constants import KEPT, Constant
+from symtop.measure.conservation import CONSTANTS, Changed
+from symtop.methods.framework.lanes import LEAST
+from symtop.methods.framework.registry import integrator
+from symtop.model.scenes import scene
+from symtop.run.long_run import QUANTITIES, long_run
 from symtop.run.trajectory import Trajectory
 
 
@@ -36,19 +42,6 @@ def test_the_behaviour_of_a_quantity_is_that_on_its_worst_scene(sizes, exponents
     })  # fmt: skip
     assert tables.worst_behaviour(cell, "energy") == word
     assert tables.worst_behaviour(cell.assign(outcome=("scene", ["ok", "left_chart"])), "energy") == "failed"
-
-
-def histories(**changes):
-    """Largest changes of p_phi as given, at rounding in everything else; the last is adaptive."""
-    names = ["rk4[angles]", "rk4[axis]", "strang[axis]", "strang[attitude]", "rk45[angles]", "taylor[axis]"]
-    sizes = [changes.get(name.replace("[", "_").rstrip("]"), 1e-15) for name in names]
-    per_row = {
-        "p_phi_largest": sizes, "energy_largest": [1e-15] * 6, "p_psi_largest": [0.0] * 6, "outcome": ["ok"] * 6,
-        "nutations": [100.0] * 6, "steps_a_nutation": [118.0] * 4 + [np.nan] * 2,
-        "tolerance": [np.nan] * 4 + [1e-8, 2.2e-18], "own_tolerance": [0.0] * 5 + [1.0],
-    }  # fmt: skip
-    coords = {"scene": ["spheroid"], "variant": names}
-    return xr.Dataset({key: (("scene", "variant"), [values]) for key, values in per_row.items()}, coords=coords)
 
 
 def test_adaptive_methods_drift_at_one_tolerance():
@@ -81,16 +74,6 @@ def test_a_history_says_with_what_it_ran():
     assert float(other["p_phi_largest"]) > 1e-9
 
 
-def test_a_change_of_law_is_told_above_rounding_only():
-    grown = {"exponent": 1.1, "exponent_interval": 0.1, "change": 42.0, "before": 0.1, "after": 2.0, "law": "linear"}
-    for name in ("energy", "phase"):
-        cell = xr.Dataset({f"{name}_{column}": value for column, value in grown.items()})
-        bent = words.law(cell.assign(energy_largest=1e-6), name)
-        assert bent == "1.10 +- 0.10, linear; t^0.10 to t^2.00 at t = 42"
-        below = "linear" if name == "phase" else "at rounding"
-        assert words.law(cell.assign(energy_largest=1e-13), name) == f"1.10 +- 0.10, {below}"
-
-
 def test_the_same_run_has_one_behaviour_in_every_study():
     """kahan-li-6 changes the energy by 9e-13 of the spin's and has an exponent of 0: an error of the step, bounded."""
     for size, exponent, interval in ((9e-12, 0.0, 0.001), (1e-15, 0.9, 0.1), (1e-4, 1.0, 0.1), (1e-4, 0.0, 0.01)):
@@ -103,31 +86,11 @@ def test_the_same_run_has_one_behaviour_in_every_study():
         assert tables.worst_behaviour(cell, "energy") == ledger.kind
 
 
-@pytest.mark.parametrize(("power", "agreeing"), [(0.45, 2), (0.8, 1)])
-def test_a_walk_of_rounding_is_held_against_one_half(power, agreeing):
-    cells = {
-        name: xr.Dataset({"exponent": exponent, "exponent_interval": 0.06, "gain": gain})
-        for name, exponent, gain in (("strang", power, 100.0), ("cayley", 0.5, 40.0))
-    }
-    sentence = words.walks(cells)
-    assert f"as n^{min(power, 0.5):.2f} to n^{max(power, 0.5):.2f} in n steps" in sentence
-    assert f"with {agreeing} of 2 variants that agrees with the 1/2 of a random walk" in sentence
-    assert "drift 40 to 100 times as far" in sentence
-
-
 def test_the_shift_of_the_mean_energy_is_relative_to_its_band():
     means = xr.DataArray([[0.0, 1e-5, 3e-5, np.nan]], dims=("variant", "window"))
-    cells = xr.Dataset({"energy_mean": means, "modified_energy_mean": means * 1e-10,
+    cells = xr.Dataset({"energy_mean": means.copy(data=[[0.0, 4e-5, 1e-6, np.nan]]),
                         "energy_largest": means + 5e-5, "energy_least": means - 5e-5})  # fmt: skip
-    sentence = words.moved(cells)
-    assert "at most 3e-01 of the width of its oscillation from the first window to the last" in sentence
-    assert "off by up to 3e-01 of that width" in words.scatter(cells)
-    assert "the mean modified energy by at most 3e-15 of" in sentence
-    there_and_back = cells.assign(energy_mean=means.copy(data=[[0.0, 4e-5, 1e-6, np.nan]]))
-    assert messages.strayed(there_and_back) == pytest.approx((0.01, 0.4))
-    said = messages.windows(there_and_back.assign(steps=means * 0.0 + 1e8))
-    assert "moves by at most 1% of the width of its oscillation in 10⁸ steps, from the first window to the last" in said
-    assert "(first row)" in said
+    assert messages.strayed(cells) == pytest.approx((0.01, 0.4))
 
 
 def test_a_change_of_law_is_found_in_a_run_and_an_oscillation_that_switches_on_is_none(monkeypatch):
@@ -144,15 +107,6 @@ def test_a_change_of_law_is_found_in_a_run_and_an_oscillation_that_switches_on_i
     assert str(found["p_phi_law"].item()) == "bounded"
     assert np.isnan(float(found["p_phi_change"]))
     assert np.isnan(float(found["p_psi_change"]))
-
-
-@pytest.mark.parametrize(("bound", "holding"), [(2e-9, 2), (5e-10, 1)])
-def test_the_truth_study_counts_the_bounds_that_an_error_exceeds(bound, holding):
-    data = xr.Dataset({
-        truth_tables.ERROR: ("horizon", [1e-9, 1e-9, np.nan, 1e-9]),
-        truth_tables.BOUND: ("horizon", [4e-9, bound, 1e-9, np.nan]),
-    })  # fmt: skip
-    assert f"Of 2 claimed bounds {holding} hold" in truth_words.bounds(data)
 
 
 def test_a_phase_is_steady_only_if_its_intervals_allow_it_and_faster_only_on_every_scene():
@@ -190,13 +144,106 @@ def test_a_chart_matters_only_where_the_change_is_above_rounding_and_twice_as_la
     assert compared(1.5e-4, 1.2e-4) == compared(1e-14, 0.0) == []
 
 
-def test_a_loss_that_is_off_by_a_fifth_was_not_predicted():
-    def message(*ratios):
-        return words.predictions({
-            f"method-{k}": xr.Dataset({"short": 100.0, "measured": 250.0, "ratio": ratio})
-            for k, ratio in enumerate(ratios)
-        })  # fmt: skip
+NAMES = ["strang[axis]", "gauss-4[axis]", "rk4[axis]", "rk4[angles]", "radau[angles]"]
+SIZES = {"energy": [1e-4, 1e-15, 1e-3, 1e-2, 1e-6], "p_phi": [0.0, 0.0, 0.0, 1e-5, 1e-6], "p_psi": [0.0] * 5}
+SLOPES = {"energy": [0.0, 0.5, 1.0, 1.0, 0.0], "p_phi": [0.0, 0.0, 0.0, 1.0, 1.0], "p_psi": [0.0] * 5}
+PHASE = [[1.0, 1.04], [0.4, 1.5], [2.0, 1.9], [2.0, 2.2], [1.0, 2.0]]  # by variant and scene
 
-    assert "3% for 2 of 2" in message(1.01, 0.97)
-    assert "method-1 (20% off)" in message(1.01, 1.2)
-    assert "1% for 1 of 2" in message(1.01, math.nan)
+
+@pytest.fixture
+def histories():
+    """Five variants on two scenes: two hold everything, one loses the energy, one that and p_phi, one p_phi."""
+    both = {
+        f"{one}_{part}": np.repeat(np.array(values, float)[:, None], 2, axis=1)
+        for one in CONSTANTS
+        for part, values in (("largest", SIZES[one]), ("exponent", SLOPES[one]), ("exponent_interval", [0.01] * 5))
+    }
+    both |= {"phase_exponent": np.array(PHASE), "phase_exponent_interval": np.full((5, 2), 0.01)}
+    both |= {"nutations": np.full((5, 2), 100.0), "steps_a_nutation": np.full((5, 2), 118.0)}
+    both |= {"tolerance": np.full((5, 2), np.nan), "own_tolerance": np.zeros((5, 2))}
+    data = xr.Dataset(
+        {key: (("variant", "scene"), values) for key, values in both.items()},
+        coords={"variant": NAMES, "scene": ["spheroid", "goldstein"]},
+    )
+    times = np.broadcast_to(np.linspace(0.0, 1.0, 3), (5, 2, 3))
+    return data.assign(
+        outcome=(("variant", "scene"), np.full((5, 2), "ok")), sample_time=(("variant", "scene", "sample"), times)
+    )
+
+
+def test_rows_are_grouped_by_the_constants_that_they_lose(histories):
+    groups = messages.lost(histories)
+    assert groups == {
+        (): ["gauss-4[axis]", "strang[axis]"],
+        ("energy", "p_phi"): ["rk4[angles]"],
+        ("energy",): ["rk4[axis]"],
+        ("p_phi",): ["radau[angles]"],
+    }
+    ended = histories.assign(outcome=histories["outcome"].where(histories["variant"] != "strang[axis]", "left_chart"))
+    assert messages.lost(ended)[CONSTANTS] == ["strang[axis]"]
+
+
+def test_growth_as_time_is_told_from_faster_growth():
+    slopes = np.array([0.91, 1.0, 1.09, 0.88, 1.12, 2.0])
+    assert messages.as_time(slopes).tolist() == [True, True, True, False, False, False]
+    assert messages.faster(slopes).tolist() == [False, False, False, False, True, True]
+
+
+def test_phases_are_grouped_by_what_the_energy_does(histories):
+    groups = messages.by_energy(histories)
+    assert sorted(groups["bounded"]) == [1.0, 1.0, 1.04, 2.0]
+    assert sorted(groups["lost"]) == [1.9, 2.0, 2.0, 2.2]
+
+
+def loss(length=2500.0, paid=100.0, exponent=1.0):
+    return xr.Dataset({"measured": length, "evaluations": paid, "exponent": exponent, "predicted": length})
+
+
+def test_the_law_of_a_method_of_order_two_needs_the_square_root_of_the_length():
+    law = figures.keeping("stormer-verlet[angles]", loss())
+    assert law.work(2500.0) == pytest.approx(100.0)
+    assert law.work(10_000.0) == pytest.approx(200.0)
+    steeper = figures.keeping("stormer-verlet[angles]", loss(exponent=2.0))  # a drifting energy
+    assert steeper.work(10_000.0) == pytest.approx(400.0)
+
+
+def test_the_law_foretells_the_work_of_a_run_that_lasts_four_times_as_long():
+    scene, verlet = symtop.scene("spheroid"), integrator("stormer-verlet[angles]")
+    short, long = (phase_loss(scene, verlet, 100.0, target) for target in (300.0, 1200.0))
+    law = figures.keeping(verlet.name, short)
+    assert law.power == pytest.approx(0.5, abs=0.05)
+    assert float(long["measured"]) > 3.0 * float(short["measured"])
+    assert law.work(float(long["measured"])) == pytest.approx(float(long["evaluations"]), rel=0.05)
+    rule = float(short["evaluations"]) / float(short["steps"])
+    assert rule == pytest.approx(1.0, abs=0.01)  # one force evaluation a step
+
+
+PER_NUTATION = 1000.37
+PARTS = ("least", "largest", "mean")
+
+
+@pytest.mark.parametrize("compensated", [True, False])
+@pytest.mark.parametrize("name", ["midpoint[angles]", "cayley[axis]"])
+def test_each_has_the_bits_of_a_long_run(name, compensated):
+    method, scenes = integrator(name), members(scene("spheroid"), 6)  # enough for lanes
+    gauges = gauges_of(scenes, method, PER_NUTATION)
+    ends, seen = side_by_side(scenes, gauges, method, 20_000, PER_NUTATION, compensated=compensated)
+    for i, one in ((0, scenes[0]), (5, scenes[5])):
+        h = one.nutation_period / PER_NUTATION
+        alone = long_run(one, method, steps=20_000, step_size=h, compensated=compensated, quiet=True)
+        np.testing.assert_array_equal(ends, alone["steps"])
+        for quantity in QUANTITIES:
+            for k, part in enumerate(PARTS):
+                np.testing.assert_array_equal(seen[quantity][i, :, k], alone[f"{quantity}_{part}"])
+    others = [seen["modified_energy"][i] for i in range(6)]
+    assert not any(np.array_equal(one, other) for one, other in pairwise(others))  # each is a run of its own
+
+
+def test_the_ordinary_ensemble_goes_in_lanes():
+    """Fewer members, or another sum, would run one after another, 8 times slower."""
+    ensembles = [case for case in study.cases(False) if case.group == ROUNDINGS]
+    assert len(ensembles) == 4
+    for case in ensembles:
+        row = integrator(case.integrator)
+        assert case.settings["count"] >= LEAST
+        assert row.solvers[row.charts()[0]].in_lanes

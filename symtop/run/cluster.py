@@ -13,7 +13,6 @@ from symtop.core.errors import SymtopError, shown
 
 PATIENCE = 10  # seconds to wait for a scheduler's answer, or for a worker when there is none
 ABSENT = "scheduler needs the package distributed: pip install 'symtop[distributed]'"
-FAREWELL = 2.0  # seconds to wait for the connection to close
 
 
 def check_sent(address: object, work: object, name: str) -> None:
@@ -45,7 +44,7 @@ def connect(address: str) -> Any:
     client, failure = None, ""
     try:
         with ThreadPoolExecutor(1) as apart:  # the caller's thread may run a loop of its own, as in a notebook
-            apart.submit(asyncio.run, _asked(address)).result()
+            apart.submit(asyncio.run, _query(address)).result()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # other versions there; the digest of every case is compared anyway
             client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
@@ -61,22 +60,19 @@ def connect(address: str) -> Any:
     return client
 
 
-async def _asked(address: str) -> None:
+async def _query(address: str) -> None:
     """Raise TimeoutError if a scheduler does not answer: a client waits for ever for one that takes the connection."""
     from distributed import rpc
 
-    async def ask() -> None:
-        async with rpc(address) as scheduler:
-            await scheduler.identity()
-
-    await asyncio.wait_for(ask(), PATIENCE)
+    async with asyncio.timeout(PATIENCE), rpc(address) as scheduler:
+        await scheduler.identity()
 
 
 def leave(client: Any) -> None:
     """Close the connection, whatever state it is in, and do not wait for a scheduler that does not answer."""
     if client is not None:
         with contextlib.suppress(Exception):
-            client.close(timeout=FAREWELL)
+            client.close(timeout=2.0)
 
 
 @contextlib.contextmanager

@@ -35,11 +35,9 @@ def member_errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array
         raise SymtopError("members must be those of the ensemble in their order, and their labels are others")
     if quantity not in data:
         raise SymtopError(f"the ensemble was asked for without the variable {quantity}")
-    errors, stride = np.empty((n, samples)), max(1, BLOCK // samples)
-    for begin in range(0, n, stride):
-        part = slice(begin, begin + stride)
-        errors[part] = _errors(members.isel(member=part), data.isel(member=part), quantity)
-    return errors
+    stride = max(1, BLOCK // samples)
+    parts = [slice(begin, begin + stride) for begin in range(0, n, stride)]
+    return np.concatenate([_errors(members.isel(member=one), data.isel(member=one), quantity) for one in parts])
 
 
 def _errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array:
@@ -92,5 +90,4 @@ def spread(errors: Array, levels: tuple[float, ...] = LEVELS) -> Array:
 
 def largest(errors: Array) -> Array:
     """The largest error of each member over its run, shape (n,)."""
-    worst: Array = np.where(np.isnan(errors), 0.0, errors).max(axis=1)
-    return worst
+    return np.asarray(np.where(np.isnan(errors), 0.0, errors).max(axis=1))

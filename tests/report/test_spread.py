@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.measure.spread import LEVELS, at_places, largest, member_errors, spread
+from symtop.report.spread import LEVELS, at_places, largest, member_errors, spread
 
 SOME = symtop.population(30, seed=7)
 ASKED = {"per_nutation": 30, "nutations": 2, "samples": 41, "quiet": True}

@@ -1,9 +1,9 @@
 """Answers that are computed once for each dataset."""
 
 import xarray as xr
+from symtop_studies.memoize import of_one_dataset
 
 from symtop.core.code_hash import Code, digest
-from symtop.core.memoize import of_one_dataset
 
 
 def test_an_answer_is_computed_once_for_each_object_and_question():

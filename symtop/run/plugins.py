@@ -1,7 +1,6 @@
 """Plug-ins: a user's Python file that registers integrators and scenes of its own.
 
-What it registers counts in a fingerprint as what symtop registers does, by its values and by the code that it reaches,
-wherever that stands.
+What it registers counts in a fingerprint by its values and by the code that it reaches, wherever that stands.
 """
 
 from pathlib import Path
@@ -25,17 +24,14 @@ def load(path: str | Path) -> list[str]:
             execute(f"symtop_plugin_{file.stem}", file)
         except SymtopError as error:  # the names in it are the file's, and no options of a command
             raise SymtopError(f"plugin {file.name}: {error}") from error
-    _loaded[file] = [
-        name
-        for name, entry in (*integrators().items(), *scenes().items())
-        if not any(entry is known for known in before)
-    ]
+    entries = (*integrators().items(), *scenes().items())
+    _loaded[file] = [name for name, entry in entries if not any(entry is known for known in before)]
     return _loaded[file]
 
 
-def loaded() -> list[str]:
+def loaded() -> tuple[str, ...]:
     """Paths of the plug-ins in use, in the order they were loaded."""
-    return [str(path) for path in _loaded]
+    return tuple(map(str, _loaded))
 
 
 def is_local(name: str) -> bool:

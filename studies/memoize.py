@@ -12,21 +12,15 @@ _answers: dict[Callable[..., Any], tuple[Any, dict[Hashable, Any]]] = {}
 
 
 def of_one_dataset(function: Callable[Concatenate[Any, P], Answer]) -> Callable[Concatenate[Any, P], Answer]:
-    """The same function, which keeps its answers as long as it is asked about the same object, by its other arguments.
-
-    Answers are shared: neither they nor the data may be changed. Another object, equal or not, forgets those before.
-    """
+    """The same function, which keeps its answers about one object at a time; neither these nor the data may change."""
 
     @functools.wraps(function)
     def remembered(data: Any, /, *args: P.args, **kwargs: P.kwargs) -> Answer:
-        before, answers = _answers.get(function, (None, {}))
-        if data is not before:
-            answers = {}
-            _answers[function] = data, answers
-        key = (args, tuple(sorted(kwargs.items())))
+        if _answers.get(function, (None, {}))[0] is not data:
+            _answers[function] = data, {}
+        answers, key = _answers[function][1], (args, tuple(sorted(kwargs.items())))
         if key not in answers:
             answers[key] = function(data, *args, **kwargs)
-        answer: Answer = answers[key]
-        return answer
+        return answers[key]  # type: ignore[no-any-return]
 
     return remembered

@@ -13,14 +13,14 @@ import pytest
 from symtop_studies.reduction import commutation
 
 import symtop
-from symtop.core import code_hash
+from symtop.core import code_hash, jit
 from symtop.core.code_hash import PACKAGE
 from symtop.methods.framework import registry
-from symtop.methods.framework.fixed_step import inside
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import is_built_in
 from symtop.report import style
 from symtop.runner import fingerprint, run as runner
-from symtop.runner.analyse import drawing_digest
+from symtop.runner.run import drawing_digest
 from symtop.runner.study import Case
 from tests.commands import PROBE, ended, symtop as symtop_command
 
@@ -118,7 +118,7 @@ def test_measure_code_and_the_reference_make_the_cases_of_their_study_stale():
     ("place", "again"),
     [
         ("symtop_studies.cost.facts:winners", True), ("symtop_studies.cost.page:sentences", True),
-        ("symtop.runner.store:_dense", True), ("symtop.cli.common:as_text", False),
+        ("symtop.measure.datasets:_dense", True), ("symtop.cli.common:as_text", False),
         ("symtop_studies.drift.words:verdict", False),
     ],
 )  # fmt: skip
@@ -173,6 +173,16 @@ def test_all_digests_of_all_studies_are_the_same_whatever_the_process_has_run():
     studies[0].measure(grids[0][0])
     forget()
     assert [fingerprint.digests(study, grid) for study, grid in zip(studies, grids, strict=True)] == before
+
+
+def test_a_function_counts_alike_before_and_after_a_kernel_registers_it():
+    def part(x):
+        return 2.0 * x
+
+    before = jit.code().reasons("part", part)
+    jit.register_jitable(part)
+    assert jit.code().reasons("part", part) == before
+    assert jit.code_of(part)[1].values != jit.code().reached("part", part)[1].values  # the control: kernels see it
 
 
 @pytest.mark.slow

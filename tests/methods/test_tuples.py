@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from symtop.core.jit import compile_kernel, times, with_item
+from symtop.core.jit import compile_kernel
+from symtop.methods.simd import times, with_item
 
 
 def scaled(values, by):

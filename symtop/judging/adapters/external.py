@@ -1,0 +1,339 @@
+"""What is not NumPy's: functions of shared objects, programs, batches of torch and JAX, and solvers of diffrax.
+
+*shared*, ``void step(double *y, double h, const double *par, long n)`` replaces y by the state n steps of h later; par
+holds I1, I3 and mgl:
+
+    gcc -O3 -shared -fPIC my.c -o my.so          symtop judge ./my.so --chart axis
+
+*program* reads one line on the standard input and writes states on the standard output:
+
+    in      I1 I3 mgl h n stride y1 y2 ...           numbers, separated by blanks
+    out     the state after 0, stride, 2 stride, ... n steps, as text (any blanks or commas) or as raw doubles
+
+n is a multiple of stride. It is started for every run, so that nothing is left from one to the next. For both, y is
+(e, L) on the axis, (q, L) on the attitude, (theta, phi, psi and their rates) in angles, and h may be negative.
+
+*torch*, *jax*: a function ``step(f, t, y, h) -> y``; y has the shape (batch, 6), a row (e, L) on the axis, or
+(batch, 7), (q, L) on the attitude, and f(t, y) has the same. What is torch is called as it stands, without gradients;
+what is JAX is compiled by `jax.jit`. The batch has two rows, the state that is judged and another, on which it must not
+depend: that is tried once, before all else.
+
+*diffrax*: a solver such as ``diffrax.Tsit5()``, its formula with fixed steps, asked for one step after another in a
+compiled loop, as by `diffrax.diffeqsolve` with a constant step; its own memory (a last slope, a second state) goes with
+it through a run. An implicit solver needs a root finder with tolerances of its own: there is no step control. A library
+is imported when something of it is judged, and computes in double precision.
+"""
+
+import contextlib
+import ctypes
+import functools
+import importlib
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from symtop.core.errors import SymtopError, at_home
+from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat, label_of, repeat
+from symtop.judging.adapters.python_step import state_like
+from symtop.methods.framework.equations import FORMULATIONS
+from symtop.methods.framework.plan import Array
+from symtop.model.top import SymmetricTop
+
+MOST = 20_000  # steps of one call, so that a call that hangs is told from a long run
+GUARD, MARK = 8, -1.2345e-67  # doubles behind the state that must stay as they are
+WORDS = 100  # characters of what a program says when it fails
+TEXT = b"0123456789+-.eEinfaINFA, \t\r\n"  # the letters of numbers
+SHORT = 1e-3  # relative: digits that a program may leave out
+SLACK = 5.0  # times the seconds that earlier runs make one expect
+COMPILING = 60.0  # seconds that the first call may take besides
+OTHER = 0.7  # momentum of the other row of a batch, of the first
+SAME = 1e-12  # relative: a row alone and in a batch
+CHARTS = ("axis", "attitude")  # whose equations are arithmetic alone; the angles have sines, of each library its own
+
+Doubles = ctypes.POINTER(ctypes.c_double)
+
+
+class SharedObject(Stepper):
+    """A stepper around one function of a library."""
+
+    implementation = "compiled"
+    own_loop = True
+
+    def __init__(self, path: str | Path, chart: str, symbol: str = "step") -> None:
+        self.path, self.chart, self.form = at_home(path).resolve(), chart, FORMULATIONS[chart]
+        self.name = label_of(f"{self.path.stem}-{symbol}" if symbol != "step" else self.path.stem)
+        if not self.path.is_file():
+            raise SymtopError(f"a shared object must be a file that is there, not {str(path)!r}")
+        try:
+            self.function: Any = getattr(ctypes.CDLL(str(self.path)), symbol)
+        except OSError as error:
+            raise SymtopError(f"{self.path.name} is no shared object that can be loaded: {error}") from None
+        except AttributeError:
+            raise SymtopError(f"{self.path.name} must have a function {symbol!r}, and has none") from None
+        self.function.argtypes = [Doubles, ctypes.c_double, Doubles, ctypes.c_long]
+        self.function.restype = None
+
+    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: Marks) -> March:
+        """The state at the marks; SymtopError if it writes beyond its state or into the parameters."""
+        numbers, size = np.array([top.I1, top.I3, top.mgl]), y.size
+        par, room = numbers.copy(), np.full(size + GUARD, MARK)
+        room[:size] = y
+        states, done = np.full((marks.size, size), np.nan), 0
+        for place, mark in enumerate(marks):
+            while done < mark:
+                some = min(MOST, int(mark) - done)
+                with heartbeat.call(h):
+                    self.function(room.ctypes.data_as(Doubles), h, par.ctypes.data_as(Doubles), some)
+                done += some
+            states[place] = room[:size]
+            if not np.isfinite(room[:size]).all():
+                break
+        if (room[size:] != MARK).any():
+            raise SymtopError(f"{self.name} writes beyond the {size} numbers of its state")
+        if (par != numbers).any():
+            raise SymtopError(f"{self.name} writes into its parameters")
+        return March(states, 0)
+
+
+class Program(Stepper):
+    """A stepper around a command."""
+
+    own_loop = True
+
+    def __init__(self, command: str, chart: str) -> None:
+        self.words, self.chart, self.form = shlex.split(command), chart, FORMULATIONS[chart]
+        self.words[:1] = [str(at_home(word)) if word.startswith("~") else word for word in self.words[:1]]
+        if not self.words or shutil.which(self.words[0]) is None:
+            raise SymtopError(f"a program must be a command that can be run, not {command!r}")
+        self.name = label_of(Path(self.words[0]).name)
+        self.seconds_a_step = 0.0  # of the slowest run so far
+
+    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: Marks) -> March:
+        """The state at the marks; SymtopError if the program fails or writes anything else."""
+        stride, last = max(int(np.gcd.reduce(marks)), 1), int(marks[-1])
+        numbers = [top.I1, top.I3, top.mgl, h, last, stride, *y.tolist()]
+        answer = self._answer(" ".join(map(repr, numbers)) + "\n", h, last)
+        states = _states(answer, last // stride + 1, y.size, self.name)
+        if not _begins(states[0], y):
+            raise SymtopError(
+                f"{self.name} must write the start that it was given as the first of its states, not "
+                f"{', '.join(f'{value:.4g}' for value in states[0])}"
+            )
+        return March(states[marks // stride], 0)
+
+    def _answer(self, line: str, h: float, steps: int) -> bytes:
+        expected = SLACK * self.seconds_a_step * steps
+        seconds = heartbeat.patience + expected
+        with heartbeat.call(h, expected + seconds):
+            began = time.monotonic()
+            with subprocess.Popen(  # noqa: S603  (the command is the user's)
+                self.words,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                start_new_session=True,
+            ) as process:
+                try:
+                    out, errors = process.communicate(line.encode(), timeout=seconds)
+                except subprocess.TimeoutExpired:
+                    with contextlib.suppress(OSError):
+                        os.killpg(process.pid, signal.SIGKILL)
+                    what = f"{steps} steps of {h:.3g}"
+                    raise SymtopError(
+                        f"{self.name} had not ended {seconds:.0f} s after it was asked for {what}"
+                    ) from None
+        if process.returncode != 0:
+            words = " ".join(errors.decode(errors="replace").split())[-WORDS:]
+            raise SymtopError(f"{self.name} ended with code {process.returncode}: {words or 'it said nothing'}")
+        if steps > 0:
+            self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps) if steps > 50 else 0.0
+        return out
+
+
+def _states(answer: bytes, rows: int, size: int, name: str) -> Array:
+    """The states that a program wrote, shape (rows, size)."""
+    if len(answer) == 8 * rows * size and answer.translate(None, TEXT):
+        return np.frombuffer(answer).reshape(rows, size).copy()
+    try:
+        values = np.array(answer.decode("ascii").replace(",", " ").split(), dtype=float)
+    except ValueError:
+        shown = answer[:40].decode(errors="replace").strip()
+        raise SymtopError(f"{name} must write numbers, as text or as raw doubles, not {shown!r}") from None
+    if values.size != rows * size:
+        raise SymtopError(
+            f"{name} must write {rows} states of {size} numbers (the start and one every stride steps), "
+            f"{rows * size} in all, not {values.size}"
+        )
+    return values.reshape(rows, size)
+
+
+def _begins(state: Array, start: Array) -> bool:
+    """Is a state the start, but for rounding, the sign of a quaternion and whole turns?"""
+    turns = np.stack([state - start, state + start, np.sin(0.5 * (state - start))])  # any of them shows that it is
+    return bool((np.abs(turns).min(axis=0) <= SHORT * np.abs(start).max()).all()) or not np.isfinite(state).all()
+
+
+class BatchStep(Stepper):
+    """A stepper around the function; `form` is torch or jax."""
+
+    def __init__(self, function: Callable[..., Any], chart: str, form: str, name: str = "") -> None:
+        self.library, self.jax = library(form, form, chart), form == "jax"
+        self.function, self.chart, self.form = function, chart, FORMULATIONS[chart]
+        self.name = label_of(name or function)
+        self._step = self.library.jit(self._called) if self.jax else self._called
+        self._tried = False
+
+    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
+        """The state at the marks: the first row of the batch."""
+        with double_precision(self.library) if self.jax else self.library.no_grad():
+            step = functools.partial(self._step, par)
+            batch = self._array(np.stack([y, np.concatenate([y[:-3], OTHER * y[-3:]])]))
+            if not self._tried:
+                self._try(step, y, batch, h)
+            states = repeat(lambda k, rows: _once(step, k * h, rows, h), batch, marks, lambda rows: np.asarray(rows[0]))
+            return March(states, 0)
+
+    def _array(self, values: Array) -> Any:
+        return self.library.numpy.asarray(values) if self.jax else self.library.tensor(values)
+
+    def _called(self, par: Any, t: float, y: Any, h: float) -> Any:
+        stack, last = (self.library.numpy.stack, "axis") if self.jax else (self.library.stack, "dim")
+        return self.function(field_of(self.chart, par, lambda rows: stack(rows, **{last: -1})), t, y, h)
+
+    def _try(self, step: Callable[..., Any], y: Array, batch: Any, h: float) -> None:
+        """A step of the first row alone, and in the batch."""
+        pair = (_once(step, 0.0, rows, h, COMPILING)[0] for rows in (self._array(y[None]), batch + 0.0))
+        one, two = (state_like(y, np.asarray(row)) for row in pair)
+        apart = float(np.max(np.abs(one - two))) / max(float(np.max(np.abs(one))), 1e-300)
+        if apart > SAME:
+            raise SymtopError(
+                "a row of a batch must be stepped by itself: the same state with another row beside it comes out "
+                f"different by {apart:.1e}"
+            )
+        self._tried = True
+
+
+def _once(step: Callable[..., Any], t: float, batch: Any, h: float, seconds: float = 0.0) -> Any:
+    with heartbeat.call(h, seconds):
+        after = step(t, batch, h)
+    if tuple(getattr(after, "shape", ())) != tuple(batch.shape):
+        shape = getattr(after, "shape", None)
+        given = type(after).__name__ if shape is None else f"shape {tuple(shape)}"
+        raise SymtopError(f"step must return a batch of states, shape {tuple(batch.shape)}, not {given}")
+    return after
+
+
+def library(form: str, name: str, chart: str) -> Any:
+    """The package `name`; SymtopError if it is not there, or for a chart whose equations are not arithmetic alone."""
+    try:
+        package = importlib.import_module(name)
+    except ImportError:
+        raise SymtopError(f"form {form} needs the package {name}, which is not installed") from None
+    if chart not in CHARTS:
+        raise SymtopError(f"chart must be axis or attitude for the form {form}, not {chart!r}", "chart")
+    return package
+
+
+def field_of(chart: str, par: Any, stack: Any) -> Any:
+    """f(t, y) on arrays; `stack(columns)` joins arrays of shape (...) along a new last axis."""
+    field = FORMULATIONS[chart].field
+
+    def f(_t: Any, y: Any) -> Any:
+        """The time derivative of y, of the shape of y."""
+        columns = tuple(y[..., k] for k in range(y.shape[-1]))
+        nothing = 0.0 * columns[0]  # a derivative that is zero is a number
+        return stack([value + nothing if isinstance(value, float) else value for value in field(par, columns)])
+
+    return f
+
+
+@contextlib.contextmanager
+def double_precision(jax: Any) -> Iterator[None]:
+    """JAX computes in double precision within, and as before after."""
+    before = jax.config.jax_enable_x64
+    jax.config.update("jax_enable_x64", True)
+    try:
+        yield
+    finally:
+        jax.config.update("jax_enable_x64", before)
+
+
+def is_solver(thing: Any) -> bool:
+    """Is it an instance of a solver of diffrax, or of a class derived from one?"""
+    bases = [one.__module__.partition(".")[0] for one in type(thing).__mro__]
+    return "diffrax" in bases and hasattr(thing, "term_structure")
+
+
+class DiffraxSolver(Stepper):
+    """A stepper around the solver."""
+
+    implementation = "compiled"
+    own_loop = True
+
+    def __init__(self, solver: Any, chart: str, name: str = "") -> None:
+        self.jax, self.diffrax = (library("diffrax", name, chart) for name in ("jax", "diffrax"))
+        if not is_solver(solver):
+            raise SymtopError(f"form diffrax needs an instance of a solver, such as diffrax.Tsit5(), not {solver!r}")
+        if isinstance(solver.term_structure, tuple):
+            raise SymtopError(
+                f"{type(solver).__name__} steps a system in two parts; form diffrax has one, y' = f(y): "
+                "judge it as a function, with form separable"
+            )
+        self.solver, self.chart, self.form = solver, chart, FORMULATIONS[chart]
+        self.name = label_of(name or solver)
+        finder = getattr(solver, "root_finder", None)
+        if finder is not None and not isinstance(getattr(finder, "rtol", 0.0), (int, float)):
+            raise SymtopError(
+                f"{type(solver).__name__} must have a root finder with tolerances of its own, such as "
+                "root_finder=diffrax.VeryChord(rtol=1e-12, atol=1e-12): a fixed step has none"
+            )
+        self._begin, self._run = self._compiled()
+        self._fresh = True  # nothing is compiled yet
+
+    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
+        """The state at the marks; NaN where the solver says that a step failed."""
+        states, done = np.full((marks.size, y.size), np.nan), 0
+        with double_precision(self.jax):
+            more = COMPILING if self._fresh else 0.0
+            with heartbeat.call(h, more):
+                at = self.jax.numpy.asarray(y)
+                memory = self._begin(par, at, h)
+            for place, mark in enumerate(marks):
+                while done < mark:
+                    some = min(MOST, int(mark) - done)
+                    with heartbeat.call(h, more):
+                        at, memory = self._run(par, at, memory, done * h, h, some)
+                        self.jax.block_until_ready(at)
+                    self._fresh, more, done = False, 0.0, done + some
+                states[place] = np.asarray(at)
+                if not np.isfinite(states[place]).all():
+                    break
+        return March(states, 0)
+
+    def _compiled(self) -> tuple[Any, Any]:
+        """The start of a run, and so many steps of it; the numbers of the top are `args`, so that both compile once."""
+        jax, diffrax, solver, stack = self.jax, self.diffrax, self.solver, self.jax.numpy.stack
+        term = diffrax.ODETerm(lambda t, y, par: field_of(self.chart, par, lambda rows: stack(rows, axis=-1))(t, y))
+
+        def begin(par: Any, y: Any, h: Any) -> Any:
+            return solver.init(term, 0.0 * h, h, y, par)
+
+        def run(par: Any, y: Any, memory: Any, t: Any, h: Any, count: Any) -> Any:
+            def once(k: Any, at: Any) -> Any:
+                now, memory = at
+                start = t + k * h
+                after, _, _, memory, result = solver.step(term, start, start + h, now, par, memory, False)
+                failed = result != diffrax.RESULTS.successful
+                return jax.numpy.where(failed, jax.numpy.nan, after), memory
+
+            return jax.lax.fori_loop(0, count, once, (y, memory))
+
+        return jax.jit(begin), jax.jit(run)

@@ -1,0 +1,139 @@
+"""Datasets over scene and variant: made of those of single cases, and compared with each other."""
+
+import math
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError
+
+Combined = xr.Dataset | xr.DataTree  # what a study measured: a tree if its cases are in groups
+Cell = tuple[str, str, xr.Dataset]  # a scene, a variant and what was measured
+
+# in the names of variables of measured times, or of such a time over a count
+CLOCKED = ("seconds", "reliable", "spread", "first_call", "alone", "together")
+
+
+def combine(cases: list[tuple[Any, xr.Dataset]]) -> Combined:
+    """One dataset over scene and integrator, or, of cases in groups, a tree with such a dataset for each group.
+
+    A dataset of a group covers the scenes and integrators of its own cases only. xarray aligns the coordinates of a
+    group with those of the groups above it, so that the root of the tree is empty: all cases are in groups, or none.
+    """
+    groups: dict[str, list[tuple[Any, xr.Dataset]]] = {}
+    for case, data in cases:
+        groups.setdefault(case.group, []).append((case, data))
+    if not groups.keys() - {""}:
+        return _dense(cases)
+    if "" in groups:
+        raise SymtopError(f"case {groups[''][0][0].label} has no group, but others of its study have one")
+    return xr.DataTree.from_dict({group: _dense(members) for group, members in groups.items()})
+
+
+def _dense(cases: list[tuple[Any, xr.Dataset]]) -> xr.Dataset:
+    """One dataset over scene and variant; a cell that was not measured is NaN (a byte 255, a string empty).
+
+    Sizes differ from case to case: each dimension gets the largest one, and a shorter case fills the beginning. A case
+    of several variants counts as one for each of them. Two cases may measure different variables of a cell.
+    """
+    cells = [cell for case, data in cases for cell in _cells(case, data)]
+    scenes, methods = (list(dict.fromkeys(names)) for names in list(zip(*cells, strict=True))[:2])
+    sizes, coordinates = _coordinates(cells)
+    filled: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]] = {}
+    taken = set[tuple[str, str, str]]()
+    for scene, method, data in cells:
+        place = scenes.index(scene), methods.index(method)
+        for name, variable in data.data_vars.items():
+            if (scene, method, str(name)) in taken:
+                raise SymtopError(
+                    f"two cases of {method} on {scene} measure {name}, and one would replace the other: "
+                    "give each a group, or measure all settings in one case, over a dimension of the dataset"
+                )
+            taken.add((scene, method, str(name)))
+            dims = tuple(str(dim) for dim in variable.dims)
+            if str(name) not in filled:
+                blank = np.full((len(scenes), len(methods), *(sizes[dim] for dim in dims)), *_blank(variable.dtype))
+                filled[str(name)] = ("scene", "variant", *dims), blank, dict(variable.attrs)
+            corner = tuple(slice(0, size) for size in variable.shape)
+            filled[str(name)][1][(*place, *corner)] = variable.values
+    variables = {name: (dims, as_text(values), attrs) for name, (dims, values, attrs) in filled.items()}
+    return xr.Dataset(variables, coords={"scene": scenes, "variant": methods} | coordinates)
+
+
+def _coordinates(cells: list[Cell]) -> tuple[dict[str, int], dict[str, Any]]:
+    """The largest size of each dimension, and its coordinate if it has one, which shorter ones begin."""
+    sizes: dict[str, int] = {}
+    longest: dict[str, Any] = {}
+    for scene, method, data in cells:
+        for dim, size in data.sizes.items():
+            name = str(dim)
+            if name in longest and dim in data.coords and data[dim].dtype.kind == "f":
+                shared = min(size, sizes[name])
+                if not np.array_equal(data[dim].values[:shared], longest[name].values[:shared]):
+                    raise SymtopError(f"the coordinate {name} of {method} on {scene} differs from that of other cases")
+            if size > sizes.get(name, 0):
+                sizes[name] = size
+                if dim in data.coords:
+                    longest[name] = data[dim]
+    return sizes, longest
+
+
+def _cells(case: Any, data: xr.Dataset) -> list[Cell]:
+    """Scene, variant and dataset of a case, or of each variant that it measured."""
+    if "variant" not in data.dims:
+        return [(case.scene, case.integrator, data)]
+    names = [str(name) for name in data["variant"].values]
+    return [(case.scene, name, data.sel(variant=name, drop=True)) for name in names]
+
+
+def _blank(kind: "np.dtype[Any]") -> tuple[Any, Any]:
+    """What stands for nothing in an array of that type, and the type that can hold it."""
+    if kind.kind in "OUT":
+        return "", object
+    return (np.iinfo(kind).max, kind) if kind.kind == "u" else (math.nan, float)
+
+
+def as_text(values: Any) -> Any:
+    """Text of any length as text of one length: archives hold no objects."""
+    return values.astype(str) if values.dtype == object else values
+
+
+def differences(stored: Combined, again: Combined, *, attributes: bool = True) -> list[str]:
+    """In what two datasets, or trees of them, differ besides measured times and where they were made."""
+    ours, theirs = netcdf.groups(stored), netcdf.groups(again)
+    return [f"group {name} is in one of them only" for name in sorted(ours.keys() ^ theirs.keys())] + [
+        f"{name}: {difference}" if name else difference
+        for name in sorted(ours.keys() & theirs.keys())
+        for difference in _differences(ours[name], theirs[name], attributes)
+    ]
+
+
+def _differences(stored: xr.Dataset, again: xr.Dataset, attributes: bool) -> list[str]:
+    ours, theirs = set(map(str, stored.variables)), set(map(str, again.variables))
+    differing = [f"{name} is in one of them only" for name in sorted(ours ^ theirs)]
+    for name in sorted(ours & theirs):
+        one, other = stored[name], again[name]
+        if one.dims != other.dims or one.shape != other.shape:
+            differing.append(f"{name} has another shape: {dict(one.sizes)} and {dict(other.sizes)}")
+        elif not any(word in name for word in CLOCKED) and not _same(one, other):
+            how_much = ""
+            if one.dtype.kind == other.dtype.kind == "f":
+                with np.errstate(all="ignore"):
+                    gap = np.abs(one.values - other.values)
+                finite = np.isfinite(gap).any()
+                how_much = f" by up to {np.nanmax(gap):.3g}" if finite else " in which values are NaN"
+            differing.append(f"{name} differs{how_much}")
+    for key in sorted({*stored.attrs, *again.attrs} - {*netcdf.provenance(), "content"}) if attributes else []:
+        before, now = stored.attrs.get(key), again.attrs.get(key)
+        if before != now and not key.startswith("timed_"):
+            differing.append(f"attribute {key} differs: {before!r} and {now!r}")
+    return differing
+
+
+def _same(one: xr.DataArray, other: xr.DataArray) -> bool:
+    """To the last bit, for numbers."""
+    if one.dtype.kind == "f" and one.dtype == other.dtype:
+        return one.values.tobytes() == other.values.tobytes()
+    return one.equals(other)
