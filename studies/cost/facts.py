@@ -1,247 +1,285 @@
-"""What the study's dataset says: costs of all variants on all tops, contests, safe settings, silent failures.
+"""Facts and tables of the study."""
 
-The dataset is a tree. Groups "short" and "long" hold the variants over the two horizons (see `ladder`), "tops" what is
-known of the tops, "prices" the seconds of an evaluation and of a call (see `prices`), "far" and "checks" the phase
-diagram (see `far`). A cost is in seconds, force evaluations x price at the tolerance that meets the error + call, or
-in force evaluations. Variants are compared where they show the same quantity: the axis in every chart but the attitude
-chart of a method that has the axis chart, which steps the same axis, and the attitude in the charts that show it.
-
-Each contest is between the variants of one class of `needs`, or of all that work for a body in general: a method of
-this very top, by its equations or its constants, is in a class of its own.
-"""
-
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections import Counter
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
-from symtop_studies.memoize import of_one_dataset
 
-from symtop.methods.framework.registry import NEEDS
-from symtop.model.charts import Array
-from symtop.run.ensemble.population import STRATA
+from symtop.methods.framework.registry import NEEDS, integrator
 from symtop.run.guard import EXPECTED
 
+from . import cells, far
+from .cells import CLASSES, EVALUATIONS, Cell
 from .ladder import KEPT, WRONG
-from .prices import prices
-from .ranking import Contest, Ladder, Safe, hindsight, safe
-from .tops import KINDS, NATURAL, SCENE
+from .prices import FLOOR, NOISY, PROCESSES, TOLERANCE, prices
+from .ranking import SAFE, TIE, Safe
+from .tops import KINDS, NATURAL
 
-HORIZONS = ("short", "long")
-POPULATIONS = {"strata": tuple(STRATA), NATURAL: (NATURAL,)}  # kinds of tops in each
-GENERAL = "any body"  # every class but this-top and solution
-CLASSES = (*(name for name in NEEDS if name != "solution"), GENERAL)
-THIS_TOP = ("this-top", "solution")
-SECONDS, EVALUATIONS = "seconds", "evaluations"
-WITHIN = 2.5  # times the least cost of a class over ten nutations: who comes as close runs over a thousand
-OFTEN = 0.1  # of the tops
-FINE = 50.0  # steps a nutation that look like enough
-
-
-class Cell(NamedTuple):
-    """A question: who reaches a target of a quantity over a horizon, on the tops of a population or a kind."""
-
-    horizon: str
-    quantity: str
-    target: float
-    tops: str  # a population or a kind
-    needs: str = GENERAL
+LEFT_OUT = {  # methods, by the reason, which the page states
+    "the same maps in three coordinates": ("midpoint-unreduced", "trapezoidal-unreduced"),
+    "the same steps as taylor in slower arithmetic": ("taylor-longdouble", "taylor-quad"),
+    "a step of any size is the motion itself": ("exact-discrete",),
+}  # fmt: skip
+NOTHING = "nothing within the budget"
+TIES = (1.0, 1.1, 1.25, 1.5)
+STEPS = (4.37, 17.48, 69.92)  # a nutation, of the table of silent failures
+QUOTED, FINE = "rk4[axis]", 69.92  # whose wrong runs the page quotes, at so many steps a nutation
+KNOWN = (
+    QUOTED, "dop853-compiled-fixed[axis]", "gauss-4[axis]", "strang[axis]", "takahashi-imada[axis]", "srkn-14-6[axis]",
+    "midpoint[angles]", "stormer-verlet[angles]",
+)  # fmt: skip
+AT = 1e-6  # rad, the error at which classes are quoted
+US = 1e6  # microseconds in a second
 
 
-class Costs(NamedTuple):
-    """Costs of variants on the tops of a cell, and relative errors of their prices."""
-
-    names: list[str]
-    values: Array  # (variants, tops), inf where a variant does not reach the target
-    errors: Array
+def decades(target: float) -> int:
+    """The 6 of 1e-6."""
+    return round(-np.log10(target))
 
 
-def horizons(data: xr.DataTree) -> list[str]:
-    """The groups of variants that are there."""
-    return [name for name in HORIZONS if name in data.children]
+def short_name(name: str) -> str:
+    """A variant, without its chart if that is the axis."""
+    return name.removesuffix("[axis]")
 
 
-def nutations(data: xr.DataTree, horizon: str) -> float:
-    """The length of a horizon."""
-    return float(np.nanmax(data[horizon]["nutations"].values))
+def titled(name: str) -> str:
+    """The same in a table of classes, with the word for what exists for symmetric bodies alone."""
+    method = integrator(name)
+    return short_name(name) + ("" if method.general or method.needs == "this-top" else " (symmetric bodies)")
 
 
-def targets(data: xr.DataTree) -> list[float]:
-    """The targets."""
-    return [float(value) for value in data["short"]["target"].values]
+def setting(one: Safe) -> str:
+    """A setting in a table: steps a nutation, or a tolerance."""
+    return f"{one.setting:.3g} steps" if integrator(one.name).fixed_step else f"tolerance {one.setting:.0e}"
 
 
-@of_one_dataset
-def kinds_of(data: xr.DataTree, horizon: str) -> NDArray[np.int64]:
-    """The place of each top's kind in `KINDS`, of the tops of a horizon."""
-    places = data["tops"].to_dataset()["kind_place"].sel(scene=horizon).values.ravel()
-    return np.asarray(places[np.isfinite(places)], dtype=np.int64)
-
-
-def members(data: xr.DataTree, horizon: str) -> int:
-    """How many tops of both populations a horizon has."""
-    return int((kinds_of(data, horizon) != KINDS.index(SCENE)).sum())
-
-
-def chosen(data: xr.DataTree, horizon: str, tops: str) -> NDArray[np.bool_]:
-    """Which tops belong to a population or a kind."""
-    return np.isin(kinds_of(data, horizon), [KINDS.index(kind) for kind in POPULATIONS.get(tops, (tops,))])
-
-
-def of_class(needs: str, wanted: str) -> bool:
-    """Does a method with these `needs` take part in the contests of a class?"""
-    return needs == wanted or (wanted == GENERAL and needs not in (*THIS_TOP, ""))
-
-
-@of_one_dataset
-def costs(data: xr.DataTree, cell: Cell, unit: str = SECONDS) -> Costs:
-    """Costs of the variants of a class that show a cell's quantity, on the tops that are asked."""
-    group = data[cell.horizon].to_dataset()[["cost", "met_at", "needs", "control"]].isel(scene=0)
-    part = [of_class(str(one), cell.needs) for one in group["needs"].values]
-    asked = group.sel(quantity=cell.quantity, target=cell.target).isel(variant=np.flatnonzero(part))
-    among = chosen(data, cell.horizon, cell.tops)
-    values = asked["cost"].transpose("variant", "member").values[:, : among.size][:, among]
-    rows, tops = ~np.isnan(values).all(axis=1), ~np.isnan(values).all(axis=0)
-    names = [str(name) for name in asked["variant"].values[rows]]
-    values = np.where(np.isnan(values), np.inf, values)[np.ix_(rows, tops)]
-    if unit == EVALUATIONS:
-        return Costs(names, values, np.zeros(len(names)))
-    met = asked["met_at"].transpose("variant", "member").values[:, : among.size][:, among][np.ix_(rows, tops)]
-    fixed = asked["control"].values[rows] == "step_size"
-    known = prices(data)
-    for row, name in enumerate(names):
-        price, call = known.at(name, np.full(met.shape[1], np.nan) if fixed[row] else met[row])
-        values[row] = values[row] * price + call
-    return Costs(names, values, known.error[[known.names.index(name) for name in names]])
-
-
-@of_one_dataset
-def contest(data: xr.DataTree, cell: Cell, unit: str = SECONDS) -> Contest:
-    """The contest of a cell in hindsight."""
-    taken = costs(data, cell, unit)
-    return hindsight(taken.names, taken.values, taken.errors, prices(data).marked if unit == SECONDS else ())
-
-
-@of_one_dataset
-def safest(data: xr.DataTree, cell: Cell) -> tuple[list[Safe], bool]:
-    """The safe choices of a cell, cheapest first, and whether the lead is called."""
-    group = data[cell.horizon].to_dataset().isel(scene=0)
-    among, known = chosen(data, cell.horizon, cell.tops), prices(data)
-    wide = asked_tops(data, cell)
-    weights = np.array([float(wide[kinds_of(data, cell.horizon)[among] == place].sum()) for place in range(len(KINDS))])
-    ladders = []
-    for name in costs(data, cell).names:
-        one = group.sel(variant=name)
-        met = one["met_at"].sel(quantity=cell.quantity, target=cell.target).values[: among.size][among][wide]
-        settings, fixed = one["setting"].values, str(one["control"].values) == "step_size"
-        price, call = known.at(name, np.full(settings.size, np.nan) if fixed else settings)
-        work = one["work"].transpose("level", "kind").values
-        work = (np.where(weights > 0.0, work, 0.0) * weights).sum(axis=1) / max(weights.sum(), 1.0)
-        error = float(known.error[known.names.index(name)])
-        ladders.append(Ladder(name, met, settings, work * price + call, fixed, error))
-    return safe(ladders, known.marked)
-
-
-def asked_tops(data: xr.DataTree, cell: Cell) -> NDArray[np.bool_]:
-    """Which tops of a cell are asked: those of whose variants some was."""
-    group = data[cell.horizon].to_dataset()["cost"].isel(scene=0).sel(quantity=cell.quantity, target=cell.target)
-    among = chosen(data, cell.horizon, cell.tops)
-    values = group.transpose("variant", "member").values[:, : among.size][:, among]
-    return np.asarray(~np.isnan(values).all(axis=0))
-
-
-def contenders(data: xr.DataTree) -> list[str]:
-    """The variants that come within `WITHIN` of the cheapest of their class on `OFTEN` of the tops, at some target."""
-    names: set[str] = set()
-    for quantity in ("axis", "attitude"):
-        for target in targets(data):
-            for tops in POPULATIONS:
-                for needs in CLASSES[:-1] if quantity == "axis" else (GENERAL, "this-top"):
-                    taken = costs(data, Cell("short", quantity, target, tops, needs))
-                    best = taken.values.min(axis=0, initial=np.inf)
-                    near = (taken.values <= WITHIN * best) & np.isfinite(taken.values)
-                    enough = near.sum(axis=1) > OFTEN * max(best.size, 1)
-                    names |= {name for name, one in zip(taken.names, enough, strict=True) if one}
-    return [str(name) for name in data["short"]["variant"].values if str(name) in names]
-
-
-# ---- winners ---------------------------------------------------------------------------------------------------------
-
-
-def cells(data: xr.DataTree, quantity: str = "axis", tops: str = NATURAL, needs: str = GENERAL) -> Iterator[Cell]:
-    """The cells of a quantity, by horizon and target."""
-    for horizon in horizons(data):
-        for target in targets(data):
-            yield Cell(horizon, quantity, target, tops, needs)
-
-
-def winners(data: xr.DataTree) -> list[dict[str, Any]]:
-    """Every cell of the axis: population, class, horizon, target; the safe choice and the contest in hindsight."""
-    return [
-        winner(data, cell) for tops in POPULATIONS for needs in CLASSES for cell in cells(data, "axis", tops, needs)
-    ]
-
-
-def winner(data: xr.DataTree, cell: Cell) -> dict[str, Any]:
-    """One cell in both protocols."""
-    choices, called = safest(data, cell)
-    judged = contest(data, cell)
-    best = choices[0] if choices and np.isfinite(choices[0].seconds) else None
+def facts(data: xr.DataTree) -> dict[str, Any]:
+    """What is safe, and the fastest in hindsight; what is wrong unseen; the guard; the map; the prices; the effort."""
+    spans = cells.horizons(data)
+    known, group = prices(data), data["short"].to_dataset()
+    made, evaluated = (sum(float(np.nansum(data[span][key].values)) for span in spans) for key in ("made", "evaluated"))
     return {
-        "tops": cell.tops, "needs": cell.needs, "nutations": nutations(data, cell.horizon), "target": cell.target,
-        "asked": int(asked_tops(data, cell).sum()), "safe": best, "safe_next": choices[1] if len(choices) > 1 else None,
-        "safe_called": called, "hindsight": judged.first, "hindsight_called": judged.called,
-        "hindsight_next": judged.standings[1] if len(judged.standings) > 1 else None, "solved": judged.solved,
+        "safe": SAFE, "tie": TIE, "wrong": WRONG, "kept": KEPT, "warned_above": EXPECTED, "near": far.TIE,
+        "processes": PROCESSES, "floor": FLOOR, "noisy": NOISY, "within": cells.WITHIN, "often": cells.OFTEN,
+        "at": AT, "longest": 10.0**far.LAST,
+        **winners_facts(data), **{f"{part}_{span}": value for span in cells.HORIZONS
+                                  for part, value in span_facts(data, span).items()},
+        **silent_facts(data), **guard_facts(data), **far_facts(data),
+        "variants": group.sizes["variant"],
+        "marked": len(known.marked),
+        "dense": known.sampled if np.isfinite(known.sampled) else None,  # price with dense output over heyoka's own
+        "runs": made,
+        "evaluations": evaluated,
     }  # fmt: skip
 
 
-# ---- silent failures and the guard -----------------------------------------------------------------------------------
+def span_facts(data: xr.DataTree, span: str) -> dict[str, float | None]:
+    """The length of a horizon in nutations, its tops, and the budget of a run in force evaluations a nutation."""
+    if span not in cells.horizons(data):
+        return dict.fromkeys(("nutations", "natural", "strata", "budget", "rows"))
+    nutations = cells.nutations(data, span)
+    return {
+        "nutations": nutations,
+        **{tops: int(cells.chosen(data, span, tops).sum()) for tops in cells.POPULATIONS},
+        "budget": float(np.nanmax(data[span]["budget"].values)) / nutations,
+        "rows": data[span].sizes["variant"],
+    }
 
 
-class Health(NamedTuple):
-    """Of one variant over ten nutations, by setting and kind of top: numbers of tops, (settings, kinds)."""
+def winners_facts(data: xr.DataTree) -> dict[str, Any]:
+    """Safe choices and winners in hindsight for any body, the safe choice of each class, and where both agree."""
+    named: dict[str, Any] = {}
+    called = 0
+    for target in cells.targets(data):
+        one, place = cells.winner(data, Cell("short", "axis", target, NATURAL)), decades(target)
+        called += bool(one["safe"] and one["safe_called"])
+        named |= _safe(f"safe_{place}", one["safe"])
+        best = one["hindsight"]
+        fewest = cells.contest(data, Cell("short", "axis", target, NATURAL), EVALUATIONS).first
+        named |= {f"best_{place}": short_name(best.name) if best else None,
+                  f"best_{place}_share": best.share if best else None,
+                  f"fewest_{place}": short_name(fewest.name) if fewest else None,
+                  f"fewest_{place}_share": fewest.share if fewest else None}  # fmt: skip
+    for needs in CLASSES[:-1]:
+        choices, _ = cells.safest(data, Cell("short", "axis", AT, NATURAL, needs))
+        best = choices[0] if choices and np.isfinite(choices[0].seconds) else None
+        named |= _safe(needs.replace("-", "_"), best)
+    both = [one for one in cells.winners(data) if one["needs"] != "this-top" and one["safe"] and one["hindsight"]]
+    named["cells"] = len(both) or None
+    named["same"] = sum(one["safe"].name == one["hindsight"].name for one in both) if both else None
+    return named | {"safe_called": called}
 
-    fixed_step: bool
-    setting: Array  # steps a nutation, or tolerances
-    drawn: Array  # (kinds,)
-    wrong: Array
-    silent: Array
-    dropped: Array  # not run any more: the budget of a run would have been exceeded
+
+def _safe(key: str, one: Safe | None) -> dict[str, Any]:
+    return {key: short_name(one.name) if one else NOTHING, f"{key}_seconds": one.seconds if one else None}
 
 
-def health(data: xr.DataTree, name: str, horizon: str = "short") -> Health:
-    """Wrong runs, silent failures and tops that were dropped."""
-    group = data[horizon].to_dataset().isel(scene=0).sel(variant=name)
-    there = np.isfinite(group["setting"].values)
-    drawn = group["drawn"].values
-    runs, wrong, silent = (group[key].transpose("level", "kind").values[there] for key in ("runs", "wrong", "silent"))
-    return Health(str(group["control"].values) == "step_size", group["setting"].values[there], drawn, wrong, silent,
-                  drawn - runs)  # fmt: skip
+def silent_facts(data: xr.DataTree) -> dict[str, Any]:
+    """Wrong and silent runs of `QUOTED` at `FINE` steps a nutation, on natural tops and on the kind with the most."""
+    names = "quoted_steps", "natural_wrong", "natural_silent", "worst_kind", "worst_wrong", "worst_silent"
+    if QUOTED not in data["short"]["variant"].values:
+        return dict.fromkeys(names)
+    one = cells.health(data, QUOTED)
+    at = int(np.argmin(np.abs(one.setting - FINE)))
+    wrong, silent = (part[at] / np.maximum(one.drawn, 1.0) for part in (one.wrong, one.silent))
+    natural, worst = KINDS.index(NATURAL), int(np.argmax(wrong[:-1]))
+    values = one.setting[at], wrong[natural], silent[natural], KINDS[worst], wrong[worst], silent[worst]
+    return dict(zip(names, values, strict=True))
 
 
-def guard_counts(data: xr.DataTree) -> list[dict[str, Any]]:
-    """What the guard says of runs, by chart and whether its trial covers the run whole: warned of wrong and of others.
+def guard_facts(data: xr.DataTree) -> dict[str, int]:
+    """Runs that the guard was asked about and warned of: wrong ones by whether its trial covers them whole, others."""
+    rows = cells.guard_counts(data)
+    kinds = {"piece": [one for one in rows if not one["whole"]], "whole": [one for one in rows if one["whole"]]}
+    wrong = {f"guard_{kind}{end}": sum(one[f"wrong{end}"] for one in part)
+             for kind, part in kinds.items() for end in ("", "_warned")}  # fmt: skip
+    return wrong | {f"guard_{key}{end}": sum(one[f"{key}{end}"] for one in rows)
+                    for key in ("between", "right") for end in ("", "_warned")}  # fmt: skip
 
-    ``between`` are runs off by more than `EXPECTED`, at which it warns, and less than `WRONG`.
-    """
-    group, rows = data["short"].to_dataset().isel(scene=0), []
-    charts, control = group["chart"].values, group["control"].values
-    for label, mask in {
-        "fixed step, axis": (control == "step_size") & (charts == "axis"),
-        "fixed step, angles": (control == "step_size") & (charts == "angles"),
-        "adaptive": control == "tolerance",
-    }.items():
-        part = group.isel(variant=np.flatnonzero(mask))
-        told, error = (part[key].values.ravel() for key in ("foretold", "measured"))
-        whole, watched = part["whole"].values.ravel() > 0.0, part["watched"].values.ravel()
-        for covered in (False, True):
-            asked = ~np.isnan(told) & (whole == covered)
-            wrong, right = asked & (error > WRONG), asked & (error <= EXPECTED)
-            between = asked & ~wrong & ~right
-            counts = {key: int(one.sum()) for key, one in (("wrong", wrong), ("between", between), ("right", right))}
-            warned = {f"{key}_warned": int((one & (told > EXPECTED)).sum())
-                      for key, one in (("wrong", wrong), ("between", between), ("right", right))}  # fmt: skip
-            rows.append({"variants": label, "whole": covered, **counts, **warned,
-                         "wrong_seen": int((wrong & (watched > KEPT)).sum())})  # fmt: skip
-    return rows
+
+def far_facts(data: xr.DataTree) -> dict[str, Any]:
+    """The map: who has the most cells, how many were predicted, and what the checks of those say."""
+    named: dict[str, Any] = {}
+    reached = predicted = 0
+    for quantity in far.QUANTITIES:
+        panel = far.diagram(data, quantity)
+        there = panel.winner >= 0
+        reached, predicted = reached + int(there.sum()), predicted + int((panel.predicted & there).sum())
+        area = Counter(panel.names[k] for k in panel.winner[there]).most_common(1)
+        named |= {f"map_{quantity}": short_name(area[0][0]) if area else None,
+                  f"map_{quantity}_share": area[0][1] / int(there.sum()) if area else None}  # fmt: skip
+    checks = far.checks(data)
+    ratios = np.concatenate([one.ratios[np.isfinite(one.ratios)] for one in checks]) if checks else np.empty(0)
+    low, middle, high = np.quantile(ratios, (0.1, 0.5, 0.9)) if ratios.size else (None,) * 3
+    return named | {
+        "map_variants": len(far.variants_of(data, "axis")),
+        "map_tops": data["far"].sizes["member"],
+        "predicted": predicted / reached if reached else None,
+        "checks": len(checks) or None,
+        "checks_held": sum(one.holds for one in checks) if checks else None,
+        "checks_longest": max((one.horizon for one in checks), default=None),
+        "checks_low": low, "checks_middle": middle, "checks_high": high,  # error, measured over predicted
+    }  # fmt: skip
+
+
+# ---- tables ----------------------------------------------------------------------------------------------------------
+
+
+def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
+    """What to use; winners in both protocols; by kind of top; other quantities; by tie; prices; silent runs; guard."""
+    return {
+        "use": use(data), "winners": winners(data, cells.winners(data)), "kinds": winners(data, by_kind(data)),
+        "quantities": winners(data, other_quantities(data)), "ties": ties(data), "prices": price_list(data),
+        "silent": silent(data), "guard": pd.DataFrame(cells.guard_counts(data)), "checks": checked(data),
+    }  # fmt: skip
+
+
+def use(data: xr.DataTree) -> pd.DataFrame:
+    """The safe choice of each class at each error, over the shorter runs."""
+    rows = []
+    for needs in CLASSES[:-1]:
+        supplied = f"{needs}: {NEEDS[needs]}" if needs != "this-top" else "this very top's equations, for no other body"
+        line = {"you can supply": supplied}
+        for target in cells.targets(data):
+            one = cells.winner(data, Cell("short", "axis", target, NATURAL, needs))
+            best, mark = one["safe"], "" if one["safe_called"] else "~ "
+            line[f"{target:.0e} rad"] = (
+                f"{mark}{titled(best.name)}, {setting(best)}, {US * best.seconds:.2g} us" if best
+                else NOTHING if one["asked"] else "not asked"
+            )  # fmt: skip
+        rows.append(line)
+    return pd.DataFrame(rows)
+
+
+def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:
+    """Cells, one a row: the safe choice with its time, and the winner in hindsight with its share."""
+    marked, rows = prices(data).marked, []
+    for one in each:
+        safe, best = one["safe"], one["hindsight"]
+        row = {
+            **({"quantity": one["quantity"]} if one["quantity"] != "axis" else {}),
+            "tops": one["tops"], "needs": one["needs"], "nutations": one["nutations"], "error": one["target"],
+            "asked (tops)": one["asked"], "solved (tops)": one["solved"],
+            "safe": short_name(safe.name) if safe else NOTHING if one["asked"] else "not asked",
+            "setting": setting(safe) if safe else "",
+        }  # fmt: skip
+        row |= {f"{key} (us)": US * value if np.isfinite(value) else np.nan for key, value in
+                zip(("time", "low", "high"), safe[2:5] if safe else (np.nan,) * 3, strict=True)}  # fmt: skip
+        row |= {"safe lead": lead(one["safe_called"], safe, marked),
+                "hindsight": short_name(best.name) if best else NOTHING if one["asked"] else "not asked"}  # fmt: skip
+        row |= dict(zip(("share", "share low", "share high", "level", "meets"),
+                        best[1:6] if best else (np.nan,) * 5, strict=True))  # fmt: skip
+        rows.append(row | {"hindsight lead": lead(one["hindsight_called"], best, marked)})
+    return pd.DataFrame(rows)
+
+
+def lead(called: bool, best: Any, marked: list[str]) -> str:
+    """Is the lead beyond the intervals?"""
+    return "" if best is None else "called" if called else "price too noisy" if best.name in marked else "none"
+
+
+def by_kind(data: xr.DataTree) -> list[dict[str, Any]]:
+    """Cells of any body by kind of top."""
+    return [cells.winner(data, Cell("short", "axis", target, kind))
+            for kind in KINDS[:-1] for target in cells.targets(data)]  # fmt: skip
+
+
+def other_quantities(data: xr.DataTree) -> list[dict[str, Any]]:
+    """Cells of any body for the attitude and the energy."""
+    return [cells.winner(data, cell) for quantity in ("attitude", "energy") for cell in cells.cells(data, quantity)]
+
+
+def ties(data: xr.DataTree) -> pd.DataFrame:
+    """The winner in hindsight if costs within another ratio are level."""
+    rows = []
+    for target in cells.targets(data):
+        taken = cells.costs(data, Cell("short", "axis", target, NATURAL))
+        solved = taken.values[:, np.isfinite(taken.values).any(axis=0)] if taken.values.size else taken.values
+        for tie in TIES:
+            level = solved < tie * (1.0 + 1e-12) * solved.min(axis=0, initial=np.inf)
+            won = (level & (level.sum(axis=0) == 1)).mean(axis=1) if solved.size else np.zeros(1)
+            first = short_name(taken.names[int(won.argmax())]) if won.any() else "none"
+            rows.append([target, tie, first, float(won.max())])
+    return pd.DataFrame(rows, columns=["axis error (rad)", "level within", "first", "share"])
+
+
+def price_list(data: xr.DataTree) -> pd.DataFrame:
+    """Price of an evaluation and of a call, the spread between processes, and what runs in the inner loop."""
+    known, rows = prices(data), []
+    for place, name in enumerate(known.names):
+        price, call = (float(part[0]) for part in known.at(name, np.array([TOLERANCE])))
+        width, method = 1.96 * known.error[place], integrator(name)
+        rows.append([name, method.needs or "", method.general, method.inner_loop or "", 1e9 * price,
+                     1e9 * price * np.exp(-width), 1e9 * price * np.exp(width), US * call, known.spread[place],
+                     name not in known.marked])  # fmt: skip
+    header = ["variant", "needs", "for any body", "inner loop", "price (ns)", "low (ns)", "high (ns)", "call (us)",
+              "spread", "ranked"]  # fmt: skip
+    return pd.DataFrame(rows, columns=header)
+
+
+def silent(data: xr.DataTree) -> pd.DataFrame:
+    """Shares of all tops of a kind that are wrong, silent and dropped, of methods that people know."""
+    rows = []
+    for name in (name for name in KNOWN if name in data["short"]["variant"].values):
+        one = cells.health(data, name)
+        for at in (int(np.argmin(np.abs(one.setting - steps))) for steps in STEPS):
+            for k, kind in enumerate(KINDS[:-1]):
+                shares = (part[at, k] / max(one.drawn[k], 1.0) for part in (one.wrong, one.silent, one.dropped))
+                rows.append([name, one.setting[at], kind, int(one.drawn[k]), *shares])
+    header = ["variant", "steps a nutation", "kind of top", "tops", "wrong", "silent", "dropped"]
+    return pd.DataFrame(rows, columns=header)
+
+
+def checked(data: xr.DataTree) -> pd.DataFrame:
+    """The predicted cells of the map that were run."""
+    rows = []
+    for one in far.checks(data):
+        good = one.ratios[np.isfinite(one.ratios)]
+        spread = np.quantile(good, (0.0, 0.5, 1.0)) if good.size else (np.nan,) * 3
+        rows.append([one.quantity, one.target, one.horizon, short_name(one.winner), short_name(one.next), *spread,
+                     one.holds])  # fmt: skip
+    header = ["quantity", "error", "nutations", "winner", "next", "measured / predicted error, least", "median", "most",
+              "meets the error"]  # fmt: skip
+    return pd.DataFrame(rows, columns=header)

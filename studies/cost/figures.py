@@ -16,8 +16,8 @@ from symtop.report import style
 from symtop.report.style import LEAST_TEXT, RAISED, few_ticks, grid, headline, panels
 from symtop.runner.study import Picture
 
-from . import facts, far
-from .facts import CLASSES, EVALUATIONS, Cell
+from . import cells, far
+from .cells import CLASSES, EVALUATIONS, Cell
 from .ladder import KEPT, WRONG
 from .page import method, percent
 from .ranking import SAFE, run_lengths
@@ -66,15 +66,15 @@ def raised(target: float) -> str:
 
 def span(data: xr.DataTree, horizon: str = "short", tops: str = NATURAL) -> str:
     """Tops and run length."""
-    return f"{facts.chosen(data, horizon, tops).sum():,} {tops} tops over {facts.nutations(data, horizon):g} nutations"
+    return f"{cells.chosen(data, horizon, tops).sum():,} {tops} tops over {cells.nutations(data, horizon):g} nutations"
 
 
 def draw_accuracy(data: xr.DataTree) -> Picture:
     """Error against the seconds of a safe run, of methods that people know."""
     lines: dict[str, list[tuple[float, float, float, float]]] = {}
-    for target in facts.targets(data):
+    for target in cells.targets(data):
         for needs in CLASSES[:-1]:
-            for one in facts.safest(data, Cell("short", "axis", target, NATURAL, needs))[0]:
+            for one in cells.safest(data, Cell("short", "axis", target, NATURAL, needs))[0]:
                 if one.name in FAMILIAR and math.isfinite(one.seconds):
                     lines.setdefault(one.name, []).append((one.seconds, target, one.low, one.high))
     figure, axes = panels(1, 1, height=4.0)
@@ -91,7 +91,7 @@ def draw_accuracy(data: xr.DataTree) -> Picture:
     style.legend_below(figure, axes)
     without = [method(name) for name in FAMILIAR if name in data["short"]["variant"].values and name not in lines]
     beyond = f" Not within the budget at any of these errors: {', '.join(without)}." if without else ""
-    best = {target: facts.safest(data, Cell("short", "axis", target, NATURAL)) for target in facts.targets(data)}
+    best = {target: cells.safest(data, Cell("short", "axis", target, NATURAL)) for target in cells.targets(data)}
     told = [f"{method(one[0].name)} to {raised(target)}" for target, (one, _) in best.items()
             if one and math.isfinite(one[0].seconds)]  # fmt: skip
     headline(figure, f"The fastest safe choice for any body changes with the error: {', '.join(told)} rad")
@@ -109,13 +109,13 @@ def draw_accuracy(data: xr.DataTree) -> Picture:
 
 def draw_classes(data: xr.DataTree) -> Picture:
     """The cheapest of each class, safe, at each error; a panel an error, a line a class, two populations."""
-    targets, classes = facts.targets(data), CLASSES[:-1]
+    targets, classes = cells.targets(data), CLASSES[:-1]
     figure, axes = panels(1, len(targets), height=0.42 * len(classes) + 0.9, sharey=True)
     for axis, target in zip(axes[0], targets, strict=True):
         for place, needs in enumerate(classes):
             color = "#AAAAAA" if needs == TOP else "black"
             for tops, fill, shift in ((NATURAL, "full", 0.0), ("strata", "none", 0.0)):
-                choices, called = facts.safest(data, Cell("short", "axis", target, tops, needs))
+                choices, called = cells.safest(data, Cell("short", "axis", target, tops, needs))
                 best = choices[0] if choices else None
                 if best is None or not math.isfinite(best.seconds):
                     if tops == NATURAL:
@@ -152,12 +152,12 @@ def draw_classes(data: xr.DataTree) -> Picture:
 
 def draw_run_lengths(data: xr.DataTree) -> Picture:
     """The share of natural tops that each variant has solved within so many force evaluations, one panel a target."""
-    targets = facts.targets(data)
-    each = {target: facts.costs(data, Cell("short", "axis", target, NATURAL), EVALUATIONS) for target in targets}
+    targets = cells.targets(data)
+    each = {target: cells.costs(data, Cell("short", "axis", target, NATURAL), EVALUATIONS) for target in targets}
     order: list[str] = []
     for target in targets:
         order += [
-            one.name for one in facts.contest(data, Cell("short", "axis", target, NATURAL), EVALUATIONS).standings[:2]
+            one.name for one in cells.contest(data, Cell("short", "axis", target, NATURAL), EVALUATIONS).standings[:2]
         ]
     rows = list(dict.fromkeys([*order, "rk4[axis]", "strang[axis]", "dop853-compiled-fixed[axis]"]))[:NAMED]
     labels = "force evaluations of a run", "share of tops solved"
@@ -181,7 +181,7 @@ def draw_run_lengths(data: xr.DataTree) -> Picture:
     axes[0].plot([], [], color=style.GREY, lw=0.8, label="all other methods for any body")
     few_ticks(*axes, most=5)
     style.legend_below(figure, axes)
-    first = [facts.contest(data, Cell("short", "axis", target, NATURAL), EVALUATIONS).first for target in targets]
+    first = [cells.contest(data, Cell("short", "axis", target, NATURAL), EVALUATIONS).first for target in targets]
     told = [f"{method(one.name)} on {percent(one.share)} to {raised(target)}"
             for target, one in zip(targets, first, strict=True) if one]  # fmt: skip
     headline(figure, f"Fewest force evaluations for any body: {', '.join(told)} rad")
@@ -190,7 +190,7 @@ def draw_run_lengths(data: xr.DataTree) -> Picture:
         f"Share of {span(data)} on which a method has met the axis error within so many force evaluations, at the step "
         "or tolerance that suits the top (hindsight). Further left needs fewer; a line that ends higher solves more "
         "tops "
-        f"within {float(np.nanmax(data['short']['budget'].values)) / facts.nutations(data, 'short'):,.0f} evaluations "
+        f"within {float(np.nanmax(data['short']['budget'].values)) / cells.nutations(data, 'short'):,.0f} evaluations "
         "a "
         "nutation. An evaluation has no price here: a stage, a kick and a derivative of a series count alike.",
         f"Empirical distribution functions of the cost, one panel for each axis error, {len(rows)} lines with a name.",
@@ -205,7 +205,7 @@ def draw_silent(data: xr.DataTree) -> Picture | None:
     kinds = [place for place, kind in enumerate(KINDS[:-1])]
     figure, axes = panels(1, len(names), height=0.34 * len(kinds) + 1.1, sharey=True)
     for axis, name in zip(axes[0], names, strict=True):
-        one = facts.health(data, name)
+        one = cells.health(data, name)
         there = np.flatnonzero((one.setting > 4.0) & (one.setting < 600.0))
         share = {key: (getattr(one, key)[there] / np.maximum(one.drawn, 1.0))[:, kinds].T
                  for key in ("wrong", "silent", "dropped")}  # fmt: skip
@@ -220,7 +220,7 @@ def draw_silent(data: xr.DataTree) -> Picture | None:
         axis.tick_params(axis="x", labelrotation=60, length=0)
         axis.grid(visible=False)
     axes[0, 0].set_ylabel("kind of top")
-    one = facts.health(data, names[0])
+    one = cells.health(data, names[0])
     at = int(np.argmin(np.abs(one.setting - 69.92)))
     shares = one.silent[at] / np.maximum(one.drawn, 1.0)
     hard = int(np.argmax(shares[:-1]))
@@ -234,7 +234,7 @@ def draw_silent(data: xr.DataTree) -> Picture | None:
         "silent", figure,
         f"Per cent of the tops of a kind whose run is silent / wrong. Wrong: axis off by more than {WRONG:g} rad "
         "within "
-        f"{facts.nutations(data, 'short'):g} nutations. Silent: wrong, though it ends well and keeps energy and "
+        f"{cells.nutations(data, 'short'):g} nutations. Silent: wrong, though it ends well and keeps energy and "
         "momenta to "
         f"{KEPT:.0%}. A dash: more than half of the tops were dropped for the budget. The strata are chosen to hold "
         "what "

@@ -192,9 +192,9 @@ def _stay(
 
 
 def stored(values: Array) -> Array:
-    """Positive numbers with `DIGITS` bits, which a file holds in half the space."""
+    """Positive numbers with `DIGITS` bits, in single precision, which a file holds in a tenth of the space."""
     size, power = np.frexp(values)
-    return np.asarray(np.ldexp(np.rint(np.ldexp(size, DIGITS)), power - DIGITS))
+    return np.ldexp(np.rint(np.ldexp(size, DIGITS)), power - DIGITS).astype(np.float32)
 
 
 def table(variant: Integrator, tops: Tops, budget: float, *, twin: bool, guarded: int) -> xr.Dataset:
@@ -203,7 +203,7 @@ def table(variant: Integrator, tops: Tops, budget: float, *, twin: bool, guarded
     done = climb(variant, tops, asked, budget)
     settings = np.array([setting_of(variant, level) for level in range(LEVELS)])
     set_to = np.where(np.isfinite(done.work), settings[:, np.newaxis], np.nan)
-    costs, met = (np.full((len(ASKED), len(TARGETS), len(tops.period)), np.nan) for _ in range(2))
+    costs, met = (np.full((len(ASKED), len(TARGETS), len(tops.period)), np.nan, np.float32) for _ in range(2))
     for place, name in enumerate(ASKED):
         if name in asked:
             first = round(math.log2(LEAST_STEPS / FIRST)) if variant.fixed_step and name == "energy" else 0
@@ -223,13 +223,15 @@ def table(variant: Integrator, tops: Tops, budget: float, *, twin: bool, guarded
         "chart": ((), variant.charts()[0]),
         "control": ((), variant.control or ""),
         "needs": ((), variant.needs or ""),
+        "general": ((), float(variant.general or False)),
         "budget": ((), budget),
         "made": ((), float(np.isfinite(done.work).sum())),
         "evaluated": ((), float(np.nansum(done.work))),
     }
     if guarded:
         data |= {
-            name: (("level", "guarded"), values) for name, values in guarded_runs(variant, tops, done, guarded).items()
+            name: (("level", "guarded"), stored(values))
+            for name, values in guarded_runs(variant, tops, done, guarded).items()
         }
     return xr.Dataset(data, coords={"quantity": list(ASKED), "target": list(TARGETS), "kind": list(KINDS)})
 

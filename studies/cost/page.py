@@ -12,8 +12,8 @@ from symtop.report.sentences import joined
 from symtop.run.guard import EXPECTED
 from symtop.runner.study import Chart, Opening, Series, Table
 
-from . import facts, far
-from .facts import CLASSES, GENERAL, POPULATIONS, Cell
+from . import cells, far
+from .cells import CLASSES, GENERAL, POPULATIONS, Cell
 from .ladder import KEPT, WRONG
 from .prices import NOISY, TOLERANCE, prices
 from .ranking import SAFE, TIE, Safe, Standing
@@ -97,16 +97,16 @@ def make_facts(data: xr.DataTree) -> Facts:
     """Numbers and names of all that the page says."""
     known = prices(data)
     short = data["short"].to_dataset()
-    spans = facts.horizons(data)
+    spans = cells.horizons(data)
     checks = far.checks(data)
     made, evaluated = (sum(float(np.nansum(data[span][key].values)) for span in spans) for key in ("made", "evaluated"))
     return {
-        "winners": facts.winners(data), "marked": known.marked, "sampled": known.sampled,
-        "guard": facts.guard_counts(data), "checks": checks,
+        "winners": cells.winners(data), "marked": known.marked, "sampled": known.sampled,
+        "guard": cells.guard_counts(data), "checks": checks,
         "checks_held": sum(one.holds for one in checks),
-        "spans": {span: (facts.nutations(data, span), facts.members(data, span)) for span in spans},
+        "spans": {span: (cells.nutations(data, span), cells.members(data, span)) for span in spans},
         "variants": short.sizes["variant"], "made": made, "evaluated": evaluated,
-        "budget": {span: float(np.nanmax(data[span]["budget"].values)) / facts.nutations(data, span) for span in spans},
+        "budget": {span: float(np.nanmax(data[span]["budget"].values)) / cells.nutations(data, span) for span in spans},
     }  # fmt: skip
 
 
@@ -148,7 +148,7 @@ def silent_sentence(data: xr.DataTree) -> str:
     name = "rk4[axis]"
     if name not in data["short"]["variant"].values:
         return ""
-    one = facts.health(data, name)
+    one = cells.health(data, name)
     at = int(np.argmin(np.abs(one.setting - STEPS[-1])))
     wrong, silent = (part[at] / np.maximum(one.drawn, 1.0) for part in (one.wrong, one.silent))
     natural, worst = KINDS.index(NATURAL), int(np.argmax(wrong))
@@ -246,8 +246,8 @@ def kinds_table(data: xr.DataTree, found: Facts) -> Table:
     """Winners by kind of top."""
     lines = []
     for kind in KINDS[:-1]:
-        for target in facts.targets(data):
-            one = facts.winner(data, Cell("short", "axis", target, kind))
+        for target in cells.targets(data):
+            one = cells.winner(data, Cell("short", "axis", target, kind))
             lines.append([kind, f"{target:.0e}", f"{one['asked']}", safe_words(one, found["marked"]),
                           hindsight_words(one, found["marked"])])  # fmt: skip
     title = f"Winners for any body by kind of top, over {found['spans']['short'][0]:g} nutations"
@@ -258,8 +258,8 @@ def quantities_table(data: xr.DataTree, found: Facts) -> Table:
     """Winners for the attitude and the energy."""
     lines = []
     for quantity in ("attitude", "energy"):
-        for cell in facts.cells(data, quantity):
-            one = facts.winner(data, cell)
+        for cell in cells.cells(data, quantity):
+            one = cells.winner(data, cell)
             lines.append([quantity, f"{one['nutations']:g}", f"{one['target']:.0e}", f"{one['asked']}",
                           safe_words(one, found["marked"]), hindsight_words(one, found["marked"])])  # fmt: skip
     header = ["quantity", "nutations", "error", "tops", "safe", "in hindsight"]
@@ -269,8 +269,8 @@ def quantities_table(data: xr.DataTree, found: Facts) -> Table:
 def ties_table(data: xr.DataTree) -> Table:
     """The winner in hindsight if costs within another ratio are level."""
     lines = []
-    for target in facts.targets(data):
-        taken = facts.costs(data, Cell("short", "axis", target, NATURAL))
+    for target in cells.targets(data):
+        taken = cells.costs(data, Cell("short", "axis", target, NATURAL))
         solved = taken.values[:, np.isfinite(taken.values).any(axis=0)] if taken.values.size else taken.values
         line = [f"{target:.0e}"]
         for tie in TIES:
@@ -303,7 +303,7 @@ def silent_table(data: xr.DataTree) -> Table:
     """Shares of all tops of a kind that are wrong, silent and dropped, of methods that people know."""
     lines = []
     for name in (name for name in KNOWN if name in data["short"]["variant"].values):
-        one = facts.health(data, name)
+        one = cells.health(data, name)
         for steps in STEPS:
             at = int(np.argmin(np.abs(one.setting - steps)))
             shares = [[percent(part[at, k] / max(one.drawn[k], 1.0)) for part in (one.wrong, one.silent, one.dropped)]
@@ -312,7 +312,7 @@ def silent_table(data: xr.DataTree) -> Table:
     title = (
         f"Wrong (axis off by more than {WRONG:g} rad) / silent (wrong, ended well, energy and momenta kept to "
         f"{KEPT:.0%}) "
-        f"/ dropped (over the budget), of all tops of a kind, over {facts.nutations(data, 'short'):g} nutations"
+        f"/ dropped (over the budget), of all tops of a kind, over {cells.nutations(data, 'short'):g} nutations"
     )
     return Table(title, ["variant", "steps a nutation", *KINDS[:-1]], lines)
 
@@ -354,8 +354,8 @@ def rules_table(data: xr.DataTree, found: Facts) -> Table:
         "the energy 4.4",
         "budget of a run": ", ".join(f"{budget:,.0f} evaluations a nutation over {found['spans'][span][0]:g} nutations"
                                      for span, budget in found["budget"].items()),
-        "long runs": f"of the {len(long)} variants within {facts.WITHIN:g} times the least cost of their class on "
-        f"{facts.OFTEN:.0%} of the tops over ten nutations; others are not run and not ranked there",
+        "long runs": f"of the {len(long)} variants within {cells.WITHIN:g} times the least cost of their class on "
+        f"{cells.OFTEN:.0%} of the tops over ten nutations; others are not run and not ranked there",
         "tops that are asked": "those whose nutation is wider than the error, and where this is at least ten times the "
         "error of the truth",
         "meets": "of all tops that are asked; wins: of those that a variant of the class solves",
@@ -371,7 +371,7 @@ def opening(data: xr.DataTree) -> Opening:
     """What to use, by what you have: safe settings on natural tops over ten nutations."""
     found = make_facts(data)
     nutations = found["spans"]["short"][0]
-    targets = facts.targets(data)
+    targets = cells.targets(data)
     lines = []
     for needs in CLASSES[:-1]:
         each = {one["target"]: one for one in select(found, tops=NATURAL, needs=needs, nutations=nutations)}
@@ -399,10 +399,10 @@ def charts(data: xr.DataTree) -> list[Chart]:
     names = [str(name) for name in data["tops"]["scene_name"].sel(scene="short").values.ravel() if str(name)]
     panels: dict[str, dict[str, list[Series]]] = {"seconds": {}, "evaluations": {}}
     known = prices(data)
-    for span in facts.horizons(data):
+    for span in cells.horizons(data):
         group = data[span].to_dataset().isel(scene=0)
         for place, scene in enumerate(names):
-            label = f"{scene}, {facts.nutations(data, span):g} nutations"
+            label = f"{scene}, {cells.nutations(data, span):g} nutations"
             for cost, into in panels.items():
                 series = []
                 for name in map(str, group["variant"].values):

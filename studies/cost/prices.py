@@ -69,7 +69,7 @@ START = "from symtop.runner import scripts; scripts.install(); from symtop_studi
 
 
 @functools.cache
-def _top() -> tuple[SymmetricTop, Angles, float]:
+def timed_top() -> tuple[SymmetricTop, Angles, float]:
     """The top that is timed, its start and its nutation period."""
     drawn = population(DRAWN, seed=0, kind=KIND)
     numbers = np.stack([drawn[name].values for name in NUMBERS], axis=1)
@@ -89,7 +89,7 @@ def run_of(variant: Integrator, tolerance: float, nutations: float, *, own: bool
     """The bare run of the top over so many nutations, of heyoka by its `own` loop."""
     if own and variant.inner_loop == "heyoka":
         return bare_heyoka(variant.charts()[0], tolerance, nutations)
-    (chart,), (top, start, period) = variant.charts(), _top()
+    (chart,), (top, start, period) = variant.charts(), timed_top()
     solver, steps = variant.solvers[chart], max(round(nutations * FIRST * 2.0**FINE), 2)
     plan = Plan.steps(period * (nutations / steps), np.array([steps // 2, steps]))
     if not variant.fixed_step:
@@ -101,7 +101,7 @@ def bare_heyoka(chart: str, tolerance: float, nutations: float) -> Call:
     """heyoka's integrator on the same equations, top and times."""
     from symtop.methods.taylor.heyoka import start_numbers, stepper
 
-    top, start, period = _top()
+    top, start, period = timed_top()
     state, parameters = start_numbers(chart, "double", top, start)
     one = stepper(chart, "double", tolerance)
 

@@ -13,7 +13,7 @@ import xarray as xr
 from symtop.methods.framework.registry import Integrator, integrator, variants
 from symtop.runner.study import Case, Study
 
-from . import facts, far, figures, page
+from . import cells, far, figures, page
 from .ladder import table
 from .prices import BATCHES, COMPANY, ENOUGH, PROCESSES, measured, prices
 from .tops import named, tops_of
@@ -68,13 +68,13 @@ def grid(*, quick: bool = False) -> list[Case]:
 
 def follow_up(data: xr.DataTree) -> list[Case]:
     """The long runs of those that may win, the prices that were noisy, and the checks of the phase diagram."""
-    quick = facts.members(data, SHORT) < 1000
+    quick = cells.members(data, SHORT) < 1000
     asked = (QUICK if quick else FULL)[LONG]
     known = prices(data)
     quiet = [name for name in known.names if name not in known.marked]
     again = [*known.marked, *quiet[:: max(len(quiet) // COMPANY, 1)]] if known.marked else []
     return [
-        *(Case("tops", name, asked, group=LONG) for name in facts.contenders(data)),
+        *(Case("tops", name, asked, group=LONG) for name in cells.contenders(data)),
         *(timing(again, BATCHES[1], quick=quick) if again else []),
         *(Case("natural", f"check-{place:02d}", settings, group=CHECKS)
           for place, settings in enumerate(far.chosen(data, CHECKED[quick]))),

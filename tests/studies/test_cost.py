@@ -6,8 +6,8 @@ import timeit
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.cost import facts, ladder, page, prices as pricing, ranking, study, tops as tops_module
-from symtop_studies.cost.facts import GENERAL, Cell
+from symtop_studies.cost import cells, ladder, page, prices as pricing, ranking, study, tops as tops_module
+from symtop_studies.cost.cells import GENERAL, Cell
 from symtop_studies.cost.ranking import Ladder, cost_to_reach, hindsight, run_lengths, safe, slowdowns, wins
 from symtop_studies.cost.tops import ASKED, FIRST, KINDS, MOMENTA, NATURAL, SCENE, natural, tops_of
 
@@ -348,7 +348,7 @@ def test_every_top_that_is_drawn_is_judged_or_dropped_and_silent_runs_are_wrong(
     assert (wrong <= runs).all()
     assert wrong[0].sum() > wrong[6].sum()
     data = xr.DataTree.from_dict({"short": strang.expand_dims(scene=["tops"], variant=["strang[axis]"])})
-    health = facts.health(data, "strang[axis]")
+    health = cells.health(data, "strang[axis]")
     assert (health.dropped >= 0).all()
     assert health.dropped[-1].sum() > 0  # a budget ends every ladder of order 2
     assert np.array_equal(health.dropped, health.drawn - runs)
@@ -356,7 +356,7 @@ def test_every_top_that_is_drawn_is_judged_or_dropped_and_silent_runs_are_wrong(
 
 def test_the_guard_is_counted_once_for_every_run_that_it_was_asked_about(strang):
     data = xr.DataTree.from_dict({"short": strang.expand_dims(scene=["tops"], variant=["strang[axis]"])})
-    rows = facts.guard_counts(data)
+    rows = cells.guard_counts(data)
     asked = np.isfinite(strang["foretold"].values).sum()
     assert sum(one[key] for one in rows for key in ("wrong", "between", "right")) == asked > 0
     assert sum(one["wrong"] for one in rows if one["whole"]) > 0  # its trial covers coarse runs whole, and says so
@@ -379,11 +379,12 @@ def test_the_work_of_the_typical_top_grows_with_the_setting(strang):
 
 
 def test_no_method_of_this_top_takes_part_in_a_contest_for_any_body():
-    assert facts.of_class("kicks", GENERAL)
-    assert facts.of_class("this-top", "this-top")
-    for needs in ("this-top", "solution", ""):
-        assert not facts.of_class(needs, GENERAL)
-    assert not {integrator(name).needs for name in study.far.candidates()} & {"this-top", "solution"}
+    assert cells.of_class("kicks", True, GENERAL)
+    assert cells.of_class("kicks", False, "kicks")
+    assert not cells.of_class("kicks", False, GENERAL)  # it exists for symmetric bodies alone
+    assert cells.of_class("this-top", False, "this-top")
+    assert not cells.of_class("", True, GENERAL)  # a plug-in that does not say what it needs
+    assert all(integrator(name).general for name in study.far.candidates())
 
 
 def test_the_old_names_answer_with_the_new_one():
@@ -406,21 +407,22 @@ def data(quick_results):
 
 def test_quick_results_hold_every_verdict(data):
     assert {"short", "long", "tops", "prices", "far"} <= set(data.children)
-    cells = facts.winners(data)
-    assert len(cells) == 2 * len(facts.CLASSES) * 2 * len(TARGETS)
-    for one in cells:
+    winners = cells.winners(data)
+    assert len(winners) == 2 * len(cells.CLASSES) * 2 * len(TARGETS)
+    for one in winners:
         for best in filter(None, (one["safe"], one["hindsight"])):
-            assert facts.of_class(integrator(best.name).needs, one["needs"])
+            method = integrator(best.name)
+            assert cells.of_class(method.needs, method.general, one["needs"])
             assert best.low <= best.high
         if one["hindsight"]:
             assert one["solved"] <= one["asked"]
-    taken = facts.costs(data, Cell("short", "axis", 1e-3, NATURAL))
+    taken = cells.costs(data, Cell("short", "axis", 1e-3, NATURAL))
     assert not any("[attitude]" in name for name in taken.names if f"{name.split('[')[0]}[axis]" in taken.names)
 
 
 def test_a_cost_holds_the_call(data):
     cell = Cell("short", "axis", 1e-3, NATURAL)
-    seconds, counted = facts.costs(data, cell), facts.costs(data, cell, facts.EVALUATIONS)
+    seconds, counted = cells.costs(data, cell), cells.costs(data, cell, cells.EVALUATIONS)
     row = seconds.names.index("rk4[axis]")
     price, call = pricing.prices(data).at("rk4[axis]", np.array([NAN]))
     good = np.isfinite(counted.values[row])
@@ -431,7 +433,7 @@ def test_a_cost_holds_the_call(data):
 def test_called_winners_survive_prices_that_are_measured_again(data):
     """The prices drawn from their own intervals once more: nobody who is called loses his cell to another."""
     cell = Cell("short", "axis", 1e-9, NATURAL)
-    taken, contest = facts.costs(data, cell), facts.contest(data, cell)
+    taken, contest = cells.costs(data, cell), cells.contest(data, cell)
     again = taken.values * np.exp(taken.errors * np.random.default_rng(9).standard_normal(len(taken.names)))[:, None]
     second = hindsight(taken.names, again, taken.errors)
     if contest.called:
