@@ -1,34 +1,31 @@
-"""Figures of the study: the five named methods together, what every order costs, error against tolerance."""
+"""Figures of the study: the named methods together, what every order costs, error against tolerance."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from symtop_studies.convergence.tables import TARGET, least_work, named_variants
 
 from symtop.measure.conservation import tops
-from symtop.methods.framework.registry import split_name
 from symtop.model.charts import Array
 from symtop.report.figures import SMALLEST, error_band
-from symtop.report.style import FIRM, LEAST_TEXT, few_ticks, headline, legend_below, line, look, number, panels
+from symtop.report.style import LEAST_TEXT, few_ticks, grid, legend_below, line, look, number, panels
 from symtop.runner.study import Picture
 
-from .tables import (
+from .measures import (
     HISTORY_STEPS,
-    LARGE,
     MAIN,
-    NAMED,
+    TARGET,
     Efficiency,
     adaptive,
     declared_order,
     efficiencies,
     evaluations_a_nutation,
     merged,
+    named_variants,
+    ratios,
     stepping,
-    tolerance_fits,
 )
 
-HORIZON = "over 8 nutations (spheroid: to t = 8)"
 EQUAL = {
     "color": "#9EC9E8",
     "lw": 5.0,
@@ -40,8 +37,8 @@ WINDOWS = 18  # of time, in each of which the largest energy error is drawn
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
-    """The five named methods; the work that each variant with a step needs; error against the tolerance."""
-    drawn = [_named(data)] if any(split_name(str(name))[0] in NAMED for name in data["variant"].values) else []
+    """The named methods; the work that each variant with a step needs; error against the tolerance."""
+    drawn = [_named(data)]
     works = efficiencies(data, TARGET)
     drawn += [_constants(data, works)] if works else []
     chosen = adaptive(data)
@@ -56,53 +53,45 @@ def _line(axis: Any, name: str, label: str, x: Any, y: Any) -> None:
 
 
 def _named(data: xr.Dataset) -> Picture:
-    """Four panels on one scene: error against the step, against the tolerance, against work; energy over time."""
+    """Panels on one scene: error against the step, against the tolerance, against work; energy over time."""
     part, labels = named_variants(data)
     scene = str(part["scene"].values)
-    figure, axes = panels(2, 2, height=2.3)
-    steps, tolerances, work, energy = axes.flat
-    floor = 0.0
-    for axis in (steps, tolerances, work):
-        floor = 0.3 * error_band(axis, part[f"{MAIN}_bound"].values)
-        axis.set(xscale="log", yscale="log", ylim=(0.5 * floor, 10.0), ylabel="largest axis error (rad)")
+    shown = [kind for kind in ("step_size", "tolerance") if np.isfinite(part[kind]).any()]
+    shown += ["work", *(["energy"] if "history_time" in part and np.isfinite(part["history_time"]).any() else [])]
+    figure, axes = grid(len(shown), 2, height=2.3)
+    places, floor = dict(zip(shown, axes, strict=True)), 0.0
+    for kind in (kind for kind in shown if kind != "energy"):
+        floor = 0.3 * error_band(places[kind], part[f"{MAIN}_bound"].values)
+        places[kind].set(xscale="log", yscale="log", ylim=(0.5 * floor, 10.0), ylabel="largest axis error (rad)")
     for name, label in labels.items():
         cell = part.sel(variant=name)
         error, paid = np.maximum(cell[MAIN].values, floor), evaluations_a_nutation(cell, scene)
-        cells = cell["force_evaluations"].values
-        with np.errstate(invalid="ignore"):
-            _line(steps, name, label, np.where(np.isfinite(cell["step_size"]), cell["step_size"], np.nan), error)
-        _line(tolerances, name, label, cell["tolerance"].values, error)
-        _line(work, name, label, np.where(cells > 0.0, paid, np.nan), error)
-        if "history_time" in cell and np.isfinite(cell["history_time"]).any():
-            _history(energy, name, label, cell)
-    energy.set_visible(bool(energy.get_lines()))
-    _equal(tolerances)
-    steps.set(xlabel="step size (s)", title="error against the step")
-    tolerances.set(xlabel="tolerance asked for", title="error against the tolerance")
-    work.set(xlabel="force evaluations per nutation", title="error against cost")
-    energy.set(xscale="log", yscale="log", xlabel="nutations", ylabel="relative change\nof the energy")
-    energy.set_title(f"energy (fixed steps: {HISTORY_STEPS:g} a nutation)")
-    few_ticks(*axes.flat)
-    paid_least = least_work(part, labels)
-    if len(paid_least) > 1:
-        (best, least), (worst, most) = paid_least[0], paid_least[-1]
-        headline(
-            figure,
-            f"{best} needs {number(least)} force evaluations a nutation for {number(TARGET)}{FIRM}rad on scene "
-            f"{scene}, {worst} {number(most)}",
-        )
-    legend_below(figure, [work, tolerances])
-    tolerance = sorted({f"{value:.1e}" for value in np.ravel(part.get("history_tolerance", np.nan)) if value > 0.0})
-    caption = (
-        f"The five methods that everybody knows on {scene}, chart in the name, to t = {float(part['horizon'].max()):g}."
-        " Largest axis error at every step, at every tolerance, and both against force evaluations per nutation: a "
-        "line of slope -2 costs ten times the work for a hundredth of the error. Last: the largest change of the "
-        f"energy, relative to E0 - min V, in each window of time, at {HISTORY_STEPS:g} steps a nutation (adaptive: "
-        f"tolerance {' or '.join(tolerance)}). The table of the cheapest runs says what an error below {TARGET:g} "
-        "takes. Grey band: below the error bound of the reference."
-    )
-    alt = "Four log-log plots of the five named methods: error against step, tolerance and work, energy over time."
-    return Picture("named-methods", figure, caption, alt, lead="Five well-known methods")
+        for kind in shown:
+            if kind == "energy":
+                _history(places[kind], name, label, cell)
+            else:
+                _line(
+                    places[kind],
+                    name,
+                    label,
+                    np.where(paid > 0.0, paid, np.nan) if kind == "work" else cell[kind].values,
+                    error,
+                )
+    titles = {
+        "step_size": ("step size (s)", "error against the step"),
+        "tolerance": ("tolerance asked for", "error against the tolerance"),
+        "work": ("force evaluations per nutation", "error against cost"),
+        "energy": ("nutations", f"energy (fixed steps: {HISTORY_STEPS:g} a nutation)"),
+    }
+    for kind, axis in places.items():
+        axis.set(xlabel=titles[kind][0], title=titles[kind][1])
+    if "energy" in places:
+        places["energy"].set(xscale="log", yscale="log", ylabel="relative change\nof the energy")
+    if "tolerance" in places:
+        _equal(places["tolerance"])
+    few_ticks(*axes)
+    legend_below(figure, axes)
+    return Picture("named-methods", figure)
 
 
 def _equal(axis: Any) -> None:
@@ -174,22 +163,7 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
     for axis in axes[0]:
         axis.set_xlabel("force evaluations\na nutation")
     legend_below(figure, axes)
-    figure.legends[0].set_title("in brackets: the variables that are stepped, angles, axis alone or whole attitude")
-    most, times = number(middle[best]), number(middle[low] / middle[best])
-    headline(
-        figure,
-        f"To {number(TARGET)}{FIRM}rad {labels[best]} needs {most} force evaluations a nutation; {labels[low]}, the "
-        f"best of order {declared_order(low)}, {times} times as many",
-    )
-    caption = (
-        "Force evaluations per nutation that each variant, method[chart], needs for an axis error of "
-        f"{TARGET:g} rad {HORIZON}, by its law error = C h^p. p is the declared order, and C the median of error / h^p "
-        f"over the steps of the fit. Bar: from the least to the largest of the scenes {', '.join(scenes)}. Marker: "
-        f"their median, open if {TARGET:g} rad lies outside the errors that were fitted on most of them. Charts of a "
-        "method with the same errors share a line. Variants without an order to be trusted are in the table only."
-    )
-    alt = "Dot plot of the work for one accuracy, a line a variant, grouped by order."
-    return Picture("constants", figure, caption, alt)
+    return Picture("constants", figure)
 
 
 def _halves(blocks: list[list[str]]) -> list[list[list[str]]]:
@@ -202,10 +176,9 @@ def _halves(blocks: list[list[str]]) -> list[list[list[str]]]:
 
 
 class Met(NamedTuple):
-    """The errors of an adaptive variant over its tolerances, and the scene of the largest."""
+    """The errors of an adaptive variant over its tolerances, on all scenes."""
 
     ratios: Array
-    worst_on: str
 
     @property
     def middle(self) -> float:
@@ -213,23 +186,11 @@ class Met(NamedTuple):
         return float(np.median(self.ratios))
 
 
-def _met(data: xr.Dataset) -> dict[str, Met]:
-    """Of each adaptive variant, where its tolerance rules; the variant that errs least first."""
-    fitted, listed = tolerance_fits(data), {}
-    for name in merged(data, MAIN):
-        parts = {}
-        for scene in map(str, data["scene"].values):
-            cell, used = data.sel(scene=scene, variant=name), fitted[scene, name].used
-            parts[scene] = (cell[MAIN] / cell["tolerance"]).values[used]
-        if sum(part.size for part in parts.values()):
-            worst_on = max(parts, key=lambda scene: parts[scene].max(initial=0.0))
-            listed[name] = Met(np.concatenate(list(parts.values())), worst_on)
-    return dict(sorted(listed.items(), key=lambda item: item[1].middle))
-
-
 def _by_tolerance(data: xr.Dataset) -> Picture:
     """Error over tolerance of every run of the adaptive variants, with the line where they are equal."""
-    met = _met(data)
+    known = ratios(data)
+    met = {name: Met(known[name]) for name in merged(data, MAIN) if known[name].size}
+    met = dict(sorted(met.items(), key=lambda item: item[1].middle))
     figure, axes = panels(1, 1, height=0.155 * max(len(met), 6) + 1.0)
     axis = axes[0, 0]
     for place, (name, one) in enumerate(met.items()):
@@ -242,37 +203,8 @@ def _by_tolerance(data: xr.Dataset) -> Picture:
     axis.grid(visible=False, axis="y")
     axis.tick_params(axis="y", length=0)
     axis.axvline(1.0, color=EQUAL["color"], lw=EQUAL["lw"], zorder=0, label=EQUAL["label"])
-    if met:
-        ratios = np.concatenate([one.ratios for one in met.values()])
-        middle, most = float(np.median(ratios)), float(ratios.max())
-        place, (_, one) = max(enumerate(met.items()), key=lambda item: item[1][1].ratios.max())
-        axis.axvline(middle, color="black", lw=0.9, ls=(0, (4, 2)), zorder=2, label="median of all runs")
-        axis.plot(most, place, "o", color="black", ms=8, mfc="none", mew=1.2, zorder=4)
-        said = {"fontsize": 7.5, "weight": "bold", "textcoords": "offset points"}
-        axis.annotate(f"{number(most)} times", (most, place), (7, 0), va="center", **said)
-        axis.annotate(f"{number(middle)} times", (middle, -0.6), (3, 1), va="bottom", **said)
-        axis.set_xlim(0.5 * ratios.min(), 20.0 * most)  # with room for the number
-        headline(
-            figure,
-            f"The error of adaptive methods is {number(middle)} times the tolerance in the median, "
-            f"{number(most)} times at most",
-        )
     axis.plot([], [], "o", color="#444444", ms=3.5, mew=0, label="a run")
-    axis.plot([], [], "|", color="#444444", ms=8, mew=2.2, label="median of a method")
+    axis.plot([], [], "|", color="#444444", ms=8, mew=2.2, label="median of a variant")
     few_ticks(axis, most=9)
     legend_below(figure, axes)
-    scenes = ", ".join(map(str, data["scene"].values))
-    figure.legends[0].set_title(
-        f"Runs on {scenes}, one at each tolerance.\nNot counted: errors above {LARGE:g} rad, and those near the "
-        "reference's error bound, which are rounding."
-    )
-    caption = (
-        f"Largest axis error {HORIZON} of the adaptive methods over the tolerance that was asked for; relative and "
-        "absolute tolerance of the Runge-Kutta methods are equal. A dot is a run, a mark the median of its variant, "
-        "method[chart]. Right of the wide line a run loses more than it was asked for. Left out are errors that do not "
-        f"follow the tolerance: above {LARGE:g} rad, and near the error bound of the reference, where rounding rules."
-    )
-    if met:
-        caption += f" The largest ratio is on {one.worst_on}."
-    alt = "A line for each adaptive method with the error of every run over its tolerance, the medians marked."
-    return Picture("tolerance", figure, caption, alt)
+    return Picture("tolerance", figure)

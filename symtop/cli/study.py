@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from symtop.runner.study import Study
 
 MOST_NAMED = 8  # integrators and scenes in a line of the status
-MOST_SENTENCES = 3  # of the findings of a study that has run
 
 
 @click.command(short_help="Run studies: datasets, figures and findings.")
@@ -167,18 +166,23 @@ def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict
 
 
 def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str, Any]:
-    """The summary of a study's findings, which are printed but for JSON: its first sentences, and where the rest is."""
-    verdict, name = findings["verdict"], findings["study"]
-    summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "verdict")}
+    """The summary of a study's findings, which are printed but for JSON: its answer, and where the rest is."""
+    from symtop.report.legacy import modern
+    from symtop.report.template import answer
+
+    name, findings = findings["study"], modern(findings)
+    summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "facts")}
     summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
     if not as_json:
         drawn = counted(summary["figures"], "figure")
         click.echo("{study}: {computed} of {cases} cases computed, {drawn}".format(drawn=drawn, **summary))
-        left = len(verdict) - MOST_SENTENCES
-        more = f"{counted(left, 'more finding')} in {name}.json" if left > 0 else ""
-        pictures = f"figures {results / 'figures' / name}-*" if findings["pictures"] else ""
-        rest = ", ".join(filter(None, (pictures, more)))
-        for line in (*(f"- {sentence}" for sentence in verdict[:MOST_SENTENCES]), f"dataset {results / name}.nc", rest):
+        files = [f"dataset {results / name}.nc", f"facts {results / name}.json"]
+        files += [
+            f"{kind} {results / kind / name}-*"
+            for kind, key in (("figures", "pictures"), ("tables", "tables"))
+            if findings[key]
+        ]
+        for line in (answer(findings, results), ", ".join(files)):
             if line:
                 click.echo(common.filled(f"  {line}"))
     for failure in findings["failures"]:

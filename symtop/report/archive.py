@@ -2,7 +2,7 @@
 
     README.md                     what each file and variable is, its units, and how it was made
     results/*.nc, *.json          datasets and findings of the studies and of the comparisons beside them
-    results/report.html, .md      the report, results/figures/ its figures
+    results/report.html, .md      the report, results/figures/ and results/tables/ what it shows
     scenes/scenes.csv             tops and starts;  scenes/states.csv, .nc: their states to 30 digits
     citations.bib                 sources of the methods
     versions.txt, machine.txt     every installed package; processor, cores, memory, system
@@ -93,7 +93,9 @@ def bundle(results: Path, target: Path | None = None) -> Path:
 
 def _stored(results: Path) -> list[Path]:
     """The files of a results folder that are bundled: no cases, and no figure that the report does not show."""
-    shown = {results / "figures" / picture["file"] for study in page.gather(results) for picture in study["pictures"]}
+    gathered = page.gather(results)
+    shown = {results / kind / one["file"] for study in gathered for kind, items in (
+        ("figures", study["pictures"]), ("tables", study["tables"])) for one in items}  # fmt: skip
     files = [path for ending in ("*.nc", "*.json", "report.html", "report.md") for path in results.glob(ending)]
     return sorted([*files, *shown])
 

@@ -5,26 +5,15 @@ The scenes and the bounds of the truth on them are read from the package when th
 """
 
 import math
-import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from symtop.core.numbers import EPSILON
-from symtop.methods.framework.registry import integrators
 from symtop.model.scenes import Scene, scenes
+from symtop.report.tables import table
 from symtop.run.reference.truth import reference
-
-TERMS = {  # of the answers, with what they mean
-    "nutation": "one nod of the axis between its two inclinations; its period T is the unit of steps and run lengths",
-    "axis": "the direction of the top; its error is the angle between where it is and where it should be, in radians",
-    "variant": "a method in one chart: a method integrates other variables in each, and differs in error and cost",
-    "[angles]": "the method integrates Euler's angles, which are singular where the axis is vertical",
-    "[axis]": "the method integrates the direction of the axis and the angular momentum, which are singular nowhere",
-    "[attitude]": "the method integrates a quaternion, the whole orientation, and the angular momentum",
-    "guard": "the forecast before a run: it tries the method on a piece of it",
-}
 
 
 class Block(NamedTuple):
@@ -101,13 +90,15 @@ EXACT = (
 )
 
 
-def glossary(text: str) -> list[tuple[str, str]]:
-    """The terms and methods that a text names, each with a line on what it is, terms first."""
-    terms = [(term, words) for term, words in TERMS.items() if re.search(rf"(?<![\w[]){re.escape(term)}", text)
-             or (term.startswith("[") and term in text)]  # fmt: skip
-    known = integrators()
-    named = re.compile(rf"(?<![\w-])({'|'.join(sorted(map(re.escape, known), key=len, reverse=True))})(?![\w-])")
-    return terms + [(name, known[name].summary) for name in dict.fromkeys(named.findall(text))]
+def text() -> str:
+    """The section below its heading, in Markdown, formulas in LaTeX."""
+    return "\n\n".join(f"### {part.title}\n\n" + "\n\n".join(map(_block, part.blocks)) for part in parts())
+
+
+def _block(block: Block) -> str:
+    if block.rows:
+        return f"**{block.title}**\n\n{table(block.header, block.rows)}"
+    return block.words or "\n\n".join(f"$${formula}$$" for formula in block.formulas)
 
 
 def parts() -> list[Part]:

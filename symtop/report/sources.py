@@ -26,9 +26,9 @@ def report_hash(results: Path, *, embed: bool) -> str:
     }
     facts = {"announced": hashed(*map(str, points)), "processor": processor(), "embed": str(embed)}
     shown = {"shown": hashed(*(path.name for path in report_files(results)))}
-    return digest(code | packages() | packages("matplotlib", "jinja2") | facts | shown)
+    return digest(code | packages() | packages("matplotlib", "jinja2", "markdown-it-py") | facts | shown)
 
 
 def report_files(results: Path) -> list[Path]:
-    """The findings, datasets and figures that the report shows or links."""
-    return sorted(path for kind in ("*.json", "*.nc", "figures/[!.]*") for path in results.glob(kind))
+    """The findings, datasets, figures and tables that the report shows or links."""
+    return sorted(path for kind in ("*.json", "*.nc", "figures/[!.]*", "tables/[!.]*") for path in results.glob(kind))

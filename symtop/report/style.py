@@ -15,6 +15,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from symtop.core import netcdf
+from symtop.report.formats import FIRM, RAISED, number  # noqa: F401  (of drawings)
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -63,7 +64,6 @@ DASHES = {  # of a line, by family; a family that is not here has a solid one
     "splitting": (0, (6.0, 1.2)), "runge-kutta": (0, (3.0, 1.2)), "lie-group": (0, (6.0, 1.2, 1.0, 1.2)),
     "taylor": (0, (1.5, 0.8)), "library": (0, (1.0, 1.6)), "engine": (0, (3.0, 1.2, 1.0, 1.2)),
 }  # fmt: skip
-RAISED, FIRM = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"), "\N{NO-BREAK SPACE}"
 UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
 _MARKERS = "osv^<>DPXph8dH"
 
@@ -249,14 +249,6 @@ def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
             compact(Image.fromarray(np.asarray(canvas.buffer_rgba()))).save(path, compress_level=LEVEL)
         else:
             FigureCanvasAgg(figure).print_png(path, metadata=metadata)
-
-
-def number(value: float, digits: int = 2) -> str:
-    """A number of a title as it is printed: ``10⁻⁶``, ``1.4 × 10⁻¹³``, ``0.012``, ``340``; no line breaks within it."""
-    text = f"{value:.{digits}g}" if not 10.0**digits <= abs(value) < 1e4 else f"{value:.0f}"
-    mantissa, mark, power = text.partition("e")
-    ten = f"10{str(int(power or 0)).translate(RAISED)}"
-    return text if not mark else ten if mantissa == "1" else f"{mantissa}{FIRM}×{FIRM}{ten}"
 
 
 def headline(figure: Any, message: str) -> None:

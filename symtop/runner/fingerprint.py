@@ -65,12 +65,12 @@ def digests(study: Study, cases: Iterable[Case]) -> list[str]:
     return [code_hash.digest(reasons(study, case)) for case in cases]
 
 
-def drawing_digest(study: Study, script: Path, *drawing: Any) -> str:
-    """Hash of what makes a study's figures, tables and sentences, and of the files beside its script that they fill."""
+def drawing_digest(study: Study, page: Path | None, *drawing: Any) -> str:
+    """Hash of what makes a study's facts, figures and tables, and of the template of its page."""
     shown = (
-        study.pictures, study.verdict, study.tables, study.charts, study.opening,
+        study.facts, study.pictures, study.tables, study.charts, study.verdict, study.opening,
         study.title, study.question, study.how_to_read,
     )  # fmt: skip
-    templates = {f"file {file.name}": code_hash.file_hash(file) for file in sorted(script.parent.glob("*.md"))}
     code = _code().reasons("drawing", shown, drawing)
-    return code_hash.digest(code | templates | code_hash.packages("matplotlib"))
+    template = {} if page is None else {f"file {page.name}": code_hash.file_hash(page)}
+    return code_hash.digest(code | template | code_hash.packages("matplotlib"))

@@ -23,11 +23,12 @@ from symtop.model.scenes import scenes
 from symtop.run import plugins
 from symtop.runner import fingerprint, manifest, store
 from symtop.runner.cases import StudyCases
+from symtop.runner.findings import findings_of
 from symtop.runner.pool import Pool, prepare
-from symtop.runner.scripts import file_of, folder, load, names
-from symtop.runner.study import Case, Save, Study, findings_of
+from symtop.runner.scripts import file_of, folder, load, names, page_of
+from symtop.runner.study import Case, Save, Study
 
-__all__ = ["findings_of", "folder", "load", "names", "run", "start"]
+__all__ = ["findings_of", "folder", "load", "names", "page_of", "run", "start"]
 
 Findings = dict[str, Any]
 
@@ -115,7 +116,7 @@ def analyse_stored(
 
 def drawing_digest(study: Study, save: Save | None) -> str:
     """Hash of what combines, draws and judges."""
-    return fingerprint.drawing_digest(study, file_of(study.name), combine, save)
+    return fingerprint.drawing_digest(study, page_of(study.name), combine, findings_of, save)
 
 
 def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> Findings:
@@ -131,10 +132,13 @@ def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> 
         combined = netcdf.describe(combined, study.title, units=units, question=study.question)
         netcdf.write(combined, dataset)
         store.forget(results, study, cases.cases)
-        findings = findings_of(study, combined, results, save, failures=cases.failures, cases=len(cases.cases))
-        findings["quick"] = quick
+        findings = findings_of(
+            study, combined, results, save, failures=cases.failures, cases=len(cases.cases), quick=quick,
+            page=page_of(study.name),
+        )  # fmt: skip
         netcdf.write_json(words, findings)
         if not cases.failures and made_of:
             pictures = [results / "figures" / picture["file"] for picture in findings["pictures"]]
-            manifest.note(results, study.name, made_of, [dataset, words, *pictures, *cases.cases])
+            tables = [results / "tables" / table["file"] for table in findings["tables"] if "file" in table]
+            manifest.note(results, study.name, made_of, [dataset, words, *pictures, *tables, *cases.cases])
     return findings

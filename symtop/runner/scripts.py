@@ -60,6 +60,13 @@ def file_of(name: str) -> Path:
     return _elsewhere.get(name) or folder() / one_of("study", name, names()) / "study.py"
 
 
+def page_of(name: str) -> Path | None:
+    """The template of a study's page: page.md beside study.py, NAME.md beside any other script; None without one."""
+    file = file_of(name)
+    page = file.with_name("page.md") if file.stem == "study" else file.with_suffix(".md")
+    return page if page.is_file() else None
+
+
 def _module(file: Path) -> ModuleType:
     if file.parent.parent == folder():
         return importlib.import_module(f"{install().__name__}.{file.parent.name}.{file.stem}")

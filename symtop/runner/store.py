@@ -4,8 +4,8 @@ results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.npz            what one 
 results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.failed.json    or how it failed, with its traceback
 results/cases/STUDY/.SCENE--INTEGRATOR--SETTINGS--DIGEST.lock          while it is being computed
 results/STUDY.nc                                                       all of them, with labelled dimensions
-results/STUDY.json                                                     verdict, tables and captions for the report
-results/figures/STUDY-NAME.png
+results/STUDY.json                                                     facts, and names of figures and tables
+results/figures/STUDY-NAME.png, results/tables/STUDY-NAME.csv
 results/cases/manifest.json                                            what these were made of (`manifest`)
 
 SETTINGS is a hash of what the case was asked to do, DIGEST one of everything that its numbers depend on; its file holds

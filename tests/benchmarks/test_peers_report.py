@@ -92,8 +92,8 @@ def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_p
     page.write(tmp_path)
     text = (tmp_path / "report.md").read_text()
     sections = re.findall(r"^## (.+)$", text, re.MULTILINE)
-    assert study.STUDY.title in sections
-    assert truth.title in sections
+    assert study.STUDY.question in sections
+    assert truth.question in sections
     assert "Measured on 2001-02-03" in text
     assert "an abacus" not in text.partition("## Provenance")[2]  # the studies were run here
 

@@ -1,4 +1,4 @@
-"""The section on how it was measured says what the package does: scenes, bounds, equations, glosses."""
+"""The section on how it was measured says what the package does: scenes, bounds, equations."""
 
 from xml.etree import ElementTree as ET
 
@@ -7,7 +7,6 @@ from latex2mathml.converter import convert
 
 import symtop
 from symtop.report import method
-from symtop.report.method import glossary
 
 
 def blocks(name):
@@ -39,9 +38,13 @@ def test_every_formula_is_shown_in_full():
         assert len(tree.findall(".//{*}mfrac")) == formula.count("\\frac")
 
 
-def test_a_gloss_is_given_to_every_name_in_a_text_and_to_no_part_of_one():
-    named = dict(glossary("Begin with rk45-compiled[axis], then gauss-12[axis]."))
-    assert named.keys() == {"rk45-compiled", "gauss-12", "[axis]"}
-    assert glossary("the axis")[0][0] == "axis"
-    assert named["gauss-12"] == symtop.integrator("gauss-12").summary
-    assert glossary("Nothing is named here.") == []
+def test_the_section_in_markdown_has_every_block():
+    text = method.text()
+    for part in method.parts():
+        assert f"### {part.title}\n" in text
+        for block in part.blocks:
+            assert not block.words or block.words in text
+            assert all(f"$${formula}$$" in text for formula in block.formulas)
+            assert all(
+                "| " + " | ".join(row).replace("<", "\\<") + " |" in text.replace("\\|", "|") for row in block.rows
+            )

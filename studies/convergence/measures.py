@@ -23,6 +23,7 @@ from symtop.run.simulation import integrate
 MAIN = "axis"  # every chart shows it
 OTHERS = ("attitude", "theta", "energy")
 NAMED = ("midpoint", "trapezoidal", "stormer-verlet", "rk45", "taylor")  # the five that every reader knows
+FEW = 9  # variants that a figure has room for
 HISTORY_STEPS, HISTORY_TOLERANCE = 100.0, 1e-6  # a nutation; of their runs for the energy over time
 LARGE = LARGEST_ERROR  # radians: larger errors follow no power of the step
 ABOVE_BOUND = 100.0  # times the reference's own error bound: smaller errors may be the reference's
@@ -176,8 +177,13 @@ TARGET = 1e-6  # rad, the axis error at which costs are compared
 
 
 def named_variants(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
-    """The five named methods on the first scene, without a chart that another covers, and their labels."""
-    named = [name for name in map(str, data["variant"].values) if split_name(name)[0] in NAMED]
+    """The named methods on the first scene, without a chart that another covers, and their labels.
+
+    Where there are few variants, or none of these methods, all of them are named.
+    """
+    every = list(map(str, data["variant"].values))
+    named = [name for name in every if split_name(name)[0] in NAMED]
+    named = every if len(every) <= FEW or not named else named
     names = [name for name in named if name.replace("[attitude]", "[axis]") not in named or "[attitude]" not in name]
     return data.sel(variant=names).isel(scene=0), merged(data.sel(variant=names), MAIN)
 
@@ -194,3 +200,12 @@ def least_work(part: xr.Dataset, labels: Mapping[str, str]) -> list[tuple[str, f
         if work.size:
             paid[name] = float(np.min(work))
     return sorted(paid.items(), key=lambda one: one[1])
+
+
+def ratios(data: xr.Dataset) -> dict[str, np.ndarray]:
+    """Axis errors over tolerances of every adaptive variant on all scenes, where the tolerance rules."""
+    found: dict[str, list[np.ndarray]] = {}
+    for (on, name), fit in tolerance_fits(data).items():
+        cell = data.sel(scene=on, variant=name)
+        found.setdefault(name, []).append((cell[MAIN] / cell["tolerance"]).values[fit.used])
+    return {name: np.concatenate(parts) for name, parts in found.items()}

@@ -1,0 +1,83 @@
+"""Numbers as the report prints them, for titles, tables and the filters of templates.
+
+A filter given None, which stands for what was not measured, returns None: a template prints "not measured" for it.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+FIRM = "\N{NO-BREAK SPACE}"
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+LARGEST_PLAIN = 1e4  # larger numbers are written with a power of ten
+MOST_COUNTED = 1e9  # larger whole numbers are no counts
+UNITS = ((1e-9, "ns"), (1e-6, "µs"), (1e-3, "ms"), (1.0, "s"), (60.0, "min"), (3600.0, "h"))  # of times, in seconds
+
+
+def number(value: float, digits: int = 2, unit: str = "") -> str:
+    """A number with so many significant digits, and its unit: ``10⁻⁶ rad``, ``1.4 × 10⁻¹³``, ``0.012``, ``340``."""
+    text = f"{value:.{digits}g}" if not 10.0**digits <= abs(value) < LARGEST_PLAIN else f"{value:.0f}"
+    mantissa, mark, power = text.partition("e")
+    ten = f"10{str(int(power or 0)).translate(RAISED)}"
+    printed = text if not mark else ten if mantissa == "1" else f"{mantissa}{FIRM}×{FIRM}{ten}"
+    return f"{printed}{FIRM}{unit}" if unit else printed
+
+
+def count(value: float) -> str:
+    """A whole number, thousands apart: ``12,345``."""
+    return f"{value:,.0f}"
+
+
+def percent(value: float, digits: int = 0) -> str:
+    """A share as a percentage: ``31 %``."""
+    return f"{100.0 * value:.{digits}f}{FIRM}%"
+
+
+def power(value: float) -> str:
+    """The power of ten next to a positive number: ``10⁻⁶``."""
+    return f"10{str(round(math.log10(value))).translate(RAISED)}"
+
+
+def fixed(value: float, digits: int = 2, unit: str = "") -> str:
+    """A number with so many digits after the point: ``1.90``."""
+    return f"{value:.{digits}f}{FIRM}{unit}" if unit else f"{value:.{digits}f}"
+
+
+def duration(seconds: float, digits: int = 2) -> str:
+    """A time, given in seconds, in the unit that suits it: ``5.4 µs``, ``176 µs``, ``4.8 ms``, ``2 h``."""
+    size, unit = next((one for one in reversed(UNITS) if abs(seconds) >= one[0]), UNITS[0])
+    return number(seconds / size, digits, unit)
+
+
+def microseconds(seconds: float, digits: int = 2) -> str:
+    """A time, given in seconds, in microseconds."""
+    return number(seconds * 1e6, digits, "µs")
+
+
+def code(name: str) -> str:
+    """A name as it is typed."""
+    return f"`{name}`"
+
+
+def cell(value: Any, digits: int = 3) -> str:
+    """What a cell of a table shows: a number with so many significant digits; nothing for what is missing."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, (int, float)):
+        whole = math.isfinite(value) and float(value).is_integer() and abs(value) < MOST_COUNTED
+        return count(value) if whole else number(value, digits)
+    return str(value)
+
+
+def _passing(filter_: Callable[..., str]) -> Callable[..., str | None]:
+    def passed(value: Any, *options: Any, **named: Any) -> str | None:
+        return None if value is None else filter_(value, *options, **named)
+
+    return passed
+
+
+FILTERS = {
+    one.__name__: _passing(one) for one in (number, count, percent, power, fixed, duration, microseconds, code, cell)
+}
