@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 from symtop.report import template
 from symtop.runner import run as runner
 
-NAMED = re.compile(r"\b(?:figure|table)\(\"([\w-]+)\"")
+NAMED = re.compile(r"\b(?:figure|table)\(\"([\w-]+)\"|\(tables/\w+?-([\w-]+)\.csv\)")
 
 
 def checked(name: str, data: object, folder: Path) -> str:
@@ -20,7 +20,9 @@ def checked(name: str, data: object, folder: Path) -> str:
     )
     found |= {"measured": "", "dataset": ""}
     there = {one["name"] for kind in ("pictures", "tables") for one in found[kind]}
-    assert set(NAMED.findall(found["page"])) == there, "figures and tables of the template and of the study differ"
+    assert {first or linked for first, linked in NAMED.findall(found["page"])} == there, (
+        "figures and tables of the template and of the study differ"
+    )
     text = template.filled(found, folder)
     empty = {**found, "facts": dict.fromkeys(found["facts"]), "pictures": [], "tables": []}
     for one in (text, template.filled(empty, folder)):

@@ -50,9 +50,9 @@ def titled(name: str) -> str:
     return short_name(name) + ("" if method.general or method.needs == "this-top" else " (symmetric bodies)")
 
 
-def setting(one: Safe) -> str:
+def setting_words(name: str, value: float) -> str:
     """A setting in a table: steps a nutation, or a tolerance."""
-    return f"{one.setting:.3g} steps" if integrator(one.name).fixed_step else f"tolerance {one.setting:.0e}"
+    return f"{value:.3g} steps" if integrator(name).fixed_step else f"tolerance {value:.0e}"
 
 
 def facts(data: xr.DataTree) -> dict[str, Any]:
@@ -141,7 +141,13 @@ def guard_facts(data: xr.DataTree) -> dict[str, int]:
 
 def far_facts(data: xr.DataTree) -> dict[str, Any]:
     """The map: who has the most cells, how many were predicted, and what the checks of those say."""
-    named: dict[str, Any] = {}
+    names = "axis", "axis_share", "energy", "energy_share", "shape", "shape_share", "variants", "tops"
+    named: dict[str, Any] = dict.fromkeys(
+        (*(f"map_{name}" for name in names), "predicted", "checks", "checks_held", "checks_longest", "checks_low",
+         "checks_middle", "checks_high")
+    )  # fmt: skip
+    if "far" not in data.children:
+        return named
     reached = predicted = 0
     for quantity in far.QUANTITIES:
         panel = far.diagram(data, quantity)
@@ -185,10 +191,10 @@ def use(data: xr.DataTree) -> pd.DataFrame:
         for target in cells.targets(data):
             one = cells.winner(data, Cell("short", "axis", target, NATURAL, needs))
             best, mark = one["safe"], "" if one["safe_called"] else "~ "
-            line[f"{target:.0e} rad"] = (
-                f"{mark}{titled(best.name)}, {setting(best)}, {US * best.seconds:.2g} us" if best
-                else NOTHING if one["asked"] else "not asked"
-            )  # fmt: skip
+            words = NOTHING if one["asked"] else "not asked"
+            if best is not None:
+                words = f"{titled(best.name)}, {setting_words(best.name, best.setting)}, {US * best.seconds:.2g} us"
+            line[f"1e-{decades(target)} rad"] = f"{mark}{words}" if best else words
         rows.append(line)
     return pd.DataFrame(rows)
 
@@ -203,7 +209,7 @@ def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:
             "tops": one["tops"], "needs": one["needs"], "nutations": one["nutations"], "error": one["target"],
             "asked (tops)": one["asked"], "solved (tops)": one["solved"],
             "safe": short_name(safe.name) if safe else NOTHING if one["asked"] else "not asked",
-            "setting": setting(safe) if safe else "",
+            "setting": setting_words(safe.name, safe.setting) if safe else "",
         }  # fmt: skip
         row |= {f"{key} (us)": US * value if np.isfinite(value) else np.nan for key, value in
                 zip(("time", "low", "high"), safe[2:5] if safe else (np.nan,) * 3, strict=True)}  # fmt: skip

@@ -353,11 +353,14 @@ def diagram(data: xr.DataTree, quantity: str) -> Diagram:
     table = np.array(costs)
     order = np.argsort(table, axis=0, kind="stable")
     best = np.take_along_axis(table, order, axis=0)
+    second = best[1] if len(best) > 1 else np.full_like(best[0], np.inf)
     with np.errstate(invalid="ignore"):
-        ratio = best[1] / best[0]
+        ratio = second / best[0]
     predicted = np.take_along_axis(np.array(unseen), order[:1], axis=0)[0] & np.isfinite(best[0])
     far = data["far"].to_dataset()["horizon"].values
-    return Diagram(names, far, table, np.where(np.isfinite(best[0]), order[0], -1), order[1], ratio, predicted, levels)
+    return Diagram(
+        names, far, table, np.where(np.isfinite(best[0]), order[0], -1), order[1 % len(order)], ratio, predicted, levels
+    )
 
 
 def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:

@@ -13,7 +13,7 @@ import xarray as xr
 from symtop.methods.framework.registry import Integrator, integrator, variants
 from symtop.runner.study import Case, Study
 
-from . import cells, far, figures, page
+from . import cells, facts, far, figures
 from .ladder import table
 from .prices import BATCHES, COMPANY, ENOUGH, PROCESSES, measured, prices
 from .tops import named, tops_of
@@ -21,7 +21,7 @@ from .tops import named, tops_of
 SEED = 1
 SHORT, LONG, TOPS, PRICES, FAR, CHECKS = "short", "long", "tops", "prices", "far", "checks"  # groups of cases
 FULL = {
-    SHORT: {"strata": 1500, "natural": 900, "seed": SEED, "nutations": 10.0, "budget": 1e4, "guarded": 120},
+    SHORT: {"strata": 900, "natural": 700, "seed": SEED, "nutations": 10.0, "budget": 4e4, "guarded": 120},
     LONG: {"strata": 250, "natural": 160, "seed": SEED, "nutations": 1000.0, "budget": 5e5, "guarded": 0},
 }
 QUICK = {
@@ -35,7 +35,7 @@ CHECKED = {False: 6e7, True: 2e6}  # force evaluations of one run of a check, by
 
 def compiled_variants() -> list[Integrator]:
     """Every compiled variant with a step or a tolerance, but those that are left out."""
-    left = {name for names in page.LEFT_OUT.values() for name in names}
+    left = {name for names in facts.LEFT_OUT.values() for name in names}
     return [
         variant
         for variant in variants()
@@ -77,7 +77,7 @@ def follow_up(data: xr.DataTree) -> list[Case]:
         *(Case("tops", name, asked, group=LONG) for name in cells.contenders(data)),
         *(timing(again, BATCHES[1], quick=quick) if again else []),
         *(Case("natural", f"check-{place:02d}", settings, group=CHECKS)
-          for place, settings in enumerate(far.chosen(data, CHECKED[quick]))),
+          for place, settings in enumerate(far.chosen(data, CHECKED[quick]) if FAR in data.children else ())),
     ]  # fmt: skip
 
 
@@ -117,13 +117,6 @@ STUDY = Study(
     name="cost",
     title="Cost",
     question="Which method is the cheapest at the accuracy I need, with what I have?",
-    how_to_read=page.HOW_TO_READ,
-    cases=lambda quick: grid(quick=quick),
-    measure=measure,
-    pictures=figures.pictures,
-    tables=page.tables,
-    verdict=page.sentences,
-    follow_up=follow_up,
-    charts=page.charts,
-    opening=page.opening,
-)
+    cases=lambda quick: grid(quick=quick), measure=measure, follow_up=follow_up,
+    facts=facts.facts, tables=facts.tables, pictures=figures.pictures, charts=figures.charts,
+)  # fmt: skip

@@ -117,7 +117,7 @@ def test_measure_code_and_the_reference_make_the_cases_of_their_study_stale():
 @pytest.mark.parametrize(
     ("place", "again"),
     [
-        ("symtop_studies.cost.cells:winners", True), ("symtop_studies.cost.page:sentences", True),
+        ("symtop_studies.cost.cells:winners", True), ("symtop_studies.cost.facts:facts", True),
         ("symtop.measure.datasets:_dense", True), ("symtop.cli.common:as_text", False),
         ("symtop_studies.drift.words:verdict", False),
     ],

@@ -6,13 +6,14 @@ import timeit
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.cost import cells, ladder, page, prices as pricing, ranking, study, tops as tops_module
+from symtop_studies.cost import cells, facts, ladder, prices as pricing, ranking, study, tops as tops_module
 from symtop_studies.cost.cells import GENERAL, Cell
 from symtop_studies.cost.ranking import Ladder, cost_to_reach, hindsight, run_lengths, safe, slowdowns, wins
 from symtop_studies.cost.tops import ASKED, FIRST, KINDS, MOMENTA, NATURAL, SCENE, natural, tops_of
 
 import symtop
 from symtop.core import netcdf
+from symtop.measure import datasets
 from symtop.measure.accuracy import error_row
 from symtop.measure.ranking import nearest, regime
 from symtop.measure.settings import TARGETS
@@ -21,6 +22,8 @@ from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.runner.run import load
+from symtop.runner.study import Case
+from tests.templates import checked
 
 INF, NAN = math.inf, math.nan
 EACH = ("strang[axis]", "midpoint[angles]", "stormer-verlet-reversible[angles]", "rk4[attitude]", "rk45-compiled[axis]")
@@ -457,12 +460,46 @@ def test_advice_counts_the_nearest_tops_of_the_quick_results(quick_results, quan
     assert advice.nearest in str(advice)
 
 
-def test_what_is_not_zero_is_not_printed_as_zero_and_what_is_not_all_not_as_all():
-    assert [page.percent(share) for share in (0.0, 0.004, 0.5, 0.9996, 1.0)] == ["0%", "0.4%", "50%", "100.0%", "100%"]
-    assert [page.seconds(value) for value in (3.14e-6, 9.99e-5, 1.2e-3, INF)] == [
-        "3.1 us", "100 us", "1.2 ms", "over the budget",
-    ]  # fmt: skip
+@pytest.fixture(scope="module")
+def small():
+    """A few variants on a few tops, with prices that are given."""
+    names = ["rk4[axis]", "takahashi-imada[axis]", "taylor[axis]", "series[axis]"]
+    asked = study.QUICK["short"] | {"strata": 60, "natural": 30}
+    cases = [Case("tops", name, asked, group="short") for name in names]
+    cases += [Case("short", "exact", asked, group="tops")]
+    few = study.FAR_QUICK | {"members": 2, "levels": 6, "steps": 4e3, "budget": 1e4}
+    cases += [Case("natural", "rk4[axis]", few, group="far")]
+    tree = datasets.combine([(case, study.measure(case)) for case in cases])
+    return tree.assign({"prices": tree_of([[7e-9, 3e-8, 1.4e-8, 8e-9]] * 5, names)["prices"]})
 
 
-def test_a_tie_is_what_it_says(data):
-    assert ranking.TIE in page.TIES
+def test_facts_and_tables_are_those_of_the_cells(small):
+    said, tables = facts.facts(small), facts.tables(small)
+    winners = tables["winners"].query("tops == 'natural'").set_index(["needs", "error"])
+    for place, target in ((3, 1e-3), (6, 1e-6)):
+        one = cells.winner(small, Cell("short", "axis", target, NATURAL))
+        assert said[f"safe_{place}"] == one["safe"].name.removesuffix("[axis]")
+        assert winners.loc[GENERAL, target]["time (us)"] == pytest.approx(1e6 * one["safe"].seconds)
+    assert said["kicks"] == "takahashi-imada"
+    assert said["lagrangian"] == facts.NOTHING
+    assert said["lagrangian_seconds"] is None
+    assert said["nutations_long"] is None  # nothing was run over a thousand
+    assert "takahashi-imada" not in set(winners.loc[GENERAL]["safe"])  # it exists for symmetric bodies alone
+    assert "takahashi-imada (symmetric bodies)" in tables["use"].iloc[3]["1e-3 rad"]
+    assert ranking.TIE in set(tables["ties"]["level within"])
+    assert len(tables["prices"]) == 4
+
+
+def test_a_share_of_silent_runs_is_that_of_its_kind(small):
+    table = facts.tables(small)["silent"].set_index(["variant", "kind of top"])
+    health = cells.health(small, "rk4[axis]")
+    kind = KINDS.index("near-separatrix")
+    rows = table.loc[("rk4[axis]", "near-separatrix")]
+    at = [int(np.argmin(np.abs(health.setting - steps))) for steps in facts.STEPS]
+    assert np.array_equal(rows["wrong"], health.wrong[at, kind] / health.drawn[kind])
+
+
+def test_the_page_says_what_was_measured(small, tmp_path):
+    text = checked("cost", small, tmp_path)
+    assert "this very top" in text
+    assert "not measured nutations" in text.replace("\n", " ")  # there are no long runs
