@@ -8,6 +8,7 @@ import pandas as pd
 import xarray as xr
 
 from symtop.methods.framework.registry import NEEDS, integrator
+from symtop.report.formats import duration, number
 from symtop.run.guard import EXPECTED
 
 from . import cells, far
@@ -22,7 +23,7 @@ LEFT_OUT = {  # methods, by the reason, which the page states
     "the same steps as taylor in slower arithmetic": ("taylor-longdouble", "taylor-quad"),
     "a step of any size is the motion itself": ("exact-discrete",),
 }  # fmt: skip
-NOTHING = "nothing within the budget"
+NOTHING = "no setting within the budget"
 TIES = (1.0, 1.1, 1.25, 1.5)
 STEPS = (4.37, 17.48, 69.92)  # a nutation, of the table of silent failures
 QUOTED, FINE = "rk4[axis]", 69.92  # whose wrong runs the page quotes, at so many steps a nutation
@@ -52,7 +53,7 @@ def titled(name: str) -> str:
 
 def setting_words(name: str, value: float) -> str:
     """A setting in a table: steps a nutation, or a tolerance."""
-    return f"{value:.3g} steps" if integrator(name).fixed_step else f"tolerance {value:.0e}"
+    return f"{value:.3g} steps" if integrator(name).fixed_step else f"tolerance {number(value, 1)}"
 
 
 def facts(data: xr.DataTree) -> dict[str, Any]:
@@ -193,7 +194,7 @@ def use(data: xr.DataTree) -> pd.DataFrame:
             best, mark = one["safe"], "" if one["safe_called"] else "~ "
             words = NOTHING if one["asked"] else "not asked"
             if best is not None:
-                words = f"{titled(best.name)}, {setting_words(best.name, best.setting)}, {US * best.seconds:.2g} us"
+                words = f"{titled(best.name)}, {setting_words(best.name, best.setting)}, {duration(best.seconds)}"
             line[f"1e-{decades(target)} rad"] = f"{mark}{words}" if best else words
         rows.append(line)
     return pd.DataFrame(rows)

@@ -53,7 +53,7 @@ CANDIDATES = (  # what can win on any body: the cheapest variants of each family
 )  # fmt: skip
 TARGETS = tuple(float(target) for target in np.logspace(-2, -12, 21))
 TIE = 1.25  # of medians
-CHECKED_TARGETS, CHECKED_AT = (1e-3, 1e-6, 1e-9), (1e5, 1e6)
+CHECKED_TARGETS, CHECKED_AT = (1e-3, 1e-6, 1e-9), (1e5, 3.16e5, 1e6)
 COARSEST = 2.0 * FEWEST_STEPS  # steps a nutation; halved from setting to setting
 LOOSEST = 1e-2  # tolerance; divided by ten
 LEAST_STEPS = 4.0  # a nutation, of what energy and shape are asked: longer steps may keep them and miss the motion
@@ -270,6 +270,7 @@ def predicted(seen: Array, work: Array, far: Array, grain: Array, *, drifts: boo
             runs = seen[q, s].T
             law = laws.fit(far, runs, MOST[name], drifts=drifts)
             noise = laws.rounding(name, w[:, np.newaxis], far, evaluations[s])
+            noise *= laws.least(runs, noise)[:, np.newaxis]
             beyond = np.hypot(law.at(far), noise)
             beyond = np.where(np.isinf(runs).any(axis=1, keepdims=True), np.inf, beyond)
             error[q, s] = np.maximum.accumulate(np.where(np.isnan(runs), beyond, runs), axis=1).T

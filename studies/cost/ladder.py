@@ -194,7 +194,8 @@ def _stay(
 def stored(values: Array) -> Array:
     """Positive numbers with `DIGITS` bits, in single precision, which a file holds in a tenth of the space."""
     size, power = np.frexp(values)
-    return np.ldexp(np.rint(np.ldexp(size, DIGITS)), power - DIGITS).astype(np.float32)
+    with np.errstate(over="ignore"):  # an error above 1e38 is infinite
+        return np.ldexp(np.rint(np.ldexp(size, DIGITS)), power - DIGITS).astype(np.float32)
 
 
 def table(variant: Integrator, tops: Tops, budget: float, *, twin: bool, guarded: int) -> xr.Dataset:

@@ -85,6 +85,22 @@ def test_a_law_predicts_a_measured_horizon_that_was_left_out_of_the_fit(name):
             assert full[0, ends.size - 1] / within < told < full[0, ends.size - 1] * within, quantity
 
 
+def test_rounding_is_not_predicted_above_what_the_run_has_shown():
+    """A fast top, whose nutation has little energy: its walk overstates that of the axis 10^5 times."""
+    row, tops = integrator("srkn-19-8[axis]"), runs.tops_of(1, 1)
+    ends = FAR[FAR <= 1.0001e4]
+    ((seen, work),) = runs.measured(row, tops, [runs.Asked(17.48, ends, np.inf)])
+    known = np.full((len(runs.QUANTITIES), 1, FAR.size, 1), np.nan)
+    known[:, 0, : ends.size] = np.where(SHORT[: ends.size, np.newaxis], seen, np.nan)
+    grain = runs.grain_of(tops)
+    told = runs.predicted(known, work[np.newaxis], FAR, grain, drifts=False)["error"].sel(quantity="axis").values[0]
+    w = np.minimum(laws.walk(known[1], work[:, np.newaxis] * FAR[:, np.newaxis]), grain)
+    alone = laws.rounding("axis", w[:, np.newaxis], FAR, work[:, np.newaxis] * FAR)[0]
+    late, end = int(np.argmin(np.abs(FAR[::2] - 1e4))), ends.size - 1
+    assert 0.1 < told[late, 0] / seen[0, end, 0] < 30.0
+    assert alone[end] > 1e3 * seen[0, end, 0]  # the control: without the limit
+
+
 def test_a_wrong_law_would_not_predict_it():
     tops = one_top()
     asked = runs.Asked(140.0, FAR[FAR <= 1.0001e4], np.inf)
