@@ -88,7 +88,7 @@ def compiled(name, scene, h, **changed):
     form = Reduced()
     par, state = form.prepare(scene.top, scene.start)
     par = par._replace(**changed)
-    method = nystrom.Nystrom(DPRKN8).method(form.field)
+    method = nystrom.Nystrom(DPRKN8)(form.field)
     memory = np.zeros((method.rows, 4))
     memory[0] = form.field(par, state)
     part = getattr(method, name)

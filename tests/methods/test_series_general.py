@@ -62,8 +62,9 @@ def test_it_takes_the_steps_of_heyoka(scene, tolerance, chart):
 
 @pytest.mark.parametrize("chart", CHARTS)
 def test_fixed_steps_have_order_sixteen(chart):
+    """With more than 18 steps a nutation errors are rounding, with fewer than 12 higher terms count."""
     quantity = "axis" if chart == "axis" else "attitude"
-    assert_order("spheroid", integrator(f"series-general[{chart}]"), 16, 1.0, (12, 24), quantity)
+    assert_order("spheroid", integrator(f"series-general[{chart}]"), 16, 1.0, (12, 18), quantity)
 
 
 def test_it_follows_the_reduced_series_at_equal_steps_and_counts_as_much():

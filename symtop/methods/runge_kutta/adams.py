@@ -22,23 +22,18 @@ Norsett, Wanner, Solving Ordinary Differential Equations I, section III.5 and II
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.angles import LEAST_TOLERANCE
-from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import add, row_of, store
-from symtop.methods.runge_kutta.pairs import Method, nothing_more, rms, solver, zero
+from symtop.methods.runge_kutta.pairs import Method, integrator, nothing_more, rms, zero
 
 HIGHEST = 12  # of k
-SUMS, NUMBERS = (
-    HIGHEST + 2,
-    2 * HIGHEST + 2,
-)  # rows of the memory: phi first, then sums of phi*, then numbers of order i
+SUMS, NUMBERS = HIGHEST + 2, 2 * HIGHEST + 2  # rows of the memory: phi, then sums of phi*, then numbers of order i
 PSI, G, ALPHA, BETA, SIGMA, WORK = range(6)  # of which these are the columns
 LAST = NUMBERS + HIGHEST + 2  # the row of what the last step was, with these columns
 ORDER, ORDER_THEN, SAME, LENGTH, SETTLED = range(5)  # k now and of the step, how many had its length, and the start
@@ -156,20 +151,7 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
     return Method(advance, nothing_more, sample, LAST + 1, 0, -0.5)
 
 
-class Adams(NamedTuple):
-    """The method as `pairs.loop` takes it."""
-
-    method: Callable[..., Method] = method
-
-
 def built_in() -> list[Integrator]:
     """`adams`."""
-    return [
-        Integrator(
-            name="adams", family="runge-kutta", control="tolerance",
-            summary="Adams methods of order 1 to 13 and variable step (Shampine-Gordon), compiled",
-            solvers={chart: solver(form, Adams()) for chart, form in FORMULATIONS.items()},
-            explicit=True, conserves=frozenset(), least_tolerance=LEAST_TOLERANCE,
-            reference="shampine-gordon-1975", needs="derivative", general=True,
-        )
-    ]  # fmt: skip
+    summary = "Adams methods of order 2 to 13 and variable step (Shampine-Gordon), compiled"
+    return [integrator("adams", summary, "shampine-gordon-1975", method)]

@@ -13,17 +13,15 @@ Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, sect
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from symtop.core.jit import register_jitable, set_item
-from symtop.methods.framework.angles import LEAST_TOLERANCE
-from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import add, row_of, store
-from symtop.methods.runge_kutta.pairs import GROW, Method, nothing_more, rms, solver
+from symtop.methods.runge_kutta.pairs import GROW, Method, integrator, nothing_more, rms
 
 LINES = 10  # at most, so that k is at most 9
 FEWEST = 3  # of k
@@ -102,20 +100,8 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
     return Method(advance, nothing_more, sample, LAST + 1, LAST, -0.2)
 
 
-class Extrapolation(NamedTuple):
-    """The method as `pairs.loop` takes it."""
-
-    method: Callable[..., Method] = method
-
-
 def built_in() -> list[Integrator]:
     """The method of Gragg, Bulirsch and Stoer."""
-    return [
-        Integrator(
-            name="extrapolation", family="runge-kutta", control="tolerance",
-            summary="Gragg-Bulirsch-Stoer extrapolation of variable order and step, compiled",
-            solvers={chart: solver(form, Extrapolation()) for chart, form in FORMULATIONS.items()},
-            explicit=True, symplectic=False, symmetric=False, conserves=frozenset(), least_tolerance=LEAST_TOLERANCE,
-            reference="bulirsch-stoer-1966 hairer-norsett-wanner-1993", needs="derivative", general=True,
-        )
-    ]  # fmt: skip
+    summary, sources = "Gragg-Bulirsch-Stoer extrapolation of variable order and step, compiled", "bulirsch-stoer-1966"
+    sources += " hairer-norsett-wanner-1993"
+    return [integrator("extrapolation", summary, sources, method, symplectic=False, symmetric=False)]

@@ -125,7 +125,7 @@ class Nystrom(NamedTuple):
 
     table: Table
 
-    def method(self, _: Callable[..., Any]) -> Method:
+    def __call__(self, _: Callable[..., Any]) -> Method:
         """Attempts, their error, and samples."""
         table, velocity = self.table, self.table.velocity
         stages, cost, count = _stages(table.c, table.a), len(table.a), len(velocity)

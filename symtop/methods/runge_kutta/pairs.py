@@ -23,6 +23,7 @@ Solving Ordinary Differential Equations I, section II.4.
 import functools
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -53,6 +54,14 @@ class Method(NamedTuple):
     rows: int
     last: int  # the row of f(y+) after a step
     power: float  # of the error in the choice of the first step
+
+
+@register_jitable
+def zero(state: Any) -> Any:
+    """A state of zeros."""
+    for m in range(len(state)):
+        state = set_item(state, m, 0.0)
+    return state
 
 
 @register_jitable
@@ -119,25 +128,23 @@ def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, toleran
 
 
 @functools.cache
-def loop(form: Any, pair: Any) -> AdaptiveLoop:  # noqa: C901
-    """The loop on the equations of a `Formulation`, compiled when it is first used; it counts force evaluations.
+def loop(form: Any, method: Any) -> AdaptiveLoop:
+    """The loop of ``method(field)`` on a `Formulation`, compiled when it is first used; it counts force evaluations.
 
     The place is (state, memory, time, step). `observe` sees the memory and the step that a sample lies in.
     """
     field, ended, observe, prepare, size = form.field, form.ended, form.observe, form.prepare.numbers, form.prepare.size
     sample = as_it_steps if form.present is None else form.present.sample
     register_jitable(observe)
-    method: Method = pair.method(field)
-    advance, refine, between, rows, last, power = method
+    made: Method = method(field)
+    advance, refine, between, rows, last, power = made
     clock = size + rows * size
 
     def march(  # type: ignore[no-untyped-def]
         numbers, tolerance, times, budget, seen, place, states, momenta
     ):
         par, state = prepare(Body(*numbers[:3]), Start(*numbers[3:]))
-        memory, nothing, end = np.zeros((rows, size)), state, times[-1]
-        for m in range(size):
-            nothing = set_item(nothing, m, 0.0)
+        memory, nothing, end = np.zeros((rows, size)), zero(state), times[-1]
         steps = effort = outcome = 0
         if seen < 0:
             slope = field(par, state)
@@ -177,19 +184,26 @@ def loop(form: Any, pair: Any) -> AdaptiveLoop:  # noqa: C901
     return compiled
 
 
-def solver(form: Any, pair: Any) -> Adaptive:
+def solver(form: Any, method: Any) -> Adaptive:
     """A solver of the registry on the equations of a `Formulation`."""
     size, shown = form.prepare.size, form.prepare.size if form.present is None else form.present.size
-    clock = size * (1 + pair.method(form.field).rows)
-    return Adaptive(lambda _: loop(form, pair), shown, clock + 2, clock, EVALUATIONS, BLOCK, check=form.prepare.check)
+    clock = size * (1 + method(form.field).rows)
+
+    @functools.cache  # once: the hash of a table takes a fifth of the time of a call
+    def compiled() -> AdaptiveLoop:
+        return loop(form, method)
+
+    return Adaptive(lambda _: compiled(), shown, clock + 2, clock, EVALUATIONS, BLOCK, check=form.prepare.check)
 
 
-@register_jitable
-def zero(state: Any) -> Any:
-    """A state of zeros."""
-    for m in range(len(state)):
-        state = set_item(state, m, 0.0)
-    return state
+def integrator(name: str, summary: str, reference: str, method: Any, **claims: Any) -> Integrator:
+    """The record of a method with a tolerance that needs f and nothing else, in every chart."""
+    solvers = {chart: solver(form, method) for chart, form in FORMULATIONS.items()}
+    return Integrator(
+        name=name, family="runge-kutta", summary=summary, solvers=solvers, control="tolerance", explicit=True,
+        conserves=frozenset(), least_tolerance=LEAST_TOLERANCE, reference=reference, needs="derivative", general=True,
+        **claims,
+    )  # fmt: skip
 
 
 @register_jitable
@@ -236,7 +250,7 @@ class Pair(NamedTuple):
     summary: str
     reference: str
 
-    def method(self, field: Callable[..., Any]) -> Method:
+    def __call__(self, field: Callable[..., Any]) -> Method:
         """What `loop` steps by: attempts, their error, and samples."""
         table, dense = self.table, self.table.dense
         keep = store if dense else _forget
@@ -272,9 +286,8 @@ class Pair(NamedTuple):
 
     def adaptive(self) -> Integrator:
         """The pair with a tolerance."""
-        return self._integrator(
-            self.name, {chart: solver(form, self) for chart, form in FORMULATIONS.items()}, "tolerance"
-        )
+        summary = f"{self.summary} with SciPy's step control, compiled"
+        return integrator(self.name, summary, self.reference, self, order=self.order, symplectic=False, symmetric=False)
 
     def fixed(self) -> Integrator:
         """The table of the higher order with a step."""
@@ -286,15 +299,9 @@ class Pair(NamedTuple):
             chart: FixedStep(fixed_loop(chart, self), rule, form.prepare, 1, implicit=False, present=form.present)
             for chart, form in FORMULATIONS.items()
         }
-        return self._integrator(f"{self.name}-fixed", solvers, "step_size")
-
-    def _integrator(self, name: str, solvers: Any, control: str) -> Integrator:
-        chosen = "with SciPy's step control" if control == "tolerance" else "with fixed steps"
-        return Integrator(
-            name=name, family="runge-kutta", summary=f"{self.summary} {chosen}, compiled", solvers=solvers,
-            control=control, order=self.order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
-            least_tolerance=LEAST_TOLERANCE if control == "tolerance" else 0.0, reference=self.reference,
-            needs="derivative", general=True,
+        return replace(
+            self.adaptive(), name=f"{self.name}-fixed", summary=f"{self.summary} with fixed steps, compiled",
+            solvers=solvers, control="step_size", least_tolerance=0.0,
         )  # fmt: skip
 
 
