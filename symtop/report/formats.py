@@ -1,10 +1,6 @@
-"""Numbers as the report prints them, for titles, tables and the filters of templates.
-
-A filter given None, which stands for what was not measured, returns None: a template prints "not measured" for it.
-"""
+"""Numbers as the report prints them, in titles and tables and by the filters of templates."""
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 FIRM = "\N{NO-BREAK SPACE}"
@@ -71,13 +67,4 @@ def cell(value: Any, digits: int = 3) -> str:
     return str(value)
 
 
-def _passing(filter_: Callable[..., str]) -> Callable[..., str | None]:
-    def passed(value: Any, *options: Any, **named: Any) -> str | None:
-        return None if value is None else filter_(value, *options, **named)
-
-    return passed
-
-
-FILTERS = {
-    one.__name__: _passing(one) for one in (number, count, percent, power, fixed, duration, microseconds, code, cell)
-}
+FILTERS = (number, count, percent, power, fixed, duration, microseconds, code, cell)

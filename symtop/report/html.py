@@ -72,7 +72,7 @@ class Writer:
         for begin, end in _blocks(tokens):
             block = tokens[begin:end]
             kind = block[0].type
-            bold = kind == "paragraph_open" and _is_title(block[1])
+            bold = _title(block[1]) if kind == "paragraph_open" else ""
             if bold:
                 block[0].attrSet("class", "title")
             if kind == "paragraph_open" and _only(block[1], "image"):
@@ -85,7 +85,7 @@ class Writer:
                 made.append(self._heading(block))
             else:
                 made.append(self._rendered(block))
-            title = block[1].children[0].content or block[1].children[1].content if bold else ""  # type: ignore[index]
+            title = bold
         return "\n".join(made)
 
     def _rendered(self, tokens: Sequence[Token]) -> str:
@@ -143,5 +143,8 @@ def _only(inline: Token, kind: str) -> bool:
     return [one.type for one in inline.children or []] == [kind]
 
 
-def _is_title(inline: Token) -> bool:
-    return [one.type for one in (inline.children or [])[:3] if one.type != "text" or one.content][:1] == ["strong_open"]
+def _title(inline: Token) -> str:
+    """What a paragraph has in bold at its beginning, but for a sentence."""
+    children = [one for one in inline.children or [] if one.type != "text" or one.content]
+    bold = children[1].content if children and children[0].type == "strong_open" else ""
+    return "" if bold.endswith(".") else bold

@@ -13,7 +13,7 @@ def modern(findings: Mapping[str, Any]) -> dict[str, Any]:
         return dict(findings)
     opening = findings.get("opening") or {"sentences": [], "table": None}
     tables = [one for one in [opening["table"], *findings["tables"]] if one]
-    bullets = [f"- {sentence}" for sentence in [*opening["sentences"], *findings["verdict"][:8]]]
+    bullets = [f"- {sentence}" for sentence in [*opening["sentences"], *findings["verdict"]]]
     parts = ["# {{ question }}", _raw("\n".join(bullets))]
     names = []
     for picture in findings["pictures"]:

@@ -43,7 +43,8 @@ def filled(findings: Findings, results: Path, *, pages: Mapping[str, str] | None
     given |= {kind: [one["name"] for one in findings[kind]] for kind in ("pictures", "tables")}
     text = rendered(findings["page"], f"page of {name}", given)
     return (
-        "\n\n".join(filter(None, [text.strip(), *findings["failures"], findings["measured"], _ending(findings)])) + "\n"
+        "\n\n".join(filter(None, [text.strip(), *findings["failures"], findings.get("measured"), _ending(findings)]))
+        + "\n"
     )
 
 
@@ -83,14 +84,25 @@ def rendered(template: str | None, name: str, given: Mapping[str, Any]) -> str:
         loader=PackageLoader("symtop", "report/templates"), undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, finalize=lambda value: "not measured" if value is None else value,
     )  # fmt: skip
-    environment.filters.update(formats.FILTERS)
+    environment.filters |= {one.__name__: _passing(one) for one in formats.FILTERS}
     try:
         ready = environment.get_template(PLAIN) if template is None else environment.from_string(template)
         text = ready.render(**given)
-    except TemplateError as error:
-        place = f", line {error.lineno}" if getattr(error, "lineno", None) else ""  # type: ignore[attr-defined]
-        raise SymtopError(f"{name}{place}: {error.message}") from error
+    except (TemplateError, TypeError, ValueError) as error:
+        place = f", line {error.lineno}" if getattr(error, "lineno", None) else ""  # type: ignore[union-attr]
+        raise SymtopError(f"{name}{place}: {error}") from error
     return "\n\n".join(map(_unwrapped, re.split(r"\n{2,}", text.strip()))) + "\n"
+
+
+def _passing(filter_: Callable[..., str]) -> Callable[..., str | None]:
+    """A format as a filter of templates: None, which was not measured, passes, and a name that is not there fails."""
+    from jinja2 import Undefined
+
+    def passed(value: Any, *options: Any, **named: Any) -> str | None:
+        value = str(value) if isinstance(value, Undefined) else value
+        return None if value is None else filter_(value, *options, **named)
+
+    return passed
 
 
 def _unwrapped(block: str) -> str:
@@ -142,5 +154,5 @@ def _names(studies: Sequence[Findings], results: Path, *, whole: bool = False) -
 
 
 def _ending(findings: Findings) -> str:
-    name, cases = findings["dataset"], findings["cases"]
+    name, cases = findings.get("dataset"), findings["cases"]
     return f"Data: [{name}]({name}), {formats.count(cases)} case{'' if cases == 1 else 's'}." if name else ""

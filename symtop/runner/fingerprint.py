@@ -72,5 +72,5 @@ def drawing_digest(study: Study, page: Path | None, *drawing: Any) -> str:
         study.title, study.question, study.how_to_read,
     )  # fmt: skip
     code = _code().reasons("drawing", shown, drawing)
-    template = {} if page is None else {f"file {page.name}": code_hash.file_hash(page)}
+    template = {} if page is None else {f"file {page.name}": code_hash.hashed(page.read_text(encoding="utf-8"))}
     return code_hash.digest(code | template | code_hash.packages("matplotlib"))

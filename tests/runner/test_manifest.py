@@ -92,8 +92,7 @@ import xarray as xr
 from symtop.runner.study import Case, Study
 
 STUDY = Study(
-    {0!r}, {0!r}, "Is it?", "", lambda quick: [Case("spheroid", "strang")], lambda case: xr.Dataset({{"one": 1.0}}),
-    lambda data: [], lambda data: ["It is."],
+    {0!r}, {0!r}, "Is it?", lambda quick: [Case("spheroid", "strang")], lambda case: xr.Dataset({{"one": 1.0}}),
 )
 """
 

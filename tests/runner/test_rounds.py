@@ -34,7 +34,7 @@ def follow_up(data):
     names = [str(name) for name in data["variant"].values]
     return [Case("spheroid", "together", {"integrators": names, "effect": PoleEffect(2.0, True, 0.1)}, timed=True)]
 
-STUDY = Study("rounds", "Rounds", "Both?", "", cases, measure, lambda data: [], lambda data: ["It ran."],
+STUDY = Study("rounds", "Rounds", "Both?", cases, measure,
               follow_up=follow_up)
 """
 

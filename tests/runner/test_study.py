@@ -178,8 +178,7 @@ def grid(count):
 def measure(case):
     return xr.Dataset({"steps": float(case.settings["steps"])})
 
-STUDY = Study("grids", "Grids", "Kept?", "", lambda quick: grid(10), measure, lambda data: [],
-              lambda data: ["It ran."], full=lambda: grid(1000))
+STUDY = Study("grids", "Grids", "Kept?", lambda quick: grid(10), measure, full=lambda: grid(1000))
 """
 
 
@@ -245,7 +244,7 @@ def measure(case):
     one = xr.Dataset({"begin": begin, "end": time.monotonic(), "process": os.getpid(), "timed": float(case.timed)})
     return one.expand_dims(k=[case.settings["k"]])
 
-STUDY = Study("clocked", "Clocked", "Alone?", "", cases, measure, lambda data: [], lambda data: ["It ran."])
+STUDY = Study("clocked", "Clocked", "Alone?", cases, measure)
 """
 
 

@@ -28,7 +28,7 @@
   const follow = () => {
     const read = sections.filter((section) => section.getBoundingClientRect().top < 0.25 * innerHeight);
     const ended = innerHeight + scrollY >= root.scrollHeight - 2;
-    const id = (ended ? sections.at(-1) : read.at(-1) ?? sections[0]).id;
+    const id = (scrollY < 2 ? sections[0] : ended ? sections.at(-1) : read.at(-1) ?? sections[0]).id;
     if (id === current) return;
     links.get(current)?.removeAttribute("aria-current");
     const link = links.get(current = id), list = contents.parentElement;
