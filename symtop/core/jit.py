@@ -33,7 +33,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from symtop.core.code_hash import Code, Part, by_file, by_name, digest, hashed
 from symtop.core.errors import SymtopError
-from symtop.core.files import cache_root, locked, on_cold, prune, touch
+from symtop.core.files import cache_root, is_trusted, locked, make_private, on_cold, prune, touch
 from symtop.core.jit_functions import Function, fused, inlined_parts, shared_parts, two_product
 from symtop.core.sines import polynomials, sincos
 
@@ -112,7 +112,7 @@ class _Folder:
         if not _pruned:
             _pruned.append(self.path)
             prune(self.path.parent, MOST_BYTES)
-        self.path.mkdir(parents=True, exist_ok=True)
+        make_private(self.path)
 
 
 class _Index(IndexDataCacheFile):  # type: ignore[misc]
@@ -120,7 +120,7 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
 
     numba counts them: two processes that save at the same time give two signatures one file, and each gets the code of
     the other. And it runs what it finds, damaged bytes, too. Here the code follows its hash, and an index that cannot
-    be read is empty.
+    be read is empty. A pickle is a program: one that somebody else may have written is not read.
     """
 
     def save(self, key: Any, data: Any) -> None:
@@ -131,7 +131,8 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
 
     def _load_index(self) -> dict[Any, str]:
         with contextlib.suppress(Exception):  # a damaged pickle raises nearly anything
-            return super()._load_index()  # type: ignore[no-any-return]
+            if is_trusted(Path(self._index_path)):
+                return super()._load_index()  # type: ignore[no-any-return]
         return {}
 
     def _save_data(self, name: str, data: Any) -> None:
@@ -139,8 +140,17 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
         with self._open_for_write(self._data_path(name)) as file:
             file.write(hashlib.sha256(code).digest() + code)
 
+    @contextlib.contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[Any]:
+        with super()._open_for_write(filepath) as file:
+            Path(file.name).chmod(0o600)
+            yield file
+
     def _load_data(self, name: str) -> Any:
-        whole = Path(self._data_path(name)).read_bytes()
+        path = Path(self._data_path(name))
+        if not is_trusted(path):
+            raise ValueError("the code on disk may be somebody else's")
+        whole = path.read_bytes()
         checksum, code = whole[:HASH], whole[HASH:]
         if hashlib.sha256(code).digest() != checksum:
             raise ValueError("the code on disk is damaged")
@@ -201,7 +211,8 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
                 stack.callback(gc.enable)
                 gc.disable()
             if isinstance(kernel._cache, _Cache) and not is_cached(kernel, signature):
-                with contextlib.suppress(SymtopError):  # a cache that cannot be written costs time and no run
+                with contextlib.suppress(SymtopError, OSError):  # a cache that cannot be written costs time and no run
+                    make_private(Path(kernel._cache._cache_path))
                     stack.enter_context(locked(Path(kernel._cache._cache_path) / "code", wait=True))
             return compiling(signature)
 
@@ -212,6 +223,7 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
 def compile_kernel(function: Callable[..., Any]) -> Any:
     """``njit`` with the disk cache; division by zero gives infinity, as in C.
 
+    A cache that somebody else may write is not used, with a warning (`is_trusted`).
     A kernel with functions typed at a prompt, which have no source file, compiles without the cache. The constructor of
     a NamedTuple has none either, but follows from the fields, which are part of what the kernel is made of.
     """
@@ -223,8 +235,9 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     written = [part for part in functions if not part.__module__.startswith("namedtuple_")]
     if all(Path(part.__code__.co_filename).is_file() for part in written):
         folder = cache_root() / "kernels" / digest(by_file(parts))
-        touch(folder)
-        kernel._cache = _Cache(function, folder)
+        if all(map(is_trusted, (cache_root(), folder.parent, folder))):
+            touch(folder)
+            kernel._cache = _Cache(function, folder)
     return kernel
 
 

@@ -39,7 +39,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.core import netcdf
-from symtop.core.errors import SymtopError, at_home, one_of, words_of
+from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, words_of
 from symtop.judging.adapters.adapter import heartbeat
 from symtop.judging.battery import Stage, measure, stages, unmeasured
 from symtop.judging.claims.constants import KEPT, Constant
@@ -99,13 +99,14 @@ def judge(
     SymtopError for a target that cannot be loaded and claims that make no sense.
     """
     one_of("chart", chart, CHARTS)
-    if energy not in ENERGY_ERRORS:
-        raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {energy!r}", "energy")
+    if not isinstance(energy, str | None) or energy not in ENERGY_ERRORS:
+        raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {shown(energy)}", "energy")
     claims = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
     claims_of_energy = {"conserves": conserves, "energy_error": energy}
-    request = Request(target, form, chart, adaptive, find_scene(scene), quick, claims | claims_of_energy)
+    flags = boolean("adaptive", adaptive), find_scene(scene), boolean("quick", quick)
+    request = Request(target, form, chart, *flags, claims | claims_of_energy)
     made = request.claimed()  # claims that make no sense are refused before anything is loaded
-    implied = {"time"} | ({"energy"} if energy is None and "energy" not in (conserves or ()) else set())
+    implied = {"time"} | ({"energy"} if energy is None and "energy" not in (made.conserves or ()) else set())
     table = isinstance(target, (xr.Dataset, Mapping))
     file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES) and " " not in str(target)
     if form is None and (table or file):
@@ -115,8 +116,8 @@ def judge(
             set(),
             About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory", "", "", 0.0),
         )
-        shown = of_trajectory(target, request.scene, made.conserves or (), energy)
-        events: Iterable[About | Results] = [about, Results(shown, {})]
+        findings_of_it = of_trajectory(target, request.scene, made.conserves or (), energy)
+        events: Iterable[About | Results] = [about, Results(findings_of_it, {})]
     else:
         events = run(request)
     findings: list[Finding] = []

@@ -239,7 +239,7 @@ def _numbers(name: str, values: Any) -> charts.Array:
     try:
         given = np.asarray(values)
         return given.astype(np.float64, casting="same_kind" if given.dtype.kind == "c" else "unsafe")
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise SymtopError(f"{name} must be an array of real numbers, not {type(values).__name__}") from error
 
 

@@ -24,7 +24,7 @@ from tqdm import tqdm
 from symtop.core import netcdf
 from symtop.core.code_hash import by_file, digest, hashed
 from symtop.core.errors import SymtopError, SymtopWarning, check_replaceable, file_path, positive, whole
-from symtop.core.files import cache_root
+from symtop.core.files import cache_root, make_private
 from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
 from symtop.core.progress import beating
@@ -273,6 +273,8 @@ class _Checkpoint:
         columns: dict[str, Any] = {"position": ("number", numbers), "rows": (("window", "part"), rows)}
         data = xr.Dataset({**columns, "steps_done": ((), at.k)})
         data.attrs.update(content=netcdf.content_hash(data), identity=self.identity)
+        if self.own:
+            make_private(self.file.parent)
         netcdf.write(data, self.file)
         self.saved, self.latest = time.monotonic(), None
 

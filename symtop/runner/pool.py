@@ -20,6 +20,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from functools import partial
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,7 +30,7 @@ from tqdm import tqdm
 
 from symtop.core import files, netcdf, parallel
 from symtop.core.errors import SymtopError, words_of
-from symtop.core.signals import at_most, is_of_user
+from symtop.core.signals import HANGUP, at_most, is_of_user
 from symtop.measure.timing import DISTURBED, slowdown
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.run import cluster, plugins
@@ -154,6 +155,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             wait(self._analyses)
             self.close_workers()
             self.size = min(size, self.jobs)
+            _start_tracker()
             self._workers = ProcessPool(
                 self.size, initializer=begin_worker, initargs=(os.getpid(),), context=parallel.OneThreadEach()
             )
@@ -253,6 +255,14 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _start_tracker() -> None:
+    """Start the process in which Python counts semaphores deaf to SIGHUP; Python protects it from SIGTERM alone."""
+    if threading.current_thread() is threading.main_thread():
+        before = signal.signal(HANGUP, signal.SIG_IGN)
+        resource_tracker.ensure_running()
+        signal.signal(HANGUP, before)
 
 
 def begin_worker(parent: int) -> None:

@@ -71,7 +71,11 @@ def test_a_write_is_whole_and_gives_back_its_lock_wherever_it_is_interrupted(tmp
 
 @pytest.mark.parametrize(
     ("number", "hearing", "kind"),
-    [(signal.SIGTERM, ending_on_sigterm, TerminatedError), (signal.SIGINT, told_apart, InterruptedByUser)],
+    [
+        (signal.SIGTERM, ending_on_sigterm, TerminatedError),
+        (signal.SIGHUP, ending_on_sigterm, TerminatedError),
+        (signal.SIGINT, told_apart, InterruptedByUser),
+    ],
 )
 def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, hearing, kind):
     done = []

@@ -186,6 +186,31 @@ KINDS = {
 }
 
 
+def _at_pole(draw):
+    """From a pole itself, mostly with a rate that leaves it."""
+    top, at = _any_start(draw, _top(draw))
+    rate = draw.choice([0.0, 1.0, 1.0, 1.0]) * at.theta_dot
+    return top, Angles(draw.choice([0.0, math.pi]), at.phi, at.psi, rate, at.phi_dot, at.psi_dot)
+
+
+def _scaled(draw):
+    """Any motion in units of inertia and of time from 1e-12 to 1e12."""
+    top, at = _any_start(draw, _top(draw))
+    mass, clock = 10.0 ** draw.uniform(-12.0, 12.0), 10.0 ** draw.uniform(-12.0, 12.0)
+    rates = (rate / clock for rate in (at.theta_dot, at.phi_dot, at.psi_dot))
+    return SymmetricTop(top.I1 * mass, top.I3 * mass, top.mgl * mass / clock**2), Angles(
+        at.theta, at.phi, at.psi, *rates
+    )
+
+
+HOSTILE = {  # drawn from by seeds below zero
+    "near-sphere": lambda draw: _any_start(draw, _top(draw, 1.0 + _excess(draw, -1.0))),
+    "flat-or-thin": lambda draw: _any_start(draw, _top(draw, draw.choice([10.0 ** draw.uniform(-3.0, 0.0), 1.999]))),
+    "scaled": _scaled,
+    "at-pole": _at_pole,
+}
+
+
 # ---- runs ------------------------------------------------------------------------------------------------------------
 
 
@@ -196,8 +221,9 @@ def drawn(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outc
     the methods that came after them.
     """
     draw = random.Random(f"{seed}/{k}")
-    kind = draw.choice([*KINDS])
-    top, at = KINDS[kind](draw)
+    kinds = KINDS if seed >= 0 else HOSTILE
+    kind = draw.choice([*kinds])
+    top, at = kinds[kind](draw)
     known = [entry for entry in integrators().values() if entry.control is not None and entry.name not in without]
     method = draw.choice(known)
     period = Scene("drawn", top, at, 1.0).nutation_period
@@ -274,13 +300,16 @@ def told(runs: list[Outcome]) -> str:
     """The figures of so many runs, and each run that should not be."""
     wrong, right = [run for run in runs if run.wrong], [run for run in runs if run.right]
     silent, false = [run for run in wrong if not run.warning], [run for run in right if run.warning]
+    ended = [run for run in runs if run.outcome not in ("ok", "refused", "endless", "crashed")]
+    sudden = [run for run in ended if not run.warning]
     odd = [run for run in runs if run.outcome in ("endless", "crashed") or run.seconds >= LONGEST]
     lines = [
         f"{len(runs)} runs: {dict(collections.Counter(run.outcome for run in runs))}",
         f"{len(wrong)} wrong by more than {WRONG} rad, of them silent: {len(silent)}",
         f"{len(right)} right to {RIGHT} rad, of them warned of: {len(false)}",
+        f"{len(ended)} ended early, of them not announced: {len(sudden)}",
     ]
-    return "\n".join([*lines, *map(repr, silent), *map(repr, odd)])
+    return "\n".join([*lines, *map(repr, silent), *map(repr, sudden), *map(repr, odd)])
 
 
 def run_all(count: int, path: Path, seed: int = SEED) -> dict[int, Outcome]:

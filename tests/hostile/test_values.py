@@ -61,6 +61,11 @@ MORE = {
         {**dict.fromkeys(("mass", "at_centre", "axial"), NOT_POSITIVE), "distance": NOT_FINITE, "gravity": NOT_FINITE},
     ),
     "errors": (symtop.errors, {"run": RUN}, {"run": NOT_DATA, "scene": UNKNOWN[1:]}),
+    "errors of a table": (
+        lambda time, theta: symtop.errors({"time": time, "theta": theta}, "spheroid"),
+        {"time": [0.0, 0.5], "theta": [0.4, 0.4]},
+        {"time": ["x", [0.0, 10**400], [0.0, -(10**400)]], "theta": ["x", [10**400, 0.4], [0.4, math.inf, 1.0]]},
+    ),
     "recommend": (
         symtop.recommend,
         {"scene": "spheroid", "accuracy": 1e-2, "horizon": 0.1},
@@ -83,6 +88,14 @@ MORE = {
         {"scenes": "spheroid", "integrators": "strang", "step_size": [0.05], "horizon": 0.2, "quiet": True},
         {"scenes": UNKNOWN, "integrators": UNKNOWN, "step_size": ["x", [0.0], [-1.0], [math.nan], object()]},
     ),
+    "compare": (
+        symtop.compare,
+        {"scene": "spheroid", "methods": "strang", "nutations": 1.0, "cost": "evaluations", "budget": 1e3},
+        {
+            "scene": UNKNOWN, "methods": UNKNOWN, "quantity": UNKNOWN, "cost": UNKNOWN, "budget": NOT_POSITIVE[1:],
+            "nutations": NOT_POSITIVE[1:],
+        },
+    ),
     "long_run": (
         symtop.long_run,
         {"scene": "spheroid", "integrator": "strang", "steps": 10, "step_size": 0.01, "checkpoint": False},
@@ -97,8 +110,14 @@ MORE = {
         {"target": lambda f, t, y, h: y, "quick": True},
         {
             "form": [value for value in UNKNOWN[1:] if value], "chart": UNKNOWN, "scene": UNKNOWN,
-            "order": NOT_WHOLE[1:], "energy": UNKNOWN[1:],
+            "order": NOT_WHOLE[1:], "energy": [*UNKNOWN[1:], np.array([1.0, 2.0])],
+            "conserves": ["energy", np.array(1.0), np.array([1.0]), np.array(["x"]), [10**400], {"x": 1}, 3],
         },
+    ),
+    "judge of nothing": (
+        symtop.judge,
+        {"target": "no-such-file.py:step", "form": "ode", "conserves": ["energy"], "energy": "kept", "quick": True},
+        {"chart": UNKNOWN, "order": NOT_WHOLE[1:], "symplectic": ["x", 2, np.array([True, False])]},
     ),
 }  # fmt: skip
 BAD = [
@@ -106,7 +125,7 @@ BAD = [
     for name, (function, good, bad) in {**CALLS, **MORE}.items()
     for argument, values in bad.items()
 ]
-COST = {"judge", "recommend"}  # seconds for every value that is taken: their bad ones only
+COST = {"judge", "recommend", "compare"}  # seconds for every value that is taken: their bad ones only
 WHATEVER = [
     pytest.param(function, good, argument, ANY, id=f"{name} {argument} any")
     for name, (function, good, bad) in {**CALLS, **MORE}.items()

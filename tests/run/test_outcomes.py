@@ -109,3 +109,51 @@ def test_absurd_runs_end_at_once_with_a_sentence(scene, name, controls):
 
 def _fine(name):
     return {} if name in ("taylor", "exact") else {"tolerance": 1e-3}
+
+
+# ---- a run that ends well shows finite numbers -----------------------------------------------------------------------
+
+DOUBTFUL = symtop.Scene(
+    "doubtful", symtop.SymmetricTop(0.1862, 0.2285, 0.1828), symtop.Angles(0.00337, psi_dot=-1.61), 87.0
+)
+
+
+def _says_so(data):
+    """Is every sample finite, or does the outcome say that it is not?"""
+    return data.attrs["outcome"] != "ok" or all(np.isfinite(values).all() for values in data.data_vars.values())
+
+
+def test_a_state_whose_squares_overflow_is_not_finite():
+    """q is finite, about 1e160; the axis and the energy are squares of it."""
+    run = symtop.simulate(DOUBTFUL, "rk4[attitude]", step_size=43.5, guard=False)
+    assert np.isfinite(run["quaternion"].values).all()
+    assert not np.isfinite(run["axis"].values).all()
+    assert (run.attrs["outcome"], run.attrs["reached_time"]) == ("not_finite", 43.5)
+    both = symtop.ensemble([DOUBTFUL] * 2, "rk4[attitude]", step_size=43.5, quiet=True)
+    assert both["outcome"].values.tolist() == ["not_finite"] * 2
+    assert both["reached_time"].values.tolist() == [43.5] * 2
+    good = symtop.simulate(DOUBTFUL, "rk4[attitude]", step_size=0.5, guard=False)  # the control
+    assert good.attrs["outcome"] == "ok"
+
+
+def test_every_variant_shows_finite_numbers_or_says_that_it_does_not():
+    draw, ended = np.random.default_rng(50), set()
+    variants = [
+        f"{method.name}[{chart}]"
+        for method in symtop.integrators().values()
+        if method.fixed_step and method.implementation == "compiled"
+        for chart in method.charts()
+    ]
+    for name in variants:
+        for _ in range(4):
+            I1, mgl, rate = 10.0 ** draw.uniform(-2.0, 2.0, 3)
+            top = symtop.SymmetricTop(I1, I1 * draw.uniform(0.05, 1.95), mgl * draw.choice([-1.0, 1.0]))
+            start = symtop.Angles(
+                draw.choice([1e-3, 1.0, 3.0]), theta_dot=rate, psi_dot=draw.choice([-1.0, 1.0]) * rate
+            )
+            h = 10.0 ** draw.uniform(0.0, 4.0) / rate
+            scene = symtop.Scene("drawn", top, start, 4.0 * h)
+            run = symtop.simulate(scene, name, step_size=h, guard=False)
+            assert _says_so(run), (name, scene, h)
+            ended.add(run.attrs["outcome"])
+    assert {"ok", "not_finite", "left_chart"} <= ended

@@ -283,14 +283,16 @@ def begun(log: Path, count: int, process) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "code", "says"), [(2, 130, "interrupted"), (15, 143, "terminated")])
+@pytest.mark.parametrize(
+    ("number", "code", "says"), [(2, 130, "interrupted"), (15, 143, "terminated"), (1, 143, "terminated")]
+)
 @pytest.mark.parametrize("quick", [True, False])
 def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quick):
     log = tmp_path / "log"
     words = ["study", PROBE, "--results", tmp_path / "r", "--jobs", 2, *(["--quick"] if quick else [])]
     process = symtop(*words, PROBE_LOG=log, PROBE_PAUSE=0.5)
     begun(log, 3 if quick else 5, process)
-    process.send_signal(number)
+    os.killpg(process.pid, number) if number == signal.SIGHUP else process.send_signal(number)  # as a terminal does
     start = time.monotonic()
     ended_with, _, err = ended(process)
     assert time.monotonic() - start < 10.0

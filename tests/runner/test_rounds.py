@@ -96,8 +96,8 @@ def test_methods_are_timed_again_when_nothing_else_is_missing(tmp_path, monkeypa
     whole, names = runner.load("cost"), ["midpoint[angles]", "strang[axis]"]
     few = [dataclasses.replace(one, settings={**one.settings, "integrators": names})
            for one in whole.cases(True) if one.group == "prices"]  # fmt: skip
-    quiet = {"pictures": lambda _: [], "tables": lambda _: [], "charts": lambda _: [], "verdict": lambda _: ["It ran."]}
-    small = dataclasses.replace(whole, cases=lambda _: few, opening=None, follow_up=None, **quiet)
+    quiet = {"pictures": lambda _: [], "tables": lambda _: {}, "charts": lambda _: []}
+    small = dataclasses.replace(whole, cases=lambda _: few, facts=None, follow_up=None, **quiet)
     assert runner.run(small, tmp_path, quiet=True)["failures"] == []
     monkeypatch.setattr(pools, "WORTH_WORKERS", 1)
     for path in StudyCases.stored(small, tmp_path, quick=False, full=False).cases:

@@ -157,7 +157,7 @@ def form_of(target: Any) -> str:
 
 def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = False) -> Stepper:
     """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else."""
-    kind = one_of("form", form or form_of(target), FORMS)
+    kind = one_of("form", form_of(target) if form is None else form, FORMS)
     one_of("chart", chart, CHARTS)
     if kind == "program":
         return Program(str(target), chart)

@@ -67,9 +67,7 @@ def _checked(method: Integrator, shape: tuple[int, int], plan: Plan, run: Any, *
             raise SymtopError(f"{must} a number of {name}, not {type(getattr(run, name)).__name__}")
     checked = Run(states, p_phi, p_psi, *run[3:])
     if checked.outcome == "ok" and not np.isfinite(states).all():
-        whole: Any = np.isfinite(states).all(axis=1)
-        reached = float(plan.times[int(np.argmin(whole)) - 1]) if whole[0] else 0.0
-        return checked._replace(outcome="not_finite", reached=reached)
+        return checked._replace(outcome="not_finite", reached=plan.last_of(np.isfinite(states).all(axis=1)))
     return checked
 
 

@@ -1,7 +1,7 @@
 """What a solver is asked for, a `Plan`, what it returns, a `Run`, and how a run can end."""
 
 import math
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -39,6 +39,10 @@ class Plan(NamedTuple):
         """To the last of `times` at a tolerance (nan for a method that has none), sampled at all of them."""
         samples = np.asarray(times, dtype=float)
         return cls(samples, float(samples[-1]), math.nan, np.empty(0, dtype=np.int64), tolerance, budget)
+
+    def last_of(self, whole: Any) -> float:
+        """The time of the last sample before the first one that is not `whole`, (samples,)."""
+        return float(self.times[int(np.argmin(whole)) - 1]) if whole[0] else 0.0
 
     def most(self, limit: float) -> float:
         """The budget, or a method's own limit where nobody gave one."""

@@ -149,8 +149,9 @@ class Integrator:
         if self.exact_steps and (self.order is not None or not self.fixed_step):
             raise SymtopError("exact_steps must be False for a method that has an order or no step_size")
         if self.conserves is not None:
-            if isinstance(self.conserves, str) or not isinstance(self.conserves, Collection):
-                raise SymtopError(f"conserves must be a set of names, not {self.conserves!r}")
+            some = isinstance(self.conserves, Collection) and getattr(self.conserves, "shape", None) != ()
+            if isinstance(self.conserves, str) or not some:
+                raise SymtopError(f"conserves must be a set of names, not {shown(self.conserves)}")
             names = frozenset(one_of("an entry of conserves", name, CONSERVED) for name in self.conserves)
             object.__setattr__(self, "conserves", names)
 

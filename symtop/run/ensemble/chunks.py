@@ -47,6 +47,7 @@ Whole = NDArray[np.int64]
 CHUNK = 65_536  # values of one column in a chunk: half a megabyte, which stays in a core's cache
 CHUNK_STEPS = 5_000_000  # in a chunk: a hundredth of a second in lanes, to a second
 SHARES, LEAST_STEPS = 16, 200_000  # threads share even a small ensemble, in chunks of a millisecond or more
+HARMLESS = 1e100  # states and momenta below it have a finite energy: no inertia is below 1e-40
 UNKNOWN_STEPS = 1000  # what a member counts for that chooses its steps, or makes none
 RAISED = "raised"  # outcome of a member on which a solver raised an exception
 ENDS = (*OUTCOMES, RAISED)
@@ -263,8 +264,12 @@ class Job:
         period = nutation_periods(self.numbers) if self.period is None else self.period
         plan = schedule(period, self.horizon, self.samples, self.steps)
         with np.errstate(all="ignore"):  # a run may blow up, and that is a result
-            runs = _whole(self._runs(plan), plan)
-            columns = self._observables(runs, plan.times)
+            runs = self._runs(plan)
+            columns = {name: self.numbers[:, k : k + 1] for k, name in enumerate(("I1", "I3", "mgl"))}
+            top: Any = SimpleNamespace(**columns)
+            top.reduced_energy = functools.partial(SymmetricTop.reduced_energy, top)  # of all tops at once
+            view = View(self.chart, top, runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
+            runs, columns = _whole(runs, view, plan), self._observables(view, plan.times)
         each: tuple[Any, ...] = (
             np.array(ENDS)[runs.outcome], runs.steps, runs.force_evaluations, runs.newton_iterations, runs.reached,
             plan.step_size, self.horizon, plan.dithered,
@@ -326,11 +331,8 @@ class Job:
         tolerance = np.nan if self.tolerance is None else float(self.tolerance[i])
         return Plan.until(plan.times[i, :count], tolerance, self.budget)
 
-    def _observables(self, runs: _Runs, times: Array) -> dict[str, Array]:
+    def _observables(self, view: View, times: Array) -> dict[str, Array]:
         """Of what a `Trajectory` shows of one run, what is asked for, of all."""
-        top: Any = SimpleNamespace(**{name: self.numbers[:, k : k + 1] for k, name in enumerate(("I1", "I3", "mgl"))})
-        top.reduced_energy = functools.partial(SymmetricTop.reduced_energy, top)  # of all tops at once
-        view = View(self.chart, top, runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
         columns = {name: getattr(view, name) for name in self.shown}
         turned = [name for name in ("phi", "psi") if name in self.shown and self.chart != "angles"]
         truth = ClosedForms(self.numbers)(np.nan_to_num(times)) if turned else None
@@ -359,11 +361,11 @@ def sampled(solver: FixedStep, numbers: Array, plan: Schedule) -> Many:
     return done
 
 
-def _whole(runs: _Runs, plan: Schedule) -> _Runs:
-    """A run that shows a state that is not finite, and reports nothing of it, ends there, as in `simulate`."""
-    if np.isfinite(runs.states.sum()):  # a tenth of the time
+def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
+    """A run whose states or energy are not finite, and that reports nothing of it, ends there, as in `simulate`."""
+    if all(values.min() > -HARMLESS and values.max() < HARMLESS for values in runs[:2]):  # a tenth of the time
         return runs
-    finite = np.isfinite(runs.states).all(axis=2) | np.isnan(plan.times)
+    finite = np.isfinite(runs.states).all(axis=2) & np.isfinite(view.energy + view.p_phi) | np.isnan(plan.times)
     bad = np.flatnonzero((runs.outcome == OK) & ~finite.all(axis=1))
     if not bad.size:
         return runs
