@@ -2,15 +2,7 @@
 
 # of the report; others follow
 ORDER = (
-    "cost",
-    "truth",
-    "convergence",
-    "factors",
-    "drift",
-    "stability",
-    "claims",
-    "reduction",
-    "oscillators",
+    "speed", "cost", "truth", "convergence", "factors", "drift", "stability", "claims", "reduction", "oscillators",
     "notebook",
-)
+)  # fmt: skip
 FORMER = dict.fromkeys(("population", "work_precision", "phase_diagram"), "cost")  # names that studies had

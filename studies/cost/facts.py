@@ -106,7 +106,8 @@ def winners_facts(data: xr.DataTree) -> dict[str, Any]:
     for needs in CLASSES[:-1]:
         choices, _ = cells.safest(data, Cell("short", "axis", AT, NATURAL, needs))
         best = choices[0] if choices and np.isfinite(choices[0].seconds) else None
-        named |= _safe(needs.replace("-", "_"), best)
+        key = needs.replace("-", "_")
+        named |= _safe(key, best) if choices else dict.fromkeys((key, f"{key}_seconds"))
     both = [one for one in cells.winners(data) if one["needs"] != "this-top" and one["safe"] and one["hindsight"]]
     named["cells"] = len(both) or None
     named["same"] = sum(one["safe"].name == one["hindsight"].name for one in both) if both else None

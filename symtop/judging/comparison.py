@@ -19,10 +19,10 @@ from symtop.core.parallel import cores, in_threads
 from symtop.core.progress import beating
 from symtop.judging.adapters.adapter import integrator as adapted
 from symtop.judging.claims.subject import open_target
-from symtop.measure import settings
+from symtop.measure import columns, settings
 from symtop.measure.accuracy import as_table, blank_row
 from symtop.measure.errors import QUANTITIES
-from symtop.measure.sweep import RAISED, SPENT, TIMED, described, error_row_or_message, listed, timed_rows
+from symtop.measure.sweep import RAISED, SPENT, TIMED, error_row_or_message, listed, timed_rows
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, horizon_of, scene as find_scene
 from symtop.run.simulation import likely_step
@@ -104,11 +104,16 @@ def compare(
         reached=(("variant", "target"), [reached for _, reached in found]),
     )  # fmt: skip
     data = data.assign_coords(variant=names, target=list(settings.TARGETS), scene=chosen.name)
-    return described(netcdf.describe(
-        data, f"error against cost on {chosen.name}", units=chosen.units, quantity=quantity, cost=cost, horizon=end,
-        nutations=end / chosen.nutation_period, timed=TIMED if cost == "time" else "nothing",
-        budget=str(most or BUDGET),
-    ))  # fmt: skip
+    entries = {
+        name: columns.ERROR_TABLE[f"{quantity}{name.removeprefix('error')}"] for name in ("error", "error_bound")
+    }
+    entries["target"] = "error that is accepted, largest over the run", *entries["error"][1:]
+    own = {name: columns.Column(entry, {}) for name, entry in entries.items()}
+    return netcdf.describe(
+        columns.described(data, chosen.units, own), f"error against cost on {chosen.name}", units=chosen.units,
+        quantity=quantity, cost=cost, horizon=end, nutations=end / chosen.nutation_period,
+        timed=TIMED if cost == "time" else "nothing", budget=str(most or BUDGET),
+    )  # fmt: skip
 
 
 def find(method: Any) -> Integrator:

@@ -20,9 +20,8 @@ from symtop.core import code_hash, netcdf
 from symtop.core.errors import SymtopError, boolean, file_path, foreign_code, positive, row, whole
 from symtop.core.parallel import MOST_THREADS, cores, in_threads
 from symtop.core.progress import beating
+from symtop.measure import columns
 from symtop.measure.accuracy import as_table, blank_row, enough_samples, error_row
-from symtop.measure.errors import QUANTITIES
-from symtop.measure.settings import ANGLES
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, scene as find_scene
@@ -36,21 +35,6 @@ TIMED = (
     "one call of the method's solver from the start to the horizon, with two samples and nothing around it; the least "
     f"of at most {BATCHES} batches of at least {1e3 * BATCH:g} ms each, in random order among those of the other runs"
 )
-WORDS = {  # of variables of a sweep and of a comparison: what they are, and their unit
-    "seconds": ("run time, the least of some", "s"),
-    "seconds_spread": ("(median - least) / least of the run time", "1"),
-    "steps_per_nutation": ("steps in a nutation period", "1"),
-    "error": ("error that is compared, largest over the run", ""),
-    "error_bound": ("the least error that can be judged", ""),
-    "message": ("why a run could not be made", ""),
-    "implementation": ("compiled code or Python", ""),
-    "variant": ("method and chart", ""),
-    "scene": ("top, start and horizon", ""),
-    "chart": ("variables of the run", ""),
-    "reached": ("is the error within a target, and if not, why", ""),
-    "target": ("largest error that is accepted", ""),
-    "exact_seconds": ("run time of the exact motion, the least of some", "s"),
-}
 MOST_NAMED = 4  # cells that a message lists
 
 
@@ -132,7 +116,7 @@ def sweep(
         )
         units = chosen[0].units if len({one.units for one in chosen}) == 1 else ""
         words = {"timed": TIMED if timed else "nothing: timed was not asked for"}
-        return described(netcdf.describe(data, "errors and work of a sweep", units=units, **words))
+        return netcdf.describe(columns.described(data, units), "errors and work of a sweep", units=units, **words)
 
     kept = time.monotonic()
     with beating(
@@ -276,7 +260,7 @@ def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Data
     """
     if file is None or not file.exists():
         return [], {}
-    data = netcdf.read(file)
+    data = netcdf.read(file).drop_attrs()
     if "made_of" not in data:
         raise SymtopError(f"path must be a new file or that of a sweep, not {str(file)!r}")
     if "integrator" in data.coords:  # a file of version 0.2
@@ -291,20 +275,6 @@ def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Data
                 pairs.append((scene, name))
                 tables[digest] = own.isel(setting=np.flatnonzero(run))
     return pairs, tables
-
-
-def described(data: xr.Dataset) -> xr.Dataset:
-    """Words and units for the errors, whose names are those of other quantities elsewhere."""
-    ends = {"": "largest over the run", "_end": "at the horizon", "_bound": "the least that can be judged"}
-    for name, words in QUANTITIES.items():
-        for end, what in ends.items():
-            unit = "rad" if name in ANGLES else "1"
-            data[f"{name}{end}"].attrs = {"long_name": f"{words}, {what}", "units": unit}
-    for name in {*WORDS} & {*map(str, data.variables)}:
-        words, unit = WORDS[name]
-        unit = unit or ("rad" if data.attrs.get("quantity") in ANGLES else "1")
-        data[name].attrs = {"long_name": words} | ({} if data[name].dtype.kind in "UO" else {"units": unit})
-    return data
 
 
 def failed_setting(cell: xr.Dataset) -> str:

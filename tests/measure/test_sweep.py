@@ -38,7 +38,7 @@ def test_settings_belong_to_those_who_have_them(data):
     assert formula["outcome"].values.tolist() == ["ok", "not_run", "not_run"]
     slope = np.diff(np.log(data.sel(variant="rk4[axis]", scene="spheroid")["axis"].values)) / math.log(0.5)
     assert slope == pytest.approx([4.0, 4.0], abs=0.3)
-    assert data["axis"].attrs["long_name"] == "angle between axes (rad), largest over the run"
+    assert data["axis"].attrs["long_name"] == "largest angle between the axis and the true axis over the run"
 
 
 def test_one_thread_and_many_and_a_file_give_the_same(data, tmp_path):

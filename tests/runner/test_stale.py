@@ -119,7 +119,7 @@ def test_measure_code_and_the_reference_make_the_cases_of_their_study_stale():
     [
         ("symtop_studies.cost.cells:winners", True), ("symtop_studies.cost.facts:facts", True),
         ("symtop.measure.datasets:_dense", True), ("symtop.cli.common:as_text", False),
-        ("symtop_studies.drift.words:verdict", False),
+        ("symtop_studies.drift.facts:facts", False),
     ],
 )  # fmt: skip
 def test_findings_are_made_again_when_what_draws_or_judges_them_is_edited(place, again):
