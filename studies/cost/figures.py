@@ -1,4 +1,4 @@
-"""The study's figures: seconds against error, run lengths, the phase diagram; and charts to point at."""
+"""The study's figures: seconds against error, run lengths, the phase diagram."""
 
 import math
 import textwrap
@@ -14,12 +14,11 @@ from matplotlib.patches import Patch, Rectangle
 from symtop.methods.framework.registry import integrator, split_name
 from symtop.report import style
 from symtop.report.style import LEAST_TEXT, few_ticks, grid, panels
-from symtop.runner.study import Chart, Picture, Series
+from symtop.runner.study import Picture
 
 from . import cells, far
 from .cells import CLASSES, EVALUATIONS, Cell
-from .facts import setting_words, short_name
-from .prices import prices
+from .facts import short_name
 from .ranking import run_lengths
 from .tops import NATURAL
 
@@ -210,33 +209,3 @@ def _key(group: str, variants: list[str]) -> str:
     others = f" and {more} other{'s' * (more > 1)}" if more > 0 else ""
     label = f"{FAMILIES.get(group, group)}: {', '.join(map(short_name, variants[:MOST_NAMES]))}{others}"
     return textwrap.fill(label, KEY, break_on_hyphens=False)
-
-
-def charts(data: xr.DataTree) -> list[Chart]:
-    """Axis error against cost of every run on the named scenes, a panel a scene and run length."""
-    names = [str(name) for name in data["tops"]["scene_name"].sel(scene="short").values.ravel() if str(name)]
-    panel: dict[str, dict[str, list[Series]]] = {"seconds": {}, "evaluations": {}}
-    for span in cells.horizons(data):
-        group = data[span].to_dataset().isel(scene=0)
-        for place, scene in enumerate(names):
-            label = f"{scene}, {cells.nutations(data, span):g} nutations"
-            for cost, into in panel.items():
-                into[label] = [_series(data, group.sel(variant=name), place, cost)
-                               for name in map(str, group["variant"].values)]  # fmt: skip
-    axes = {"seconds": "evaluations x price + call (s)", "evaluations": "force evaluations"}
-    return [Chart(cost, f"Every run on the named scenes, by {cost}", axes[cost], "largest axis error (rad)", each)
-            for cost, each in panel.items()]  # fmt: skip
-
-
-def _series(data: xr.DataTree, one: xr.Dataset, place: int, cost: str) -> Series:
-    """The runs of a variant on a scene."""
-    name = str(one["variant"].values)
-    work, error = (one[key].transpose("level", "named").values[:, place] for key in ("scene_work", "scene_error"))
-    good = np.isfinite(work) & np.isfinite(error) & (error > 0.0)
-    settings, x = one["setting"].values[good], work[good]
-    if cost == "seconds":
-        fixed = str(one["control"].values) == "step_size"
-        price, call = prices(data).at(name, np.where(fixed, np.nan, settings))
-        x = x * price + call
-    return Series(name, [(float(f"{a:.3g}"), float(f"{b:.3g}"), f"{setting_words(name, c)}, error {b:.1e}")
-                         for a, b, c in zip(x, error[good], settings, strict=True)])  # fmt: skip

@@ -118,5 +118,5 @@ STUDY = Study(
     title="Cost",
     question="Which method is the cheapest at the accuracy I need, with what I have?",
     cases=lambda quick: grid(quick=quick), measure=measure, follow_up=follow_up,
-    facts=facts.facts, tables=facts.tables, pictures=figures.pictures, charts=figures.charts,
+    facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
 )  # fmt: skip
