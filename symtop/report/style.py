@@ -115,7 +115,7 @@ _LOOKS = {
 OUTCOME_COLORS = {
     "accurate": GREEN, "bounded_but_wrong": YELLOW, "drifting": ORANGE, "wrong_regime": PURPLE,
     "left_chart": VERMILLION, "not_converged": BLUE, "not_finite": BLACK, "step_too_small": GREY,
-    "out_of_budget": SKY,
+    "out_of_budget": SKY, "not_normalised": SKIES[1],
 }  # fmt: skip
 
 
