@@ -46,6 +46,8 @@ def judge(
     my.py:step      a function step(f, t, y, h) -> y for y' = f(t, y)
     my.py:MyRK      a class derived from scipy.integrate.OdeSolver
     my.py:solver    an instance of a solver of diffrax
+    my.py:step      with --form rotation, step(q, w, h, inertia, torque) -> q, w of a rigid
+                    body: q = (w, x, y, z) from body to space, or a matrix (3, 3)
     ./my.so         void step(double *y, double h, const double *par, long n)
     "./engine -x"   a program: a line of numbers in, states out
     run.csv         a trajectory without a method: time and states (see symtop.judging.judge_step)
