@@ -187,10 +187,11 @@ def recommend(
     """
     with ticking("loading"):
         from symtop import advise
+        from symtop.measure.ranking import STORED
     if accuracy is None and engine is None:
         raise SymtopError("recommend needs --accuracy, for example 1e-6, or --i-use")
     options |= {"step_size": common.step_of(scene, options), "needs": options["needs"] or ()}
-    if engine is None and results is None and (Path("results") / advise.STORED_STUDY).is_file():
+    if engine is None and results is None and (Path("results") / STORED).is_file():
         results = "results"
     with ticking("trying methods"):
         answer: Any

@@ -10,6 +10,17 @@ A run of a variant with fixed step makes FIRST 2^k steps a nutation. Its samples
 dozen that are not commensurate with the nutation, so that the truth is computed once. Of the largest error of 2000
 samples they see 93 to 100 % in the median run, and half in one of twenty; it is the same for all variants. The
 coarsest run is that coarse because a step of 14 stages meets 1e-6 at four a nutation.
+
+Two populations and the named scenes stand one behind the other:
+
+    strata     `symtop.population`: six kinds, chosen to hold what is hard (25, 25, 15, 10, 10 and 15 % of the tops)
+    natural    homogeneous spheroids that turn about a pole of their surface, let go anywhere. In units where
+               I1 = mgl = 1 and time is counted in 1/g, g = sqrt(mgl/I1):
+                   inertia     axes of ratio r, log-uniform from 1/4 to 4, so that I3/I1 = 0.4/(0.2 + 1.2 r^2)
+                   axis        isotropic
+                   spin        I3 w3 over the sleeping threshold 2 sqrt(I1 mgl), log-uniform from 1/16 to 32, either way
+                   velocity    of the axis from 0 to 2 g, uniform, in any direction
+    scene      the scenes of the catalogue with a nutation, each one top among the others
 """
 
 import functools
@@ -20,14 +31,15 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from symtop_studies.grid import grid_scenes
 
 from symtop.core.numbers import EPSILON, GOLDEN, TINY
 from symtop.methods.framework.lanes import members_of
 from symtop.model import charts, scenes
 from symtop.model.charts import Array, axis_of, space_energy
 from symtop.model.exact.closed_form import ClosedForms
-from symtop.model.top import Angles, SymmetricTop, effective_potential
-from symtop.run.ensemble.population import NUMBERS, STRATA, population
+from symtop.model.top import NUMBERS, Angles, SymmetricTop, effective_potential, flat
+from symtop.run.ensemble.population import STRATA, population
 from symtop.run.reference.truth import ROUNDING
 
 FIRST = 1.0925  # steps a nutation of the coarsest run
@@ -35,6 +47,14 @@ SAMPLES = 12
 ASKED = ("axis", "attitude", "energy")  # quantities that have targets
 MOMENTA = "momenta"
 CLEAR = 0.1  # a target is asked where the truth's bound is at most this part of it
+NATURAL, SCENE = "natural", "scene"
+KINDS = (*STRATA, NATURAL, SCENE)
+DRAWS = 8  # uniform numbers of a natural top
+LEFT_OUT = {  # tags of scenes, with the reason
+    "repeats": "the same ranking shows",
+    "steady": "no nutation: every target is wider than it",
+    "unstable": "errors grow with the motion",
+}
 TOGETHER = 512  # members whose errors are computed at a time: what is between states and errors stays in the cache
 
 
@@ -59,10 +79,11 @@ class Shown(Protocol):
 
 
 class Tops:
-    """Tops and starts as rows (n, 9) of `NUMBERS`, followed for a number of nutations."""
+    """Tops and starts as rows (n, 9) of `NUMBERS`, followed for a number of nutations, and places in `KINDS`, (n,)."""
 
-    def __init__(self, numbers: Array, nutations: float) -> None:
+    def __init__(self, numbers: Array, nutations: float, kinds: NDArray[np.int64] | None = None) -> None:
         self.numbers, self.nutations = np.ascontiguousarray(numbers), nutations
+        self.kinds = np.zeros(len(numbers), dtype=np.int64) if kinds is None else kinds
         self.forms = ClosedForms(self.numbers)
         self._members: dict[int, tuple[SymmetricTop, Angles]] = {}
         self.period = np.array(self.forms.nutation_period)
@@ -70,11 +91,6 @@ class Tops:
         places = np.arange(1.0, SAMPLES + 1.0) + np.append(np.mod(GOLDEN * np.arange(1.0, SAMPLES), 1.0) - 0.5, 0.0)
         self.marks = np.unique(np.maximum(np.rint(places * self.steps / SAMPLES).astype(np.int64), 1))
         self.times = self.marks * (self.period / FIRST)[:, np.newaxis]
-
-    @staticmethod
-    def drawn(members: int, seed: int, nutations: float) -> "Tops":
-        """The first members of the population of that seed; made once and kept, for every variant runs the same."""
-        return _drawn(members, seed, nutations)
 
     @property
     def known(self) -> NDArray[np.bool_]:
@@ -185,21 +201,35 @@ class Tops:
         return {name: np.where(np.isfinite(values), values, np.inf) for name, values in largest.items()}
 
 
-def numbers_of(members: int, seed: int) -> Array:
-    """Tops and starts (members, 9)."""
-    drawn = population(members, seed=seed)
-    return np.stack([drawn[name].values for name in NUMBERS], axis=1)
+def natural(members: int, seed: int) -> Array:
+    """Tops and starts (members, 9) of the natural population; the first n of a larger one are those of the smaller."""
+    integers = np.random.Philox([seed, 1]).random_raw(members * DRAWS) >> np.uint64(11)
+    draw = (integers * 2.0**-53).reshape(members, DRAWS).T
+    theta, ratio = np.arccos(1.0 - 2.0 * draw[0]), 0.4 / (0.2 + 1.2 * 16.0 ** (2.0 * draw[1] - 1.0))
+    spin = np.where(draw[3] < 0.5, -2.0, 2.0) * 2.0 ** (9.0 * draw[2] - 4.0)  # I3 w3
+    speed, way = 2.0 * draw[4], 2.0 * np.pi * draw[5]
+    phi_dot = speed * np.sin(way) / np.sin(theta)
+    one = np.ones(members)
+    columns = {
+        "I1": one, "I3": ratio, "mgl": one, "theta": theta, "phi": np.pi * (2.0 * draw[6] - 1.0),
+        "psi": np.pi * (2.0 * draw[7] - 1.0), "theta_dot": speed * np.cos(way), "phi_dot": phi_dot,
+        "psi_dot": spin / ratio - phi_dot * np.cos(theta),
+    }  # fmt: skip
+    return np.stack([columns[name] for name in NUMBERS], axis=1)
 
 
-@functools.lru_cache(maxsize=2)
-def _drawn(members: int, seed: int, nutations: float) -> Tops:
-    return Tops(numbers_of(members, seed), nutations)
+def named() -> dict[str, Array]:
+    """The nine numbers of each scene of the catalogue that has a nutation and repeats no other."""
+    each = {name: scenes.scene(name) for name in grid_scenes(LEFT_OUT)}
+    chosen = {name: one for name, one in each.items() if math.isfinite(one.nutation_period)}
+    return {name: np.array(flat(one.top, one.start)) for name, one in chosen.items()}
 
 
-@functools.lru_cache(maxsize=2)
-def strata_of(members: int, seed: int) -> NDArray[np.int64]:
-    """Places of the members' strata in `STRATA`; kept, and not to be written to."""
-    names = list(STRATA)
-    places = np.array([names.index(name) for name in population(members, seed=seed)["stratum"].values])
-    places.flags.writeable = False
-    return places
+@functools.lru_cache(maxsize=3)
+def tops_of(strata: int, natural_tops: int, seed: int, nutations: float) -> Tops:
+    """So many tops of both populations and the named scenes; made once and kept, for every variant runs the same."""
+    drawn = population(strata, seed=seed)
+    parts = np.stack([drawn[name].values for name in NUMBERS], axis=1), natural(natural_tops, seed), [*named().values()]
+    places = [KINDS.index(name) for name in drawn["stratum"].values]
+    kinds = [*places, *[KINDS.index(NATURAL)] * natural_tops, *[KINDS.index(SCENE)] * len(parts[2])]
+    return Tops(np.concatenate([np.reshape(part, (-1, len(NUMBERS))) for part in parts]), nutations, np.array(kinds))

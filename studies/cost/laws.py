@@ -21,7 +21,9 @@ showed, but no more than the rounding of the energy itself,
     energy, shape   w sqrt(N)                        N evaluations up to the horizon
     axis            2 pi H w sqrt(N) / sqrt(3)       the phase under a walk of the energy, whose period changes with it
 
-both with coefficient one, so that they are orders of magnitude. They are added in quadrature.
+both with coefficient one, so that they are orders of magnitude, and no more than the largest error that the run itself
+showed: the period of a fast top hardly changes with the energy of its nutation, and the axis walks much less than that.
+They are added in quadrature.
 """
 
 import math
@@ -122,3 +124,13 @@ def rounding(quantity: str, w: Array, horizons: Array, evaluations: Array) -> Ar
     """What rounding adds, of `evaluations` (..., horizons) and `w` that fits before them."""
     walked = w * np.sqrt(evaluations)
     return np.asarray(walked * 2.0 * math.pi * horizons / math.sqrt(3.0) if quantity == "axis" else walked)
+
+
+def least(errors: Array, noise: Array) -> Array:
+    """What a run's `noise` (n, horizons) is multiplied with, (n,), so as not to exceed its measured errors."""
+    measured = np.isfinite(errors)
+    last = np.max(np.where(measured, np.arange(errors.shape[1]), 0), axis=1)[:, np.newaxis]
+    largest = np.max(np.where(measured, errors, 0.0), axis=1)
+    with np.errstate(all="ignore"):
+        ratio = largest / np.take_along_axis(noise, last, axis=1)[:, 0]
+    return np.where(measured.any(axis=1) & np.isfinite(ratio), np.minimum(ratio, 1.0), 1.0)

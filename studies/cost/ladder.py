@@ -12,16 +12,19 @@ The energy is asked from `LEAST_STEPS` a nutation on, because longer steps may k
 *wrong* if its axis is off by more than `WRONG`; it is a *silent failure* if nothing warns of it: it ended `ok` and kept
 the energy and both momenta to `KEPT`. A member that left with an accurate run is right at all finer settings.
 
-Variables over `quantity`, `target`, `member`, `level`, `stratum`, `guarded`:
+Variables over `quantity`, `target`, `member`, `level`, `kind` (of tops), `guarded`, `named` (scenes):
 
     cost(quantity, target, member)   force evaluations, inf if it was not reached, NaN if it was not asked
-    met_at(quantity, target, member) tenths of a decade of the tolerance that reaches it; 0 if none does, or has a step
+    met_at(quantity, target, member) steps a nutation or the tolerance that reaches it, interpolated as the cost is
     setting(level)                   steps a nutation, or the tolerance
-    runs, wrong, ended, silent (level, stratum)    numbers of members: judged, wrong, ended `ok`, silent failures
+    work(level, kind)                force evaluations of the median top of a kind
+    runs, wrong, ended, silent (level, kind)       numbers of members: judged, wrong, ended `ok`, silent failures
+    drawn(kind)                                    members with a nutation; at a level the rest of `runs` was dropped
     foretold, measured (level, guarded)            axis error, rad: of the guard's forecast, and of the run
-    made, evaluated                                runs of the ladder, and their force evaluations
     watched(level, guarded)                        the larger error of energy and momenta, infinite if it ended badly
     whole(level, guarded)                          1 if the guard's trial was the whole run, and nothing was foretold
+    scene_error, scene_work (level, named)         axis error and force evaluations on the named scenes
+    made, evaluated                                runs of the ladder, and their force evaluations
 """
 
 import math
@@ -44,8 +47,8 @@ from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.guard import forecast
 
-from .costs import cost_to_reach
-from .tops import ASKED, FIRST, MOMENTA, Tops
+from .ranking import cost_to_reach
+from .tops import ASKED, FIRST, KINDS, MOMENTA, NATURAL, SCENE, Tops
 
 LEVELS = 15  # settings at most
 WRONG = 0.1  # rad
@@ -54,7 +57,6 @@ ASYMPTOTIC = 1e-2  # rad; an error below this falls as the order says
 FORGIVEN = 10.0
 BLOCK = 256  # members of an adaptive variant that climb together: as many starts as heyoka's conversion remembers
 DIGITS = 10  # bits of a cost that are stored, 0.1 %
-TENTHS = 10.0  # of a decade: how finely a tolerance is stored, in a byte
 Members = NDArray[np.int64]  # places of members
 
 GUARDED_LEVELS = 10  # of them are shown to the guard: up to 559 steps a nutation
@@ -171,8 +173,7 @@ def _stay(
     work, good = done.work[level, live], done.ended[level, live]
     typical = float(np.max(work[good], initial=1.0))  # a run that failed early has not shown what the next one costs
     work = np.where(good, work, typical)
-    order = float(variant.order or 1)
-    ratio, falls = (2.0, 2.0**order) if variant.fixed_step else (10.0 ** (1.0 / (variant.order or 20)), 10.0)
+    ratio, falls = growth_of_work(variant), 2.0 ** float(variant.order or 1) if variant.fixed_step else 10.0
     left = np.floor(np.log(budget / np.maximum(work, 1.0)) / math.log(ratio))
     settled = done.errors["axis"][level, live] <= ASYMPTOTIC
     worth = ~settled
@@ -191,62 +192,83 @@ def _stay(
 
 
 def stored(values: Array) -> Array:
-    """Positive numbers with `DIGITS` bits, which a file holds in half the space."""
+    """Positive numbers with `DIGITS` bits, in single precision, which a file holds in a tenth of the space."""
     size, power = np.frexp(values)
-    return np.asarray(np.ldexp(np.rint(np.ldexp(size, DIGITS)), power - DIGITS))
+    with np.errstate(over="ignore"):  # an error above 1e38 is infinite
+        return np.ldexp(np.rint(np.ldexp(size, DIGITS)), power - DIGITS).astype(np.float32)
 
 
-def met_at(variant: Integrator, done: Climb, name: str, targets: Sequence[float] = TARGETS) -> NDArray[np.uint8]:
-    """The tolerance that reaches each target, (targets, n), interpolated as its cost is, in tenths of a decade."""
-    if variant.fixed_step:
-        return np.zeros((len(targets), done.work.shape[1]), dtype=np.uint8)
-    tolerances = np.array([[setting_of(variant, level)] for level in range(LEVELS)])
-    reached = cost_to_reach(np.where(np.isfinite(done.work), tolerances, np.nan), done.errors[name], targets)
-    return np.where(np.isfinite(reached), np.rint(-TENTHS * np.log10(reached)), 0.0).astype(np.uint8)
-
-
-def table(
-    variant: Integrator, tops: Tops, strata: NDArray[np.int64], kinds: int, budget: float, *, twin: bool, guarded: int
-) -> xr.Dataset:
+def table(variant: Integrator, tops: Tops, budget: float, *, twin: bool, guarded: int) -> xr.Dataset:
     """The dataset of one variant over one horizon."""
     asked = {name: mask for name, mask in tops.asked(TARGETS).items() if name in quantities_of(variant, twin)}
     done = climb(variant, tops, asked, budget)
-    costs = np.full((len(ASKED), len(TARGETS), len(tops.period)), np.nan)
-    met = np.zeros(costs.shape, dtype=np.uint8)
+    settings = np.array([setting_of(variant, level) for level in range(LEVELS)])
+    set_to = np.where(np.isfinite(done.work), settings[:, np.newaxis], np.nan)
+    costs, met = (np.full((len(ASKED), len(TARGETS), len(tops.period)), np.nan, np.float32) for _ in range(2))
     for place, name in enumerate(ASKED):
         if name in asked:
             first = round(math.log2(LEAST_STEPS / FIRST)) if variant.fixed_step and name == "energy" else 0
-            reached = cost_to_reach(done.work[first:], done.errors[name][first:], TARGETS)
-            costs[place] = np.where(asked[name], stored(reached), np.nan)
-            met[place] = np.where(np.isfinite(costs[place]), met_at(variant, done, name), 0)
+            for into, values in ((costs, done.work), (met, set_to)):
+                reached = cost_to_reach(values[first:], done.errors[name][first:], TARGETS)
+                into[place] = np.where(asked[name], stored(reached), np.nan)
+    scenes = tops.kinds == KINDS.index(SCENE)
     data: dict[str, Any] = {
         "cost": (("quantity", "target", "member"), costs),
         "met_at": (("quantity", "target", "member"), met),
-        "setting": ("level", [setting_of(variant, level) for level in range(LEVELS)]),
-        **{name: (("level", "stratum"), values) for name, values in _healthy(done, tops, strata, kinds).items()},
+        "setting": ("level", settings),
+        "work": (("level", "kind"), typical_work(variant, done, tops)),
+        **{name: (("level", "kind"), values) for name, values in _healthy(done, tops).items()},
+        "drawn": ("kind", [float((tops.known & (tops.kinds == kind)).sum()) for kind in range(len(KINDS))]),
+        "scene_error": (("level", "named"), stored(done.errors["axis"][:, scenes])),
+        "scene_work": (("level", "named"), done.work[:, scenes]),
         "chart": ((), variant.charts()[0]),
         "control": ((), variant.control or ""),
-        "order": ((), float(variant.order or math.nan)),
+        "needs": ((), variant.needs or ""),
+        "general": ((), float(variant.general or False)),
         "budget": ((), budget),
         "made": ((), float(np.isfinite(done.work).sum())),
         "evaluated": ((), float(np.nansum(done.work))),
     }
     if guarded:
         data |= {
-            name: (("level", "guarded"), values) for name, values in guarded_runs(variant, tops, done, guarded).items()
+            name: (("level", "guarded"), stored(values))
+            for name, values in guarded_runs(variant, tops, done, guarded).items()
         }
-    return xr.Dataset(data, coords={"quantity": list(ASKED), "target": list(TARGETS)})
+    return xr.Dataset(data, coords={"quantity": list(ASKED), "target": list(TARGETS), "kind": list(KINDS)})
 
 
-def _healthy(done: Climb, tops: Tops, strata: NDArray[np.int64], kinds: int) -> dict[str, Array]:
-    """Numbers of members judged, wrong, ended `ok` and silent failures, (LEVELS, strata)."""
+def typical_work(variant: Integrator, done: Climb, tops: Tops) -> Array:
+    """Force evaluations of the median top of each kind, (LEVELS, kinds); NaN where a level was run on less than half.
+
+    A top that left takes as much more at a finer setting as the tops that stayed.
+    """
+    work = done.work.copy()
+    for level in range(1, LEVELS):
+        left = np.isnan(work[level])
+        with np.errstate(all="ignore"):
+            both = ~left & np.isfinite(work[level - 1])
+            ratio = np.median(work[level, both] / work[level - 1, both]) if both.any() else growth_of_work(variant)
+        work[level, left] = ratio * work[level - 1, left]
+    limit = [np.isfinite(setting_of(variant, level)) for level in range(LEVELS)]
+    kinds = [tops.known & (tops.kinds == kind) for kind in range(len(KINDS))]
+    each = [np.median(work[:, chosen], axis=1) if chosen.any() else np.full(LEVELS, np.nan) for chosen in kinds]
+    return np.where(np.array(limit)[:, np.newaxis], np.stack(each, axis=1), np.nan)
+
+
+def growth_of_work(variant: Integrator) -> float:
+    """By how much the work grows from one level to the next, if nothing is measured."""
+    return 2.0 if variant.fixed_step else 10.0 ** (1.0 / (variant.order or 20))
+
+
+def _healthy(done: Climb, tops: Tops) -> dict[str, Array]:
+    """Numbers of members judged, wrong, ended `ok` and silent failures, (LEVELS, kinds)."""
     ran, error = np.isfinite(done.work), done.errors["axis"]
     right_later = done.settled & ~ran & tops.known  # left before with an accurate run
     wrong = ran & ~(error <= WRONG)
     silent = wrong & done.ended & (done.errors["energy"] <= KEPT) & (done.errors[MOMENTA] <= KEPT)
     counted = {"runs": ran | right_later, "wrong": wrong, "ended": done.ended | right_later, "silent": silent}
     return {
-        name: np.stack([mask[:, strata == kind].sum(axis=1) for kind in range(kinds)], axis=1).astype(float)
+        name: np.stack([mask[:, tops.kinds == kind].sum(axis=1) for kind in range(len(KINDS))], axis=1).astype(float)
         for name, mask in counted.items()
     }
 
@@ -255,7 +277,11 @@ def guarded_runs(variant: Integrator, tops: Tops, done: Climb, guarded: int) -> 
     """What the guard foretells, what is watched and what is measured, for the first members; (LEVELS, guarded)."""
     (chart,) = variant.charts()
     seen = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured", "whole")}
-    chosen = np.flatnonzero(tops.known)[:guarded]
+    each = [
+        np.flatnonzero(tops.known & part)
+        for part in (tops.kinds < KINDS.index(NATURAL), tops.kinds == KINDS.index(NATURAL))
+    ]
+    chosen = np.concatenate([each[0][: guarded // 2], each[1][: guarded // 2]])
     for place, (top, start) in enumerate(tops.members(chosen)):
         member = chosen[place]
         scene = Scene(f"member-{member}", top, start, horizon=float(tops.times[member, -1]))
