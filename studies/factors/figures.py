@@ -86,8 +86,8 @@ def draw_waterfall(shown: list[tuple[str, float, float, list[Bar]]]) -> Picture:
         f"{words.product(*shown[0])} Each bar changes what its label names and holds the rest, at the coarsest step or "
         "tolerance found. Language: SciPy's loop with its right-hand side in Python, then compiled, then the whole "
         "loop. Hatched bars are slower. Above, every change but the last is timed through simulate, whose "
-        f"{SAMPLES} samples hide the method; below with the kernel. The product is the same. Noise (median over least "
-        f"sample): at most {noise:.0%}.",
+        f"{SAMPLES} samples hide the method; below with the kernel. The product is the same. Noise (quartiles of "
+        f"processes over their median): at most {noise:.0%}.",
         "Horizontal bars on a logarithmic axis of time, each beginning where the one above ends.",
         lead="Where the speed comes from",
     )

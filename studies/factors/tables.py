@@ -1,11 +1,16 @@
 """Settings of equal accuracy, their times, and the comparisons that change one factor.
 
 Dimensions: variant (such as ``rk45-numba[axis]``, see `cells`), horizon (nutation periods), target (of the axis
-error, rad), call, batch.
+error, rad), call, process. A time is the median over processes that are started for it, one after another, of the least
+sample of each: where memory and code lie differs from process to process and stays the same within one.
 """
 
 import functools
+import json
 import math
+import pickle
+import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -13,8 +18,9 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure import settings
-from symtop.measure.timing import NOISY, Timing, first_call, timings
+from symtop.measure.timing import first_call, timings
 from symtop.methods.framework.registry import SMALLEST_FIRST
+from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 
 from .cells import (
@@ -35,7 +41,9 @@ from .cells import (
 LEAST = 0.7  # of the target: the search ends with an error from here to the target, if nine runs suffice
 PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
 FINER = 1e-3  # of the target: the tolerance that a second search begins with
-SHORT = 0.01  # seconds of a call
+ENOUGH = 0.2  # seconds of a function's samples in one process; those that are longer have two
+NOISY, NOISY_SHARE = 0.25, 0.02  # spread of a noisy time, and the share of such times beyond which none is worth having
+START = "from symtop.runner import scripts; scripts.install(); from symtop_studies.factors import tables; tables.{}()"
 TIE = 0.1  # times that differ by less are level
 FACTORS = ("method", "chart", "language", "call")
 
@@ -45,7 +53,7 @@ class Column:
 
     SETTING, AXIS, AXIS_BOUND, FORCES = "setting", "axis", "axis_bound", "force_evaluations"  # of one run
     REASON = "reason"  # why a variant has no setting; empty if it has
-    SECONDS, SPREAD, SAMPLES = "seconds", "spread", "seconds_samples"  # the least sample, (median - least)/least, all
+    SECONDS, SPREAD, SAMPLES = "seconds", "spread", "seconds_samples"  # median, distance of quartiles over it, all
 
 
 class Goal(NamedTuple):
@@ -87,34 +95,38 @@ def settle(scene: Scene, grid: Sequence[Cell], goal: Goal) -> dict[Cell, setting
     return settled
 
 
-def timed(
-    scene: Scene, chosen: dict[Cell, settings.Met], calls: Sequence[str], rounds: int, batch: float, further: int
-) -> dict[tuple[Cell, str], Timing]:
-    """Times of every cell in every call, in interleaved rounds.
+class Runs(NamedTuple):
+    """What a fresh process times on a scene: (variant, call, setting, horizon) of each run, in so many rounds."""
 
-    Short calls take part in `further` times as many rounds again, because a busy moment of the machine can spoil all
-    their samples; of the long ones those that are noisy take part in as many rounds again.
-    """
-    functions = {
-        (cell, call): function
-        for cell, met in chosen.items()
-        for call in calls
-        if (function := caller(scene, cell, call, met.setting, met.horizon)) is not None
-    }
-    for function in functions.values():
+    scene: Scene
+    runs: list[tuple[str, str, float, float]]
+    rounds: int
+    batch: float  # seconds
+
+
+def answer() -> None:
+    """What a fresh process does: `Runs` pickled on standard input, the least time of each as JSON on the other."""
+    asked: Runs = pickle.load(sys.stdin.buffer)  # noqa: S301  (of the process that started this one)
+    known = {cell.name: cell for cell in cells()}
+    functions: Any = [caller(asked.scene, known[name], *run) for name, *run in asked.runs]
+    for function in functions:
         first_call(function)
-    taken = dict(zip(functions, timings(list(functions.values()), rounds, batch, warm=True), strict=True))
-    short = [key for key, timing in taken.items() if timing.best < SHORT]
-    noisy = [key for key, timing in taken.items() if timing.best >= SHORT and timing.spread > NOISY]
-    for again, times_more in ((short, further), (noisy, 1)):
-        more = timings([functions[key] for key in again], times_more * rounds, batch, seed=times_more, warm=True)
-        for key, timing in zip(again, more, strict=True):
-            taken[key] = Timing(taken[key].samples + timing.samples, taken[key].first_call)
-    return taken
+    taken = timings(functions, asked.rounds, asked.batch, warm=True, patience=ENOUGH)
+    print(json.dumps([timing.best for timing in taken]))  # noqa: T201
+
+
+def timed(asked: Runs, processes: int) -> Array:
+    """The least time of every run in each of some fresh processes, (runs, processes)."""
+    command = [sys.executable, "-c", START.format(answer.__name__)]  # named, so that a case depends on its code
+    answers = []
+    for _ in range(processes):
+        done = subprocess.run(command, input=pickle.dumps(asked), stdout=subprocess.PIPE, check=True)  # noqa: S603
+        answers.append(json.loads(done.stdout.splitlines()[-1]))
+    return np.array(answers).T
 
 
 def factorial(
-    scene: Scene, schemes: Sequence[str] | None, goals: Sequence[Goal], rounds: int, batch: float, further: int
+    scene: Scene, schemes: Sequence[str] | None, goals: Sequence[Goal], rounds: int, batch: float, processes: int
 ) -> Any:
     """The factorial of one scene: settings, errors and times of all cells for all goals."""
     grid = cells(schemes)
@@ -123,11 +135,11 @@ def factorial(
     names = Column.SETTING, Column.AXIS, Column.AXIS_BOUND, Column.FORCES
     numbers = {name: np.full(shape, math.nan) for name in names}
     reasons = np.full(shape, "", dtype=object)
-    samples = np.full((*shape, len(CALLS), (1 + further) * rounds), math.nan)
+    samples = np.full((*shape, len(CALLS), processes), math.nan)
+    places, runs = [], []
     for goal in goals:
         part = [cell for cell in grid if cell.language in goal.languages]
         settled = settle(scene, part, goal)
-        good = {cell: met for cell, met in settled.items() if not isinstance(met, str)}
         at = horizons.index(goal.nutations), targets.index(goal.target)
         for cell, met in settled.items():
             if isinstance(met, str):
@@ -135,19 +147,23 @@ def factorial(
                 continue
             for name, value in zip(names, (met.setting, met.error, met.bound, met.evaluations), strict=True):
                 numbers[name][(grid.index(cell), *at)] = value
-        for (cell, call), timing in timed(scene, good, goal.calls, rounds, batch, further).items():
-            place = (grid.index(cell), *at, CALLS.index(call))
-            samples[place][: len(timing.samples)] = timing.samples
+            for call in goal.calls:
+                if caller(scene, cell, call, met.setting, met.horizon) is not None:
+                    places.append((grid.index(cell), *at, CALLS.index(call)))
+                    runs.append((cell.name, call, met.setting, met.horizon))
+    for place, taken in zip(places, timed(Runs(scene, runs, rounds, batch), processes), strict=True):
+        samples[place] = taken
     dims = ("variant", "horizon", "target")
     table = xr.Dataset(
         {name: (dims, values) for name, values in numbers.items()}
-        | {Column.REASON: (dims, reasons.astype(str)), Column.SAMPLES: ((*dims, "call", "batch"), samples)},
+        | {Column.REASON: (dims, reasons.astype(str)), Column.SAMPLES: ((*dims, "call", "process"), samples)},
         coords={
             "variant": [cell.name for cell in grid], "horizon": horizons, "target": targets, "call": list(CALLS),
         },
     )  # fmt: skip
-    best = table[Column.SAMPLES].min("batch")
-    return table.assign({Column.SECONDS: best, Column.SPREAD: table[Column.SAMPLES].median("batch") / best - 1.0})
+    low, middle, high = table[Column.SAMPLES].quantile((0.25, 0.5, 0.75), "process", skipna=False).values
+    dims = (*dims, "call")
+    return table.assign({Column.SECONDS: (dims, middle), Column.SPREAD: (dims, (high - low) / middle)})
 
 
 # ---- reading ---------------------------------------------------------------------------------------------------------
@@ -213,7 +229,19 @@ def fastest(rows: Sequence[Timed], call: str = KERNEL, language: str | None = No
     return min(level, key=lambda one: (SMALLEST_FIRST["axis"].index(one.chart), one.seconds))
 
 
-START = (DORMAND_PRINCE, "angles", SCIPY_PYTHON, SOLVE_IVP)
+USUAL = (DORMAND_PRINCE, "angles", SCIPY_PYTHON, SOLVE_IVP)
+
+
+def noisy(data: xr.Dataset) -> tuple[int, int]:
+    """How many times differ too much from process to process, and how many there are."""
+    spread = data[Column.SPREAD].values
+    return int(np.sum(spread > NOISY)), int(np.isfinite(spread).sum())
+
+
+def busy(data: xr.Dataset) -> bool:
+    """Was the machine too busy for times to be compared?"""
+    loud, every = noisy(data)
+    return loud > NOISY_SHARE * every
 
 
 class Bar(NamedTuple):
@@ -232,7 +260,7 @@ def waterfall(rows: Sequence[Timed], *, call_first: bool = False) -> list[Bar]:
     was not timed.
     """
     known = {one.levels: one for one in rows}
-    if START not in known:
+    if USUAL not in known:
         return []
     end = fastest(rows)
     path = [
@@ -243,7 +271,7 @@ def waterfall(rows: Sequence[Timed], *, call_first: bool = False) -> list[Bar]:
         ("method", end.method),
         ("call", KERNEL),
     ]
-    bars, levels = [Bar("", "", math.nan, known[START])], list(START)
+    bars, levels = [Bar("", "", math.nan, known[USUAL])], list(USUAL)
     for factor, level in path:
         place = FACTORS.index(factor)
         before, levels[place] = levels[place], level

@@ -7,23 +7,25 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from symtop.measure.timing import NOISY
 from symtop.report.sentences import abridged, joined
 from symtop.runner.study import Table
 
 from .cells import COMPILED, FAMILIES, KERNEL, SAMPLES, SCIPY_PYTHON, SCIPYS, SIMULATE, SOLVE_IVP
 from .tables import (
     LEAST,
+    NOISY,
     TIE,
     Bar,
     Change,
     Column,
     Timed,
+    busy,
     changes,
     chart_ratio,
     fastest,
     goals_of,
     least_share,
+    noisy,
     times,
     waterfall,
 )  # fmt: skip
@@ -68,10 +70,10 @@ def times_faster(value: float) -> str:
 
 
 def waterfalls(data: xr.Dataset, *, call_first: bool = False) -> list[tuple[str, float, float, list[Bar]]]:
-    """Scene, nutations, target and bars of every goal that has a waterfall."""
+    """Scene, nutations, target and bars of every goal that has a waterfall; none of times of a busy machine."""
     every = [
         (scene, span, target, waterfall(times(part), call_first=call_first))
-        for scene, span, target, part in goals_of(data)
+        for scene, span, target, part in ([] if busy(data) else goals_of(data))
     ]
     return [one for one in every if one[3]]
 
@@ -245,14 +247,20 @@ def accuracy_sentence(data: xr.Dataset) -> str:
 
 def noise_sentence(data: xr.Dataset) -> str:
     """How far the times can be trusted."""
-    spread = data[Column.SPREAD].values[np.isfinite(data[Column.SPREAD].values)]
-    loud = int(np.sum(spread > NOISY))
-    warning = f" {loud} of {spread.size} are above {NOISY:.0%}: measure again on a quiet machine." if loud else ""
-    return f"The median sample of a time is {np.median(spread):.0%} above its least, for the median time.{warning}"
+    loud, every = noisy(data)
+    usual = np.nanmedian(data[Column.SPREAD])
+    return (
+        f"A time is the median of its processes, whose quartiles are {usual:.0%} apart for the median time and more "
+        f"than {NOISY:.0%} for {loud} of {every}."
+    )
 
 
 def verdict(data: xr.Dataset) -> list[str]:
     """The waterfalls, the factors, SciPy, the charts, and what the numbers are worth."""
+    if busy(data):
+        loud, every = noisy(data)
+        said = f"{loud} of {every} times differ by more than {NOISY:.0%} from process to process"
+        return [f"Not measured: the machine was busy. {said}; repeat it on a quiet one.", accuracy_sentence(data)]
     said = [
         *(f"{product(*one)} {largest_step(one[-1])}" for one in waterfalls(data)[:2]),  # the tables have the others
         factors_sentence(data),
