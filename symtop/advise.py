@@ -1,8 +1,7 @@
 """`recommend`: the cheapest integrator, with its step or tolerance, that meets an accuracy on a scene.
 
-    1. Candidates. A stored population study counts on how many of the random tops nearest to this one a method was
-       the cheapest or nearly so (`symtop.measure.ranking`); a stored work-precision study lists the methods that were
-       cheapest on the nearest scene. Without a stored study every compiled method is a candidate.
+    1. Candidates. A stored study of cost counts on how many of the random tops nearest to this one a method was the
+       cheapest or nearly so (`symtop.measure.ranking`). Without a stored study every compiled method is a candidate.
     2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
        (`symtop.measure.settings`), against the closed form and a target lowered by the law of growth; one run is timed.
     3. Confirmation. The three fastest candidates are run to the whole horizon, if a budget of force evaluations allows
@@ -30,16 +29,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-import xarray as xr
-
-from symtop.core import netcdf
 from symtop.core.errors import SymtopError, boolean, one_of, positive
 from symtop.judging.claims.subject import declared
-from symtop.measure import ranking, settings
+from symtop.measure import settings
 from symtop.measure.errors import QUANTITIES, errors
 from symtop.measure.phase import FREQUENCIES
-from symtop.measure.ranking import STORED, Near, distances, nearest, regime
+from symtop.measure.ranking import STORED, Near, nearest
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import (
     NEEDS,
@@ -56,10 +51,9 @@ from symtop.run.guard import MOST_STEPS
 from symtop.run.simulation import simulate
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
-STORED_STUDY = "work_precision.nc"
 THIS_TOP = ("this-top", "solution")  # needs of what is named beside the answer, unless it is asked for
 KEPT = {"energy": ("energy",), "momenta": ("p_phi", "p_psi")}  # claims, by what a user wants kept
-CANDIDATES = 8  # methods of the stored studies that are tried
+CANDIDATES = 8  # methods of the stored study that are tried
 FINALISTS = 3  # methods that are run to the whole horizon
 TOO_DEAR = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
 CONFIDENCE = {
@@ -176,10 +170,9 @@ def recommend(
 
     `accuracy` is the largest error of `quantity` over the run: radians for ``axis``, ``attitude`` and ``theta``, and
     relative for others, energy and momenta by the scales of `symtop.errors`. `horizon` is the scene's own by default.
-    `results` is a folder with a stored ``work_precision.nc``, and ``population.nc`` if it is there; without it every
-    compiled method is tried. `needs` leaves out methods that need something else (`Integrator.needs`), for example
-    ``("derivative", "kicks")`` where there is no formula; without them, what is made for this very top is not the
-    answer but named beside it (`Advice.beside`).
+    `results` is a folder with a stored ``cost.nc``; without it every compiled method is tried. `needs` leaves out
+    methods that need something else (`Integrator.needs`), for example ``("derivative", "kicks")`` where there is no
+    formula; without them, what is made for this very top is not the answer but named beside it (`Advice.beside`).
 
     `step_size` is the step that you have: every method of fixed step runs with it, and the fastest that is good enough
     is the answer. `max_step` is the longest step, `time_a_step` the most seconds of one on this machine. `general`
@@ -195,7 +188,8 @@ def recommend(
     if quantity in settings.ANGLES and accuracy >= math.pi:
         raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}", "accuracy")
     horizon = scene.horizon if horizon is None else horizon_of(horizon)
-    data = None if results is None else _stored(Path(results) / STORED_STUDY)
+    comparable = allowed or [need for need in NEEDS if need not in THIS_TOP]
+    near = None if results is None else nearest(Path(results) / STORED, scene, quantity, accuracy, horizon, comparable)
     limit = settings.judgeable(scene, quantity, horizon)
     step = None if step_size is None else positive("step_size", step_size)
     if step is not None and not horizon / MOST_STEPS <= step < horizon:
@@ -209,9 +203,8 @@ def recommend(
     if accuracy < limit:
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(question, [], (), source)
-    near = None if results is None else nearest(Path(results) / STORED, scene, quantity, accuracy, horizon)
-    guesses, source = _candidates(question, data, near)
-    source += f" ({Path(results) / STORED_STUDY})" if results is not None else ""
+    guesses, source = _candidates(question, near)
+    source += f" ({Path(results) / STORED})" if results is not None else ""
     trials: list[_Trial] = []
     ranked: list[_Trial] = []
     fails: dict[str, list[str]] = {}
@@ -246,20 +239,6 @@ def _sort_in(trial: "_Trial | str", trials: list[_Trial], fails: dict[str, list[
         fails.setdefault(trial, []).append(name)
 
 
-def _stored(file: Path) -> xr.Dataset:
-    """The dataset of the work-precision study; refused with a sentence if it is not there or cannot be read."""
-    if not file.is_file():
-        raise SymtopError(f"results holds no {file.name}: {str(file.parent)!r}; run symtop study work_precision first")
-    remedy = "run symtop study work_precision --fresh"
-    try:
-        data = netcdf.read(file)
-    except SymtopError as error:
-        raise SymtopError(f"{file} cannot be read ({error.__cause__}); {remedy}") from error
-    if missing := [name for name in ("variant", *ranking.NEEDS) if name not in data]:
-        raise SymtopError(f"{file} is of an older version, without {', '.join(missing)}; {remedy}")
-    return data
-
-
 def _usable(quantity: str, needs: tuple[str, ...] = ()) -> list[str]:
     """Compiled methods with a step or a tolerance, each in the charts that show the quantity, which it then names."""
     return [
@@ -276,45 +255,25 @@ def _same(variant: str, usable: Sequence[str]) -> str | None:
     return next((name for name in (variant, *usable) if name in usable and split_name(name)[0] == method), None)
 
 
-def _candidates(
-    question: _Question, data: xr.Dataset | None, near: Near | None = None
-) -> tuple[dict[str, float | None], str]:
+def _candidates(question: _Question, near: Near | None) -> tuple[dict[str, float | None], str]:
     """Names of methods to try, each with a first guess of its setting, and a phrase on their origin."""
-    scene, accuracy, quantity, horizon = question[:4]
-    usable = [name for name in _usable(quantity, question.needs) if question.allows(integrator(name))]
+    scene, usable = question.scene, _usable(question.quantity, question.needs)
+    usable = [name for name in usable if question.allows(integrator(name))]
     everyone: dict[str, float | None] = dict.fromkeys(usable)
     if question.step is not None:
         return everyone, f"tried all {len(everyone)} compiled methods of fixed step that you can use"
-    if data is None or quantity not in data:
+    if near is None:
         return everyone, f"tried all {len(everyone)} compiled methods (without a stored study)"
-    catalogue = scenes.scenes()
-    stored = {name: catalogue[name] for name in map(str, data["scene"].values) if name in catalogue}
-    if not stored:
-        return everyone, f"tried all {len(everyone)} compiled methods (the stored study holds no known scene)"
-    numbers = regime(scene)
-    closest = min(stored, key=lambda name: float(distances(regime(stored[name])[np.newaxis], numbers)[0]))
-    column = int(np.argmin(np.abs(np.log(data["horizon"].values / max(horizon / scene.nutation_period, 1e-3)))))
-    cell = data.sel(scene=closest).isel(horizon=column)
-    served = [_same(name, usable) for name, count in near.served.items() if count] if near is not None else []
-    often = dict.fromkeys(filter(None, served))  # the methods that served most of the nearest tops first
-    scale = scene.nutation_period / stored[closest].nutation_period
-    cheapest: dict[str, float | None] = {}
-    stored_as = "axis" if quantity == "attitude" else quantity  # the study runs what shows the axis
-    for place in ranking.cheapest(cell, accuracy, stored_as):
-        name = _same(place.integrator, usable)
-        if name is not None and name not in cheapest:
-            run = cell.sel(variant=place.integrator).isel(setting=place.setting)
-            step, fixed = float(run["step_size"]), bool(np.isfinite(run["step_size"]))
-            scaled = step * scale if math.isfinite(scale) and scale > 0.0 else step
-            cheapest[name] = scaled if fixed else float(run["tolerance"])
-    chosen = {name: cheapest.get(name) for name in [*often, *cheapest][:CANDIDATES]}
+    chosen: dict[str, float | None] = {}
+    for variant, count in near.served.items():
+        name = _same(variant, usable)
+        if name is not None and name not in chosen and count and len(chosen) < CANDIDATES:
+            setting = near.settings[variant]
+            chosen[name] = scene.nutation_period / setting if integrator(name).fixed_step else setting
     if not chosen:
-        return everyone, f"tried all {len(everyone)} compiled methods (none met it on {closest}, the nearest scene)"
-    count = sum(name in often for name in chosen)
-    words = [f"{count} methods that served the {near.tops} nearest random tops most often"] if near and count else []
-    if len(chosen) > count:
-        words.append(f"{len(chosen) - count} methods that are cheapest on {closest}, the nearest stored scene")
-    return chosen, f"tried the {' and '.join(words)}"
+        return everyone, f"tried all {len(everyone)} compiled methods (none served the nearest random tops)"
+    served = f"tried the {len(chosen)} methods that served the {near.tops} nearest random tops most often"
+    return chosen | dict.fromkeys(name for name in usable if integrator(name).needs in THIS_TOP), served
 
 
 def _try(question: _Question, method: Integrator, guess: float | None, patience: float) -> "_Trial | str":

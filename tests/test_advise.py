@@ -10,9 +10,9 @@ from click.testing import CliRunner
 
 import symtop
 from symtop import advise
-from symtop.advise import regime
 from symtop.cli.main import main
 from symtop.measure import settings
+from symtop.measure.ranking import regime
 from symtop.methods.framework.registry import methods
 
 
@@ -154,8 +154,9 @@ def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_wi
 
 
 def test_an_older_study_is_refused_with_a_remedy(tmp_path):
-    xr.Dataset({"seconds": ("setting", [1.0])}).to_netcdf(tmp_path / "work_precision.nc")
-    with pytest.raises(symtop.SymtopError, match=r"older version, without .*control.*--fresh"):
+    tree = xr.DataTree.from_dict({"short": xr.Dataset({"cost": ("x", [1.0])})})
+    tree.to_netcdf(tmp_path / "cost.nc", engine="netcdf4")
+    with pytest.raises(symtop.SymtopError, match=r"older version, without .*nutations.*--fresh"):
         symtop.recommend("spheroid", accuracy=1e-3, results=tmp_path)
 
 
@@ -179,7 +180,7 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
 
 
 def test_a_folder_without_a_study_is_refused():
-    with pytest.raises(symtop.SymtopError, match="work_precision"):
+    with pytest.raises(symtop.SymtopError, match="symtop study cost first"):
         symtop.recommend("spheroid", accuracy=1e-6, results="/nowhere")
 
 
@@ -195,12 +196,12 @@ def test_the_command_prints_and_refuses(tmp_path, monkeypatch):
 def test_the_answer_does_not_depend_on_the_working_directory(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "results").mkdir()
-    (tmp_path / "results" / "work_precision.nc").write_text("no dataset")
+    (tmp_path / "results" / "cost.nc").write_text("no dataset")
     few(monkeypatch, 1)
     assert symtop.recommend("spheroid", accuracy=1e-3).integrator == "strang"
     command = CliRunner().invoke(main, ["recommend", "spheroid", "--accuracy", "1e-3"])  # it says what it reads
     assert command.exit_code == 2
-    assert "work_precision.nc cannot be read" in command.output
+    assert "cost.nc cannot be read" in command.output
 
 
 def test_a_regime_does_not_depend_on_units():

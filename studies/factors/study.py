@@ -14,9 +14,9 @@ from symtop.methods.framework.registry import integrators
 from symtop.model.scenes import TAGS, scene
 from symtop.runner.study import Case, Study
 
-from . import figures, words
+from . import facts, figures
 from .cells import CALLS, COMPILED, KERNEL, LANGUAGES, QUICK
-from .tables import Goal, factorial
+from .measures import Goal, factorial
 
 LEFT_OUT = {  # tags of scenes, with the reason
     "ordinary": "spheroid and goldstein show it",
@@ -60,12 +60,6 @@ STUDY = Study(
     name="factors",
     title="Factors",
     question="What makes the difference: method, formulation, language or call?",
-    how_to_read=words.HOW_TO_READ,
-    cases=cases,
-    measure=measure,
-    pictures=figures.pictures,
-    tables=words.tables,
-    verdict=words.verdict,
-    timed=True,
-    uses=lambda _: list(integrators()),
-)
+    cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
+    timed=True, uses=lambda _: list(integrators()),
+)  # fmt: skip

@@ -83,8 +83,9 @@ def pole_facts(part: xr.Dataset) -> dict[str, Any]:
         effect = pole_effect(map_of(part.sel(variant=name)))
         if effect is not None and method.control == "step_size":
             halved[method.charts() == ("angles",)].append(effect.halves)
-    return {"angles": len(halved[True]), "angles_halved": sum(halved[True]),
-            "others": len(halved[False]), "others_halved": sum(halved[False])}  # fmt: skip
+    groups = {"angles": halved[True], "others": halved[False]}
+    found = {name: len(group) for name, group in groups.items() if group}
+    return found | {f"{name}_halved": sum(groups[name]) for name in found}
 
 
 def resonance_facts(part: xr.Dataset) -> dict[str, Any]:

@@ -109,21 +109,22 @@ def _ends(values: Any) -> tuple[float, float]:
 
 
 def _lines(axis: Any, part: xr.Dataset, x: str, y: str, dots: bool = False) -> None:
-    """A line, or dots, a variant; those that are not named in grey."""
-    for name in map(str, part["variant"].values):
+    """A line, or dots, a variant; of many those that are not known in grey and without a name."""
+    variants = list(map(str, part["variant"].values))
+    named = NAMED if len(variants) > len(NAMED) else variants
+    for name in variants:
         across, up = (part[key].sel(variant=name).values for key in (x, y))
         order = np.argsort(across)
         across, up = across[order], up[order]
         good = np.isfinite(across) & np.isfinite(up)
         if good.any():
             looks = style.line(name) | {"label": name, "markevery": max(1, int(good.sum()) // 8), "zorder": 3}
-            looks = looks if name in NAMED else OTHERS | {"lw": 0.6, "marker": "." if dots else "", "ms": 3.0}
+            looks = looks if name in named else OTHERS | {"lw": 0.6, "marker": "." if dots else "", "ms": 3.0}
             axis.plot(across[good], up[good], **(looks | ({"ls": "none", "markevery": 1} if dots else {})))
 
 
 def _pole(axis: Any, data: xr.Dataset) -> None:
-    part = data.sel(scene="grazing")
-    _lines(axis, part.sel(variant=part[Column.CONTROL] == "step_size"), Column.PARAMETER, Column.GRAZING_ERROR)
+    _lines(axis, data.sel(scene="grazing"), Column.PARAMETER, Column.GRAZING_ERROR)
     axis.set(xscale="log", yscale="log", title="a pole next to the path")
     axis.set(xlabel=r"gap $\delta$ to the pole (rad)", ylabel="largest axis error (rad)")
 

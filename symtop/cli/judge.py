@@ -46,6 +46,8 @@ def judge(
     my.py:step      a function step(f, t, y, h) -> y for y' = f(t, y)
     my.py:MyRK      a class derived from scipy.integrate.OdeSolver
     my.py:solver    an instance of a solver of diffrax
+    my.py:step      with --form rotation, step(q, w, h, inertia, torque) -> q, w of a rigid
+                    body: q = (w, x, y, z) from body to space, or a matrix (3, 3)
     ./my.so         void step(double *y, double h, const double *par, long n)
     "./engine -x"   a program: a line of numbers in, states out
     run.csv         a trajectory without a method: time and states (see symtop.judging.judge_step)
@@ -160,10 +162,11 @@ def recommend(
     """
     with ticking("loading"):
         from symtop import advise
+        from symtop.measure.ranking import STORED
     if accuracy is None and engine is None:
         raise SymtopError("recommend needs --accuracy, for example 1e-6, or --i-use")
     options |= {"step_size": common.step_of(scene, options), "needs": options["needs"] or ()}
-    if engine is None and results is None and (Path("results") / advise.STORED_STUDY).is_file():
+    if engine is None and results is None and (Path("results") / STORED).is_file():
         results = "results"
     with ticking("trying methods"):
         answer: Any

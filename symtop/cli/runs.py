@@ -210,8 +210,11 @@ def ensemble(
             from symtop.report.plot import draw_ensemble
 
             draw_ensemble(few, shown, figure)
-        worst = {name: spread(largest(member_errors(few, shown, name))[:, None])[:, 0].tolist() for name in compared}
+        own = {name: largest(member_errors(few, shown, name)) for name in compared}
+        worst = {name: spread(values[:, None])[:, 0].tolist() for name, values in own.items()}
     data.close()
+    if output is not None:
+        _add_members(output, tops, own)
     if as_json:
         errors = {name: dict(zip(map("{:g}".format, LEVELS), row, strict=True)) for name, row in worst.items()}
         click.echo(as_text({"outcomes": outcomes, "steps": steps, "largest_errors": errors}))
@@ -225,6 +228,24 @@ def ensemble(
         say_written(output, figure)
     if "ok" not in outcomes:
         sys.exit(3)
+
+
+def _add_members(file: str, tops: Any, errors: dict[str, Any]) -> None:
+    """Put the tops, ``I1`` and ``start_theta``, and the largest ``axis_error`` of each into a file of their runs."""
+    import netCDF4
+
+    from symtop.report.spread import QUANTITIES
+
+    numbers = {str(name): tops[name] for name in tops.data_vars if tops[name].dtype.kind == "f"}
+    with netCDF4.Dataset(file, "a") as data:
+        for name, values in numbers.items():
+            made = data.createVariable(name if name in ("I1", "I3", "mgl") else f"start_{name}", "f8", ("member",))
+            made[:] = values.values
+            made.setncatts(values.attrs)
+        for name, values in errors.items():
+            made = data.createVariable(f"{name}_error", "f8", ("member",))
+            made[: len(values)] = values
+            made.setncatts({"long_name": f"{QUANTITIES[name]}, largest over the run, infinite after a failure"})
 
 
 @click.command(short_help="Open the explorer: one run in a browser, with sliders.")

@@ -18,6 +18,7 @@ from symtop.measure.verdicts import judgement
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
+from symtop.report import style
 from symtop.runner.study import Case
 from tests.templates import checked
 
@@ -352,5 +353,12 @@ def test_a_map_of_few_variants_names_them_all_and_one_of_many_the_known_ones():
     one = atlas.maps(hand_made([[A, B, L]] * 4), "cusp")["midpoint"]
     few = {"mine": one._replace(control="tolerance"), "strang[axis]": one}
     assert list(figures._chosen(few)) == ["strang[axis]", "mine"]
+    part = xr.Dataset(
+        {"x": ("variant", [1.0, 2.0]), "y": ("variant", [1.0, 2.0])},
+        coords={"variant": ["mine[axis]", "gauss-8[axis]"]},
+    ).expand_dims("moment")
+    axis = style.grid(1, 1)[1][0]
+    figures._lines(axis, part, "x", "y")
+    assert axis.get_legend_handles_labels()[1] == ["mine[axis]", "gauss-8[axis]"]
     many = {**{f"mine-{k}": one for k in range(figures.MOST)}, "strang[axis]": one}
     assert list(figures._chosen(many)) == ["strang[axis]"]
