@@ -143,6 +143,7 @@ class About(NamedTuple):
     chart: str
     implementation: str
     seconds_a_step: float
+    seed: int = 0  # of what was drawn at random
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,7 @@ def heading(about: About, scene: str) -> str:
     cost = f", {pace / (unit or 1e-9):.3g} {name} a step" if pace else ""
     chart = f" in the {about.chart} chart" if about.chart else ""
     names = "".join(name.ljust(width) for name, width in COLUMNS.items())
-    return f"{about.name}{chart} on {scene}{cost}\n\n{names}the number that decides"
+    return f"{about.name}{chart} on {scene}{cost}, seed {about.seed}\n\n{names}the number that decides"
 
 
 def line(finding: Finding, width: int = WIDTH) -> str:

@@ -198,7 +198,9 @@ class BatchStep(Stepper):
             batch = self._array(np.stack([y, np.concatenate([y[:-3], OTHER * y[-3:]])]))
             if not self._tried:
                 self._try(step, y, batch, h)
-            states = repeat(lambda k, rows: _once(step, k * h, rows, h), batch, marks, lambda rows: np.asarray(rows[0]))
+            states = repeat(
+                lambda k, rows: _once(step, self.since + k * h, rows, h), batch, marks, lambda rows: np.asarray(rows[0])
+            )
             return March(states, 0)
 
     def _array(self, values: Array) -> Any:
@@ -310,7 +312,7 @@ class DiffraxSolver(Stepper):
                 while done < mark:
                     some = min(MOST, int(mark) - done)
                     with heartbeat.call(h, more):
-                        at, memory = self._run(par, at, memory, done * h, h, some)
+                        at, memory = self._run(par, at, memory, self.since + done * h, h, some)
                         self.jax.block_until_ready(at)
                     self._fresh, more, done = False, 0.0, done + some
                 states[place] = np.asarray(at)

@@ -23,9 +23,11 @@ from typing import NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError
+from symtop.judging.adapters.adapter import AdapterSolver
 from symtop.judging.claims.subject import CONSTANTS, PLANE, Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
 from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, residuals, tops
+from symtop.measure.step_map import generic_start, one_step, restart_gap
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import NOT_FINITE, OK, OUTCOMES, Array, Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator
@@ -53,6 +55,7 @@ OF_A_RUN = (*CONSTANTS, "reported", "invariant", "explicit", "work")
 KINDS = ("kept", "bounded", "random walk", "growing", "drift")  # from best to worst
 OWN = "its states'"  # what every run says of the momenta that it reports
 BADNESS = ("inapplicable", "measured", "confirmed", "undecided", "refuted")
+CUTS, SAME_RUN, OF_RUN = 6, 1e-7, "state"  # runs that are compared with parts of longer ones, and within what
 WINDOWS = 160  # of a long run, evenly spaced in the logarithm of time: what a figure shows of it
 
 Rows = dict[str, Array]  # by the names of constants
@@ -132,7 +135,7 @@ def _run(
 
 
 def long_run(
-    method: Integrator, scene: Scene, chart: str, *, quick: bool = False, most: float | None = None
+    method: Integrator, scene: Scene, chart: str, *, quick: bool = False, most: float | None = None, seed: int = 0
 ) -> LongRun:
     """A million steps of a compiled method in one of its charts, or `most`; fewer where that would take minutes."""
     for finer in FINER:  # a motion that passes close to a pole needs shorter steps
@@ -152,8 +155,38 @@ def long_run(
         reported = from_increments(method, scene, plan) if method.fixed_step else None
     else:
         reported = _difference(scene, shown, run)
+    if chart and method.fixed_step and not isinstance(method.solvers[chart], AdapterSolver):
+        reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
     steady = len({one.force_evaluations / max(one.steps, 1) for one in (first, other)}) == 1
     return found_in(run, scene, chart, plan.times, constants(scene, shown), constants(scene, pilot), steady, reported)
+
+
+def _contradiction(
+    method: Integrator, scene: Scene, chart: str, long: tuple[Run, Plan], pilot: Run, h: float, seed: int
+) -> Difference | None:
+    """How far a run of n steps, n drawn at random, is from the first n steps of a longer one, and m from the n-th.
+
+    A step knows nothing of the run it is part of. The m steps are left out for what is not one map
+    (`restart_gap`), and from a state that has lost its length, which no start has.
+    """
+    draw, step = np.random.default_rng(seed), one_step(method, chart, scene, h)
+    run, plan = long
+    longest, one_map = run.states.shape[0] - 1, restart_gap(step, generic_start(scene)) <= SAME_RUN
+    for k in range(CUTS):
+        source, marks = (run, plan.marks) if k % 2 else (pilot, np.arange(pilot.states.shape[0]))
+        i = min(int(min(longest, marks.size - 2) ** draw.uniform(0.0, 1.0)), marks.size - 2)
+        states = [step.scaled(source.states[j], source.p_phi[j], source.p_psi[j]) for j in (i, i + 1)]
+        n, m = int(marks[i]), int(marks[i + 1] - marks[i])
+        if n == 0 or not np.isfinite(np.concatenate(states)).all():
+            continue
+        gap = step.gap(step.shown(step.run(scene.start, h, n)), states[0])
+        words = f"a run of {n} steps from the first {n} of one of {int(marks[-1])} (seed {seed})"
+        if one_map and gap <= SAME_RUN and abs(step.length(states[0]) - 1.0) < SAME_RUN**1.5:
+            gap = step.gap(step.shown(step.run(step.restart(states[0]), h, m)), states[1])
+            words = f"{m} steps from step {n} of a run of {int(marks[-1])} (seed {seed}) when they are run alone"
+        if gap > SAME_RUN:
+            return Difference(OF_RUN, gap, SAME_RUN, words)
+    return None
 
 
 def found_in(
@@ -256,7 +289,9 @@ def measure(subject: Subject) -> list[Finding]:
         return of_run(method, run)
     for chart in method.charts():
         try:
-            run = long_run(method, subject.scene, chart, quick=subject.quick, most=subject.long_steps)
+            run = long_run(
+                method, subject.scene, chart, quick=subject.quick, most=subject.long_steps, seed=subject.seed
+            )
             runs.append(run)
             findings = of_run(method, run)
         except SymtopError as error:
@@ -320,6 +355,11 @@ def _reported(run: LongRun) -> Finding:
     if other.size <= other.floor:
         why = f"they differ from those of the states by {other.size:.1e} at most"
         return Finding("reported", "", Measured(OWN), "measured", why, other.size, other.floor)
+    if other.name == OF_RUN:
+        why = (
+            f"a run contradicts itself, as if the method knew of it: the state differs by {other.size:.1e}, {other.how}"
+        )
+        return Finding("reported", OWN, Measured("another run", other.size), "refuted", why, other.size, other.floor)
     why = f"it reports other momenta than its states have: {other.name} differs by {other.size:.1e} {other.how}"
     return Finding("reported", OWN, Measured("others", other.size), "refuted", why, other.size, other.floor)
 
