@@ -6,6 +6,7 @@
 import importlib.util
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -138,7 +139,16 @@ for solver in (nothing, leaves, crashes):
 )
 def test_a_plug_in_that_fails_is_told_of(tmp_path, name, says):
     (tmp_path / "plugin.py").write_text(PLUGIN)
-    words = ["symtop", "claims", f"{name}-at-once", "--plugin", str(tmp_path / "plugin.py"), "--quick"]
+    words = [
+        sys.executable,
+        "-m",
+        "symtop.cli",
+        "claims",
+        f"{name}-at-once",
+        "--plugin",
+        str(tmp_path / "plugin.py"),
+        "--quick",
+    ]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert says in done.stdout
@@ -146,7 +156,7 @@ def test_a_plug_in_that_fails_is_told_of(tmp_path, name, says):
 
 def test_a_plug_in_that_ends_its_process_when_it_is_loaded_is_told_of(tmp_path):
     (tmp_path / "plugin.py").write_text("import os\nos._exit(0)\n")
-    words = ["symtop", "claims", "--plugin", str(tmp_path / "plugin.py")]
+    words = [sys.executable, "-m", "symtop.cli", "claims", "--plugin", str(tmp_path / "plugin.py")]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "plugin plugin.py cannot be loaded: its process ended with code 0" in done.stderr

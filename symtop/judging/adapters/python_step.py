@@ -44,7 +44,8 @@ from symtop.model.charts import space_momenta
 from symtop.model.top import Angles, SymmetricTop, effective_force
 
 Field = Callable[[float, Array], Array]
-ANY = 1e100  # a tolerance that every step meets, and whose square is a number
+ANY = 1e300  # a tolerance that every step meets; infinity times a component of zero would be no number
+LOOSE = 1e8  # one that every step meets, and beside which an update of Newton's iteration can be seen
 SOLVED, MOST_NEWTON, NEWTON = 1e-13, 50, "NEWTON_MAXITER"  # of a stage, absolute; rounds, and what modules call them
 SAME = 1e-9  # of a step: one that is this near to h has its length
 
@@ -136,10 +137,12 @@ class ScipySolver(PythonStep):
         """The states at the marks for any right-hand side, from a time t on; SymtopError for steps that are not h."""
         end, size = t + (int(marks[-1]) + 2) * h, abs(h)
         with heartbeat.call(h):
-            made: Any = self.function(f, t, y, end, max_step=size, first_step=size, rtol=ANY, atol=ANY)
-        for name in ("newton_tol", "kappa", "tiny_err"):
-            if isinstance(getattr(made, name, None), float):
-                setattr(made, name, SOLVED / ANY)
+            options = {"max_step": size, "first_step": size}
+            made: Any = self.function(f, t, y, end, **options, rtol=ANY, atol=ANY)
+            if hasattr(made, "newton_tol") or hasattr(made, "kappa"):
+                made = self.function(f, t, y, end, **options, rtol=LOOSE, atol=LOOSE * max(1.0, np.abs(y).max()))
+                for name in ("newton_tol", "kappa", "tiny_err"):
+                    setattr(made, name, SOLVED / LOOSE)
 
         def once(k: int, y: Array) -> Array:
             if made.status != "running" or not np.isfinite(y).all():

@@ -27,7 +27,7 @@ from symtop.judging.adapters.adapter import AdapterSolver
 from symtop.judging.claims.subject import CONSTANTS, PLANE, Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
 from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, residuals, tops
-from symtop.measure.step_map import generic_start, one_step, restart_gap
+from symtop.measure.step_map import one_step
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import NOT_FINITE, OK, OUTCOMES, Array, Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator
@@ -55,7 +55,7 @@ OF_A_RUN = (*CONSTANTS, "reported", "invariant", "explicit", "work")
 KINDS = ("kept", "bounded", "random walk", "growing", "drift")  # from best to worst
 OWN = "its states'"  # what every run says of the momenta that it reports
 BADNESS = ("inapplicable", "measured", "confirmed", "undecided", "refuted")
-CUTS, SAME_RUN, OF_RUN = 6, 1e-7, "state"  # runs that are compared with parts of longer ones, and within what
+CUTS, SAME_RUN, OF_RUN = 8, 1e-9, "state"  # runs that are compared with parts of longer ones, and within what
 WINDOWS = 160  # of a long run, evenly spaced in the logarithm of time: what a figure shows of it
 
 Rows = dict[str, Array]  # by the names of constants
@@ -164,28 +164,17 @@ def long_run(
 def _contradiction(
     method: Integrator, scene: Scene, chart: str, long: tuple[Run, Plan], pilot: Run, h: float, seed: int
 ) -> Difference | None:
-    """How far a run of n steps, n drawn at random, is from the first n steps of a longer one, and m from the n-th.
-
-    A step knows nothing of the run it is part of. The m steps are left out for what is not one map
-    (`restart_gap`), and from a state that has lost its length, which no start has.
-    """
+    """How far a run of n steps, n drawn at random, is from the first n of a longer one: a step knows nothing of it."""
     draw, step = np.random.default_rng(seed), one_step(method, chart, scene, h)
-    run, plan = long
-    longest, one_map = run.states.shape[0] - 1, restart_gap(step, generic_start(scene)) <= SAME_RUN
     for k in range(CUTS):
-        source, marks = (run, plan.marks) if k % 2 else (pilot, np.arange(pilot.states.shape[0]))
-        i = min(int(min(longest, marks.size - 2) ** draw.uniform(0.0, 1.0)), marks.size - 2)
-        states = [step.scaled(source.states[j], source.p_phi[j], source.p_psi[j]) for j in (i, i + 1)]
-        n, m = int(marks[i]), int(marks[i + 1] - marks[i])
-        if n == 0 or not np.isfinite(np.concatenate(states)).all():
-            continue
-        gap = step.gap(step.shown(step.run(scene.start, h, n)), states[0])
-        words = f"a run of {n} steps from the first {n} of one of {int(marks[-1])} (seed {seed})"
-        if one_map and gap <= SAME_RUN and abs(step.length(states[0]) - 1.0) < SAME_RUN**1.5:
-            gap = step.gap(step.shown(step.run(step.restart(states[0]), h, m)), states[1])
-            words = f"{m} steps from step {n} of a run of {int(marks[-1])} (seed {seed}) when they are run alone"
-        if gap > SAME_RUN:
-            return Difference(OF_RUN, gap, SAME_RUN, words)
+        run, marks = (long[0], long[1].marks) if k % 2 else (pilot, np.arange(pilot.states.shape[0]))
+        i = min(int(marks.size ** draw.uniform(0.0, 1.0)), marks.size - 1)
+        state = step.scaled(run.states[i], run.p_phi[i], run.p_psi[i])
+        if marks[i] > 0 and np.isfinite(state).all():
+            gap = step.gap(step.shown(step.run(scene.start, h, int(marks[i]))), state)
+            if gap > SAME_RUN:
+                how = f"in a run of {marks[i]} steps from the first of one of {marks[-1]} (seed {seed})"
+                return Difference(OF_RUN, gap, SAME_RUN, how)
     return None
 
 
@@ -357,7 +346,7 @@ def _reported(run: LongRun) -> Finding:
         return Finding("reported", "", Measured(OWN), "measured", why, other.size, other.floor)
     if other.name == OF_RUN:
         why = (
-            f"a run contradicts itself, as if the method knew of it: the state differs by {other.size:.1e}, {other.how}"
+            f"a run contradicts itself, as if the method knew of it: the state differs by {other.size:.1e} {other.how}"
         )
         return Finding("reported", OWN, Measured("another run", other.size), "refuted", why, other.size, other.floor)
     why = f"it reports other momenta than its states have: {other.name} differs by {other.size:.1e} {other.how}"
