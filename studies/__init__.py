@@ -2,6 +2,6 @@
 
 # of the report; others follow
 ORDER = (
-    "population", "truth", "convergence", "work_precision", "factors", "drift", "stability", "claims", "reduction",
-    "phase_diagram", "oscillators", "notebook",
+    "speed", "population", "truth", "convergence", "work_precision", "factors", "drift", "stability", "claims",
+    "reduction", "phase_diagram", "oscillators", "notebook",
 )  # fmt: skip

@@ -14,6 +14,7 @@ from symtop.core import old_paths as old_paths
 if TYPE_CHECKING:
     from symtop.advise import Advice as Advice, recommend as recommend
     from symtop.core.errors import SymtopError as SymtopError, SymtopWarning as SymtopWarning
+    from symtop.judging.comparison import compare as compare
     from symtop.judging.judge_step import judge as judge
     from symtop.measure.errors import errors as errors
     from symtop.measure.sweep import sweep as sweep
@@ -70,6 +71,7 @@ _NAMES = {  # by the module that holds them
     "run.ensemble.population": "population",
     "run.reference.truth": "reference",
     "run.simulation": "simulate",
+    "judging.comparison": "compare",
     "report.card": "card",
     "report.plot": "plot",
     "runner.study": "Case Picture Study Table",

@@ -21,7 +21,7 @@ stands it is mostly the fastest way, and the advice says so with its time.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -36,7 +36,7 @@ from symtop.measure.errors import QUANTITIES, errors
 from symtop.measure.phase import FREQUENCIES
 from symtop.measure.ranking import STORED, Near, distances, nearest, regime
 from symtop.measure.timing import bare_run, timings
-from symtop.methods.framework.registry import Integrator, integrator, integrators, is_built_in, split_name
+from symtop.methods.framework.registry import NEEDS, Integrator, integrator, integrators, is_built_in, split_name
 from symtop.model import scenes
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run.guard import MOST_STEPS
@@ -118,6 +118,7 @@ class _Question(NamedTuple):
     accuracy: float
     quantity: str
     horizon: float
+    needs: tuple[str, ...]  # of the methods that may be recommended; empty: of any
 
 
 class _Trial(NamedTuple):
@@ -134,17 +135,19 @@ class _Trial(NamedTuple):
 
 def recommend(
     scene: "str | Scene", *, accuracy: float, quantity: str = "axis", horizon: float | None = None,
-    results: str | Path | None = None,
+    results: str | Path | None = None, needs: Collection[str] = (),
 ) -> Advice:  # fmt: skip
     """The cheapest integrator, with its step or tolerance, that keeps the error of `quantity` below `accuracy`.
 
     `accuracy` is the largest error of `quantity` over the run: radians for ``axis``, ``attitude`` and ``theta``, and
     relative for others, energy and momenta by the scales of `symtop.errors`. `horizon` is the scene's own by default.
     `results` is a folder with a stored ``work_precision.nc``, and ``population.nc`` if it is there; without it every
-    compiled method is tried. Raises SymtopError for arguments that are out of range. It runs what it recommends, which
-    takes from 0.1 s to half a minute.
+    compiled method is tried. `needs` leaves out methods that need something else (`Integrator.needs`), for example
+    ``("derivative", "kicks")`` where there is no formula. Raises SymtopError for arguments that are out of range. It
+    runs what it recommends, which takes from 0.1 s to half a minute.
     """
     scene = scenes.scene(scene)
+    allowed = tuple(one_of("needs", need, NEEDS) for need in ([needs] if isinstance(needs, str) else needs))
     accuracy = positive("accuracy", accuracy)
     one_of("quantity", quantity, KNOWN_QUANTITIES)
     if quantity in settings.ANGLES and accuracy >= math.pi:
@@ -152,7 +155,7 @@ def recommend(
     horizon = scene.horizon if horizon is None else horizon_of(horizon)
     data = None if results is None else _stored(Path(results) / STORED_STUDY)
     limit = settings.judgeable(scene, quantity, horizon)
-    question = _Question(scene, accuracy, quantity, horizon)
+    question = _Question(scene, accuracy, quantity, horizon, allowed)
     if accuracy < limit:
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(question, [], (), source)
@@ -201,12 +204,13 @@ def _stored(file: Path) -> xr.Dataset:
     return data
 
 
-def _usable(quantity: str) -> list[str]:
+def _usable(quantity: str, needs: tuple[str, ...] = ()) -> list[str]:
     """Compiled methods with a step or a tolerance, each in the charts that show the quantity, which it then names."""
     return [
         variant.name if len(integrator(variant.method).charts()) > 1 else variant.method
         for variant in settings.compared(settings.observed(quantity))
         if variant.control is not None and variant.implementation == "compiled"
+        if not needs or variant.needs in needs
     ]
 
 
@@ -220,8 +224,8 @@ def _candidates(
     question: _Question, data: xr.Dataset | None, near: Near | None = None
 ) -> tuple[dict[str, float | None], str]:
     """Names of methods to try, each with a first guess of its setting, and a phrase on their origin."""
-    scene, accuracy, quantity, horizon = question
-    usable = _usable(quantity)
+    scene, accuracy, quantity, horizon, _ = question
+    usable = _usable(quantity, question.needs)
     everyone: dict[str, float | None] = dict.fromkeys(usable)
     if data is None or quantity not in data:
         return everyone, f"tried all {len(everyone)} compiled methods (without a stored study)"
@@ -257,7 +261,7 @@ def _candidates(
 
 def _try(question: _Question, method: Integrator, guess: float | None, patience: float) -> "_Trial | str":
     """A candidate's setting and cost from short runs, or the reason why it has none."""
-    scene, accuracy, quantity, horizon = question
+    scene, accuracy, quantity, horizon, _ = question
     period = scene.nutation_period
     short = min(horizon, settings.SHORT * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** settings.growth(method, quantity)
@@ -272,7 +276,7 @@ def _try(question: _Question, method: Integrator, guess: float | None, patience:
 
 def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
     """The trial run to the whole horizon, if not too much, with its setting corrected; or the reason why it fails."""
-    scene, accuracy, quantity, horizon = question
+    scene, accuracy, quantity, horizon, _ = question
     short = trial.met
     if short.evaluations * horizon / short.horizon > settings.MOST_EVALUATIONS[short.integrator.implementation]:
         met = settings.rounded(scene, short, accuracy * short.error / (trial.error or 1.0), quantity)
@@ -288,7 +292,7 @@ def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
 def _advice(
     question: _Question, ranked: Sequence[_Trial], fails: tuple[str, ...], source: str, near: Near | None = None
 ) -> Advice:
-    scene, accuracy, quantity, horizon = question
+    scene, accuracy, quantity, horizon, _ = question
     goal = f"{quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}"
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}."
@@ -297,6 +301,8 @@ def _advice(
     best = ranked[0]
     name, fixed = best.met.integrator.name, best.met.integrator.fixed_step
     worth = f"error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
+    if need := best.met.integrator.needs:
+        worth += f"; it needs {NEEDS[need]} ({need})"
     runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
     served = _same(name, list(near.served)) if near is not None else None  # None: the study has no chart of it
     return Advice(
@@ -310,7 +316,7 @@ def _advice(
 
 def _lines(question: _Question, met: settings.Met) -> dict[str, str]:
     """The command and the Python line that make the recommended run; no command for a scene that has no name here."""
-    scene, _, _, horizon = question
+    scene, _, _, horizon, _ = question
     value, name, whole = float(met.setting), met.integrator.name, horizon == scene.horizon
     known = scenes.scenes().get(scene.name) == scene
     shown, control = f'"{name}"' if "[" in name else name, str(met.integrator.control)
@@ -323,7 +329,7 @@ def _lines(question: _Question, met: settings.Met) -> dict[str, str]:
 
 def _without_steps(question: _Question, best: float) -> str:
     """What the closed form costs beside a run of `best` seconds (nan if there is none), and why it is not advised."""
-    scene, _, quantity, horizon = question
+    scene, _, quantity, horizon, _ = question
     exact = integrator("exact")
     call = bare_run(scene, exact, exact.chart_for(settings.observed(quantity)), math.nan, horizon)
     taken = timings([call], batches=5, batch=0.002)[0].best

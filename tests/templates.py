@@ -1,6 +1,7 @@
 """What every template of a study must do: render whole and with nothing measured, and name only what is there."""
 
 import re
+from collections.abc import Collection
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -11,15 +12,20 @@ from symtop.runner import run as runner
 NAMED = re.compile(r"\b(?:figure|table)\(\"([\w-]+)\"")
 
 
-def checked(name: str, data: object, folder: Path) -> str:
-    """The page of a study with what a dataset shows; all that its template names is there, with or without numbers."""
+def checked(name: str, data: object, folder: Path, elsewhere: Collection[str] = ()) -> str:
+    """The page of a study with what a dataset shows; all that its template names is there, with or without numbers.
+
+    Figures and tables that are shown `elsewhere` stand on the front page.
+    """
     study, page = runner.load(name), runner.page_of(name)
     assert page is not None
     found = runner.findings_of(
         study, data, folder, lambda figure, _: plt.close(figure), failures=[], cases=1, page=page
     )
     there = {one["name"] for kind in ("pictures", "tables") for one in found[kind]}
-    assert set(NAMED.findall(found["page"])) == there, "figures and tables of the template and of the study differ"
+    assert set(NAMED.findall(found["page"])) == there - {*elsewhere}, (
+        "figures and tables of the template and of the study differ"
+    )
     text = template.filled(found, folder)
     empty = {**found, "facts": dict.fromkeys(found["facts"]), "pictures": [], "tables": []}
     for one in (text, template.filled(empty, folder)):

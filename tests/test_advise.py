@@ -248,3 +248,14 @@ def test_thirty_random_tops():
                 ratios.append(advice.seconds / best)
     assert np.mean(met) >= 0.97
     assert np.median(ratios) <= 2.0
+
+
+def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
+    usable = advise._usable("axis", ("derivative", "kicks"))
+    assert {symtop.integrator(name).needs for name in usable} == {"derivative", "kicks"}
+    assert set(usable) < set(advise._usable("axis"))
+    advice = symtop.recommend("spheroid", accuracy=1e-6, horizon=4.0, needs="expression")
+    assert symtop.integrator(advice.integrator).needs == "expression"
+    assert "it needs f as a formula (expression)" in advice.reason
+    with pytest.raises(symtop.SymtopError, match="needs 'luck' is unknown"):
+        symtop.recommend("spheroid", accuracy=1e-6, needs=["luck"])

@@ -12,6 +12,7 @@ from benchmarks.peers.measure import SCENES, measure
 from benchmarks.peers.study import STUDY, measured
 from benchmarks.peers.summary import lines
 from symtop.core import netcdf
+from symtop.measure import columns
 from symtop.report import style
 from symtop.runner import run as runner
 
@@ -33,7 +34,9 @@ def main() -> None:
         peers, missing = load(tuple(options.only))
         for sentence in missing:
             print(sentence)
-        data = netcdf.describe(measure(peers, options.scenes), STUDY.title, question=STUDY.question)
+        own = columns.read(Path(__file__).parent / "columns.tsv")
+        data = columns.described(measure(peers, options.scenes), own=own)
+        data = netcdf.describe(data, STUDY.title, question=STUDY.question)
         netcdf.write(data, file)
         many = together.measure(SOLVERS if any(peer.package == DIFFRAX for peer in peers) else ())
     findings = runner.findings_of(

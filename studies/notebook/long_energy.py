@@ -16,7 +16,7 @@ from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.run.simulation import integrate
 
-from .tables import SOLVER, Column
+from .measures import SOLVER, Column
 
 FIRST = 1.0  # s, of the times at which the largest error so far is stored
 TIMES = 320  # of them: neighbours are 2 to 3 % apart

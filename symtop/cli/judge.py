@@ -138,11 +138,12 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
 @click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
 @click.option("--results", type=File(file_okay=False), help="Folder of a stored study; results by default.")
+@click.option("--needs", default="", help="What methods may need, for example derivative,kicks; anything by default.")
 @plugin_option
 @json_option
 def recommend(
     scene: str, accuracy: float | None, engine: str | None, step_size: float | None, quantity: str,
-    horizon: float | None, results: str | None, as_json: bool,
+    horizon: float | None, results: str | None, needs: str, as_json: bool,
 ) -> None:  # fmt: skip
     """Find the cheapest integrator and step that meet an accuracy on a SCENE.
 
@@ -150,6 +151,7 @@ def recommend(
 
     \b
     symtop recommend spheroid --accuracy 1e-6
+    symtop recommend spheroid --accuracy 1e-6 --needs derivative,kicks
     symtop recommend goldstein --accuracy 1e-3 --quantity attitude --horizon 1e4
     symtop recommend mine --plugin my_scene.py --accuracy 1e-9
     symtop recommend goldstein --i-use mujoco --step-size 0.002
@@ -169,7 +171,10 @@ def recommend(
     if results is None and (Path("results") / advise.STORED_STUDY).is_file():
         results = "results"
     with ticking("trying methods"):
-        advice = advise.recommend(scene, accuracy=accuracy or 0.0, quantity=quantity, horizon=horizon, results=results)
+        advice = advise.recommend(
+            scene, accuracy=accuracy or 0.0, quantity=quantity, horizon=horizon, results=results,
+            needs=[need for need in needs.replace(" ", "").split(",") if need],
+        )  # fmt: skip
     click.echo(as_text(dataclasses.asdict(advice))) if as_json else say(str(advice))
     if advice.integrator is None:
         sys.exit(1)

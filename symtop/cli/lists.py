@@ -70,10 +70,15 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, eng
         click.echo(as_text([described]) if as_json else _integrator_page(described))
     else:
         short: list[Record] = [
-            {"name": method.name, "order": str(method.order or "?"), "flags": _flags(method), "summary": method.summary}
+            {
+                "name": method.name, "order": str(method.order or "?"), "flags": _flags(method),
+                "needs": method.needs or "?", "summary": method.summary,
+            }
             for method in methods
-        ]
-        note = f"flags: {FLAGS}. One in full: symtop integrators NAME; in one chart: NAME[CHART]."
+        ]  # fmt: skip
+        needs = "; ".join(f"{name}, {words}" for name, words in registry.NEEDS.items())
+        note = f"flags: {FLAGS}. needs, the weakest thing that suffices: {needs}."
+        note += " One in full: symtop integrators NAME; in one chart: NAME[CHART]."
         _list(records, short, note, wide, as_json)
 
 

@@ -1,4 +1,4 @@
-"""The command line: ``symtop integrators | scenes | run | long | ensemble | study | judge | report | ...``.
+"""The command line: ``symtop integrators | scenes | run | compare | ensemble | study | judge | report | ...``.
 
 Exit codes: 0 fine; 1 a case or a check failed; 2 bad input, or a place that cannot be written; 3 a run ended early by
 its outcome (its dataset was written); 130 and 143 it was interrupted or terminated (what a study had computed is kept).
@@ -10,7 +10,7 @@ import sys
 import click
 
 from symtop import __version__
-from symtop.cli import doctor, judge, lists, runs, study
+from symtop.cli import compare, doctor, judge, lists, runs, study
 from symtop.cli.common import Group, warn
 from symtop.core import files
 
@@ -34,7 +34,7 @@ def main() -> None:
 
 
 for command in (
-    lists.integrators, lists.scenes, runs.run, runs.long, runs.ensemble, runs.explore, judge.claims, judge.judge,
-    judge.recommend, study.study, study.report, study.archive, lists.cite, doctor.doctor,
+    lists.integrators, lists.scenes, runs.run, compare.compare, runs.long, runs.ensemble, runs.explore, judge.claims,
+    judge.judge, judge.recommend, study.study, study.report, study.archive, lists.cite, doctor.doctor,
 ):  # fmt: skip
     main.add_command(command)

@@ -37,7 +37,9 @@ from symtop.core.files import cache_root, is_trusted, locked, make_private, on_c
 from symtop.core.jit_functions import Function, fused, inlined_parts, shared_parts, two_product
 from symtop.core.sines import polynomials, sincos
 
-__all__ = ["code_of", "compile_kernel", "fused", "is_cached", "register_jitable", "set_item", "to_fixed_tuple"]
+__all__ = [
+    "code_of", "combined", "compile_kernel", "fused", "is_cached", "register_jitable", "set_item", "to_fixed_tuple",
+]  # fmt: skip
 
 set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple
 
@@ -275,3 +277,24 @@ def _two_product(a, b):  # type: ignore[no-untyped-def]
         return product, _fma(a, b, -product)
 
     return exactly
+
+
+@intrinsic
+def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
+    """place + h w_0 terms_0 + h w_1 terms_1 + ... of tuples, in this order and without the terms whose weight is None.
+
+    Written out: a closure for each term takes twice as long to compile, a loop four times as long to run.
+    """
+    used = [j for j, weight in enumerate(weights) if weight is not types.none]
+
+    def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        result, rows, numbers, step = arguments
+        factors = [(j, builder.fmul(step, builder.extract_value(numbers, j))) for j in used]
+        for m in range(len(place)):
+            total = builder.extract_value(result, m)
+            for j, factor in factors:
+                total = builder.fadd(total, builder.fmul(factor, builder.extract_value(rows, [j, m])))
+            result = builder.insert_value(result, total, m)
+        return result
+
+    return place(place, terms, weights, h), emit

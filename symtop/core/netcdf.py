@@ -128,19 +128,26 @@ def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
 @functools.cache
 def variable_attributes(name: str, units: str) -> dict[str, str]:
     """The long name and units of a variable; none of one that symtop does not know."""
-    long_name, *choice = VARIABLES.get(name, ("",))
-    named = {"long_name": long_name} if long_name else {}
-    return named | ({"units": choice[0 if units == "SI" else -1]} if choice else {})
+    return label(VARIABLES[name], units) if name in VARIABLES else {}
+
+
+def label(entry: tuple[str, ...], units: str, elsewhere: str = "") -> dict[str, str]:
+    """Attributes of a variable with such an entry in `VARIABLES`; `elsewhere` ends a name whose units are not SI's."""
+    long_name, *choice = entry
+    if units == "SI" or len(set(choice)) < 2:
+        elsewhere = ""
+    return {"long_name": long_name + elsewhere} | ({"units": choice[0 if units == "SI" else -1]} if choice else {})
 
 
 def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree:
-    """Give the variables their names and units and the dataset, or a tree's root, its provenance and attributes.
+    """Give variables without a long name theirs and units, and a dataset, or a tree's root, provenance and attributes.
 
     `units` is that of the scene: "SI", or empty for a problem without units, where all but angles have the unit "1".
     """
     for group in groups(data).values():
         for name, variable in group.variables.items():  # ``group[name]`` would make a DataArray
-            variable.attrs.update(variable_attributes(str(name), units))
+            if "long_name" not in variable.attrs:
+                variable.attrs.update(variable_attributes(str(name), units))
     data.attrs.update(attributes_of(title, **attributes))
     return data
 

@@ -38,6 +38,14 @@ QUANTITIES: dict[str, str] = {
     "p_phi": "relative error of p_phi",
     "p_psi": "relative error of p_psi",
 }
+ERRORS = {  # what each is of and against what, and its units
+    "axis": ("angle between the axis and the true axis", "rad"),
+    "attitude": ("angle of the rotation between the attitude and the true attitude", "rad"),
+    "theta": ("error of theta against the true motion", "rad"),
+    "energy": ("error of the energy against that of the start, relative to E0 - min V", "1"),
+    "p_phi": ("error of p_phi against that of the start, relative to the larger momentum", "1"),
+    "p_psi": ("error of p_psi against that of the start, relative to the larger momentum", "1"),
+}
 
 
 def errors(
@@ -81,9 +89,9 @@ def errors(
         warnings.warn(f"on {chosen.name}: {sentence}", SymtopWarning, stacklevel=2)
     shown = dataset(data.time, columns | {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns})
     for name in columns:
-        units = "1" if name in CONSTANTS else "rad"
-        shown.variables[name].attrs.update(long_name=QUANTITIES[name], units=units)
-        shown.variables[f"{name}_bound"].attrs.update(long_name=f"the least {QUANTITIES[name]} to be seen", units=units)
+        words, units = ERRORS[name]
+        shown.variables[name].attrs.update(long_name=words, units=units)
+        shown.variables[f"{name}_bound"].attrs.update(long_name=f"least {words} to be told from none", units=units)
     attributes = {"scene": chosen.name, "precision": truth.attrs["precision"]}
     if isinstance(run, xr.Dataset) and not foreign:
         shown.variables["time"].attrs.update(run["time"].attrs)

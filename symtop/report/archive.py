@@ -34,6 +34,7 @@ import xarray as xr
 
 from symtop import __version__
 from symtop.core import netcdf
+from symtop.measure import columns
 from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import Scene, scenes
 from symtop.report import page
@@ -213,7 +214,7 @@ def states(chosen: Sequence[Scene]) -> xr.Dataset:
         "component": ["x", "y", "z"],
         "part": ["w", "x", "y", "z"],
     }
-    data = netcdf.describe(xr.Dataset(variables, coordinates), TITLE)
+    data = netcdf.describe(columns.described(xr.Dataset(variables, coordinates)), TITLE)
     for name in (*ANGLES, "axis", "quaternion"):
         data[f"{name}_lo"].attrs.update(long_name=f"what {name} lacks, to be added", units=data[name].attrs["units"])
     for name in ANGLES:

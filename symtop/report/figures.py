@@ -1,6 +1,7 @@
 """What drawings of studies share: names at the ends of lines, the grey band of the reference's bound, the front."""
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -81,3 +82,45 @@ def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]], size: flo
             arrowprops={"arrowstyle": "-", "color": color, "lw": 0.5, "shrinkA": 0, "shrinkB": 1, "relpos": (0.0, 0.5)},
             annotation_clip=False,
         )  # fmt: skip
+
+
+def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], size: float = LEAST_TEXT) -> None:
+    """Write the name of each line beside one of its ends or its middle, in its colour, where it covers no
+    other name and few points.
+
+    `lines` have name, colour, x and y. Limits and layout of the panel must be final.
+    """
+    if not lines:
+        return
+    figure = axis.figure.canvas.figure
+    figure.draw_without_rendering()
+    renderer, frame = figure.canvas.get_renderer(), axis.get_window_extent()
+    marks = np.concatenate([axis.transData.transform(_dense(x, y)) for _, _, x, y in lines])
+    taken: list[Any] = []
+    for name, color, x, y in sorted(lines, key=lambda one: -len(one[0])):
+        look = {"textcoords": "offset points", "va": "center", "fontsize": size, "color": ink(color), "weight": "bold"}
+        tried: list[Any] = []
+        for end, (dx, dy, side) in product((len(x) - 1, 0, len(x) // 2), PLACES):
+            text = axis.annotate(name, (x[end], y[end]), (dx, dy), ha=side, **look)
+            box = text.get_window_extent(renderer)
+            out = box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0 or box.y1 > frame.y1
+            covered = np.all((marks > box.min) & (marks < box.max), axis=1).sum()
+            price = 1e3 * (sum(box.overlaps(other) for other in taken) + out) + covered + 0.5 * (end != len(x) - 1)
+            tried.append((price, len(tried), text, box))
+        best = min(tried)
+        for _, _, text, _ in tried:
+            if text is not best[2]:
+                text.remove()
+        taken.append(best[3])
+
+
+PLACES = tuple(
+    (dx, dy, side) for dx, side in ((5, "left"), (-5, "right")) for dy in (0, -5, 5, -9, 9, -14, 14)
+)  # points
+
+
+def _dense(x: Any, y: Any) -> Any:
+    """Points along a line, close together on logarithmic axes."""
+    steps = np.linspace(0.0, len(x) - 1.0, 12 * len(x))
+    each = [np.exp(np.interp(steps, np.arange(len(x)), np.log(part))) for part in (x, y)]
+    return np.stack(each, axis=1)

@@ -49,6 +49,7 @@ class Writer:
         self, images: Mapping[str, Mapping[str, Any]], markers: Callable[[str, str], str], *taken: str
     ) -> None:
         self.images, self.markers, self.anchor = images, markers, Anchors(*taken)
+        self._seen = False  # is there a figure above? The first one is loaded at once
         self._parser = MarkdownIt("commonmark", {"html": False}).enable("table")
 
     def __call__(self, text: str) -> str:
@@ -100,11 +101,13 @@ class Writer:
         address, alt = str(image.attrs["src"]), html.escape(image.content)
         shown = self.images.get(address, {})
         size = f' width="{shown["width"]}" height="{shown["height"]}"' if shown else ""
+        lazy = "" if not self._seen else ' loading="lazy" decoding="async"'
+        self._seen = True
         film = ' class="film"' if address.endswith(".gif") else ""
         name = self.anchor(Path(address).stem)
         return (
             f'<figure id="{name}"><div class="scroll" tabindex="0" role="region" aria-label="Figure {name}"><img{film} '
-            f'src="{shown.get("source", address)}"{size} loading="lazy" decoding="async" alt="{alt}"></div>'
+            f'src="{shown.get("source", address)}"{size}{lazy} alt="{alt}"></div>'
             "<figcaption></figcaption></figure>"
         )
 

@@ -37,7 +37,7 @@ QUICK = "This is a quick pass on coarse grids, for checking that every study wor
 def prepared(chart: Mapping[str, Any]) -> str:
     """JSON of a chart of the findings, safe inside a script element, without points that a log axis cannot show."""
     panels = {title: [_series(name, points) for name, points in series] for title, series in chart["panels"].items()}
-    content = {"title": chart["title"], "x": chart["x"], "y": chart["y"], "panels": panels}
+    content = {key: chart[key] for key in ("title", "x", "y", "choices", "marks") if key in chart} | {"panels": panels}
     return json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
 
 
@@ -49,8 +49,12 @@ def _series(name: str, points: Sequence[tuple[float | None, float | None, str]])
         "color": style.color,
         "marker": style.marker,
         "dashed": method is not None and method.implementation == "python",
-        "points": [list(point) for point in points if all(x is not None and 0.0 < x < math.inf for x in point[:2])],
+        "points": [list(point) for point in points if len(point) > 3 or all(map(_drawn, point[:2]))],
     }
+
+
+def _drawn(value: float | None) -> bool:
+    return value is not None and 0.0 < value < math.inf
 
 
 def gather(results: Path) -> list[dict[str, Any]]:

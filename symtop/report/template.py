@@ -22,6 +22,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from symtop.core.errors import SymtopError
+from symtop.methods.framework.registry import integrators
 from symtop.report import formats
 from symtop.report.tables import table
 
@@ -51,7 +52,7 @@ def filled(findings: Findings, results: Path, *, pages: Mapping[str, str] | None
 def front(template: str, studies: Sequence[Findings], results: Path, pages: Mapping[str, str]) -> str:
     """A page on all studies: `fact("STUDY.NAME")` is a fact or None, figures and tables are named ``STUDY-NAME``."""
     facts = {f"{study['study']}.{name}": value for study in studies for name, value in study["facts"].items()}
-    given = {"pages": Links(pages), "fact": facts.get, "listed": list(pages.values())}
+    given = {"pages": Links(pages), "fact": facts.get, "listed": list(pages.values()), "methods": len(integrators())}
     return rendered(template, "front page", given | _names(studies, results, whole=True)).strip() + "\n"
 
 

@@ -21,7 +21,8 @@ def findings_of(
     charts = each(study.name, "charts", lambda: study.charts(data), Chart, "a list of Chart")
     found: dict[str, Any] = {
         "study": study.name, "title": study.title, "question": study.question,
-        "charts": [chart._asdict() for chart in charts], "failures": failures, "cases": cases, "quick": quick,
+        "charts": [chart._asdict() | {"marks": dict(chart.marks)} for chart in charts],
+        "failures": failures, "cases": cases, "quick": quick,
         "provenance": netcdf.provenance(changes=True),
     }  # fmt: skip
     if study.how_to_read:

@@ -65,12 +65,12 @@ def digests(study: Study, cases: Iterable[Case]) -> list[str]:
     return [code_hash.digest(reasons(study, case)) for case in cases]
 
 
-def drawing_digest(study: Study, page: Path | None, *drawing: Any) -> str:
-    """Hash of what makes a study's facts, figures and tables, and of the template of its page."""
+def drawing_digest(study: Study, beside: Iterable[Path | None], *drawing: Any) -> str:
+    """Hash of what makes a study's facts, figures and tables, and of the files beside it that they fill."""
     shown = (
         study.facts, study.pictures, study.tables, study.charts, study.verdict, study.opening,
         study.title, study.question, study.how_to_read,
     )  # fmt: skip
     code = _code().reasons("drawing", shown, drawing)
-    template = {} if page is None else {f"file {page.name}": code_hash.hashed(page.read_text(encoding="utf-8"))}
-    return code_hash.digest(code | template | code_hash.packages("matplotlib"))
+    texts = {f"file {file.name}": code_hash.hashed(file.read_text(encoding="utf-8")) for file in beside if file}
+    return code_hash.digest(code | texts | code_hash.packages("matplotlib"))

@@ -18,6 +18,7 @@ from symtop.core import files, netcdf
 from symtop.core.code_hash import hashed
 from symtop.core.errors import positive
 from symtop.core.progress import beating, progress_bar
+from symtop.measure import columns
 from symtop.measure.datasets import combine
 from symtop.model.scenes import scenes
 from symtop.run import plugins
@@ -25,7 +26,7 @@ from symtop.runner import fingerprint, manifest, store
 from symtop.runner.cases import StudyCases
 from symtop.runner.findings import findings_of
 from symtop.runner.pool import Pool, prepare
-from symtop.runner.scripts import file_of, folder, load, names, page_of
+from symtop.runner.scripts import columns_of, file_of, folder, load, names, page_of
 from symtop.runner.study import Case, Save, Study
 
 __all__ = ["findings_of", "folder", "load", "names", "page_of", "run", "start"]
@@ -116,7 +117,8 @@ def analyse_stored(
 
 def drawing_digest(study: Study, save: Save | None) -> str:
     """Hash of what combines, draws and judges."""
-    return fingerprint.drawing_digest(study, page_of(study.name), combine, findings_of, save)
+    beside = page_of(study.name), columns_of(study.name)
+    return fingerprint.drawing_digest(study, beside, combine, columns.described, findings_of, save)
 
 
 def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> Findings:
@@ -129,6 +131,7 @@ def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> 
         combined = cases.combined()
         places = [catalogue.get(case.scene) for case in cases.cases.values()]
         units = "SI" if all(place is not None and place.units == "SI" for place in places) else ""
+        combined = columns.described(combined, units, columns.read(columns_of(study.name)))
         combined = netcdf.describe(combined, study.title, units=units, question=study.question)
         netcdf.write(combined, dataset)
         store.forget(results, study, cases.cases)

@@ -60,9 +60,17 @@ def file_of(name: str) -> Path:
 
 def page_of(name: str) -> Path | None:
     """The template of a study's page: page.md beside study.py, NAME.md beside any other script; None without one."""
-    file = file_of(name)
-    page = file.with_name("page.md") if file.stem == "study" else file.with_suffix(".md")
-    return page if page.is_file() else None
+    return _beside(file_of(name), "page.md")
+
+
+def columns_of(name: str) -> Path | None:
+    """The table of a study's columns, columns.tsv or NAME.tsv, likewise."""
+    return _beside(file_of(name), "columns.tsv")
+
+
+def _beside(script: Path, name: str) -> Path | None:
+    file = script.with_name(name) if script.stem == "study" else script.with_suffix(Path(name).suffix)
+    return file if file.is_file() else None
 
 
 def _module(file: Path) -> ModuleType:

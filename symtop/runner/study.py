@@ -63,23 +63,28 @@ class Picture(NamedTuple):
 
 
 class Series(NamedTuple):
-    """One line of a chart: an integrator's points (x, y, words shown at the pointer)."""
+    """One line of a chart: an integrator's points (x, y or more numbers, words shown at the pointer)."""
 
     integrator: str
-    points: Sequence[tuple[float, float, str]]
+    points: Sequence[tuple[Any, ...]]
 
 
 class Chart(NamedTuple):
     """A log-log chart the reader can point at and filter; the page draws it, beside the figure it repeats.
 
-    ``panels`` holds the series of each choice (a scene, a quantity), the first one shown at first.
+    ``panels`` holds the series of each choice (a scene, a quantity), the first one shown at first; `choices` says what
+    each part between ``" | "`` of their names chooses. `x` and `y` name the axes, or each is a choice of columns: of
+    places in a point, by their names. `marks` are, by panel, the x of a vertical line, the exact motion without an
+    integrator, and the y below which the truth cannot judge, both for the first columns.
     """
 
     name: str
     title: str
-    x: str
-    y: str
+    x: str | Mapping[str, int]
+    y: str | Mapping[str, int]
     panels: Mapping[str, Sequence[Series]]
+    choices: Sequence[str] = ("Show",)
+    marks: Mapping[str, tuple[float, float]] = MappingProxyType({})
 
 
 class Table(NamedTuple):

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+import symtop
 from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError
@@ -34,6 +35,13 @@ def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):
     assert done.exit_code == 3, done.output
     assert "theta left (0, pi)" in done.output
     assert netcdf.read(path).attrs["outcome"] == "left_chart"
+
+
+def test_recommend_tries_only_methods_that_need_no_more_than_there_is():
+    line = ("recommend", "spheroid", "--accuracy", "1e-4", "--horizon", 2, "--json", "--needs")
+    advice = json.loads(call(*line, "kicks, group").stdout)
+    assert symtop.integrator(advice["integrator"]).needs in ("kicks", "group")
+    assert call(*line, "solution").exit_code == 1  # the closed form has no step that could be recommended
 
 
 def test_the_table_for_the_documents_is_markdown():
@@ -81,6 +89,7 @@ def test_the_table_for_the_documents_is_markdown():
         ("recommend spheroid --accuracy 1e-3 --i-use mujoco", ["--accuracy", "--i-use", "not both"]),
         ("recommend spheroid --accuracy 1e-3 --step-size 1", ["--step-size", "--i-use"]),
         ("recommend spheroid --accuracy 5", ["--accuracy", "below pi", "5.0"]),
+        ("recommend spheroid --accuracy 1 --needs kicks,luck", ["--needs 'luck'", "derivative", "kicks", "this-top"]),
         ("study convergense", ["'convergense'", "convergence"]),
         ("study", ["name a study", "--all", "convergence"]),
         ("study convergence --all", ["--all", "not both"]),

@@ -19,6 +19,7 @@ GOOD = {
     "integrators": ["strang"],
     "judge": ["own.py:step", "--order", "4", "--quick"],
     "long": ["spheroid", "strang", "--steps", "10", "--step-size", "0.01"],
+    "compare": ["spheroid", "strang", "--nutations", "1", "--cost", "evaluations", "--budget", "1e3"],
     "recommend": ["spheroid", "--accuracy", "1e-3", "--horizon", "1"],
     "report": [],
     "run": ["spheroid", "strang", "--step-size", "0.02", "--horizon", "0.2", "--samples", "2"],
@@ -48,7 +49,7 @@ BAD = {
     "--per-nutation": NUMBERS, "--nutations": NUMBERS, "--budget": NUMBERS, "--steps": [*NUMBERS, "1e300"],
     "--accuracy": [*NUMBERS, "1e300"], "--limit": NUMBERS,
     "--scene": NAMES, "--kind": NAMES, "--observe": NAMES, "--quantity": NAMES, "--i-use": NAMES, "--chart": NAMES,
-    "--variables": NAMES, "--form": NAMES, "--energy": NAMES, "--only": NAMES, "--conserves": NAMES,
+    "--variables": NAMES, "--form": NAMES, "--cost": NAMES, "--energy": NAMES, "--only": NAMES, "--conserves": NAMES,
     "--output": WRITTEN, "--figure": WRITTEN, "--card": WRITTEN, "--badge": WRITTEN, "--checkpoint": WRITTEN,
     "--results": FOLDERS, "--plugin": PLUGINS, "--scheduler": ADDRESSES,
 }  # fmt: skip

@@ -88,6 +88,14 @@ MORE = {
         {"scenes": "spheroid", "integrators": "strang", "step_size": [0.05], "horizon": 0.2, "quiet": True},
         {"scenes": UNKNOWN, "integrators": UNKNOWN, "step_size": ["x", [0.0], [-1.0], [math.nan], object()]},
     ),
+    "compare": (
+        symtop.compare,
+        {"scene": "spheroid", "methods": "strang", "nutations": 1.0, "cost": "evaluations", "budget": 1e3},
+        {
+            "scene": UNKNOWN, "methods": UNKNOWN, "quantity": UNKNOWN, "cost": UNKNOWN, "budget": NOT_POSITIVE[1:],
+            "nutations": NOT_POSITIVE[1:],
+        },
+    ),
     "long_run": (
         symtop.long_run,
         {"scene": "spheroid", "integrator": "strang", "steps": 10, "step_size": 0.01, "checkpoint": False},
@@ -117,7 +125,7 @@ BAD = [
     for name, (function, good, bad) in {**CALLS, **MORE}.items()
     for argument, values in bad.items()
 ]
-COST = {"judge", "recommend"}  # seconds for every value that is taken: their bad ones only
+COST = {"judge", "recommend", "compare"}  # seconds for every value that is taken: their bad ones only
 WHATEVER = [
     pytest.param(function, good, argument, ANY, id=f"{name} {argument} any")
     for name, (function, good, bad) in {**CALLS, **MORE}.items()

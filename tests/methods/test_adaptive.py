@@ -17,7 +17,11 @@ SOLVERS = {
     row.name: row.solvers[row.charts()[0]] for row in variants() if isinstance(row.solvers[row.charts()[0]], Adaptive)
 }
 COUNTS = 7
-BUDGET = 900.0
+BUDGET = 400.0  # evaluations: Adams methods end the longest run after 808, others the shortest one after 162
+LARGEST = {  # evaluations of a step with its samples; of all others 48, three tries of vern9
+    "series-adaptive": 20.0 * (1 + COUNTS),  # a series a sample
+    "extrapolation": 2.0 * (1 + 10**2),  # ten lines have so many; tried twice
+}
 
 
 def members(count=60):
@@ -29,8 +33,11 @@ def members(count=60):
 
 
 def test_the_adaptive_solvers_are_own_ones():
-    assert {name.split("[")[0] for name in SOLVERS} == {"rk45-compiled", "series-adaptive"}
-    assert len(SOLVERS) == 5
+    assert {name.split("[")[0] for name in SOLVERS} == {
+        "rk45-compiled", "tsit5", "dop853-compiled", "vern9", "extrapolation", "adams", "dprkn8", "series-adaptive",
+        "series-general-adaptive",
+    }  # fmt: skip
+    assert len(SOLVERS) == 23
 
 
 @pytest.mark.parametrize("budget", [None, BUDGET])
@@ -71,10 +78,7 @@ def test_a_budget_is_passed_by_less_than_a_step(name):
     done, reached = SOLVERS[name].many(numbers, tolerance, times, np.full(20, COUNTS), BUDGET)
     ended = done.outcome == OUTCOMES.index("out_of_budget")
     assert ended.any()
-    most = (
-        20.0 * (1 + COUNTS) if name.startswith("series") else 6.0 * 8
-    )  # a step and the samples in it; some rejections
-    assert (done.work[ended] < BUDGET + most).all()
+    assert (done.work[ended] < BUDGET + LARGEST.get(name.split("[")[0], 48.0)).all()
     assert (reached[ended] < times[ended, -1]).all()
 
 

@@ -13,8 +13,9 @@ from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.framework.registry import integrator
 from symtop.methods.library.scipy_ivp import RightHandSide, compiled_field, scipy_method
-from symtop.methods.runge_kutta import dormand_prince
+from symtop.methods.runge_kutta import pairs
 from symtop.methods.runge_kutta.explicit import LOOPS, Tableau, runge_kutta
+from symtop.methods.runge_kutta.pair_tables import DORMAND_PRINCE
 from symtop.model.scenes import closed_form
 from symtop.model.top import flat
 from symtop.run.simulation import integrate, make_plan
@@ -246,23 +247,23 @@ def test_only_the_angles_have_a_pole():
 # --- Dormand-Prince -------------------------------------------------------------------------------------------------
 
 
-def _walk(scene, tolerance, horizon, pair=dormand_prince.DORMAND_PRINCE, **limits):
+def _walk(scene, tolerance, horizon, pair=pairs.RK45, **limits):
     plan, _ = make_plan(scene, integrator("rk45-compiled"), None, tolerance, horizon=horizon, samples=301)
-    return plan, replace(dormand_prince.solver("angles", pair), **limits)(scene.top, scene.start, plan)
+    return plan, replace(pairs.solver(FORMULATIONS["angles"], pair), **limits)(scene.top, scene.start, plan)
 
 
 def _step_ends(scene, tolerance, horizon, pair):
     """The ends of the accepted steps: with a budget of one evaluation the loop returns after each."""
-    loop, place, seen, ends = dormand_prince.loop("angles", pair), np.empty(14), -1, []
+    loop, place, seen, ends = pairs.loop(FORMULATIONS["angles"], pair), np.empty(6 + 7 * 6 + 2), -1, []
     samples = np.array([horizon]), np.empty((1, 4)), np.empty((1, 2))
     while seen < 1:
         budget = 3 if seen < 0 else 1  # two evaluations choose the first step
         seen, *_ = loop(flat(scene.top, scene.start), tolerance, samples[0], budget, seen, place, *samples[1:])
-        ends.append(place[12])
+        ends.append(place[-2])
     return np.array(ends)
 
 
-def _assert_same_steps(scene, tolerance, horizon, close, pair=dormand_prince.DORMAND_PRINCE):
+def _assert_same_steps(scene, tolerance, horizon, close, pair=pairs.RK45):
     """SciPy's steps, counts and samples."""
     from scipy.integrate import solve_ivp
 
@@ -281,8 +282,8 @@ def _assert_same_steps(scene, tolerance, horizon, close, pair=dormand_prince.DOR
 def test_the_tableau_is_scipys():
     from scipy.integrate import RK45
 
-    pair = dormand_prince.DORMAND_PRINCE
-    np.testing.assert_array_equal(pair.a, RK45.A[1:][np.tril_indices(5)])
+    pair = DORMAND_PRINCE
+    np.testing.assert_array_equal(np.concatenate(pair.a), RK45.A[1:][np.tril_indices(5)])
     np.testing.assert_array_equal(pair.b, RK45.B)
     np.testing.assert_array_equal(pair.error, RK45.E)
     np.testing.assert_array_equal(pair.dense, RK45.P)
@@ -295,8 +296,7 @@ def test_compiled_rk45_takes_scipys_steps():
 
 
 def test_a_wrong_error_estimate_is_caught():
-    pair = dormand_prince.DORMAND_PRINCE
-    wrong = pair._replace(error=(*pair.error[:-1], 1 / 39))
+    wrong = pairs.RK45._replace(table=DORMAND_PRINCE._replace(error=(*DORMAND_PRINCE.error[:-1], 1 / 39)))
     with pytest.raises(AssertionError):
         _assert_same_steps(symtop.scene("spheroid"), 1e-6, 20.0, 1e-9, wrong)
 
@@ -310,9 +310,9 @@ def test_both_rk45_are_one_method():
 
 
 def test_adaptive_outcomes():
-    scene, pair = symtop.scene("spheroid"), dormand_prince.DORMAND_PRINCE
+    scene, pair = symtop.scene("spheroid"), pairs.RK45
     for error in (math.inf, math.nan):
-        hopeless = _walk(scene, 1e-6, 8.0, pair._replace(error=(error,) * 7))[1]
+        hopeless = _walk(scene, 1e-6, 8.0, pair._replace(table=DORMAND_PRINCE._replace(error=(error,) * 7)))[1]
         assert (hopeless.outcome, hopeless.steps) == ("step_too_small", 0)
     assert _walk(POLE, 1e-2, 5.0)[1].outcome == "left_chart"
     plan, run = _walk(scene, 1e-9, 8.0, block=500, most=1000)

@@ -15,6 +15,7 @@ from symtop.measure import datasets
 from symtop.report import archive, style
 from symtop.runner import run as runner
 from symtop.runner.study import Case, Picture, Study
+from tests.core.test_conventions import lacking
 
 
 def draw(data):
@@ -92,6 +93,7 @@ def test_the_states_can_be_read_from_the_bundle(bundled, tmp_path):
     states = netcdf.read(tmp_path / "states.nc")
     assert list(states["scene"].values) == list(symtop.scenes())
     assert states["quaternion_lo"].dims == ("scene", "sample", "part")
+    assert lacking(states) == []
 
 
 def test_the_same_results_make_the_same_bundle(results, bundled, tmp_path):

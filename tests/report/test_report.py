@@ -246,10 +246,10 @@ def test_the_filter_and_the_choice_change_what_is_drawn(browser):
     browser.resize(1280, 900)
     count = "document.querySelectorAll('.chart .mark').length"
     everything = browser.evaluate(count)
-    browser.click(".chart input[value='runge-kutta']")
+    browser.click(".chart input[value='rk4']")
     without = browser.evaluate(count)
     assert 0 < without < everything
-    browser.click(".chart input[value='runge-kutta']")
+    browser.click(".chart input[value='rk4']")
     assert browser.evaluate(count) == everything
     before = browser.evaluate("document.querySelector('.chart svg').innerHTML")
     browser.set(".chart select", "energy")

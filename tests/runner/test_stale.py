@@ -79,7 +79,7 @@ METHODS = "symtop.methods"
         (f"{METHODS}.lagrangian.galerkin:increment", {"galerkin-simpson"}),
         (f"{METHODS}.lagrangian.discrete_lagrangian:increment", STRAIGHT),
         (f"{METHODS}.library.scipy_ivp:compiled_field", SCIPY),
-        (f"{METHODS}.runge_kutta.explicit:weighted", {"rk4", "rk45-compiled"}),
+        (f"{METHODS}.runge_kutta.explicit:weighted", {"rk4", "rk45-compiled", "tsit5", "dop853-compiled", "vern9"}),
         (f"{METHODS}.splitting.reversible:march", {"stormer-verlet-reversible"}),
         (f"{METHODS}.lie_group.generalised_alpha:turn", {"generalised-alpha"}),
         (f"{METHODS}.taylor.heyoka:propagate", {"taylor", "taylor-longdouble", "taylor-quad"}),
@@ -119,7 +119,7 @@ def test_measure_code_and_the_reference_make_the_cases_of_their_study_stale():
     [
         ("symtop_studies.work_precision.leads:winners", True), ("symtop_studies.work_precision.words:sentences", True),
         ("symtop.measure.datasets:_dense", True), ("symtop.cli.common:as_text", False),
-        ("symtop_studies.drift.words:verdict", False),
+        ("symtop_studies.drift.facts:facts", False),
     ],
 )  # fmt: skip
 def test_findings_are_made_again_when_what_draws_or_judges_them_is_edited(place, again):
@@ -271,7 +271,7 @@ def test_an_edit_of_each_family_is_named_by_status_and_is_all_that_is_computed(t
     edits = [
         (package / "methods/runge_kutta/gauss.py", "\n", "\n# a comment\n", None, set()),
         (tmp_path / "coeffs.py", "(0.0, 1.0)", "(0.5, 0.5)", "integrator bad-of-a-user", {"bad-of-a-user"}),
-        (package / "methods/runge_kutta/dormand_prince.py", "\n", "\n", None, set()),
+        (package / "methods/runge_kutta/pairs.py", "\n", "\n", None, set()),
         (tmp_path / "probe.py", "samples=51", "samples=53", "code probe.py", "all"),
     ]
     for file, before, after, why, stale in edits:

@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.notebook import solid, words as notebook_words
+from symtop_studies.notebook import facts
 from symtop_studies.notebook.derivations import easy_way, energies, hard_way, notebook_top, nutation_cubic, with_alpha
 from symtop_studies.notebook.long_energy import better_from
-from symtop_studies.notebook.tables import (
+from symtop_studies.notebook.measures import (
     SOLVER,
     SOLVER_TOLERANCE,
     Column,
@@ -18,16 +18,18 @@ from symtop_studies.notebook.tables import (
     modified_energy_table,
     residual_history,
 )
-from symtop_studies.notebook.words import long_table
+from symtop_studies.notebook.study import STUDY, cases, measure
 
 import symtop
 from symtop.core.errors import SymtopError
+from symtop.measure import datasets
 from symtop.measure.order import power_law
 from symtop.methods.framework.angles import accelerations, momenta
 from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian.discrete_lagrangian import RULES
-from symtop.model import charts
 from symtop.run.modified_energy import modified_energy
+from symtop.runner.study import Case
+from tests.templates import checked
 
 FIRST = symtop.scene("spheroid").top
 NUMBERS = (FIRST.I1, FIRST.I3, FIRST.mgl)
@@ -219,12 +221,38 @@ def test_discrete_methods_keep_the_momenta_and_27_or_more_are_in_the_study():
         assert max(float(run[f"{p}_largest"]) for p in ("p_phi", "p_psi")) < 1e-13
 
 
-def test_body_axes_are_those_of_the_charts():
-    q = charts.quaternion_from_angles(*np.random.default_rng(1).uniform(0.2, 2.8, (3, 5)))
-    frames = solid.columns_of(q)
-    assert np.max(np.abs(frames[:, 2] - charts.axis_from_quaternion(q))) < 1e-15
-    assert np.max(np.abs(frames[:, 0] - solid.transverse_from_quaternion(q))) < 1e-15
-    assert np.max(np.abs(np.cross(frames[:, 0], frames[:, 1]) - frames[:, 2])) < 1e-15
+@pytest.fixture(scope="module")
+def data():
+    """The quick grid, with shorter long runs."""
+    asked = [Case(case.scene, case.integrator, case.settings | {"long": 100.0, "film": 2}) for case in cases(True)]
+    return datasets.combine([(case, measure(case)) for case in asked])
+
+
+def test_the_page_says_what_the_notebook_and_the_discrete_methods_keep(data, tmp_path):
+    found = facts.facts(data)
+    text = checked("notebook", data, tmp_path)
+    assert "mgl = 26.8658" in text
+    assert (found["compared"], found["discrete"], found["momenta_kept"]) == (5, 5, 5)
+    assert found["momenta"] < 1e-14
+    assert found["solver_momenta"] > 1e-7  # the control
+    assert max(found["ways"], found["energies"]) < 1e-10
+    assert found["followed"] > 1e-6
+    assert (found["first_turned"], found["second_turned"]) == pytest.approx((90.0, 90.0), abs=0.1)
+    assert (found["alpha_at_rest"], found["alpha_rate"]) == pytest.approx((1.4981443962885, 0.31914824723237937))
+    assert (found["power_least"], found["modified_most"]) == pytest.approx((2.0, 4.0), abs=0.06)
+    assert found["first_behind"] == 5
+    assert (found["second_behind"], found["second_ahead"]) == (2, 3)  # the other two get ahead after 100 s
+    assert found["second_last"] < found["second_end"] < found["long"]
+
+
+@pytest.mark.parametrize("name", ["midpoint[angles]", "strang[axis]", SOLVER])
+def test_one_method_alone_has_the_facts_and_figures_that_are_its_own(data, name, tmp_path):
+    alone = data.sel(variant=[name])
+    found = facts.facts(alone)
+    assert found.keys() == facts.facts(data).keys()
+    assert (found["momenta"] is None) is (found["ways"] is not None) is (name == SOLVER)
+    assert [one.name for one in STUDY.pictures(alone)] == ["energy", "modified-energy"][: 1 + (name[0] == "m")]
+    assert len(facts.tables(alone)["kept"]) == 2
 
 
 def long_runs(level, slope):
@@ -242,8 +270,6 @@ def long_runs(level, slope):
 def test_the_notebooks_question_is_answered_and_the_time_from_which_its_hope_is_true_is_measured():
     late = long_runs(3e-5, 1e-7)
     assert better_from(late, "spheroid", "midpoint[angles]") == pytest.approx(300.0, rel=0.03)
-    table = long_table(late, ["midpoint[angles]"])
-    assert list(table.rows[-1]) == ["spheroid", "midpoint[angles]", "8", "3e-05", "3e-05", "302"]
     never, always = long_runs(3e-5, 1e-9), long_runs(1e-9, 1e-7)
     assert better_from(never, "spheroid", "midpoint[angles]") == math.inf
     assert better_from(always, "spheroid", "midpoint[angles]") == 0.0
@@ -257,4 +283,4 @@ def test_the_notebooks_path_is_turned_by_a_quarter_about_the_vertical():
         {name: (("scene", "variant", "path"), values[None, None]) for name, values in angles.items()},
         coords={"scene": ["spheroid"], "variant": [SOLVER]},
     )
-    assert notebook_words.turned(data, "spheroid") == pytest.approx(90.0)
+    assert facts.turned(data, "spheroid") == pytest.approx(90.0)

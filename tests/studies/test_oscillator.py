@@ -6,7 +6,9 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from symtop_studies.oscillators import facts, figures, study
 from symtop_studies.oscillators.damped_top import Friction, damped_run, damped_truth
+from symtop_studies.oscillators.measures import Column, convergence, damped_top_table, decay, notebook_history
 from symtop_studies.oscillators.oscillator import (
     ONE_SIDED,
     Oscillator,
@@ -15,10 +17,13 @@ from symtop_studies.oscillators.oscillator import (
     notebook_positions,
     rule_sums,
 )
-from symtop_studies.oscillators.tables import Column, convergence, damped_top_table, decay, notebook_history
+from symtop_studies.oscillators.quartic_measures import QUARTICS
 
 import symtop
+from symtop.measure import datasets
 from symtop.measure.order import power_law
+from symtop.runner.study import Case
+from tests.templates import checked
 
 
 def step_matrix(oscillator, rule, h):
@@ -179,3 +184,35 @@ def test_the_power_of_the_friction_is_what_the_energy_loses():
     assert np.subtract(*(scene.top.energy(symtop.Angles(*truth[:, k])) for k in (0, -1))) == pytest.approx(
         spent, rel=1e-4
     )
+
+
+@pytest.fixture(scope="module")
+def data():
+    """The quick grid with fewer steps."""
+    fewer = {"steps": [10.0 ** (-k / 2.0) for k in range(2, 6)], "counts": [4000, 8000, 16000], "long_step": 0.25}
+    asked = [Case(case.scene, case.integrator, case.settings | fewer) if case.scene not in QUARTICS else case
+             for case in study.cases(True)]  # fmt: skip
+    return datasets.combine([(case, study.measure(case)) for case in asked])
+
+
+def test_the_page_says_what_friction_does_and_what_is_exact(data, tmp_path):
+    checked("oscillators", data, tmp_path)
+    found = facts.facts(data)
+    assert None not in found.values()
+    assert (found["order_least"], found["order_most"]) == pytest.approx((2.0, 2.0), abs=0.05)
+    assert found["one_sided_least"] == pytest.approx(1.0, abs=0.1)
+    assert (found["rate_midpoint"], found["rate_trapezoidal"]) == pytest.approx((2.0, 1.0), abs=0.1)
+    assert found["rate_force_at_one_end"] == pytest.approx(0.5, abs=0.1)
+    assert found["balance"] < 1e-11
+    assert found["balance_rk45"] > 1e-8
+    assert found["undamped_midpoint"] < 1e-11
+    assert found["damped_midpoint"] > 1e-3
+    assert max(found["exact"], found["update_gap"]) < 1e-11
+    assert (found["top_order_least"], found["map_order_least"]) == pytest.approx((2.0, 2.0), abs=0.05)
+
+
+@pytest.mark.parametrize(("name", "drawn"), [("midpoint", 3), ("rk45", 1), ("exact-discrete", 1)])
+def test_one_method_alone_has_the_facts_and_figures_that_are_its_own(data, name, drawn):
+    found = facts.facts(data.sel(variant=[name]))
+    assert found.keys() == facts.facts(data).keys()
+    assert len(figures.pictures(data.sel(variant=[name]))) == drawn

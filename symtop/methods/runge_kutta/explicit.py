@@ -128,7 +128,7 @@ def store(slopes: Any, i: int, slope: Any) -> None:
 
 
 @register_jitable
-def _row(slopes: Any, i: int, like: Any) -> Any:
+def row_of(slopes: Any, i: int, like: Any) -> Any:
     """Row i as a tuple as long as `like`."""
     for m in range(len(like)):
         like = set_item(like, m, slopes[i, m])
@@ -159,7 +159,7 @@ def later_stages(field: Any, par: Any, a: Any, stages: int, state: Any, slopes: 
     for i in range(1, stages):
         place = state
         for j in range(i):
-            place = add(place, _row(slopes, j, place), h * a[row + j])
+            place = add(place, row_of(slopes, j, place), h * a[row + j])
         row += i
         store(slopes, i, field(par, place))
 
@@ -171,7 +171,7 @@ def weighted(weights: Any, state: Any, slopes: Any, h: float) -> Any:
     for m in range(len(state)):
         step = set_item(step, m, 0.0)
     for i in range(len(weights)):
-        step = add(step, _row(slopes, i, step), h * weights[i])
+        step = add(step, row_of(slopes, i, step), h * weights[i])
     return step
 
 
@@ -254,7 +254,7 @@ def runge_kutta(
             for chart, form in FORMULATIONS.items()
         },
         order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
-        reference=reference,
+        reference=reference, needs="derivative", general=True,
     )  # fmt: skip
 
 

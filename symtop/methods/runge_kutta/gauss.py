@@ -560,6 +560,8 @@ def gauss(stages: int) -> Integrator:
         symmetric=True,
         conserves=frozenset({"energy", "p_phi", "p_psi", "axis_length"}),
         reference="butcher-1964 hairer-mclachlan-razakarivony-2008",
+        needs="derivative",
+        general=True,
     )
 
 

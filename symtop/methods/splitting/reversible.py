@@ -115,5 +115,6 @@ def built_in() -> list[Integrator]:
         name="stormer-verlet-reversible", family="splitting", order=2, explicit=True, symplectic=False,
         symmetric=True, conserves=frozenset({"p_phi", "p_psi"}), energy_error="bounded",
         summary="Stormer-Verlet with reversible steps that shrink towards a pole, eps sin(theta)",
-        solvers={"angles": Reversible()}, reference="hairer-soderlind-2005 huang-leimkuhler-1997",
+        needs="kicks", general=False, solvers={"angles": Reversible()},
+        reference="hairer-soderlind-2005 huang-leimkuhler-1997",
     )]  # fmt: skip

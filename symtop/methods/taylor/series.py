@@ -422,7 +422,7 @@ def series(name: str, order: int = DEFAULT_ORDER) -> Integrator:
             "attitude": FixedStep(march_attitude(order), rule, space.on_attitude, order, implicit=False),
         },
         order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi"}),
-        reference="biscani-izzo-2021",
+        reference="biscani-izzo-2021", needs="this-top", general=False, inner_loop="vector registers",
     )  # fmt: skip
 
 
@@ -434,6 +434,6 @@ def built_in() -> list[Integrator]:
         solvers={chart: solver(chart) for chart in CHARTS},
         control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi"}),
         least_tolerance=EPSILON / 1000.0, default_tolerance=EPSILON / 10.0,
-        reference="biscani-izzo-2021",
+        reference="biscani-izzo-2021", needs="this-top", general=False, inner_loop="vector registers",
     )  # fmt: skip
     return [series("series"), adaptive]

@@ -99,20 +99,3 @@ def quartic_order(data: xr.Dataset, name: str, method: str, column: str = ERROR)
     cell = data.sel(scene=name, variant=method)
     steps, errors = cell[STEP].values, cell[column].values
     return power_law(steps, errors, (steps < ASYMPTOTIC) & (errors > ROUNDING))
-
-
-def distances(data: xr.Dataset, name: str, method: str) -> Array:
-    """Distances of the points of a discrete orbit from the true curve, a polygon, at the larger of the steps shown."""
-    true, cell = data.sel(scene=name, variant="exact-discrete"), data.sel(scene=name, variant=method)
-    curve = true[CURVE_HERE].values[-1] + 1j * true[CURVE_AHEAD].values[-1]
-    begins, sides = curve[:-1], np.diff(curve)
-    squares = cell[ORBIT].values[-1]
-    away = (squares[:-1] + 1j * squares[1:])[:, None] - begins[None, :]
-    along = np.clip(np.real(away * sides.conj()) / np.maximum(np.abs(sides) ** 2, 1e-300), 0.0, 1.0)
-    nearest: Array = np.min(np.abs(away - along * sides), axis=1)
-    return nearest
-
-
-def off_curve(data: xr.Dataset, name: str, method: str) -> float:
-    """The largest of the distances, NaN if a point is lost."""
-    return float(np.max(distances(data, name, method)))

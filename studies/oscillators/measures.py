@@ -48,11 +48,6 @@ class Column:
     P_PHI, P_PSI, BALANCE_PHI, BALANCE_PSI = "p_phi", "p_psi", "balance_phi", "balance_psi"
 
 
-def tops(data: xr.Dataset) -> list[str]:
-    """Names of the damped tops in a dataset."""
-    return [name for name in TOPS if name in data["scene"]]
-
-
 def order(data: xr.Dataset, scene: str, method: str, error: str) -> Fit:
     """Slope of an error against the step, over the steps that are small enough and the errors above rounding."""
     step = Column.TOP_STEP if error == Column.THETA_ERROR else Column.STEP
