@@ -46,7 +46,7 @@ from symtop.model.top import Angles, SymmetricTop, effective_force
 Field = Callable[[float, Array], Array]
 ANY = 1e300  # a tolerance that every step meets; infinity times a component of zero would be no number
 LOOSE = 1e8  # one that every step meets, and beside which an update of Newton's iteration can be seen
-SOLVED, MOST_NEWTON, NEWTON = 1e-13, 50, "NEWTON_MAXITER"  # of a stage, absolute; rounds, and what modules call them
+SOLVED, MOST_NEWTON, NEWTON = 1e-14, 50, "NEWTON_MAXITER"  # of a stage, absolute; rounds, and what modules call them
 SAME = 1e-9  # of a step: one that is this near to h has its length
 
 
@@ -140,7 +140,7 @@ class ScipySolver(PythonStep):
             options = {"max_step": size, "first_step": size}
             made: Any = self.function(f, t, y, end, **options, rtol=ANY, atol=ANY)
             if hasattr(made, "newton_tol") or hasattr(made, "kappa"):
-                made = self.function(f, t, y, end, **options, rtol=LOOSE, atol=LOOSE * max(1.0, np.abs(y).max()))
+                made = self.function(f, t, y, end, **options, rtol=LOOSE, atol=LOOSE)
                 for name in ("newton_tol", "kappa", "tiny_err"):
                     setattr(made, name, SOLVED / LOOSE)
 
