@@ -93,14 +93,11 @@ def measure(subject: Subject) -> list[Finding]:
         if table.order < min(power, len(table.defect)):
             words, verdict = words + _visible_from(table, power, subject.scene), "refuted"
         finding = finding._replace(verdict=verdict, why=f"{words}; {finding.why}")
-    power = method.order or (round(finding.value) if finding.verdict == "measured" else 0)
-    if finding.verdict in ("confirmed", "measured") and power > 0 and finding.measured.kind != "wrong limit":
-        lower = _elsewhere(subject, power)
+    if method.order is not None and finding.verdict == "confirmed":
+        lower = _elsewhere(subject, method.order)
         if lower is not None:
-            verdict = "measured" if method.order is None else "refuted"
-            order, why = lower
-            measured = Measured("order", order, text=f"{order:.1f} elsewhere")
-            finding = finding._replace(verdict=verdict, measured=measured, value=order, resolution=LOWER, why=why)
+            measured = Measured("order", lower[0], text=f"{lower[0]:.1f} elsewhere")
+            finding = Finding("order", finding.declared, measured, "refuted", lower[1], lower[0], LOWER)
     return [finding]
 
 
@@ -116,7 +113,7 @@ def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
     scenes = drawn(subject.scene, DRAWS[subject.quick], subject.seed, same_top=subject.knows_top)
     for k, scene in enumerate(scenes):
         since, scale = (
-            scene.time_scale() * 10.0 ** draw.uniform(0.0, 4.0),
+            scene.time_scale() * 10.0 ** draw.uniform(0.0, 3.0),
             scene.time_scale() * math.sin(scene.start.theta),
         )
         coarsest = scale / draw.uniform(9.0, 18.0)
