@@ -23,7 +23,7 @@ from symtop.runner import store
 from tests.commands import ended, leftovers, symtop
 
 PATIENCE = 2400.0  # seconds for an undisturbed run
-CHOSEN_BY_TIMES = "phase_diagram/spheroid--check-"  # cells that are run in full follow from measured prices
+CHOSEN_BY_TIMES = "cost/natural--check-"  # cells that are run in full follow from measured prices
 
 
 class Survived(NamedTuple):

@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 from symtop.report import template
 from symtop.runner import run as runner
 
-NAMED = re.compile(r"\b(?:figure|table)\(\"([\w-]+)\"")
+NAMED = re.compile(r"\b(?:figure|table)\(\"([\w-]+)\"|\(tables/\w+?-([\w-]+)\.csv\)")
 
 
 def checked(name: str, data: object, folder: Path, elsewhere: Collection[str] = ()) -> str:
@@ -23,7 +23,7 @@ def checked(name: str, data: object, folder: Path, elsewhere: Collection[str] = 
         study, data, folder, lambda figure, _: plt.close(figure), failures=[], cases=1, page=page
     )
     there = {one["name"] for kind in ("pictures", "tables") for one in found[kind]}
-    assert set(NAMED.findall(found["page"])) == there - {*elsewhere}, (
+    assert {first or linked for first, linked in NAMED.findall(found["page"])} == there - {*elsewhere}, (
         "figures and tables of the template and of the study differ"
     )
     text = template.filled(found, folder)

@@ -69,5 +69,5 @@ def test_every_study_runs(hidden, tmp_path):
     done = hidden("study", "--all", "--quick", "--results", "here")
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     names = {path.stem for path in (tmp_path / "here" / "quick").glob("*.nc")}
-    assert {"truth", "convergence", "work_precision", "drift", "stability", "reduction", "claims"} <= names
+    assert {"truth", "convergence", "cost", "drift", "stability", "reduction", "claims"} <= names
     assert hidden("report", "--results", "here/quick").returncode == 0

@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
+from benchmarks import pages
 from benchmarks.engines.measure import COMPARED, COUNT, LEVEL, STEPS, agrees
+from benchmarks.pages import Table
 from symtop.core import netcdf
 from symtop.methods.framework.registry import integrator
 from symtop.report.sentences import counted, few
@@ -70,12 +72,9 @@ def verdict(rows: Sequence[dict[str, Any]]) -> list[str]:
 def findings(rows: Sequence[dict[str, Any]], missing: Sequence[str], measured: str) -> dict[str, Any]:
     """What the report wants, and the numbers themselves."""
     failed = [f"{made['engine']} ({made['name']}): {made['failed']}" for made in rows if "failed" in made]
-    table = {"title": "Engines against their maps", "header": list(HEADER), "rows": [cells(made) for made in rows]}
-    return {
-        "study": NAME, "title": "Engines against their maps",
-        "question": "Are the maps of the catalogue those that the engines take?",
-        "how_to_read": HOW_TO_READ, "verdict": verdict(rows), "tables": [table], "charts": [], "opening": None,
-        "pictures": [], "failures": [*missing, *failed], "cases": len(rows), "quick": False,
-        "provenance": netcdf.provenance(changes=True), "measured": measured, "rows": list(rows),
-        "missing": list(missing),
-    }  # fmt: skip
+    table = Table("Engines against their maps", HEADER, [cells(made) for made in rows])
+    return pages.findings(
+        NAME, "Engines against their maps", "Are the maps of the catalogue those that the engines take?", verdict(rows),
+        HOW_TO_READ, [table], failures=[*missing, *failed], cases=len(rows), measured=measured,
+        provenance=netcdf.provenance(changes=True), rows=list(rows), missing=list(missing),
+    )  # fmt: skip

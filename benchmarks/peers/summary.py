@@ -10,9 +10,9 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.kernels import ratio
+from benchmarks.pages import Table
 from benchmarks.peers.measure import HEYOKA, OURS, PERIODS, SHOWN, TARGETS
 from symtop.measure.timing import Timing
-from symtop.runner.study import Table
 
 JUDGED = TARGETS[1:]  # the accuracies at which a verdict is given
 LEVEL = 1.25  # a ratio nearer to one than this is no difference

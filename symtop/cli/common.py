@@ -18,7 +18,16 @@ from typing import Any, TextIO
 import click
 
 from symtop.core import files
-from symtop.core.errors import SymtopError, SymtopWarning, UnknownNameError, at_home, check_replaceable, file_path
+from symtop.core.errors import (
+    SymtopError,
+    SymtopWarning,
+    UnknownNameError,
+    at_home,
+    check_replaceable,
+    file_path,
+    positive,
+)
+from symtop.core.progress import telling
 from symtop.core.signals import INTERRUPTED, told_apart
 
 LONGEST_NAME = 80  # characters of the name of a file that are shown
@@ -28,6 +37,7 @@ NAMES = {  # what the shell completes: the module and its function
     "integrators": ("symtop.methods.framework.registry", "integrators"),
     "variants": ("symtop.methods.framework.registry", "variants"),
 }  # fmt: skip
+SILENT = ("explore",)  # commands that work until they are ended
 PLUGINS = "symtop.plugins"  # in the context of a command: plug-ins were given
 
 
@@ -70,6 +80,19 @@ def completing(kind: str) -> Callable[[click.Context, click.Parameter, str], lis
     return complete
 
 
+def step_of(scene: str, settings: dict[str, Any]) -> float | None:
+    """The step of the options --step-size and --per-nutation, of which the second is taken out of `settings`."""
+    step, count = settings.get("step_size"), settings.pop("per_nutation")
+    if step is not None and count is not None:
+        raise SymtopError("give --step-size or --per-nutation, not both")
+    if count is None:
+        return step
+    from symtop.model.scenes import scene as find
+
+    return find(scene).time_scale(settings.get("horizon")) / positive("per_nutation", count)
+
+
+per_nutation_option = click.option("--per-nutation", type=float, help="In place of a step: steps in a nutation period.")
 plugin_option = click.option(
     "--plugin", multiple=True, metavar="FILE", callback=_load_plugins, expose_value=False, is_eager=True,
     help="A Python file that registers integrators or scenes.",
@@ -83,6 +106,15 @@ results_option = click.option(
 
 class Group(click.Group):
     """Prints an error as one sentence that names options, and exits with code 2; 130 after Ctrl-C."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command of a line; from here on it says now and then that it works."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if not ctx.resilient_parsing and name not in SILENT:
+            ctx.with_resource(telling(str(name)))
+        return name, command, rest
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""

@@ -48,6 +48,8 @@ def judge(
     my.py:step      a function step(f, t, y, h) -> y for y' = f(t, y)
     my.py:MyRK      a class derived from scipy.integrate.OdeSolver
     my.py:solver    an instance of a solver of diffrax
+    my.py:step      with --form rotation, step(q, w, h, inertia, torque) -> q, w of a rigid
+                    body: q = (w, x, y, z) from body to space, or a matrix (3, 3)
     ./my.so         void step(double *y, double h, const double *par, long n)
     "./engine -x"   with --form program: a line of numbers in, states out
     run.csv         a trajectory without a method: time and states (see symtop.judging.judge_step)
@@ -134,47 +136,49 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
 @click.argument("scene", shell_complete=completing("scenes"))
 @click.option("--accuracy", type=float, help="The largest error you accept, for example 1e-6; rad of an angle.")
 @click.option("--i-use", "engine", help="A physics engine, for example mujoco: what its settings make of the scene.")
-@click.option("--step-size", type=float, help="Of the engine; 1/240 by default.")
+@click.option("--step-size", type=float, help="The step that you have; of the engine, 1/240 by default.")
+@common.per_nutation_option
+@click.option("--max-step", type=float, help="The longest step that you can take.")
+@click.option("--time-a-step", type=float, help="The most seconds that a step may take here, for example 1e-6.")
+@click.option("--needs", callback=common.separated, help="What methods may need, for example derivative,kicks.")
+@click.option("--general", is_flag=True, help="Only what exists for a body without symmetry.")
+@click.option("--keeps", help="Only what does not let it drift: energy or momenta.")
 @click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
 @click.option("--results", type=File(file_okay=False), help="Folder of a stored study; results by default.")
-@click.option("--needs", default="", help="What methods may need, for example derivative,kicks; anything by default.")
 @plugin_option
 @json_option
 def recommend(
-    scene: str, accuracy: float | None, engine: str | None, step_size: float | None, quantity: str,
-    horizon: float | None, results: str | None, needs: str, as_json: bool,
-) -> None:  # fmt: skip
+    scene: str, accuracy: float | None, engine: str | None, results: str | None, as_json: bool, **options: Any
+) -> None:
     """Find the cheapest integrator and step that meet an accuracy on a SCENE.
 
-    The exit code is 1 if none does.
+    The answer is no method that is made for this very top; the best of those is named beside it. The exit code is 1 if
+    none meets the accuracy.
 
     \b
     symtop recommend spheroid --accuracy 1e-6
-    symtop recommend spheroid --accuracy 1e-6 --needs derivative,kicks
+    symtop recommend spheroid --accuracy 1e-3 --step-size 0.001 --general
+    symtop recommend spheroid --accuracy 1e-6 --needs derivative,kicks --keeps energy
     symtop recommend goldstein --accuracy 1e-3 --quantity attitude --horizon 1e4
     symtop recommend mine --plugin my_scene.py --accuracy 1e-9
     symtop recommend goldstein --i-use mujoco --step-size 0.002
     """
     with ticking("loading"):
         from symtop import advise
-    if (accuracy is None) is (engine is None):
-        both = "" if accuracy is None else ", not both"
-        raise SymtopError(f"recommend takes one of --accuracy, for example 1e-6, and --i-use{both}")
-    if engine is not None:
-        step = {} if step_size is None else {"step_size": step_size}
-        outcome = advise.i_use(engine, scene, horizon=horizon, **step)
-        click.echo(as_text(dataclasses.asdict(outcome)) if as_json else str(outcome))
-        return
-    if step_size is not None:
-        raise SymtopError("--step-size belongs to --i-use; with --accuracy the step is what is found")
-    if results is None and (Path("results") / advise.STORED_STUDY).is_file():
+        from symtop.measure.ranking import STORED
+    if accuracy is None and engine is None:
+        raise SymtopError("recommend needs --accuracy, for example 1e-6, or --i-use")
+    options |= {"step_size": common.step_of(scene, options), "needs": options["needs"] or ()}
+    if engine is None and results is None and (Path("results") / STORED).is_file():
         results = "results"
     with ticking("trying methods"):
-        advice = advise.recommend(
-            scene, accuracy=accuracy or 0.0, quantity=quantity, horizon=horizon, results=results,
-            needs=[need for need in needs.replace(" ", "").split(",") if need],
-        )  # fmt: skip
-    click.echo(as_text(dataclasses.asdict(advice))) if as_json else say(str(advice))
-    if advice.integrator is None:
+        answer: Any
+        if engine is not None:
+            answer = advise.i_use(engine, scene, accuracy=accuracy, results=results, **options)
+            advice = answer.advice if accuracy is not None else None
+        else:
+            answer = advice = advise.recommend(scene, accuracy=accuracy or 0.0, results=results, **options)
+    click.echo(as_text(dataclasses.asdict(answer))) if as_json else say(str(answer))
+    if advice is not None and advice.integrator is None:
         sys.exit(1)

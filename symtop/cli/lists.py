@@ -165,7 +165,7 @@ def cite(files: tuple[Path, ...]) -> None:
 
     \b
     symtop cite
-    symtop cite results/work_precision.nc run.nc
+    symtop cite results/cost.nc run.nc
     """
     from symtop.core import netcdf
     from symtop.methods.framework.registry import bibliography, citation_keys, integrator

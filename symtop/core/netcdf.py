@@ -1,7 +1,7 @@
 """Labelled datasets: names and units of variables, provenance, and files that are whole or absent.
 
-Conventions are CF-1.11 where it applies. Only maps of bytes are compressed: round-off does not compress. No time stamps
-inside, so that equal inputs give equal bytes.
+Conventions are CF-1.11 where it applies. Only maps of bytes and numbers in single precision, which a study has rounded,
+are compressed: round-off does not compress. No time stamps inside, so that equal inputs give equal bytes.
 """
 
 import contextlib
@@ -216,9 +216,12 @@ def read_json(path: Path) -> Any:
 
 
 def _encoding(data: xr.Dataset) -> dict[Any, dict[str, Any]]:
-    """No fill value in coordinates; bytes compressed."""
+    """No fill value in coordinates; bytes and single precision compressed."""
     bare = {name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"}
-    return bare | {name: {"zlib": True} for name, values in data.data_vars.items() if values.dtype.kind == "u"}
+    return bare | {
+        name: {"zlib": True} for name, values in data.data_vars.items()
+        if values.dtype.kind == "u" or values.dtype == np.float32
+    }  # fmt: skip
 
 
 def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:

@@ -1,4 +1,7 @@
-"""A clock on the terminal that goes on while one piece of work takes long, such as a compilation."""
+"""What a command says while it works: a clock on a terminal, and a line now and then where nobody watches.
+
+Processes of their own write both, which end with this one: a compiler that holds Python's lock stops threads.
+"""
 
 import contextlib
 import subprocess
@@ -10,6 +13,16 @@ from typing import Any
 from symtop.core.files import is_terminal
 
 BEAT = 1.0  # seconds from one drawing to the next
+FIRST, EVERY = 2.0, 9.0  # seconds to the first line of a command in a pipe, and from one to the next
+LINES = """\
+import signal, sys, threading, time
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+began, ended, words, wait = time.monotonic(), threading.Event(), [sys.argv[1]], float(sys.argv[2])
+threading.Thread(target=lambda: (words.extend(map(str.strip, sys.stdin)), ended.set()), daemon=True).start()
+while not ended.wait(wait):
+    print(f"symtop: {words[-1]}, {time.monotonic() - began:.0f} s", file=sys.stderr, flush=True)
+    wait = float(sys.argv[3])
+"""
 CLOCK = """\
 import signal, sys, threading, time
 signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
@@ -45,11 +58,29 @@ def beating(bar: Any) -> Iterator[Any]:
 
 
 @contextlib.contextmanager
-def ticking(words: str) -> Iterator[None]:
-    """Some words and the time since, on the standard error if that is a terminal, drawn each second until the end.
+def telling(words: str) -> Iterator[None]:
+    """Some words, or those of `ticking`, in lines on a standard error that is no terminal, from two seconds on."""
+    if is_terminal(sys.stderr):
+        yield
+        return
+    command = [sys.executable, "-I", "-S", "-c", LINES, words, str(FIRST), str(EVERY)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, text=True) as lines:  # noqa: S603  (our own words)
+        _listeners.append(lines)
+        try:
+            yield
+        finally:
+            _listeners.remove(lines)
 
-    A process of its own draws them, which ends with this one: a compiler that holds Python's lock stops threads.
-    """
+
+_listeners: "list[subprocess.Popen[str]]" = []  # of the command that runs
+
+
+@contextlib.contextmanager
+def ticking(words: str) -> Iterator[None]:
+    """Some words and the time since, on the standard error if that is a terminal, drawn each second until the end."""
+    for lines in _listeners:
+        with contextlib.suppress(OSError):  # somebody has ended it
+            print(words, file=lines.stdin, flush=True)
     if not is_terminal(sys.stderr):
         yield
         return

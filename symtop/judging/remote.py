@@ -26,7 +26,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, words_of
 from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat
-from symtop.judging.adapters.python_step import REDUCED, ROTATION
+from symtop.judging.adapters.python_step import MATRIX, REDUCED, ROTATION
 from symtop.methods.framework.calling import OWN, solve
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array, Plan, Run
@@ -37,7 +37,7 @@ Table = dict[str, Callable[..., Any]]
 THREADED = "jax"  # hangs in a process that was forked after its import
 LOOK = 0.05  # seconds between two looks
 WORDS = 160  # characters of what a process says before it ends
-FORMS = {"RotationStep": ROTATION, "SeparableStep": REDUCED}  # others have that of their chart
+FORMS = {"rotation": ROTATION, "matrix": MATRIX, "plane": REDUCED}  # others have that of their chart
 
 
 class Process:
@@ -194,7 +194,8 @@ def table_of(opened: Callable[[], Stepper]) -> Table:
     def about() -> dict[str, Any]:
         names = ("name", "chart", "implementation", "own_loop", "takes_field")
         facts = {name: getattr(stepper, name) for name in names}
-        return facts | {"kind": type(stepper).__name__, "adaptive": stepper.adaptive is not None}
+        kind = next((name for name, form in FORMS.items() if form is stepper.form), "")
+        return facts | {"kind": kind, "adaptive": stepper.adaptive is not None}
 
     def adaptive(*args: Any) -> dict[str, Any]:
         assert stepper.adaptive is not None  # noqa: S101

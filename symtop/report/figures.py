@@ -28,17 +28,6 @@ def error_band(axis: Any, bounds: Any, least: float = 1e-16) -> float:
     return level
 
 
-def pareto(cost: Any, error: Any) -> Any:
-    """Which points no other point beats in both cost and error (boolean, the shape of the arrays)."""
-    shape, cost, error = cost.shape, cost.ravel(), error.ravel()
-    order = np.lexsort((error, np.where(np.isfinite(error), cost, np.inf)))
-    best, front = np.inf, np.zeros(cost.size, bool)
-    for k in order:
-        if np.isfinite(cost[k]) and error[k] < best:
-            best, front[k] = error[k], True
-    return front.reshape(shape)
-
-
 def largest_so_far(values: Any) -> Any:
     """The largest size up to each sample; zeros are `SMALLEST`, for a logarithmic axis."""
     return np.maximum.accumulate(np.maximum(np.abs(np.asarray(values)), SMALLEST))

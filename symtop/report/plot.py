@@ -105,8 +105,12 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         ax.plot(times, values.values, color=color, lw=1.2)
         ax.set_ylabel(f"{quantity} ({unit})" if unit else quantity)
     title, ended = (data.attrs.get(word, "") for word in ("title", "outcome_message"))
-    unit = data["time"].attrs.get("units", "")
-    ax.set(xlabel=f"time ({unit})" if unit else "time", title=f"{title}: {ended}" if ended else title)
+    ax.set(xlabel=_clock(data), title=f"{title}: {ended}" if ended else title)
+
+
+def _clock(data: xr.Dataset) -> str:
+    """The name of the axis of time, with its unit on a scene that has units."""
+    return "time (s)" if data["time"].attrs.get("units") == "s" else "time"
 
 
 def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
@@ -178,7 +182,7 @@ def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Datase
     for name, values in residuals(scene, Trajectory.of_data(run)).items():
         _line(constants, times, np.abs(values), COLORS[name], f"residual of {name}, relative")
     angles.set(yscale="log", ylabel="error (rad)")
-    constants.set(yscale="log", ylabel="|change| since the start", xlabel="time")
+    constants.set(yscale="log", ylabel="|change| since the start", xlabel=_clock(run))
     if run.attrs["outcome"] != "ok":
         for axis in axes[:, 0]:
             axis.axvline(run.attrs["reached_time"], color=VERMILLION, ls="--", label="stopped here")

@@ -112,13 +112,6 @@ _LOOKS = {
     "jsbsim-buss2": Look(SKY, "h"),
 }  # fmt: skip
 
-OUTCOME_COLORS = {
-    "accurate": GREEN, "bounded_but_wrong": YELLOW, "drifting": ORANGE, "wrong_regime": PURPLE,
-    "left_chart": VERMILLION, "not_converged": BLUE, "not_finite": BLACK, "step_too_small": GREY,
-    "out_of_budget": SKY,
-}  # fmt: skip
-
-
 FILLS = {"angles": "none", "axis": "full", "attitude": "left"}  # of a marker, by chart
 
 
@@ -187,7 +180,7 @@ def compact(picture: "Image.Image") -> "Image.Image":
     from PIL.ImageColor import getrgb
 
     shades = [shade for family in _SHADES.values() for shade in family]
-    ours = dict.fromkeys([*shades, *(look.color for look in _LOOKS.values()), *OUTCOME_COLORS.values(), "#FFFFFF"])
+    ours = dict.fromkeys([*shades, *(look.color for look in _LOOKS.values()), "#FFFFFF"])
     fixed = np.array([getrgb(color) for color in ours], np.uint8)
     picture = picture.convert("RGB")
     free = picture.quantize(256 - len(ours)).getpalette() or []

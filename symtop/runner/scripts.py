@@ -55,6 +55,8 @@ def file_of(name: str) -> Path:
     """The script of a study: a shipped one by its name, or any by its path, which ends in .py."""
     if name.endswith(".py"):
         return python_file(name, "study", "a name or a Python file that is there")
+    if (new := install().FORMER.get(name)) is not None:
+        raise SymtopError(f"study {name} is now {new}: symtop study {new}")
     return _elsewhere.get(name) or folder() / one_of("study", name, names()) / "study.py"
 
 

@@ -78,9 +78,9 @@ def test_noise_is_not_called_a_win():
 
 def _peers_into(folder):
     data = _stored({"symtop": (1e-3, 2e-5), "scipy[axis] C": (6e-3, 4e-3)})
-    found = runner.findings_of(study.STUDY, data, folder, style.save, failures=["drake was skipped."], cases=2)
+    found = study.findings(data, [], folder, ["drake was skipped."])
     found["provenance"] = {**found["provenance"], "processor": "an abacus"}
-    netcdf.write_json(folder / "peers.json", found | {"measured": study.measured(data)})
+    netcdf.write_json(folder / "peers.json", found)
 
 
 def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_path, quick_results):

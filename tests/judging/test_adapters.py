@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from scipy.integrate import RK23
+from scipy.spatial.transform import Rotation
 
 import symtop
 from symtop.cli.judge import FORMS as OFFERED
 from symtop.cli.main import main
-from symtop.judging.adapters.adapter import heartbeat, integrator, label_of
+from symtop.judging.adapters.adapter import heartbeat, integrator, integrator as adapted, label_of
 from symtop.judging.adapters.python_step import PythonStep, RotationStep, SeparableStep, to_body, to_space
 from symtop.judging.battery import CLAIMS, TABLE
 from symtop.judging.claims.subject import FORMS, open_target
@@ -423,3 +424,57 @@ def test_the_example_in_c_is_what_it_says(tmp_path):
     code, output = run_judge(str(library), "--order", "1", "--symplectic", "--conserves", "p_phi,p_psi")
     assert code == 0, output
     assert "It is: order 1, symplectic, not reversible" in output
+
+
+# ---- rotation matrices -----------------------------------------------------------------------------------------------
+
+
+def crossing(v):
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def euler_of_matrices(R, w, h, inertia, torque):
+    w = w + h * (np.cross(inertia * w, w) + torque(R)) / inertia
+    return R @ Rotation.from_rotvec(h * w).as_matrix(), w
+
+
+def euler_of_quaternions(q, w, h, inertia, torque):
+    w = w + h * (np.cross(inertia * w, w) + torque(q)) / inertia
+    x, y, z, s = (Rotation.from_quat([*q[1:], q[0]]) * Rotation.from_rotvec(h * w)).as_quat()
+    return np.array([s, x, y, z]), w
+
+
+def euler_that_stretches(R, w, h, inertia, torque):
+    return R + h * R @ crossing(w), w + h * (np.cross(inertia * w, w) + torque(R)) / inertia
+
+
+def of_rotation(function, step_size, horizon):
+    method = adapted(RotationStep(function))
+    return symtop.simulate("spheroid", method, step_size=step_size, horizon=horizon, guard=False)
+
+
+def test_a_step_of_rotation_matrices_is_judged_as_one_of_quaternions():
+    matrices, quaternions = (of_rotation(one, 0.01, 2.0) for one in (euler_of_matrices, euler_of_quaternions))
+    assert matrices.attrs["outcome"] == quaternions.attrs["outcome"] == "ok"
+    np.testing.assert_allclose(matrices["axis"].values, quaternions["axis"].values, atol=1e-11)
+    np.testing.assert_allclose(matrices["p_phi"].values, quaternions["p_phi"].values, rtol=1e-10)
+    errors = [float(symtop.errors(of_rotation(euler_of_matrices, h, 0.5))["axis"].max()) for h in (2e-3, 1e-3)]
+    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)  # order 1
+
+
+def test_a_matrix_that_is_no_rotation_any_more_is_seen():
+    run = of_rotation(euler_that_stretches, 0.01, 2.0)
+    assert run.attrs["outcome"] == "not_normalised"
+    early = of_rotation(euler_that_stretches, 1e-5, 1e-3)
+    lengths = np.linalg.norm(early["axis"].values, axis=1)
+    assert 1e-13 < abs(lengths[-1] - 1.0) < 1e-3
+
+
+def test_the_order_of_a_quaternion_is_said_where_a_step_is_refused():
+    def of_a_rotation(q, w, h, inertia, torque):
+        return q
+
+    with pytest.raises(symtop.SymtopError, match=r"q = \(w, x, y, z\)"):
+        of_rotation(of_a_rotation, 0.01, 1.0)
+    with pytest.raises(symtop.SymtopError, match=r"takes \(q, w, h, inertia, torque\): form rotation"):
+        symtop.judge(of_a_rotation, quick=True)

@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 import symtop
 from symtop.cli.main import main
+from symtop.core import netcdf
 from symtop.judging.battery import CLAIMS, judge
 from symtop.judging.claims import constants, constants as long, order, structure
 from symtop.judging.claims.subject import Subject
@@ -27,6 +28,7 @@ from symtop.run import plugins
 from symtop.run.simulation import integrate
 from symtop.runner import run as runner
 from tests.conftest import random_scenes
+from tests.templates import checked
 
 registry = importlib.import_module("symtop.methods.framework.registry")
 LIARS = Path(__file__).parent / "liars"
@@ -383,7 +385,7 @@ def test_the_command_prints_one_sentence_for_each_claim():
     assert "order: claims 2; confirmed: its table meets the conditions up to order 2 to 1e-16; slopes att" in lines[0]
 
 
-def test_the_study_shows_a_refuted_claim(tmp_path, clean_registry, monkeypatch):
+def test_the_study_counts_lists_and_draws_a_refuted_claim(tmp_path, clean_registry):
     plugins.load(LIARS / "symplectic_rk4.py")
     study = runner.load("claims")
     mine = dataclasses.replace(
@@ -391,10 +393,22 @@ def test_the_study_shows_a_refuted_claim(tmp_path, clean_registry, monkeypatch):
     )
     found = runner.run(mine, tmp_path, quick=True, jobs=1, quiet=True, save=style.save)
     assert found["failures"] == []
-    assert any("symplectic-rk4, symplectic: claims yes; refuted" in line for line in found["verdict"])
-    cells = next(row for row in found["tables"][0]["rows"] if row[0] == "symplectic-rk4")
-    assert cells[1 + CLAIMS.index("symplectic")].startswith("✗ yes | no")
-    assert cells[1 + CLAIMS.index("order")].startswith("✓ 4 | ")
+    data = netcdf.read_any(tmp_path / "claims.nc")
+    ledger = study.tables(data)["ledger"].set_index(["integrator", "claim"])
+    lie = ledger.loc["symplectic-rk4", "symplectic"]
+    assert (lie["declared"], lie["measured"].split(",")[0], lie["verdict"]) == ("yes", "no", "refuted")
+    assert ledger.loc["symplectic-rk4", "order"]["verdict"] == "confirmed"
+    facts = study.facts(data)
+    refuted = ledger[ledger["verdict"] == "refuted"]
+    assert facts["refuted"] == len(refuted) > 0
+    assert set(refuted.index.get_level_values("integrator")) == {"symplectic-rk4"}
+    assert facts["declared"] == facts["held"] + facts["refuted"]
+    assert list(ledger["verdict"].iloc[: len(refuted)]) == ["refuted"] * len(refuted)
+    assert facts["level"] == "rk4"  # of those that are drawn
+    assert facts["falling"] is None
+    honest = study.facts(data.sel(variant=["rk4"]))
+    assert (honest["integrators"], honest["refuted"]) == (1, 0)
+    assert f"{facts['refuted']} are refuted" in checked("claims", data, tmp_path)
     assert (tmp_path / "figures" / "claims-ledger.png").is_file()
 
 

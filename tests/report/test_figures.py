@@ -53,14 +53,16 @@ def faults(name, figure) -> list[str]:
 @pytest.mark.parametrize("name", runner.names())
 def test_every_figure_can_be_read_in_print(name, quick_results):
     data = netcdf.read_any(quick_results / f"{name}.nc")
-    drawn = [one for one in runner.load(name).pictures(data) if not hasattr(one.figure, "suffix")]
-    assert drawn
+    study = runner.load(name)
+    drawn = [one for one in study.pictures(data) if not hasattr(one.figure, "suffix")]
+    assert drawn or study.facts(data)["busy"]  # times of a busy machine are not drawn
     assert {one.name: faults(name, one.figure) for one in drawn} == {one.name: [] for one in drawn}
     assert all(one.figure.get_figwidth() <= style.WIDTH for one in drawn)
     assert all(one.figure.get_figheight() <= 10.0 for one in drawn)  # inches: a page
 
 
-def test_a_figure_that_cannot_be_read_is_found():
+def test_a_figure_that_cannot_be_read_is_found(monkeypatch):
+    monkeypatch.setattr(runner, "page_of", lambda name: None)  # as of a study without a template
     figure, axes = style.panels(1, 1)
     axes[0, 0].plot([0.0, 1.0], [0.0, 1.0], label="one")
     style.headline(figure, "A message")
@@ -85,7 +87,7 @@ def contrast(color) -> float:
 
 
 def test_letters_have_the_contrast_that_letters_need():
-    colors = {style.look(name).color for name in symtop.integrators()} | set(style.OUTCOME_COLORS.values())
+    colors = {style.look(name).color for name in symtop.integrators()} | {style.YELLOW}
     assert min(map(contrast, colors)) < 2.0  # as they are, not all could be read
     assert min(contrast(style.ink(color)) for color in colors) >= 4.5
     assert style.ink(style.BLUE) == pytest.approx(to_rgb(style.BLUE))  # dark enough as it is

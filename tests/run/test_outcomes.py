@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import symtop
+from symtop.model import charts
 from symtop.model.scenes import grazing, steady
 
 # ---- outcomes in the kernels -----------------------------------------------------------------------------------------
@@ -28,6 +29,7 @@ HUGE = symtop.Scene("huge", symtop.SymmetricTop(1.0, 1.0, 1e30), symtop.Angles(t
         ("spheroid", "rk45-compiled", {"tolerance": 1e-9, "budget": 100}, "out_of_budget"),
         ("spheroid", "dop853", {"tolerance": 1e-9, "budget": 100}, "out_of_budget"),
         ("spheroid", "taylor", {"budget": 3}, "out_of_budget"),
+        ("spheroid", "rk4[attitude]", {"step_size": 0.2}, "not_normalised"),
     ],
 )
 def test_every_outcome_is_produced_said_and_timed(scene, name, controls, outcome):
@@ -111,6 +113,36 @@ def _fine(name):
     return {} if name in ("taylor", "exact") else {"tolerance": 1e-3}
 
 
+@pytest.mark.parametrize(("name", "step_size"), [("rk4[attitude]", 0.2), ("series[attitude]", 0.5)])
+def test_a_quaternion_that_leaves_length_one_has_failed_alone_and_in_an_ensemble(name, step_size):
+    options = {"step_size": step_size, "horizon": 8.0, "samples": 41}
+    run = symtop.simulate("spheroid", name, **options, guard=False)
+    assert run.attrs["outcome"] == "not_normalised"
+    assert "0.1 %" in run.attrs["outcome_message"]
+    shown = np.isfinite(run["quaternion"].values).all(axis=1)
+    assert 0 < shown.sum() < shown.size
+    assert (np.diff(shown.astype(int)) <= 0).all()  # nothing after the failure
+    lengths = np.linalg.norm(run["quaternion"].values[shown], axis=1)
+    assert np.abs(lengths - 1.0).max() <= 1e-3
+    assert run.attrs["reached_time"] == run["time"].values[shown][-1]
+    assert np.isnan(run["p_phi"].values[~shown]).all()
+    assert np.nanmax(symtop.errors(run)["attitude"].values) <= np.pi
+    many = symtop.ensemble(["spheroid", "goldstein"], name, **options, observe="attitude", quiet=True).isel(member=0)
+    assert many["outcome"].item() == "not_normalised"
+    assert many["reached_time"].item() == run.attrs["reached_time"]
+    np.testing.assert_array_equal(many["quaternion"].values[: shown.size], run["quaternion"].values)
+
+
+def test_a_quaternion_that_keeps_its_length_has_not_failed():
+    run = symtop.simulate("spheroid", "strang[attitude]", step_size=0.5, guard=False)
+    assert run.attrs["outcome"] == "ok"
+    near = symtop.simulate("spheroid", "rk4[attitude]", step_size=0.05, guard=False)
+    assert near.attrs["outcome"] == "ok"
+    assert np.abs(np.linalg.norm(near["quaternion"].values, axis=1) - 1.0).max() > 5e-4
+    far = charts.attitude_distance(np.array([3e116, 0.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 0.0]))
+    assert far == np.pi
+
+
 # ---- a run that ends well shows finite numbers -----------------------------------------------------------------------
 
 DOUBTFUL = symtop.Scene(
@@ -124,15 +156,15 @@ def _says_so(data):
 
 
 def test_a_state_whose_squares_overflow_is_not_finite():
-    """q is finite, about 1e160; the axis and the energy are squares of it."""
-    run = symtop.simulate(DOUBTFUL, "rk4[attitude]", step_size=43.5, guard=False)
-    assert np.isfinite(run["quaternion"].values).all()
-    assert not np.isfinite(run["axis"].values).all()
-    assert (run.attrs["outcome"], run.attrs["reached_time"]) == ("not_finite", 43.5)
-    both = symtop.ensemble([DOUBTFUL] * 2, "rk4[attitude]", step_size=43.5, quiet=True)
+    """L is finite, about 1e160; the energy is the square of it."""
+    run = symtop.simulate(DOUBTFUL, "rk4[axis]", step_size=43.5, horizon=130.5, guard=False)
+    assert np.isfinite(run["axis"].values).all()
+    assert not np.isfinite(run["energy"].values).all()
+    assert (run.attrs["outcome"], run.attrs["reached_time"]) == ("not_finite", 87.0)
+    both = symtop.ensemble([DOUBTFUL] * 2, "rk4[axis]", step_size=43.5, horizon=130.5, quiet=True)
     assert both["outcome"].values.tolist() == ["not_finite"] * 2
-    assert both["reached_time"].values.tolist() == [43.5] * 2
-    good = symtop.simulate(DOUBTFUL, "rk4[attitude]", step_size=0.5, guard=False)  # the control
+    assert both["reached_time"].values.tolist() == [87.0] * 2
+    good = symtop.simulate(DOUBTFUL, "rk4[axis]", step_size=0.5, guard=False)  # the control
     assert good.attrs["outcome"] == "ok"
 
 

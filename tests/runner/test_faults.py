@@ -309,8 +309,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quic
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("words", "longest", "kills"),
-    [([PROBE], 2.5, 10), (["convergence", "factors", "phase_diagram", "--quick"], 15.0, 6)],
+    ("words", "longest", "kills"), [([PROBE], 2.5, 10), (["convergence", "factors", "reduction", "--quick"], 15.0, 6)]
 )  # python -m tests.kills --all: 30
 def test_kill_9_at_random_moments(tmp_path, words, longest, kills):
     found = survive(words, tmp_path, longest, kills)

@@ -89,9 +89,7 @@ def plugin(tmp_path_factory):
     return file
 
 
-@pytest.mark.parametrize(
-    "studies", [("convergence",), pytest.param(("work_precision", "drift", "stability"), marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("studies", [("convergence",), pytest.param(("drift", "stability"), marks=pytest.mark.slow)])
 def test_a_plugins_method_and_scene_are_in_every_study(studies, plugin, tmp_path):
     words = ["--quick", "--only", "simpson-of-a-user,strang", "--results", str(tmp_path), "--plugin", str(plugin)]
     done = CliRunner().invoke(main, ["study", *studies, *words])

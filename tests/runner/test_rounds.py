@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from symtop_studies.work_precision.timing_rounds import TimedRun
 
+from symtop.measure.ranking import Near
 from symtop.runner import pool as pools, run as runner, store
 from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool
@@ -91,31 +91,20 @@ def test_timed_cases_that_alone_are_missing_run_in_new_workers(study, tmp_path, 
     assert set(np.ravel(again["later"])) == {2.0}
 
 
-@pytest.fixture(scope="module")
-def timed(tmp_path_factory):
-    """The study that times methods, with two of them on one scene, and its results."""
-    whole, results = runner.load("work_precision"), tmp_path_factory.mktemp("timed")
-    few = [
-        one
-        for one in whole.cases(True)
-        if one.scene == "spheroid" and one.integrator in ("midpoint[angles]", "strang[axis]")
-    ]
-    said = {"pictures": lambda _: [], "tables": lambda _: [], "charts": lambda _: [], "verdict": lambda _: ["It ran."]}
-    small = dataclasses.replace(whole, cases=lambda _: few, opening=None, **said)
-    assert runner.run(small, results, quiet=True)["failures"] == []
-    return small, results
-
-
-def test_methods_are_timed_in_new_workers_when_nothing_else_is_missing(timed, monkeypatch):
-    study, results = timed
+def test_methods_are_timed_again_when_nothing_else_is_missing(tmp_path, monkeypatch):
+    """The study that times methods, with two of them, in workers."""
+    whole, names = runner.load("cost"), ["midpoint[angles]", "strang[axis]"]
+    few = [dataclasses.replace(one, settings={**one.settings, "integrators": names})
+           for one in whole.cases(True) if one.group == "prices"]  # fmt: skip
+    quiet = {"pictures": lambda _: [], "tables": lambda _: {}, "charts": lambda _: []}
+    small = dataclasses.replace(whole, cases=lambda _: few, facts=None, follow_up=None, **quiet)
+    assert runner.run(small, tmp_path, quiet=True)["failures"] == []
     monkeypatch.setattr(pools, "WORTH_WORKERS", 1)
-    for path, case in StudyCases.stored(study, results, quick=False, full=False).cases.items():
-        if study.is_timed(case):
-            path.unlink()
+    for path in StudyCases.stored(small, tmp_path, quick=False, full=False).cases:
+        path.unlink()
     with Pool(2) as pool:
-        done = runner.run(study, results, quiet=True, pool=pool)
-    assert done["computed"] > 0
-    assert done["failures"] == []
+        done = runner.run(small, tmp_path, quiet=True, pool=pool)
+    assert (done["computed"], done["failures"]) == (len(few), [])
 
 
 def plain(value: object) -> bool:
@@ -135,7 +124,7 @@ def survives(settings: dict) -> bool:
 
 def test_a_record_among_settings_is_noticed():
     assert survives({"runs": [["midpoint", 0, 0.1, (1, 2)]], "longest": math.nan, "none": None})
-    assert not survives({"runs": [TimedRun("midpoint[angles]", 0, 0, 0.1, 100.0, 50.0, (1, 2))]})
+    assert not survives({"runs": [Near({"midpoint[angles]": 1}, 50, "axis", 0.1, 10.0, {})]})
     assert not survives({"counts": {1: "one"}})
 
 
@@ -144,10 +133,3 @@ def test_settings_of_the_first_round_are_values_of_json(name):
     study = runner.load(name)
     for case in [*study.grid(quick=True), *study.grid(), *study.grid(full=True)]:
         assert survives(dict(case.settings)), case
-
-
-def test_settings_of_the_second_round_are_values_of_json(timed):
-    study, results = timed
-    later = [case for case in StudyCases.stored(study, results, quick=False, full=False).cases.values() if case.timed]
-    assert later
-    assert all(survives(dict(case.settings)) for case in later)

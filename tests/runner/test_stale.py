@@ -117,13 +117,13 @@ def test_measure_code_and_the_reference_make_the_cases_of_their_study_stale():
 @pytest.mark.parametrize(
     ("place", "again"),
     [
-        ("symtop_studies.work_precision.leads:winners", True), ("symtop_studies.work_precision.words:sentences", True),
+        ("symtop_studies.cost.cells:winners", True), ("symtop_studies.cost.facts:facts", True),
         ("symtop.measure.datasets:_dense", True), ("symtop.cli.common:as_text", False),
         ("symtop_studies.drift.facts:facts", False),
     ],
 )  # fmt: skip
 def test_findings_are_made_again_when_what_draws_or_judges_them_is_edited(place, again):
-    study = runner.load("work_precision")
+    study = runner.load("cost")
     before = drawing_digest(study, style.save)
     with edited(place):
         assert (drawing_digest(study, style.save) != before) is again
@@ -164,7 +164,7 @@ def test_a_case_depends_on_the_integrators_that_its_study_says_it_runs():
 
 def test_all_digests_of_all_studies_are_the_same_whatever_the_process_has_run():
     """Values that calls have left in modules are state and count for nothing."""
-    studies = [runner.load(name) for name in ("convergence", "population", "notebook")]
+    studies = [runner.load(name) for name in ("convergence", "cost", "notebook")]
     grids = [study.cases(True)[:20] for study in studies]
     before = [fingerprint.digests(study, grid) for study, grid in zip(studies, grids, strict=True)]
     symtop.simulate("spheroid", "strang", step_size=0.01)

@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.optimize import root
-from symtop_studies.reduction import commutation, words
+from symtop_studies.reduction import commutation, facts, figures, study
 from symtop_studies.reduction.commutation import gap, kernel_path, path, reduced_first
 from symtop_studies.reduction.tables import Column, commutation_table, unreduced_forms
 
 import symtop
+from symtop.measure import datasets
 from symtop.measure.order import power_law
 from symtop.methods.framework import registry
 from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, rule_of
 from tests.conftest import random_scenes
+from tests.templates import checked
 
 SCENES = ("spheroid", "goldstein")
 COUNTS = (100, 200, 400, 800)
@@ -128,9 +130,44 @@ def test_what_a_reduced_kernel_saves_is_split_into_iterations_and_the_time_of_on
          Column.COMPARED_STEP: (("scene", "variant", "twin_step"), [[[0.1, 0.01]]])},
         coords={"scene": ["spheroid"], "variant": ["midpoint"], "kernel": ["reduced", "unreduced"]},
     )  # fmt: skip
-    first, second = words.savings(data)
-    assert (first.time, first.more, first.each) == pytest.approx((2.0, 1.5, 4.0 / 3.0))
-    assert (second.time, second.more, second.each) == pytest.approx((3.0, 3.0, 1.0))
+    found, table = facts.facts(data), facts.tables(data)["kernels"]
+    assert list(table["time (ratio)"]) == pytest.approx([2.0, 3.0])
+    assert list(table["iterations (ratio)"]) == pytest.approx([1.5, 3.0])
+    assert list(table["time of an iteration (ratio)"]) == pytest.approx([4.0 / 3.0, 1.0])
+    assert (found["step_least"], found["step_most"]) == pytest.approx((2.0, 3.0))
+    assert (found["commuting"], found["charts"], found["twins_gap"]) == (None, None, None)
+
+
+@pytest.fixture(scope="module")
+def measured():
+    """Every rule on one scene, and one method in its charts, all with short runs."""
+    small = {"counts": [50, 100, 200, 400], "batches": 1, "horizon": 2.0, "step_sizes": [0.1, 0.01]}
+    parts = []
+    for case in study.cases(True):
+        if case.scene == "spheroid" and (case.settings["part"] != "charts" or case.integrator == "euler-poincare"):
+            settings = {key: small.get(key, value) for key, value in case.settings.items()}
+            parts.append((case, study.measure(dataclasses.replace(case, settings=settings))))
+    return datasets.combine(parts)
+
+
+def test_facts_are_those_of_the_rules_and_charts(measured):
+    found = facts.facts(measured)
+    assert found["commuting"] == "midpoint"
+    assert found["commuting_gap"] < 1e-13
+    assert found["others"] == "trapezoidal, simpson-linear, galerkin-simpson"
+    assert (found["power_least"], found["power_most"]) == pytest.approx((2.0, 4.0), abs=0.2)
+    assert found["rules"] == "midpoint, trapezoidal"
+    assert 0.0 < found["twins_gap"] < found["same_map"]
+    assert found["charts"] == len(facts.tables(measured)["charts"])
+    two = measured.isel(commutation_step=slice(2))  # too few for an order, and no less apart
+    assert (facts.facts(two)["others"], facts.facts(two)["power_least"]) == (found["others"], None)
+    assert len(figures.pictures(two)) == 1
+
+
+def test_the_page_says_what_was_measured(measured, tmp_path):
+    text = checked("reduction", measured, tmp_path)
+    assert "one and the same method of midpoint." in text
+    assert "matters with trapezoidal, simpson-linear, galerkin-simpson." in text
 
 
 def test_a_kernel_is_known_under_any_name():

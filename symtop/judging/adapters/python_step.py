@@ -10,7 +10,8 @@ changes its input in place, and returns it, works.
 
 q = (w, x, y, z) turns body vectors into space vectors, w is the angular velocity, inertia holds the three principal
 moments (I1, I1, I3) about the pivot, and torque(q) is that of gravity. L in space is R(q) inertia w, R(q) with q at
-length one; a q that loses its length shows it as an axis that is not a unit vector.
+length one; a q that loses its length shows it as an axis that is not a unit vector. A step that returns a matrix of
+shape (3, 3) in place of q is given R, body to space, and torque(R); one that ceases to be a rotation shows it likewise.
 
 *separable*, ``step(state, h, dT, dV) -> state`` for the nutation alone, whose Hamiltonian separates:
 
@@ -32,6 +33,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat, label_of, repeat
@@ -44,6 +46,7 @@ from symtop.model.charts import space_momenta
 from symtop.model.top import Angles, SymmetricTop, effective_force
 
 Field = Callable[[float, Array], Array]
+PROBE = 1e-3  # step of the call that shows whether a rotation is a matrix
 ANY = 1e300  # a tolerance that every step meets; infinity times a component of zero would be no number
 LOOSE = 1e8  # one that every step meets, and beside which an update of Newton's iteration can be seen
 SOLVED, MOST_NEWTON, NEWTON = 1e-14, 50, "NEWTON_MAXITER"  # of a stage, absolute; rounds, and what modules call them
@@ -213,26 +216,59 @@ def _body_momenta(body: Body, states: Array) -> tuple[Array, Array]:
 ROTATION = FORMULATIONS["attitude"]._replace(prepare=_body_of, present=_body_shown, momenta=_body_momenta)
 
 
+def _matrix_of(top: SymmetricTop, at: Angles) -> tuple[Body, tuple[float, ...]]:
+    """The body and the state (R, w) of a start, R row by row."""
+    body, state = _body_of(top, at)
+    return body, (*to_space(np.array(state[:4]), np.eye(3)).T.ravel().tolist(), *state[4:])
+
+
+def _with_quaternions(states: Array) -> Array:
+    """States (q, w) of states (R, w): q of the nearest rotation, and the length of R's third column is |q|^2."""
+    shown = np.full((len(states), 7), np.nan)
+    for k, state in enumerate(states):
+        if np.isfinite(state).all():
+            matrix = state[:9].reshape(3, 3)
+            x, y, z, w = Rotation.from_matrix(matrix).as_quat()
+            shown[k] = *(np.sqrt(np.linalg.norm(matrix[:, 2])) * np.array([w, x, y, z])), *state[9:]
+    return shown
+
+
+MATRIX = ROTATION._replace(
+    prepare=_matrix_of, present=lambda body, times, states: _body_shown(body, times, _with_quaternions(states)),
+    momenta=lambda body, states: _body_momenta(body, _with_quaternions(states)),
+)  # fmt: skip
+
+
 class RotationStep(FunctionStep):
     """A stepper around the function of a rigid body; the torques that it asks for are its force evaluations."""
 
     chart, form = "attitude", ROTATION
 
+    def __init__(self, function: Callable[..., Any], name: str = "") -> None:
+        super().__init__(function, name)
+        with contextlib.suppress(Exception), heartbeat.call(PROBE):
+            first = function(
+                np.eye(3), np.array([0.1, 0.2, 0.3]), PROBE, np.array([1.0, 1.0, 0.5]), lambda _: np.zeros(3)
+            )
+            self.form = MATRIX if np.shape(first[0]) == (3, 3) and np.size(first[1]) == 3 else ROTATION
+
     def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks."""
-        calls, down = 0, np.array([0.0, 0.0, -par.mgl])
+        calls, down, shape = 0, np.array([0.0, 0.0, -par.mgl]), (3, 3) if self.form is MATRIX else (4,)
 
         def torque(q: Any) -> Array:
             nonlocal calls
             calls += 1
-            moment: Array = np.cross([0.0, 0.0, 1.0], to_body(np.asarray(q, dtype=float), down))
+            at = np.asarray(q, dtype=float)
+            moment: Array = np.cross([0.0, 0.0, 1.0], at.T @ down if shape == (3, 3) else to_body(at, down))
             return moment
 
         def once(_: float, y: Array) -> Array:
-            after = self.function(y[:4].copy(), y[4:].copy(), h, par.inertia.copy(), torque)
+            q = y[:-3].reshape(shape)
+            after = self.function(q.copy(), y[-3:].copy(), h, par.inertia.copy(), torque)
             if not isinstance(after, (tuple, list)) or len(after) != 2:
-                raise SymtopError(f"step must return q and w, a pair, not {type(after).__name__}")
-            return np.concatenate([state_like(y[:4], after[0]), state_like(y[4:], after[1])])
+                raise SymtopError(f"step must return q = (w, x, y, z) and w, a pair, not {type(after).__name__}")
+            return np.concatenate([state_like(q, after[0]).ravel(), state_like(y[-3:], after[1])])
 
         states = self.steps(once, 0.0, y, h, marks)
         return March(states, calls)

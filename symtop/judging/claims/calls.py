@@ -60,6 +60,7 @@ def _calls(subject: Subject) -> Finding:
         par, state = stepper.form.prepare(scene.top, at)
         return stepper.march(scene.top, par, np.array(state), step, np.array([1])).states[0]
 
+    stepper.renew()  # the step has been timed
     other = Angles(*(getattr(start, name) * (1.0 - ELSEWHERE) for name in Angles.__slots__))
     first = once(start, h)
     if not np.isfinite(first).all():

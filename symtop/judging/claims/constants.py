@@ -321,7 +321,9 @@ def _constant(claim: str, claimed: str, run: LongRun, constant: Constant | None)
             why += f", drifting by {changed.rise / max(run.steps, 1):.1e} a step"
     # an error that returns with the nutation cannot exceed the largest change of a step, all one way
     most = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
-    if run.outcome not in ("ok", "not_finite") or (kind in ("kept", "bounded") and run.outcome != "ok"):
+    if run.outcome not in ("ok", "not_finite", "not_normalised") or (
+        kind in ("kept", "bounded") and run.outcome != "ok"
+    ):
         why += f"; but the run {run.message}"
     elif kind == "unknown":
         why = f"the run {run.message}" if run.outcome != "ok" else f"{why}: no exponent to judge it by"

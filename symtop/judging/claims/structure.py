@@ -223,7 +223,7 @@ def pole(subject: Subject) -> list[Finding]:
     words = ["passes" if one.passes else "wrong" if one.outcome == "ok" else "ends there" for one in judged]
     if not claim:
         verdict = "measured"
-    elif any(one.outcome not in ("ok", "left_chart", "not_finite") for one in judged):
+    elif any(one.outcome not in ("ok", "left_chart", "not_finite", "not_normalised") for one in judged):
         verdict = "undecided"
     else:
         verdict = "confirmed" if all(one.passes for one in judged) else "refuted"

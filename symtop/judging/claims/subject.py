@@ -215,7 +215,10 @@ def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = F
         pass
     except TypeError:
         signature = inspect.signature(thing)
-        raise SymtopError(f"a step of the form {kind} must take {arguments}, not {signature}") from None
+        hint = (
+            "; a rotation, q = (w, x, y, z), takes (q, w, h, inertia, torque): form rotation" if kind == "ode" else ""
+        )
+        raise SymtopError(f"a step of the form {kind} must take {arguments}, not {signature}{hint}") from None
     if kind in ("torch", "jax"):
         return BatchStep(thing, chart, kind, name)
     if kind == "ode":

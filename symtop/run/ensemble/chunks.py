@@ -29,7 +29,7 @@ from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.lanes import Many, W, column, members_of, put
 from symtop.methods.framework.loop import FixedStep
-from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, OUTCOMES, Plan
+from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, off_length
 from symtop.methods.framework.preparation import Body, Start
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
@@ -264,7 +264,7 @@ class Job:
         period = nutation_periods(self.numbers) if self.period is None else self.period
         plan = schedule(period, self.horizon, self.samples, self.steps)
         with np.errstate(all="ignore"):  # a run may blow up, and that is a result
-            runs = self._runs(plan)
+            runs = _of_length_one(self._runs(plan), plan, self.chart)
             columns = {name: self.numbers[:, k : k + 1] for k, name in enumerate(("I1", "I3", "mgl"))}
             top: Any = SimpleNamespace(**columns)
             top.reduced_energy = functools.partial(SymmetricTop.reduced_energy, top)  # of all tops at once
@@ -373,6 +373,19 @@ def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
     first = finite[bad].argmin(axis=1)
     outcome[bad], reached[bad] = NOT_FINITE, np.where(first > 0, plan.times[bad, first - 1], 0.0)
     return runs._replace(outcome=outcome, reached=reached)
+
+
+def _of_length_one(runs: _Runs, plan: Schedule, chart: str) -> _Runs:
+    """Runs end where their quaternions have left length one, as in `simulate`."""
+    lost = off_length(chart, runs.states)
+    bad = lost.any(axis=1)
+    if not bad.any():
+        return runs
+    reached = plan.times[np.arange(len(runs.steps)), np.maximum(lost.argmax(axis=1) - 1, 0)]
+    return runs._replace(
+        states=np.where(lost[..., None], np.nan, runs.states), momenta=np.where(lost[..., None], np.nan, runs.momenta),
+        outcome=np.where(bad, NOT_NORMALISED, runs.outcome), reached=np.where(bad, reached, runs.reached),
+    )  # fmt: skip
 
 
 def same_times(times: Any, row: Any) -> bool:

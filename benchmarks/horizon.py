@@ -1,0 +1,69 @@
+"""Runs of up to 10^8 nutations: does the phase diagram's prediction hold where the study cannot afford to run?
+
+    python -m benchmarks.horizon [--nutations 1e8]        two minutes of a quiet core; writes results/horizon.json
+
+One method on eight natural tops. The laws of growth are fitted to what the runs showed up to 10^4 nutations, as the
+study of cost does, and compared with what they show later.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks import measured
+from symtop.methods.framework.registry import integrator
+from symtop.runner import scripts, store
+from symtop.runner.study import Table
+
+NAME, STEPS, TOPS, SEED = "takahashi-imada[axis]", 8.74, 8, 1
+FITTED = 1e4  # nutations
+
+
+def main() -> None:
+    """Run, compare, print and write down."""
+    scripts.install()
+    from symtop_studies.cost import far, laws
+
+    parser = argparse.ArgumentParser(description="Predicted against measured errors of very long runs")
+    parser.add_argument("--nutations", type=float, default=1e8)
+    parser.add_argument("--results", type=Path, default=Path("results"))
+    options = parser.parse_args()
+    facts, tops = measured.circumstances(), far.tops_of(TOPS, SEED)
+    ends = far.horizons()[far.horizons() <= 1.0001 * options.nutations]
+    ((errors, work),) = far.measured(integrator(NAME), tops, [far.Asked(STEPS, ends, np.inf)])
+    every = far.horizons()
+    seen = np.full((len(far.QUANTITIES), 1, every.size, TOPS), np.nan)
+    fitted = ends <= 1.0001 * FITTED
+    seen[:, 0, : ends.size][:, fitted] = errors[:, fitted]
+    told = far.predicted(seen, work[np.newaxis], every, far.grain_of(tops), drifts=far.drifts_of(integrator(NAME)))
+    lines = []
+    for place, quantity in enumerate(far.QUANTITIES):
+        largest = np.maximum.accumulate(errors[place], axis=0)
+        for horizon in told["horizon"].values[told["horizon"].values > 1.0001 * FITTED][1::2]:
+            if horizon > 1.0001 * ends[-1]:
+                break
+            mine = largest[int(np.argmin(np.abs(ends - horizon)))]
+            ratio = mine / told["error"].sel(quantity=quantity, horizon=horizon).values[0]
+            good = ratio[(mine < laws.SATURATED) & np.isfinite(ratio)]
+            spread = f"{np.median(good):.3g} ({good.min():.3g} to {good.max():.3g})" if good.size else "saturated"
+            lines.append([quantity, f"{horizon:.0e}", f"{np.median(mine):.2e}", spread, f"{good.size}"])
+    table = Table(
+        f"{NAME} at {STEPS} steps a nutation on {TOPS} natural tops, beyond the {FITTED:.0e} nutations of the fit",
+        ["quantity", "nutations", "median error", "measured over predicted", "tops not saturated"],
+        lines,
+    )
+    print("\n".join(" | ".join(line) for line in [table.header, *lines]))
+    options.results.mkdir(exist_ok=True)
+    content = {
+        "study": "horizon", "title": "Very long runs", "question": "Do predictions hold up to 10^8 nutations?",
+        "how_to_read": "A ratio near one is a prediction that holds; from the least to the largest of the tops.",
+        "verdict": [], "tables": [table._asdict()], "charts": [], "opening": None, "pictures": [], "failures": [],
+        "cases": 1, "quick": False, "measured": measured.sentence(facts, "python -m benchmarks.horizon"),
+        "provenance": {key: facts[key] for key in facts if key not in ("measured", "cores", "load_before")},
+    }  # fmt: skip
+    store.write_json(options.results / "horizon.json", content)
+
+
+if __name__ == "__main__":
+    main()

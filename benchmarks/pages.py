@@ -1,0 +1,46 @@
+"""Findings of a benchmark as the report takes them: a page of sentences, pictures with captions, and short tables.
+
+A benchmark is measured on a quiet machine, and what it says is stored with its numbers; sentences of a study stand in a
+template, since it is measured again and again.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from symtop.report.tables import table
+
+ROWS = 10  # of a table that the page shows
+
+
+class Table(NamedTuple):
+    """A table of a benchmark; cells are shown as they are."""
+
+    title: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+def findings(
+    name: str, title: str, question: str, sentences: Sequence[str], how_to_read: str, tables: Sequence[Table], *,
+    captions: Mapping[str, tuple[str, str]] | None = None, **others: Any,
+) -> dict[str, Any]:  # fmt: skip
+    """What NAME.json holds; `captions` are caption and text for the blind of each figure."""
+    figures = [
+        f'{{% call figure("{figure}", title={title!r}, alt={alt!r}) %}}{_raw(caption)}{{% endcall %}}'
+        for figure, (caption, alt) in (captions or {}).items()
+    ]
+    shown = [_raw(f"**{one.title}**{_count(one)}\n\n{table(one.header, one.rows[:ROWS])}") for one in tables]
+    listed = _raw("\n".join(f"- {sentence}" for sentence in sentences))
+    page = "\n\n".join(["# {{ question }}", listed, *figures, _raw(f"**How to read it.** {how_to_read}"), *shown])
+    return {
+        "study": name, "title": title, "question": question, "facts": {}, "tables": [], "charts": [], "pictures": [],
+        "failures": [], "quick": False, "page": page, **others,
+    }  # fmt: skip
+
+
+def _count(one: Table) -> str:
+    return f" (the first {ROWS} of {len(one.rows)} rows)" if len(one.rows) > ROWS else ""
+
+
+def _raw(text: str) -> str:
+    return f"{{% raw %}}{text}{{% endraw %}}"

@@ -1,0 +1,70 @@
+"""Facts and the table of the study: every finding in a line, how many there are of each verdict, and the long runs."""
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from symtop.judging.battery import CLAIMS, SCENE
+from symtop.judging.findings import VERDICTS, claim_name
+from symtop.methods.framework.registry import integrators
+
+MARKED = ("midpoint", "strang", "galerkin-simpson", "sofroniou-spaletta-10", "gauss-4", "gauss-12", "rk4", "rk45")
+REFINED = 100.0  # a defect that falls by more than this over the differencing widths is an error of the differencing
+FIRST = ("refuted", "undecided", "confirmed", "measured", "inapplicable")  # of the verdicts
+
+
+def ledger(data: xr.Dataset) -> pd.DataFrame:
+    """A line a finding, the refuted ones first; an integrator that is no longer registered is of the family "other"."""
+    names = ["scene", "variant", "claim", "declared", "measured", "verdict", "value", "resolution", "why"]
+    frame = data[names[3:]].to_dataframe().reset_index()[names]
+    frame = frame[frame["verdict"].isin(VERDICTS)].rename(columns={"variant": "integrator"})
+    families = {name: method.family for name, method in integrators().items()}
+    frame.insert(2, "family", frame["integrator"].map(families).fillna("other"))
+    ranks = {"verdict": FIRST.index, "claim": CLAIMS.index}
+    return frame.sort_values(list(ranks), key=lambda column: column.map(ranks[str(column.name)]), kind="stable")
+
+
+def defects(data: xr.Dataset) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Differencing widths and how far one step is from preserving the bracket, of `MARKED`, or else of all."""
+    first = data[["defect_width", "bracket_defect"]].isel(scene=0)
+    every = [str(name) for name in data["variant"].values]
+    cells = {name: first.sel(variant=name).dropna("width") for name in [one for one in every if one in MARKED] or every}
+    return {name: (cell["defect_width"].values, cell["bracket_defect"].values)
+            for name, cell in cells.items() if cell.sizes["width"]}  # fmt: skip
+
+
+def facts(data: xr.Dataset) -> dict[str, Any]:
+    """How many claims have each verdict, which defects are real, and how many steps the long runs have."""
+    found, measured = ledger(data), defects(data)
+    count = Counter(found["verdict"])
+    falling = [name for name, (_, defect) in measured.items() if defect[-1] < defect[0] / REFINED]
+    made = data["steps_run"].isel(scene=0).to_series()
+    made = made[made > 0].astype(int)
+    undecided = Counter(found["claim"][found["verdict"] == "undecided"].map(claim_name))
+    ((open_claim, open_most),) = undecided.most_common(1) or [(None, None)]
+    ((usual, usual_runs),) = Counter(made).most_common(1) or [(None, None)]
+    return {
+        "integrators": found["integrator"].nunique() or None,
+        "scene": SCENE,
+        "declared": count["confirmed"] + count["refuted"] or None,  # and judged
+        "held": count["confirmed"],
+        **{word: count[word] for word in ("refuted", "undecided", "measured")},
+        "open_claim": open_claim,  # that most of the undecided findings are on
+        "open_most": open_most,
+        "falling": ", ".join(falling) or None,  # methods whose defect is that of the differences
+        "level": ", ".join(name for name in measured if name not in falling) or None,
+        "runs": len(made) or None,
+        "usual": usual,  # steps of a long run
+        "usual_runs": usual_runs,
+        "least": min(made, default=None),
+        "least_integrator": made.idxmin() if len(made) else None,
+    }
+
+
+def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
+    """Every finding."""
+    found = ledger(data)
+    return {"ledger": found.assign(claim=found["claim"].map(claim_name))}

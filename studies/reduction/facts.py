@@ -1,0 +1,109 @@
+"""Facts and tables of the reduction study, from its dataset."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from .tables import CHART_PERIODS, COMMUTES, COMPARED_STEPS, GAPS, SAME_MAP, Column, chart_ratios, commutation_order
+
+WORST = "largest difference (rad)"
+AS_FAST = 1.1  # times as long: what the noise of a time hides
+
+
+def cells(data: xr.Dataset, variable: str) -> list[tuple[str, str, xr.Dataset]]:
+    """Scene, integrator and data of the cells in which a variable was measured."""
+    if variable not in data:
+        return []
+    there = np.isfinite(data[variable]).any([dim for dim in data[variable].dims if dim not in ("scene", "variant")])
+    return [
+        (str(scene), str(name), data.sel(scene=scene, variant=name))
+        for scene in data["scene"].values
+        for name in data["variant"].values
+        if there.sel(scene=scene, variant=name)
+    ]
+
+
+def facts(data: xr.Dataset) -> dict[str, Any]:
+    """Which rules commute with the reduction (rad), how far an unreduced form is from its kernel, what charts cost."""
+    gaps, kernels, charts = tables(data).values()
+    compared = cells(data, Column.THETA_GAP)
+    same, apart = (gaps[(gaps[WORST] < COMMUTES) == wanted] for wanted in (True, False))
+    slowest = charts.loc[charts["time (ratio)"].idxmax()] if len(charts) else {}
+    return {
+        "charts_periods": CHART_PERIODS,  # nutations
+        "compared_steps": COMPARED_STEPS,
+        "same_map": SAME_MAP,  # rad
+        "as_fast": AS_FAST - 1.0,
+        "commuting": listed(same["rule"]),
+        "commuting_gap": largest(same[WORST]),
+        "others": listed(apart["rule"]),
+        "power_least": least(apart["power of h"]),
+        "power_most": largest(apart["power of h"]),
+        "rules": listed(name for _, name, _ in compared),
+        "twins_gap": largest(float(cell[gap].max()) for *_, cell in compared for gap in GAPS),
+        "twins_drift": largest(
+            float(cell[drift].max()) for *_, cell in compared for drift in (Column.P_PHI_DRIFT, Column.P_PSI_DRIFT)
+        ),
+        **{
+            f"{key}_{name}": pick(kernels[header])
+            for key, header in (("step", "time (ratio)"), ("iterations", "iterations (ratio)"))
+            for name, pick in (("least", least), ("most", largest))
+        },
+        "charts": len(charts) or None,
+        "charts_as_fast": int((charts["time (ratio)"] <= AS_FAST).sum()) if len(charts) else None,
+        "slowest": slowest.get("variant"),
+        "slowest_time": slowest.get("time (ratio)"),
+    }
+
+
+def listed(names: Iterable[str]) -> str | None:
+    """Names, each once."""
+    return ", ".join(dict.fromkeys(names)) or None
+
+
+def largest(values: Iterable[float]) -> float | None:
+    """The largest number that is there."""
+    return max((float(one) for one in values if np.isfinite(one)), default=None)
+
+
+def least(values: Iterable[float]) -> float | None:
+    """The smallest number that is there."""
+    return min((float(one) for one in values if np.isfinite(one)), default=None)
+
+
+def commutation(data: xr.Dataset) -> pd.DataFrame:
+    """The difference of reducing first and last by scene and rule; no power of h where it is rounding."""
+    rows = []
+    for scene, rule, cell in cells(data, Column.GAP):
+        gap, worst = cell[Column.GAP].dropna("commutation_step").values, float(cell[Column.GAP].max())
+        power = None if worst < COMMUTES else commutation_order(cell)
+        rows.append([scene, rule, power, worst, gap[-1], float(cell[Column.STEP].max())])
+    header = ["scene", "rule", "power of h", WORST, "at the finest step (rad)", "coarsest step (s)"]
+    return pd.DataFrame(rows, columns=header).astype({"power of h": float})
+
+
+def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
+    """Reducing first or last; kernels and their unreduced forms at each step; every chart against the smallest."""
+    kernels, charts = [], []
+    for scene, rule, cell in cells(data, Column.SECONDS_A_STEP):
+        for step in range(cell.sizes["twin_step"]):
+            at = cell.isel(twin_step=step)
+            seconds, done = (at[name].sel(kernel=["reduced", "unreduced"]).values
+                             for name in (Column.SECONDS_A_STEP, Column.ITERATIONS_A_STEP))  # fmt: skip
+            time, more = seconds[1] / seconds[0], done[1] / done[0]
+            kernels.append([scene, rule, float(at[Column.COMPARED_STEP]), time, more, time / more, *seconds, *done])
+    for scene, method, cell in cells(data, Column.SECONDS):
+        for one in chart_ratios(cell):
+            name = f"{method}[{one.chart}]"
+            charts.append([scene, name, one.base, one.time, one.error])
+    header = ["scene", "rule", "step (s)", "time (ratio)", "iterations (ratio)", "time of an iteration (ratio)",
+              "a step, reduced (s)", "unreduced (s)", "iterations a step, reduced", "unreduced"]  # fmt: skip
+    over = ["scene", "variant", "against", "time (ratio)", "axis error (ratio)"]
+    return {
+        "commutation": commutation(data),
+        "kernels": pd.DataFrame(kernels, columns=header),
+        "charts": pd.DataFrame(charts, columns=over).sort_values("time (ratio)", ascending=False, kind="stable"),
+    }

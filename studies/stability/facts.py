@@ -1,0 +1,195 @@
+"""Facts and tables of the stability study, from its dataset."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from symtop.methods.framework.registry import split_name
+
+from .atlas import COMMON, FAST, NEAR, SLOW, families, map_of, maps, methods_of, pole_effect
+from .failures import LOST
+from .mechanisms import (
+    BARELY,
+    limits,
+    measured,
+    misses,
+    only_windows,
+    outlasting,
+    resonant,
+    sampled,
+    unlimited,
+    unreached,
+)
+from .tables import CURVE_STEPS, PERIODS, SOUGHT_PHASE, Column
+
+QUOTED = "stormer-verlet[angles]"  # whose numbers are quoted
+NAMES = (  # of all facts that are measured
+    "family", "stepped", "fast_variant", "fast_reach", "slow_variant", "slow_reach", "slow_none", "shortest",
+    "quoted_fast", "quoted_fails", "silent", "cells", "settled", "checks", "refuted", "angles", "angles_halved",
+    "others", "others_halved", "limited", "limit_least", "limit_variant", "free", "windows", "window_width", "resonant",
+    "turned", "verlet_third", "midpoint_third", "sleep_step", "strang_sleeps", "cayley_sleeps", "sleep_miss", "lawful",
+    "law_middle", "law_most", "law_unreached", "outlasting", "sampled", "hidden", "small", "small_most",
+    "small_variant", "one_iteration", "solved",
+)  # fmt: skip
+
+
+def facts(data: xr.Dataset) -> dict[str, Any]:
+    """How far methods are accurate and how they fail; what each mechanism does. Steps of maps are in nutations."""
+    found: dict[str, Any] = dict.fromkeys(NAMES)
+    found |= {"periods": PERIODS, "slow": SLOW, "fast": FAST, "near": NEAR, "barely": BARELY, "sought": SOUGHT_PHASE,
+              "lost": LOST, "common": COMMON, "curve_steps": CURVE_STEPS}  # fmt: skip
+    if family := next(iter(families(data)), None):
+        found |= atlas_facts(data, family)
+    for scene, variable, read in READ:
+        if measured(data, scene, variable):
+            found |= read(data.sel(scene=scene))
+    return found
+
+
+def atlas_facts(data: xr.Dataset, family: str) -> dict[str, Any]:
+    """The shares and reaches of the maps over the spin of one family."""
+    shown, known = maps(data, family), methods_of(data)
+    steps = {name: one for name, one in shown.items()
+             if one.control == "step_size" and not (name in known and known[name].exact_steps)}  # fmt: skip
+    cells, made = (
+        sum(values) for values in zip(*((one.made.size, one.made.sum()) for one in shown.values()), strict=True)
+    )
+    silent = [one.silent for one in shown.values() if math.isfinite(one.silent)]
+    found = {
+        "family": family,
+        "silent": float(np.median(silent)) if silent else None,  # share of the inaccurate runs, median variant
+        "cells": cells,
+        "settled": 1.0 - made / cells,  # share that was not run
+        **{name: int(data[name].sel(scene=family).sum()) for name in (Column.CHECKS, Column.REFUTED)},
+    }
+    if steps:
+        for kind in ("fast", "slow"):
+            best = max(steps, key=lambda name: np.nan_to_num(steps[name].usual_reach[kind]))
+            found |= {f"{kind}_variant": best, f"{kind}_reach": steps[best].usual_reach[kind]}
+        found |= {"stepped": len(steps), "shortest": min(float(one.settings[0]) for one in steps.values()),
+                  "slow_none": sum(one.usual_reach["slow"] == 0.0 for one in steps.values())}  # fmt: skip
+    if QUOTED in steps:
+        found |= {"quoted_fast": steps[QUOTED].usual_reach["fast"], "quoted_fails": steps[QUOTED].failure.setting}
+    return found
+
+
+def pole_facts(part: xr.Dataset) -> dict[str, Any]:
+    """Of how many variants of fixed step a pole halves the accurate step, in angles and in other charts."""
+    halved: dict[bool, list[bool]] = {True: [], False: []}
+    for name, method in methods_of(part).items():
+        effect = pole_effect(map_of(part.sel(variant=name)))
+        if effect is not None and method.control == "step_size":
+            halved[method.charts() == ("angles",)].append(effect.halves)
+    groups = {"angles": halved[True], "others": halved[False]}
+    found = {name: len(group) for name, group in groups.items() if group}
+    return found | {f"{name}_halved": sum(groups[name]) for name in found}
+
+
+def resonance_facts(part: xr.Dataset) -> dict[str, Any]:
+    """Where small nutations grow (h omega), and where a third of a turn a step loses a top."""
+    phases, windows, lost, free = limits(part), only_windows(part), resonant(part), unlimited(part)
+    least = min(phases, key=lambda name: phases[name], default=None)
+    width = max((end - start for start, end in windows.values()), default=None)
+    return {"limited": len(phases), "limit_least": phases.get(least), "limit_variant": least, "free": len(free),
+            "windows": len(windows), "window_width": width, "resonant": len(lost),
+            "turned": int(np.isfinite(part[Column.THIRD_TURN_PHASE]).sum()),
+            "verlet_third": lost.get(QUOTED), "midpoint_third": lost.get("midpoint[angles]")}  # fmt: skip
+
+
+def sleeping_facts(part: xr.Dataset) -> dict[str, Any]:
+    """The spin from which a top sleeps at the longest step, and how far all of them are from theory."""
+    found: dict[str, Any] = {"sleep_step": float(part[Column.SLEEPING_STEP].max())}
+    misses_ = []
+    for name, method in methods_of(part).items():
+        cell = part.sel(variant=name).dropna("rung", subset=[Column.SLEEPING_THRESHOLD])
+        if method.sleeps_from is not None and cell.sizes["rung"]:
+            steps, spins = (cell[key].values for key in (Column.SLEEPING_STEP, Column.SLEEPING_THRESHOLD))
+            misses_ += [abs(one - method.sleeps_from(float(h))) for h, one in zip(steps, spins, strict=True)]
+            if split_name(name)[0] in ("strang", "cayley"):
+                found[f"{split_name(name)[0]}_sleeps"] = float(spins[-1])
+    return found | {"sleep_miss": max(misses_, default=None)}
+
+
+def separatrix_facts(part: xr.Dataset) -> dict[str, Any]:
+    """How well an early error predicts the accurate time next to the separatrix, in 1/λ."""
+    gaps = misses(part)
+    middle, most = (float(pick(gaps)) if gaps.size else None for pick in (np.median, np.max))
+    return {"lawful": gaps.size, "law_middle": middle, "law_most": most, "law_unreached": unreached(part),
+            "outlasting": len(outlasting(part))}  # fmt: skip
+
+
+def sampling_facts(part: xr.Dataset) -> dict[str, Any]:
+    """What an energy error sampled once a nutation hides, and the share of the solver in that of the midpoint rule."""
+    hidden, ratios = sampled(part)
+    worst = max(ratios, key=lambda name: ratios[name], default=None)
+    found = {"sampled": len(hidden) + len(ratios), "hidden": len(hidden),
+             "small": sum(ratio > 10.0 for ratio in ratios.values()),
+             "small_most": ratios.get(worst), "small_variant": worst}  # fmt: skip
+    if Column.TEXTBOOK_ENERGY in part:
+        rule = part.dropna("variant", how="all", subset=[Column.ONE_ITERATION_ENERGY]).isel(variant=0)
+        found |= {"one_iteration": float(rule[Column.ONE_ITERATION_ENERGY]),
+                  "solved": float(rule[Column.TEXTBOOK_ENERGY][-1])}  # fmt: skip
+    return found
+
+
+READ = (
+    ("grazing", Column.OUTCOME, pole_facts), ("steady-fast", Column.THIRD_TURN_PHASE, resonance_facts),
+    ("sleeping", Column.SLEEPING_THRESHOLD, sleeping_facts), ("separatrix", Column.HORIZON, separatrix_facts),
+    ("goldstein", Column.ENERGY_ONCE, sampling_facts),
+)  # fmt: skip
+
+
+def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
+    """Every map in numbers, the largest accurate share first; every limit in numbers."""
+    return {"atlas": atlas_table(data), "limits": limits_table(data)}
+
+
+def atlas_table(data: xr.Dataset) -> pd.DataFrame:
+    """A row for each family and variant; steps are in nutation periods."""
+    rows, past = [], maps(data, "grazing")
+    for family in families(data):
+        for name, one in maps(data, family).items():
+            effect, failure, beside = pole_effect(past.get(name)), one.failure, past.get(name)
+            limit = data[Column.LINEAR_LIMIT].sel(scene=family, variant=name) if Column.LINEAR_LIMIT in data else None
+            rows.append({
+                "variant": name, "scene": family, "set": one.control.replace("step_size", "step"),
+                "accurate (%)": 100.0 * one.accurate,
+                "accurate up to, fast tops": one.usual_reach["fast"],
+                "accurate up to, slow tops": one.usual_reach["slow"],
+                "fails from": failure.setting, "fails mostly by": failure.kind.replace("_", " "),
+                "ended early (%)": 100.0 * one.early, "wrong without an error (%)": 100.0 * one.silent,
+                "accurate past a pole (%)": None if beside is None else 100.0 * beside.accurate,
+                "a pole halves it within (rad)": effect.width if effect is not None and effect.halves else None,
+                "small nutations grow from": None if limit is None else float(limit.min()),
+            })  # fmt: skip
+    table = pd.DataFrame(rows)
+    place = {"step": 0, "tolerance": 1, "none": 2}
+    table = table.sort_values("accurate (%)", ascending=False, kind="stable") if rows else table
+    return table.sort_values("set", key=lambda column: column.map(place), kind="stable") if rows else table
+
+
+LIMITS = {  # header: scene, variable
+    "nutations grow at h omega": ("steady-fast", Column.LIMIT_PHASE),
+    "first window of growth from": ("steady-fast", Column.WINDOW_START),
+    "a third of a turn at": ("steady-fast", Column.THIRD_TURN_PHASE),
+    "survives there (rad)": ("steady-fast", Column.SURVIVING_AT_THIRD_TURN),
+    "sleeps from a spin of": ("sleeping", Column.SLEEPING_THRESHOLD),
+    "energy error, every step": ("goldstein", Column.ENERGY_EVERY),
+    "energy error, once a nutation": ("goldstein", Column.ENERGY_ONCE),
+}
+
+
+def limits_table(data: xr.Dataset) -> pd.DataFrame:
+    """Limits of every variant of fixed step, the least linear limit first; of several steps the longest."""
+    there = {key: one for key, one in LIMITS.items() if one[0] in data["scene"].values and one[1] in data}
+    columns = {
+        key: data[name].sel(scene=scene).transpose("variant", ...).values for key, (scene, name) in there.items()
+    }
+    table = pd.DataFrame({"variant": data["variant"].values.astype(str)} | {
+        key: values if values.ndim == 1 else values[:, -1] for key, values in columns.items()
+    }).dropna(how="all", subset=list(columns))  # fmt: skip
+    first = next(iter(LIMITS))
+    return table.sort_values(first, kind="stable") if first in table else table

@@ -1,0 +1,110 @@
+"""What the measurements of single mechanisms say, each read from its scene of the dataset."""
+
+import math
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from .atlas import methods_of
+from .tables import Column
+
+BARELY = 0.02  # rad: a top that is lost at a smaller displacement is lost to a resonance
+NEXT = 1.05  # times the largest displacement up to which all stay, at most: the first that was lost
+REVIVAL = 3.0  # times more survives past a resonance than in it; what stays dead beyond is no resonance
+LEAST_SAMPLED = 1e-14  # an energy error that is rounding
+LEAST_ASKED = 1e-12  # an energy error at every step from which on one asks what samples show of it
+OUTLASTS = 10.0  # 1/λ: two and a half digits more than the early error has
+EARLY = 1e-15, 1e-2  # rad, axis errors that predict the time next to a separatrix: above rounding, still small
+
+
+def measured(data: xr.Dataset, scene: str, variable: str) -> bool:
+    """Does any variant have a value of a variable on a scene?"""
+    return (
+        scene in data["scene"].values
+        and variable in data
+        and bool(np.isfinite(data[variable].sel(scene=scene).values).any())
+    )
+
+
+def variants_with(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
+    """The variants that have a value of a variable, by name."""
+    cells = {str(name): part.sel(variant=name) for name in part["variant"].values if variable in part}
+    return {name: cell for name, cell in cells.items() if np.isfinite(cell[variable].values).any()}
+
+
+def only_windows(part: xr.Dataset) -> dict[str, tuple[float, float]]:
+    """Methods whose nutations grow between the steps of the search only, with the ends of their first window."""
+    return {
+        name: (float(cell[Column.WINDOW_START]), float(cell[Column.WINDOW_END]))
+        for name, cell in variants_with(part, Column.WINDOW_START).items()
+        if math.isnan(float(cell[Column.LIMIT_PHASE]))
+    }
+
+
+def limits(part: xr.Dataset) -> dict[str, float]:
+    """The least step, as h omega, at which small nutations grow, of the methods that have a limit."""
+    return {
+        name: float(np.fmin(cell[Column.LIMIT_PHASE], cell.get(Column.WINDOW_START, math.nan)))
+        for name, cell in variants_with(part, Column.LIMIT_PHASE).items()
+    }  # a narrow window may come first
+
+
+def unlimited(part: xr.Dataset) -> list[str]:
+    """Methods whose small nutations grow at no step.
+
+    A method whose step reaches a third of a turn was followed on the whole way there; one that shows neither is not
+    symmetric, or has no precession to follow.
+    """
+    known = {**limits(part), **only_windows(part)}
+    return [name for name in variants_with(part, Column.THIRD_TURN_PHASE) if name not in known]
+
+
+def resonant(part: xr.Dataset) -> dict[str, float]:
+    """By variant the linearly stable steps (h omega) where some small displacement is lost, and none just past."""
+    phases = {}
+    for name, cell in variants_with(part, Column.THIRD_TURN_PHASE).items():
+        at, past = float(cell[Column.SURVIVING_AT_THIRD_TURN]), float(cell[Column.SURVIVING_PAST_THIRD_TURN])
+        if past > REVIVAL * at and NEXT * at < BARELY:
+            phases[name] = float(cell[Column.THIRD_TURN_PHASE])
+    return phases
+
+
+def outlasting(part: xr.Dataset) -> list[str]:
+    """Variants with a run that stays accurate next to the separatrix longer than predicted, by over `OUTLASTS`."""
+    longer = (part[Column.HORIZON] - part[Column.PREDICTED_HORIZON]).transpose("variant", ...).values
+    variants = zip(map(str, part["variant"].values), longer, strict=True)
+    return [name for name, values in variants if np.max(values[np.isfinite(values)], initial=0.0) > OUTLASTS]
+
+
+def lawful(part: xr.Dataset) -> xr.DataArray:
+    """To which runs next to the separatrix does the law of their early error apply?"""
+    early, methods, apart = part[Column.EARLY_ERROR], methods_of(part), outlasting(part)
+    conserving = [
+        name in apart or (name in methods and "energy" in (methods[name].conserves or ()))
+        for name in map(str, part["variant"].values)
+    ]
+    return (early < EARLY[1]) & (early > EARLY[0]) & ~xr.DataArray(conserving, dims="variant")
+
+
+def misses(part: xr.Dataset) -> NDArray[np.float64]:
+    """By how much the law misses the accurate time of the runs to which it applies, in units of 1/λ."""
+    gap = np.abs(part[Column.HORIZON] - part[Column.PREDICTED_HORIZON]).where(lawful(part)).values
+    return np.asarray(gap[np.isfinite(gap)])
+
+
+def unreached(part: xr.Dataset) -> int:
+    """How many runs that the law applies to never reach the error of which it speaks."""
+    return int((lawful(part) & part[Column.HORIZON].isnull()).sum())
+
+
+def sampled(part: xr.Dataset) -> tuple[list[str], dict[str, float]]:
+    """Variants whose energy error is at rounding if sampled once a nutation; how much too small those of others look.
+
+    No ratio is formed with a number at rounding.
+    """
+    pairs = {name: (float(cell[Column.ENERGY_ONCE]), float(cell[Column.ENERGY_EVERY]))
+             for name, cell in variants_with(part, Column.ENERGY_ONCE).items()}  # fmt: skip
+    asked = {name: pair for name, pair in pairs.items() if pair[1] > LEAST_ASKED}
+    hidden = [name for name, (once, _) in asked.items() if once <= LEAST_SAMPLED]
+    return hidden, {name: every / once for name, (once, every) in asked.items() if name not in hidden}
