@@ -21,7 +21,7 @@ A netCDF file has time, axis (n, 3), quaternion (n, 4), momentum (n, 3) and the 
 import math
 import secrets
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -120,15 +120,19 @@ def judge(
     findings: list[Finding] = []
     traces: dict[str, Any] = {}
     listen = tell or (lambda _: None)
-    for event in events:
-        if isinstance(event, About):
-            about = event
-            listen(about)
-            continue
-        for one in event.findings:
-            listen(one)
-        findings += event.findings
-        traces |= event.traces
+    try:
+        for event in events:
+            if isinstance(event, About):
+                about = event
+                listen(about)
+                continue
+            for one in event.findings:
+                listen(one)
+            findings += event.findings
+            traces |= event.traces
+    finally:
+        if isinstance(events, Generator):
+            events.close()  # also where the one that listens has raised: its process ends
     if not findings:
         raise SymtopError("it cannot be judged: its process ended before it was open")
     return StepLedger(about.name, request.scene.name, tuple(findings), traces, about, frozenset(implied))

@@ -205,3 +205,11 @@ def test_a_run_that_is_returned_is_one_of_numbers():
         run = symtop.simulate("spheroid", separated(method, process), step_size=0.1, guard=False)
     assert run.attrs["outcome"] == "not_finite"
     assert np.isnan(run["energy"].values).all()
+
+
+def test_a_command_whose_reader_leaves_ends():
+    command = [sys.executable, "-m", "symtop.cli", "judge", f"{FILE}:rk4", "--quick"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        process.stdout.readline()
+        process.stdout.close()
+        assert process.wait(60.0) != 0
