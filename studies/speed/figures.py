@@ -24,8 +24,9 @@ LINES = {  # label, colour and line; what is not here is pale
     "strang[axis]": ("Strang splitting", "#66A61E", "-"),
     "takahashi-imada[axis]": ("Takahashi-Imada", "#00573F", "-"),
     "taylor[axis]": ("Taylor (heyoka)", BLACK, "-"),
-    "rk45[axis]": ("RK45 called through SciPy", VERMILLION, SCIPY),
+    "rk45[axis]": ("RK45 through SciPy", VERMILLION, SCIPY),
 }
+OTHERS = {"series[axis]": "Taylor for this top", "dop853[axis]": "DOP853 through SciPy"}  # names of pale ones
 LEAST, MOST = 1e-16, 3.0  # rad, of the panel
 COSTS = {"time of a run, one core (s)": "seconds", "force evaluations": "force_evaluations"}
 ERRORS = {
@@ -49,22 +50,24 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         good = np.isfinite(x) & np.isfinite(y) & (y < MOST)
         if split_name(name)[0] == REFERENCE or not good.any():
             continue
-        label, color, dash = LINES.get(name, (split_name(name)[0], PALE, "-"))
+        label, color, dash = LINES.get(name, (OTHERS.get(name, split_name(name)[0]), PALE, "-"))
         x, y = x[good], np.maximum(y[good], 0.3 * level)
         thick = (1.0, 1.5, 1.5) if color == PALE else (1.7, 2.4, 2.0)
         axis.plot(x, y, color=color, ls=dash, marker="o", **dict(zip(("lw", "ms", "zorder"), thick, strict=True)))
         ends.append((label, color, x, y))
     axis.text(0.995, math.sqrt(LEAST * level), "below the bound of the truth ", transform=axis.get_yaxis_transform(),
               ha="right", va="center", fontsize=LEAST_TEXT, color="#444444")  # fmt: skip
+    walls = []
     if REFERENCE in part["variant"].values:
         exact = float(part["seconds"].sel(variant=REFERENCE).min())
+        walls = [([exact] * 40, np.geomspace(LEAST, MOST, 40)), ([0.85 * exact] * 40, np.geomspace(LEAST, MOST, 40))]
         axis.axvline(exact, color="#555555", ls=(0, (1, 2)), lw=1.0)
         place = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "ha": "right", "va": "bottom"}
         axis.annotate("exact motion, no integrator", (exact, 0.16), (-2, 0), rotation=90, color="#444444",
                       fontsize=LEAST_TEXT, **place)  # fmt: skip
     low, high = axis.get_xlim()
     axis.set_xlim(low, 6.0 * high)  # with room for the labels
-    label_lines(axis, ends)
+    label_lines(axis, ends, walls)
     return [Picture("error-against-time", figure)]
 
 

@@ -12,6 +12,8 @@ from symtop.cli.common import File, as_text, check_outputs, completing, json_opt
 from symtop.core.errors import SymtopError
 from symtop.core.progress import ticking
 
+CHARTS = ("axis", "attitude", "angles")
+BESIDE, MOST_BESIDE = ("rk4", "strang", "dop853", "taylor"), 2e4  # methods, and force evaluations of a run
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
 
 
@@ -36,11 +38,13 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 @click.option("--output", type=File(dir_okay=False), help="Write the findings to this netCDF file.")
 @click.option("--card", type=File(dir_okay=False), help="Write a page with two figures and the ledger (HTML).")
 @click.option("--badge", type=File(dir_okay=False), help="Write a badge for a README (SVG).")
+@click.option("--figure", type=File(dir_okay=False), help="Draw its error against evaluations, beside four methods.")
 @plugin_option
 @json_option
 def judge(
-    target: str, scene: str, output: str | None, card: str | None, badge: str | None, as_json: bool, **options: Any
-) -> None:
+    target: str, scene: str, output: str | None, card: str | None, badge: str | None, figure: str | None, as_json: bool,
+    **options: Any,
+) -> None:  # fmt: skip
     """Judge TARGET: its order, structure, invariants and drift on the top, beside what you claim of it.
 
     \b
@@ -71,7 +75,7 @@ def judge(
         elif line := findings.line(event, common.terminal_width()):
             click.echo(line)
 
-    check_outputs(output=output, card=card, badge=badge)
+    check_outputs(output=output, card=card, badge=badge, figure=figure)
     ledger = judged(target, scene=scene, tell=None if as_json else tell, **options)
     if as_json:
         click.echo(as_text([finding.plain() for finding in ledger.findings]))
@@ -87,9 +91,30 @@ def judge(
         for file, write in ((card, cards.card), (badge, cards.write_badge)):
             if file is not None:
                 write(ledger, file)
-    say_written(output, card, badge, err=as_json)
+    _draw_beside(target, scene, figure, options)
+    say_written(output, card, badge, figure, err=as_json)
     if ledger.refuted:
         sys.exit(1)
+
+
+def _draw_beside(target: str, scene: str, file: str | None, options: dict[str, Any]) -> None:
+    """The figure of a step's error against force evaluations beside `BESIDE`, if a file was named."""
+    if file is None:
+        return
+    with ticking("comparing"):
+        from symtop.judging.adapters.adapter import integrator
+        from symtop.judging.claims.subject import open_target
+        from symtop.judging.comparison import compare
+        from symtop.report.plot import draw_compare
+
+        stepper = open_target(target, options["form"], options["chart"], adaptive=options["adaptive"])
+        if stepper.chart not in CHARTS:
+            raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
+        method = integrator(stepper, order=options["order"])
+        data = compare(
+            scene, [method, *BESIDE], cost="evaluations", nutations=10.0, budget=MOST_BESIDE, quiet=True
+        )  # fmt: skip
+        draw_compare(data, file)
 
 
 @click.command(short_help="Measure what integrators claim about themselves.")

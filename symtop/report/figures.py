@@ -73,28 +73,36 @@ def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]], size: flo
         )  # fmt: skip
 
 
-def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], size: float = LEAST_TEXT) -> None:
-    """Write the name of each line beside one of its ends or its middle, in its colour, where it covers no
-    other name and few points.
+def label_lines(
+    axis: Any,
+    lines: Sequence[tuple[str, str, Any, Any]],
+    others: Sequence[tuple[Any, Any]] = (),
+    size: float = LEAST_TEXT,
+) -> None:
+    """Write the name of each line beside an end of it or its middle, in its colour, where it covers little else.
 
-    `lines` have name, colour, x and y. Limits and layout of the panel must be final.
+    `lines` have name, colour, x and y, and `others`, which have no name, x and y. Limits and layout of the panel must
+    be final.
     """
     if not lines:
         return
     figure = axis.figure.canvas.figure
     figure.draw_without_rendering()
     renderer, frame = figure.canvas.get_renderer(), axis.get_window_extent()
-    marks = np.concatenate([axis.transData.transform(_dense(x, y)) for _, _, x, y in lines])
+    marks = np.concatenate([_dense(axis, x, y) for *_, x, y in [*lines, *others]])
     taken: list[Any] = []
     for name, color, x, y in sorted(lines, key=lambda one: -len(one[0])):
         look = {"textcoords": "offset points", "va": "center", "fontsize": size, "color": ink(color), "weight": "bold"}
         tried: list[Any] = []
-        for end, (dx, dy, side) in product((len(x) - 1, 0, len(x) // 2), PLACES):
+        for kind, (dx, dy, side) in product(range(3), PLACES):
+            end = (len(x) - 1, 0, len(x) // 2)[kind]
             text = axis.annotate(name, (x[end], y[end]), (dx, dy), ha=side, **look)
             box = text.get_window_extent(renderer)
             out = box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0 or box.y1 > frame.y1
             covered = np.all((marks > box.min) & (marks < box.max), axis=1).sum()
-            price = 1e3 * (sum(box.overlaps(other) for other in taken) + out) + covered + 0.5 * (end != len(x) - 1)
+            price = (
+                1e3 * (sum(box.overlaps(other) for other in taken) + out) + covered + abs(dy) / 3.0 + ELSEWHERE[kind]
+            )
             tried.append((price, len(tried), text, box))
         best = min(tried)
         for _, _, text, _ in tried:
@@ -103,13 +111,16 @@ def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], size: flo
         taken.append(best[3])
 
 
+APART = 3.0  # pixels
+ELSEWHERE = (0.0, 2.0, 8.0)  # points of lines that a name covers rather than stand at the first end, or in the middle
 PLACES = tuple(
     (dx, dy, side) for dx, side in ((5, "left"), (-5, "right")) for dy in (0, -5, 5, -9, 9, -14, 14)
 )  # points
 
 
-def _dense(x: Any, y: Any) -> Any:
-    """Points along a line, close together on logarithmic axes."""
-    steps = np.linspace(0.0, len(x) - 1.0, 12 * len(x))
-    each = [np.exp(np.interp(steps, np.arange(len(x)), np.log(part))) for part in (x, y)]
-    return np.stack(each, axis=1)
+def _dense(axis: Any, x: Any, y: Any) -> Any:
+    """Points along a line on the screen, `APART` from each other."""
+    ends = axis.transData.transform(np.stack([x, y], axis=1))
+    length = np.append(0.0, np.cumsum(np.hypot(*np.diff(ends, axis=0).T)))
+    places = np.arange(0.0, length[-1] + APART, APART)
+    return np.stack([np.interp(places, length, ends[:, k]) for k in range(2)], axis=1)

@@ -478,3 +478,15 @@ def test_the_order_of_a_quaternion_is_said_where_a_step_is_refused():
         of_rotation(of_a_rotation, 0.01, 1.0)
     with pytest.raises(symtop.SymtopError, match=r"takes \(q, w, h, inertia, torque\): form rotation"):
         symtop.judge(of_a_rotation, quick=True)
+
+
+def test_a_figure_shows_a_step_beside_four_methods(tmp_path):
+    file = tmp_path / "step.py"
+    file.write_text("def step(f, t, y, h):\n    return y + h * f(t + h / 2, y + h / 2 * f(t, y))\n", encoding="utf-8")
+    drawn = tmp_path / "step.png"
+    done = CliRunner().invoke(main, ["judge", f"{file}:step", "--quick", "--order", "2", "--figure", str(drawn)])
+    assert done.exit_code == 0, done.output
+    assert drawn.stat().st_size > 1000
+    assert f"written to {drawn}" in done.output
+    refused = CliRunner().invoke(main, ["judge", f"{file}:step", "--figure", "step.doc"])
+    assert refused.exit_code == 2

@@ -15,54 +15,28 @@ import symtop
 from symtop.report import page, style, template
 from symtop.report.html import Writer
 from symtop.runner import run as runner
-from symtop.runner.study import Chart, Series
 from tests.browser import FAINT, Browser
 
 FEW = (
-    "midpoint[angles]",
-    "stormer-verlet[angles]",
-    "strang[axis]",
-    "rk4[axis]",
-    "rk45-compiled[angles]",
-    "taylor[axis]",
-)
-PICTURE = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
-
-
-def error_against_work(data):
-    """A chart with a panel for each of two quantities."""
-
-    def series(quantity):
-        return [
-            Series(str(name), [
-                (float(x), float(y), f"{x:.0f} force evaluations, error {y:.1e}")
-                for x, y in zip(data["force_evaluations"].sel(variant=name).values.ravel(),
-                                data[quantity].sel(variant=name).values.ravel(), strict=True)
-            ])
-            for name in data["variant"].values
-        ]  # fmt: skip
-
-    panels = {quantity: series(quantity) for quantity in ("axis", "energy")}
-    return [Chart("work", "Error against work", "force evaluations", "error", panels)]
+    "exact", "midpoint[angles]", "stormer-verlet[angles]", "strang[axis]", "rk4[axis]", "rk4[attitude]", "taylor[axis]",
+    "rk45-compiled[axis]",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    """A small study of convergence with a chart, its findings and the page."""
+    """Small studies of speed, of what goes wrong and of convergence, their findings and the page."""
     folder = tmp_path_factory.mktemp("results")
-    study = runner.load("convergence")
-    few = [case for case in study.cases(True) if case.scene == "spheroid" and case.integrator in FEW]
-    small = dataclasses.replace(study, cases=lambda _: few, charts=error_against_work)
-    findings = runner.run(small, folder, jobs=1, quiet=True, save=style.save)
-    assert findings["failures"] == []
-    with pytest.MonkeyPatch.context() as patch:  # its template has no chart
-        filled = template.filled
-        patch.setattr(
-            template,
-            "filled",
-            lambda *args, **options: filled(*args, **options) + "\n<!-- chart convergence-work -->\n",
-        )
-        page.write(folder)
+    for name in ("speed", "pitfalls", "convergence"):
+        study = runner.load(name)
+        few = [case for case in study.cases(True) if name == "pitfalls" or case.integrator in FEW]
+        if name == "convergence":
+            few = [case for case in few if case.scene == "spheroid"]
+        if name == "speed":
+            few = [dataclasses.replace(case, settings={"lengths": (4.0, 8.0), "settings": 5}) for case in few]
+        small = dataclasses.replace(study, cases=lambda _, few=few: few)
+        assert runner.run(small, folder, jobs=1, quiet=True, save=style.save)["failures"] == []
+    page.write(folder)
     return folder
 
 
@@ -88,7 +62,7 @@ def test_nothing_overflows_and_every_figure_is_there(browser, scheme, width):
     browser.evaluate("[...document.images].forEach(one => { one.loading = 'eager'; })")
     browser.wait_for("[...document.images].every(one => one.complete)")
     assert browser.evaluate("[...document.images].every(one => one.naturalWidth > 100 && one.alt)")
-    assert browser.evaluate("document.images.length") == 3
+    assert browser.evaluate("document.images.length") == 5
     least = "Math.min(...[...document.querySelectorAll('.chart svg text')].map(t => t.getBoundingClientRect().height))"
     assert browser.evaluate(least) >= 10.0  # pixels: legible
     assert browser.problems == []
@@ -190,7 +164,7 @@ def test_the_keyboard_reaches_content_tables_and_points(browser):
         browser.press("ArrowRight")
         said.append(browser.evaluate("document.querySelector('.chart .tip').textContent"))
     assert said[0] != said[1]
-    assert all("error" in one for one in said)
+    assert all(re.search("step|tolerance", one) for one in said)
     browser.press("Escape")
     assert browser.evaluate("document.querySelector('.chart .tip').hidden")
 
@@ -213,9 +187,10 @@ def test_it_paints_within_a_second_and_is_small(browser, results):
 def test_the_page_can_be_sent_alone(results, tmp_path):
     for folder in ("figures", "tables"):
         shutil.copytree(results / folder, tmp_path / folder)
-    shutil.copy(results / "convergence.json", tmp_path)
+    for name in ("convergence", "speed", "pitfalls"):
+        shutil.copy(results / f"{name}.json", tmp_path)
     text = page.write(tmp_path, embed=True).read_text(encoding="utf-8")
-    assert text.count("data:image/png;base64,") == 3
+    assert text.count("data:image/png;base64,") == 5
     assert 'src="figures/' not in text
 
 
@@ -236,26 +211,47 @@ POINT = """(() => {
 def test_pointing_at_a_run_shows_what_it_was(browser, results):
     browser.resize(1280, 900)
     tip = browser.evaluate(POINT % (0, 0))
-    name, error = re.fullmatch(r"(\S+) \(\S+\): .*error (\S+)", tip).groups()
-    cell = xr.load_dataset(results / "convergence.nc").sel(scene="spheroid", variant=name)
-    assert any(f"{value:.1e}" == error for value in cell["axis"].values)
+    name, step = re.fullmatch(r"(\S+) \(\S+\): step (\S+) s", tip).groups()
+    cell = xr.load_dataset(results / "speed.nc").sel(scene="goldstein", variant=name).isel(nutations=0)
+    assert any(f"{value:.3g}" == step for value in cell["step_size"].values)
     assert browser.evaluate(POINT % (0, 100_000)) == ""  # far from every run: nothing
 
 
-def test_the_filter_and_the_choice_change_what_is_drawn(browser):
+def test_methods_cost_error_and_run_length_are_chosen(browser, results):
     browser.resize(1280, 900)
-    count = "document.querySelectorAll('.chart .mark').length"
-    everything = browser.evaluate(count)
+    marks, drawn = (
+        "document.querySelectorAll('.chart .mark').length",
+        "document.querySelector('.chart svg').innerHTML.split('<circle')[0]",
+    )
+    everything, before = browser.evaluate(marks), browser.evaluate(drawn)
+    data = xr.load_dataset(results / "speed.nc").sel(scene="goldstein").isel(nutations=0)
+    good = (data["axis"] > 0.0) & (data["seconds"] > 0.0) & (data["variant"] != "exact")
+    assert everything == int(good.sum())
     browser.click(".chart input[value='rk4']")
-    without = browser.evaluate(count)
-    assert 0 < without < everything
+    assert 0 < browser.evaluate(marks) < everything
     browser.click(".chart input[value='rk4']")
-    assert browser.evaluate(count) == everything
-    before = browser.evaluate("document.querySelector('.chart svg').innerHTML")
-    browser.set(".chart select", "energy")
-    assert browser.evaluate("document.querySelector('.chart svg').innerHTML") != before
-    browser.set(".chart select", "axis")
-    assert browser.evaluate("document.querySelector('.chart svg').innerHTML") == before
+    assert browser.evaluate(marks) == everything
+    labels = "[...document.querySelectorAll('.chart svg text')].map(one => one.textContent)"
+    assert {"rk4[axis]", "exact motion, no integrator", "below the bound of the truth"} <= set(browser.evaluate(labels))
+    for menu, choice, shown in (
+        ("Error", "largest error of the attitude (rad)", "rk4[attitude]"),
+        ("Cost", "force evaluations", "force evaluations"),
+        ("run length", "8 nutations", "strang[axis]"),
+    ):
+        select = f".chart select[name='{menu}']"
+        first = browser.evaluate(f'document.querySelector("{select}").value')
+        browser.set(select, choice)
+        assert browser.evaluate(drawn) != before
+        assert shown in browser.evaluate(labels)
+        browser.set(select, first)
+        assert browser.evaluate(drawn) == before
+
+
+def test_the_chart_takes_the_place_of_its_figure_on_the_screen_and_not_in_print(browser):
+    place = "document.querySelector('#speed-error-against-time .scroll').checkVisibility()"
+    assert browser.evaluate(place) is False
+    assert browser.evaluate("document.querySelector('#speed-error-against-time .chart svg').checkVisibility()")
+    assert browser.evaluate("document.querySelector('#pitfalls-three .scroll').checkVisibility()")
 
 
 def test_words_follow_from_the_stored_data_and_from_nothing_else(results, tmp_path):
