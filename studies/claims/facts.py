@@ -11,9 +11,23 @@ from symtop.judging.battery import CLAIMS, SCENE
 from symtop.judging.findings import VERDICTS, claim_name
 from symtop.methods.framework.registry import integrators
 
+from .planted import LIES
+
 MARKED = ("midpoint", "strang", "galerkin-simpson", "sofroniou-spaletta-10", "gauss-4", "gauss-12", "rk4", "rk45")
 REFINED = 100.0  # a defect that falls by more than this over the differencing widths is an error of the differencing
 FIRST = ("refuted", "undecided", "confirmed", "measured", "inapplicable")  # of the verdicts
+
+
+def parts(data: xr.Dataset) -> tuple[xr.Dataset, pd.DataFrame]:
+    """What was measured of integrators, and the findings on those that make planted false claims."""
+    false = data["variant"].isin(list(LIES))
+    return data.isel(variant=~false), ledger(data.isel(variant=false))
+
+
+def caught(found: pd.DataFrame) -> pd.Series:
+    """Of each planted integrator, by its name: is its false claim refuted?"""
+    lies = found[found["claim"] == found["integrator"].map(LIES)]
+    return lies.set_index("integrator")["verdict"] == "refuted"
 
 
 def ledger(data: xr.Dataset) -> pd.DataFrame:
@@ -38,6 +52,8 @@ def defects(data: xr.Dataset) -> dict[str, tuple[np.ndarray, np.ndarray]]:
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """How many claims have each verdict, which defects are real, and how many steps the long runs have."""
+    data, false = parts(data)
+    told = caught(false)
     found, measured = ledger(data), defects(data)
     count = Counter(found["verdict"])
     falling = [name for name, (_, defect) in measured.items() if defect[-1] < defect[0] / REFINED]
@@ -52,6 +68,9 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "declared": count["confirmed"] + count["refuted"] or None,  # and judged
         "held": count["confirmed"],
         **{word: count[word] for word in ("refuted", "undecided", "measured")},
+        "planted": len(told) or None,  # integrators that make a false claim
+        "caught": int(told.sum()),
+        "escaped": ", ".join(told.index[~told]) or None,
         "open_claim": open_claim,  # that most of the undecided findings are on
         "open_most": open_most,
         "falling": ", ".join(falling) or None,  # methods whose defect is that of the differences
@@ -65,6 +84,8 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
-    """Every finding."""
-    found = ledger(data)
-    return {"ledger": found.assign(claim=found["claim"].map(claim_name))}
+    """Every finding, and what is found of the false claims."""
+    data, false = parts(data)
+    lies = false[false["claim"] == false["integrator"].map(LIES)]
+    named = {"ledger": ledger(data), "planted": lies.drop(columns=["scene", "family"])}
+    return {name: part.assign(claim=part["claim"].map(claim_name)) for name, part in named.items() if len(part)}

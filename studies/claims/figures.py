@@ -15,7 +15,8 @@ from symtop.report import style
 from symtop.report.figures import name_ends
 from symtop.runner.study import Picture
 
-from .facts import FIRST, defects, ledger
+from .facts import FIRST, caught, defects, ledger, parts
+from .planted import LIES
 
 SYMBOLS = {"confirmed": "✓", "refuted": "✗", "measured": "○", "undecided": "?", "inapplicable": "∅"}
 SAID = {
@@ -34,18 +35,23 @@ COLORS = {
     "confirmed": "#CFE8F3", "refuted": style.VERMILLION, "measured": "#F2F2F2", "undecided": style.YELLOW,
     "inapplicable": "#FFFFFF",
 }  # fmt: skip
+CAUGHT = "#BFE3D0"  # a planted false claim that is refuted
 
 
 def pictures(data: xr.Dataset) -> Iterator[Picture]:
     """The matrix of verdicts, and the defect of the bracket against the differencing width."""
+    data, false = parts(data)
     if len(found := ledger(data)):
-        yield draw_ledger(found)
+        yield draw_ledger(found, caught(false))
     if measured := defects(data):
         yield draw_bracket(measured)
 
 
-def draw_ledger(found: pd.DataFrame) -> Picture:
-    """One row a claim, one column a family of methods: how many of its methods have each verdict."""
+def draw_ledger(found: pd.DataFrame, told: pd.Series) -> Picture:
+    """One row a claim, one column a family of methods: how many of its methods have each verdict.
+
+    The last column has the planted false claims, and how many of them are refuted.
+    """
     counts = found.groupby(["family", "claim"])["verdict"].value_counts()
     sizes = found.groupby("family")[["scene", "integrator"]].apply(lambda part: len(part.drop_duplicates()))
     names = [family for family in (*FAMILIES, "other") if family in sizes]
@@ -64,10 +70,19 @@ def draw_ledger(found: pd.DataFrame) -> Picture:
                 column, line, ", ".join(f"{count[word]} {SYMBOLS[word]}" for word in there), ha="center", va="center",
                 fontsize=style.LEAST_TEXT, fontweight="bold" if "refuted" in there else "normal",
             )  # fmt: skip
-    axis.set(xlim=(-0.5, len(names) - 0.5), ylim=(len(CLAIMS) - 0.5, -0.5))
+    right = len(names) + 0.25
+    for claim, refuted in told.groupby(told.index.map(LIES)):
+        line, color = CLAIMS.index(claim), CAUGHT if refuted.all() else COLORS["refuted"]
+        axis.add_patch(Rectangle((right - 0.5, line - 0.5), 1.0, 1.0, facecolor=color, edgecolor="white", lw=1.5))
+        axis.text(
+            right, line, f"{refuted.sum()} of {len(refuted)}", ha="center", va="center", fontsize=style.LEAST_TEXT
+        )
+    axis.set(xlim=(-0.5, (right if len(told) else len(names) - 1) + 0.5), ylim=(len(CLAIMS) - 0.5, -0.5))
     axis.set_yticks(range(len(CLAIMS)), [ROWS.get(claim, claim_name(claim)) for claim in CLAIMS])
     heads = [f"{TITLES.get(name, name)}\n{sizes[name]} method{'' if sizes[name] == 1 else 's'}" for name in names]
-    axis.set_xticks(range(len(names)), [head.replace("-", "\n") for head in heads])
+    places = [*range(len(names)), right] if len(told) else range(len(names))
+    heads = [head.replace("-", "\n") for head in heads] + ["false claims,\nplanted:\ncaught"][: len(told)]
+    axis.set_xticks(places, heads)
     axis.tick_params(length=0, bottom=False, labelbottom=False, labeltop=True)
     axis.grid(visible=False)
     axis.spines[:].set_visible(False)

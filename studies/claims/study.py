@@ -8,7 +8,7 @@ from symtop.methods.framework.registry import integrator, integrators
 from symtop.model.scenes import scene
 from symtop.runner.study import Case, Study
 
-from . import facts, figures
+from . import facts, figures, planted
 
 LEFT_OUT = {  # tags of scenes, with the reason; all claims of all integrators take minutes on each scene
     "mild": "a defect shows less",
@@ -20,13 +20,16 @@ LEFT_OUT = {  # tags of scenes, with the reason; all claims of all integrators t
 
 
 def cases(quick: bool) -> list[Case]:
-    """One case an integrator and scene."""
+    """One case an integrator and scene, and those that make false claims."""
     names = grid_scenes(LEFT_OUT)
-    return [Case(name, method.name, {"quick": quick}) for name in names for method in integrators().values()]
+    every = [Case(name, method.name, {"quick": quick}) for name in names for method in integrators().values()]
+    return every + planted.cases(quick)
 
 
 def measure(case: Case) -> xr.Dataset:
     """The findings on one integrator, in every chart that it works in."""
+    if case.integrator in planted.LIES:
+        return planted.measured(case)
     return (
         judge(integrator(case.integrator), scene(case.scene), quick=case.settings["quick"])
         .dataset()

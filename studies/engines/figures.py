@@ -1,6 +1,6 @@
 """Figures of the study of engines: axis error against steps a nutation, and at equal cost."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -40,11 +40,12 @@ def color(row: pd.Series) -> str:
     return COLORS[min(COLORS, key=lambda known: abs(known - row["group"]))] if row["engine"] else OURS
 
 
-def key(figure: Any) -> None:
-    """The colours of a figure and its marks, below it."""
-    said = ["no gyroscopic term", *(f"order {order:g}" for order in COLORS if order)]
-    for label, shade in zip([*said, "no engine, for comparison"], [*COLORS.values(), OURS], strict=True):
-        figure.axes[0].plot([], [], "s", color=shade, ms=6, label=label)
+def key(figure: Any, shades: Iterable[str]) -> None:
+    """The colours that a figure has and its marks, below it."""
+    said = ["no gyroscopic term", *(f"order {order:g}" for order in COLORS if order), "no engine, for comparison"]
+    for label, shade in zip(said, [*COLORS.values(), OURS], strict=True):
+        if shade in shades:
+            figure.axes[0].plot([], [], "s", color=shade, ms=6, label=label)
     style.legend_below(figure, figure.axes)
 
 
@@ -73,9 +74,10 @@ def draw_error(data: xr.DataTree, known: pd.DataFrame, colors: dict[str, str]) -
         axis.annotate(f"1/{rate:g} s", (place, RANGE[0] * 1.6), (3, 0), textcoords="offset points",
                       fontsize=style.LEAST_TEXT, bbox=PAPER)  # fmt: skip
     axis.set(xscale="log", yscale="log", ylim=RANGE, xlim=(14.0, right), xlabel="steps a nutation", ylabel=ERROR)
-    axis.plot([], [], color="#444444", lw=1.0, ls=DASHES, label="single precision")
-    axis.plot([], [], "v", color="#444444", ms=5, mec="white", label="its best step")
-    key(figure)
+    if known["single"].any():
+        axis.plot([], [], color="#444444", lw=1.0, ls=DASHES, label="single precision")
+        axis.plot([], [], "v", color="#444444", ms=5, mec="white", label="its best step")
+    key(figure, {colors[name] for name in known.index})
     name_ends(axis, ends)
     return Picture("error", figure)
 
@@ -100,5 +102,5 @@ def draw_cost(data: xr.DataTree, known: pd.DataFrame, colors: dict[str, str]) ->
         axes[0, 0].plot([], [], marker=mark, ms=4, color=OURS, ls="", label=f"{rate:g} evaluations a second")
     axes[0, 0].plot([], [], color=style.GREY, lw=0.9, ls=(0, (1, 2)), label="π: the most, or a run that ended early")
     style.few_ticks(*axes.flat, most=5)
-    key(figure)
+    key(figure, {colors[name] for name in names})
     return Picture("cost", figure)

@@ -5,11 +5,11 @@ import importlib
 import json
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from symtop_studies.claims import planted
 
 import symtop
 from symtop.cli.main import main
@@ -31,7 +31,6 @@ from tests.conftest import random_scenes
 from tests.templates import checked
 
 registry = importlib.import_module("symtop.methods.framework.registry")
-LIARS = Path(__file__).parent / "liars"
 SPHEROID = symtop.scene("spheroid")
 CHARTS = ("angles", "axis", "attitude")
 
@@ -322,7 +321,10 @@ OWN_KERNEL = {"one_newton", "coefficient_off", "verlet_swapped", "leaking_moment
 
 
 def test_every_file_of_false_claims_is_tested():
-    assert {path.stem for path in LIARS.glob("*.py")} == set(CAUGHT)
+    assert {path.stem for path in planted.LIARS.glob("*.py")} == set(CAUGHT)
+    assert {planted.file_of(name).stem: lie for name, lie in planted.LIES.items()} == {
+        liar: claim for liar, (claim, _) in CAUGHT.items()
+    }
 
 
 def run_claims(*arguments):
@@ -333,7 +335,7 @@ def run_claims(*arguments):
 @pytest.mark.parametrize("liar", [pytest.param(n, marks=pytest.mark.slow if n in OWN_KERNEL else []) for n in CAUGHT])
 def test_a_liar_is_caught_for_the_right_reason(liar, clean_registry):
     quick = [] if liar in OWN_KERNEL else ["--quick"]
-    code, output = run_claims("--plugin", str(LIARS / f"{liar}.py"), "--json", *quick)
+    code, output = run_claims("--plugin", str(planted.LIARS / f"{liar}.py"), "--json", *quick)
     claim, why = CAUGHT[liar]
     findings = {row.pop("claim"): row for row in json.loads(output)}
     assert code == 1
@@ -386,7 +388,7 @@ def test_the_command_prints_one_sentence_for_each_claim():
 
 
 def test_the_study_counts_lists_and_draws_a_refuted_claim(tmp_path, clean_registry):
-    plugins.load(LIARS / "symplectic_rk4.py")
+    plugins.load(planted.LIARS / "symplectic_rk4.py")
     study = runner.load("claims")
     mine = dataclasses.replace(
         study, cases=lambda quick: [case for case in study.cases(quick) if case.integrator in ("symplectic-rk4", "rk4")]

@@ -9,10 +9,12 @@ from symtop.methods.splitting import space as family
 from symtop.methods.splitting.coefficients import STRANG
 from symtop.methods.splitting.loop import Stages
 
+whole_step = family.AXIS.increment  # numba finds a name of this module, not an attribute of another one's
+
 
 def increment(par, rule, state, carry, h):
     """The family's step and a little more."""
-    step, axis, forces, outcome = family.AXIS.increment(par, rule, state, carry, h)
+    step, axis, forces, outcome = whole_step(par, rule, state, carry, h)
     return (step[0], step[1], step[2], step[3], step[4], step[5] + 1e-10), axis, forces, outcome
 
 
