@@ -12,6 +12,8 @@ from symtop.cli.common import File, as_text, check_outputs, completing, json_opt
 from symtop.core.errors import SymtopError
 from symtop.core.progress import ticking
 
+CHARTS = ("axis", "attitude", "angles")
+BESIDE, MOST_BESIDE = ("rk4", "strang", "dop853", "taylor"), 2e4  # methods, and force evaluations of a run
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
 
 
@@ -30,15 +32,19 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 )  # fmt: skip
 @click.option("--energy", type=click.Choice(["kept", "bounded"]), help="Claim what becomes of the energy.")
 @click.option("--adaptive", is_flag=True, help="Judge a class of SciPy's at a tolerance, not at fixed steps.")
+@click.option("--autonomous", is_flag=True, help="It was written for y' = f(y), without a time.")
 @click.option("--quick", is_flag=True, help="Ten seconds at most: shorter runs.")
+@click.option("--seed", type=int, help="Draw the starts, times and steps of an earlier judging again.")
 @click.option("--output", type=File(dir_okay=False), help="Write the findings to this netCDF file.")
 @click.option("--card", type=File(dir_okay=False), help="Write a page with two figures and the ledger (HTML).")
 @click.option("--badge", type=File(dir_okay=False), help="Write a badge for a README (SVG).")
+@click.option("--figure", type=File(dir_okay=False), help="Draw its error against evaluations, beside four methods.")
 @plugin_option
 @json_option
 def judge(
-    target: str, scene: str, output: str | None, card: str | None, badge: str | None, as_json: bool, **options: Any
-) -> None:
+    target: str, scene: str, output: str | None, card: str | None, badge: str | None, figure: str | None, as_json: bool,
+    **options: Any,
+) -> None:  # fmt: skip
     """Judge TARGET: its order, structure, invariants and drift on the top, beside what you claim of it.
 
     \b
@@ -49,7 +55,7 @@ def judge(
     my.py:step      with --form rotation, step(q, w, h, inertia, torque) -> q, w of a rigid
                     body: q = (w, x, y, z) from body to space, or a matrix (3, 3)
     ./my.so         void step(double *y, double h, const double *par, long n)
-    "./engine -x"   a program: a line of numbers in, states out
+    "./engine -x"   with --form program: a line of numbers in, states out
     run.csv         a trajectory without a method: time and states (see symtop.judging.judge_step)
 
     Without a claim it says what the method is. The exit code is 1 if a claim is refuted.
@@ -69,7 +75,7 @@ def judge(
         elif line := findings.line(event, common.terminal_width()):
             click.echo(line)
 
-    check_outputs(output=output, card=card, badge=badge)
+    check_outputs(output=output, card=card, badge=badge, figure=figure)
     ledger = judged(target, scene=scene, tell=None if as_json else tell, **options)
     if as_json:
         click.echo(as_text([finding.plain() for finding in ledger.findings]))
@@ -85,9 +91,30 @@ def judge(
         for file, write in ((card, cards.card), (badge, cards.write_badge)):
             if file is not None:
                 write(ledger, file)
-    say_written(output, card, badge, err=as_json)
+    _draw_beside(target, scene, figure, options)
+    say_written(output, card, badge, figure, err=as_json)
     if ledger.refuted:
         sys.exit(1)
+
+
+def _draw_beside(target: str, scene: str, file: str | None, options: dict[str, Any]) -> None:
+    """The figure of a step's error against force evaluations beside `BESIDE`, if a file was named."""
+    if file is None:
+        return
+    with ticking("comparing"):
+        from symtop.judging.adapters.adapter import integrator
+        from symtop.judging.claims.subject import open_target
+        from symtop.judging.comparison import compare
+        from symtop.report.plot import draw_compare
+
+        stepper = open_target(target, options["form"], options["chart"], adaptive=options["adaptive"])
+        if stepper.chart not in CHARTS:
+            raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
+        method = integrator(stepper, order=options["order"])
+        data = compare(
+            scene, [method, *BESIDE], cost="evaluations", nutations=10.0, budget=MOST_BESIDE, quiet=True
+        )  # fmt: skip
+        draw_compare(data, file)
 
 
 @click.command(short_help="Measure what integrators claim about themselves.")
@@ -99,14 +126,15 @@ def judge(
 def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> None:
     """Measure every claim of each INTEGRATOR: order, symplecticity, symmetry, conserved quantities, cost.
 
-    The exit code is 1 if a claim is refuted. Without a name: the integrators of the plug-in, or all.
+    The exit code is 1 if a claim is refuted, or if nothing can be measured of an integrator. Without a name: the
+    integrators of the plug-in, or all. A plug-in runs in a process of its own.
 
     \b
     symtop claims midpoint rk4
     symtop claims --plugin my_methods.py
     """
     with ticking("loading"):
-        from symtop.judging.battery import judge as measured
+        from symtop.judging.judge_step import apart
         from symtop.methods.framework import registry
         from symtop.model import scenes
 
@@ -115,8 +143,9 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
     refuted, entries = False, []
     for name in names or added or registry.integrators():
         with ticking(f"measuring {name}"):
-            ledger = measured(registry.integrator(name), chosen, quick=quick)
-        refuted |= any(finding.verdict == "refuted" for finding in ledger.findings)
+            ledger = apart(registry.integrator(name), chosen, quick=quick)
+        verdicts = {finding.verdict for finding in ledger.findings}
+        refuted |= "refuted" in verdicts or not verdicts & {"confirmed", "measured"}
         if as_json:
             about = {"integrator": ledger.integrator, "scene": chosen.name}
             entries += [{**about, **finding.plain()} for finding in ledger.findings]

@@ -159,6 +159,10 @@ def _runs(
             answer: float | str = settings.BUDGET
         else:
             answer = settings.seek(run, guess, target, ends, power, fixed_step=method.fixed_step, patience=budget)
+        if answer == settings.BUDGET and rows and method.fixed_step:  # the last run that can be afforded
+            last = min(rows)
+            affordable = last * run(last)[1] / budget
+            answer = affordable if 0.0 < affordable < last / 1.2 and run(affordable)[0] <= target else answer
         if isinstance(answer, str):
             why = RAISED if rows and all(row["outcome"] == RAISED for row in rows.values()) else REASONS[answer]
             reached += [why] * (len(settings.TARGETS) - k)
