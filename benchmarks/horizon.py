@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import measured
+from benchmarks import measured, pages
+from benchmarks.pages import Table
+from symtop.core import netcdf
 from symtop.methods.framework.registry import integrator
-from symtop.runner import scripts, store
-from symtop.runner.study import Table
+from symtop.runner import scripts
 
 NAME, STEPS, TOPS, SEED = "takahashi-imada[axis]", 8.74, 8, 1
 FITTED = 1e4  # nutations
@@ -55,14 +56,13 @@ def main() -> None:
     )
     print("\n".join(" | ".join(line) for line in [table.header, *lines]))
     options.results.mkdir(exist_ok=True)
-    content = {
-        "study": "horizon", "title": "Very long runs", "question": "Do predictions hold up to 10^8 nutations?",
-        "how_to_read": "A ratio near one is a prediction that holds; from the least to the largest of the tops.",
-        "verdict": [], "tables": [table._asdict()], "charts": [], "opening": None, "pictures": [], "failures": [],
-        "cases": 1, "quick": False, "measured": measured.sentence(facts, "python -m benchmarks.horizon"),
-        "provenance": {key: facts[key] for key in facts if key not in ("measured", "cores", "load_before")},
-    }  # fmt: skip
-    store.write_json(options.results / "horizon.json", content)
+    said = pages.findings(
+        "horizon", "Very long runs", "Do predictions hold up to 10^8 nutations?", [],
+        "A ratio near one is a prediction that holds; from the least to the largest of the tops.", [table], cases=1,
+        measured=measured.sentence(facts, "python -m benchmarks.horizon"),
+        provenance={key: facts[key] for key in facts if key not in ("measured", "cores", "load_before")},
+    )  # fmt: skip
+    netcdf.write_json(options.results / "horizon.json", said)
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from symtop.run.long_run import long_run as long_run
     from symtop.run.reference.truth import reference as reference
     from symtop.run.simulation import simulate as simulate
-    from symtop.runner.study import Case as Case, Picture as Picture, Study as Study, Table as Table
+    from symtop.runner.study import Case as Case, Picture as Picture, Study as Study
 
 __version__ = "0.3.0"
 
@@ -74,7 +74,7 @@ _NAMES = {  # by the module that holds them
     "judging.comparison": "compare",
     "report.card": "card",
     "report.plot": "plot",
-    "runner.study": "Case Picture Study Table",
+    "runner.study": "Case Picture Study",
     "measure.sweep": "sweep",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}

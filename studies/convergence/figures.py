@@ -8,7 +8,8 @@ import xarray as xr
 from symtop.measure.conservation import tops
 from symtop.model.charts import Array
 from symtop.report.figures import SMALLEST, error_band
-from symtop.report.style import LEAST_TEXT, few_ticks, grid, legend_below, line, look, number, panels
+from symtop.report.formats import number
+from symtop.report.style import LEAST_TEXT, few_ticks, grid, legend_below, line, look, panels
 from symtop.runner.study import Picture
 
 from .measures import (

@@ -167,10 +167,9 @@ def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict
 
 def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str, Any]:
     """The summary of a study's findings, which are printed but for JSON: its answer, and where the rest is."""
-    from symtop.report.legacy import modern
     from symtop.report.template import answer
 
-    name, findings = findings["study"], modern(findings)
+    name = findings["study"]
     summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "facts")}
     summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
     if not as_json:

@@ -143,6 +143,7 @@ class About(NamedTuple):
     chart: str
     implementation: str
     seconds_a_step: float
+    seed: int = 0  # of what was drawn at random
 
 
 @dataclass(frozen=True)
@@ -173,8 +174,9 @@ def heading(about: About, scene: str) -> str:
     unit, name = next(one for one in UNITS if pace >= one[0])
     cost = f", {pace / (unit or 1e-9):.3g} {name} a step" if pace else ""
     chart = f" in the {about.chart} chart" if about.chart else ""
+    drawn = f", seed {about.seed}" if about.seed else ""
     names = "".join(name.ljust(width) for name, width in COLUMNS.items())
-    return f"{about.name}{chart} on {scene}{cost}\n\n{names}the number that decides"
+    return f"{about.name}{chart} on {scene}{cost}{drawn}\n\n{names}the number that decides"
 
 
 def line(finding: Finding, width: int = WIDTH) -> str:

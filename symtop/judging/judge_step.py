@@ -1,10 +1,7 @@
 """judge(): anybody's integrator against its claims in a process of its own; or a trajectory, as far as it shows them.
 
-*A step* that hangs, crashes or takes too long costs one verdict. The process is forked, so that any function can be
-judged, and sends its findings as they are made; the one that waits looks at its heartbeat. A call that does not return
-is ended with its process; if it was a step backwards, the next process refuses such steps and measures the same claims
-again, and else the claims stay undecided and say why. Where the system cannot fork, or JAX is loaded here, whose
-threads a fork would lose, the battery runs in this process and has no limits.
+*A step* runs in a process of its own (`symtop.judging.remote`); one that hangs, crashes or takes too long costs the
+verdicts of one stage, which stay undecided and say why.
 
 *A trajectory without a method*: its errors are against the true motion of the scene (`symtop.measure.errors`). Where
 the angular momentum L in space is there, energy and momenta are recomputed from it, whatever the file reports,
@@ -21,17 +18,10 @@ time, elapsed since the start of the scene, and any of
 A netCDF file has time, axis (n, 3), quaternion (n, 4), momentum (n, 3) and the same scalars, or is one of `simulate`.
 """
 
-import contextlib
-import faulthandler
 import math
-import multiprocessing
-import os
-import signal
-import sys
-import tempfile
+import secrets
 import time
-import warnings
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,15 +29,16 @@ import numpy as np
 import xarray as xr
 
 from symtop.core import netcdf
-from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, words_of
+from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, whole
 from symtop.judging.adapters.adapter import heartbeat
 from symtop.judging.battery import Stage, measure, stages, unmeasured
 from symtop.judging.claims.constants import KEPT, Constant
-from symtop.judging.claims.subject import Request
-from symtop.judging.findings import NOTHING, About, Finding, Measured, StepLedger, undecided
+from symtop.judging.claims.subject import Request, Subject
+from symtop.judging.findings import NOTHING, About, Finding, Ledger, Measured, StepLedger, undecided
+from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
 from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import completed, errors, refuse_other_scene, sampled
-from symtop.methods.framework.registry import ENERGY_ERRORS
+from symtop.methods.framework.registry import ENERGY_ERRORS, Integrator
 from symtop.model.charts import CHARTS, space_energy
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.trajectory import Trajectory
@@ -57,19 +48,19 @@ FILES = (".csv", ".txt", ".dat", ".nc")
 VECTORS = {"axis": ("ex", "ey", "ez"), "quaternion": ("qw", "qx", "qy", "qz"), "momentum": ("Lx", "Ly", "Lz")}
 SCALARS = ("time", "theta", "phi", "psi", *CONSTANTS)
 FEWEST = 100  # samples by which a law of growth is judged
-THREADED = "jax"  # hangs in a process that was forked after its import
-LOOK = 0.05  # seconds between two looks
+SEEDS = 1_000_000_000
 OPENING = 60.0  # seconds for loading a file and its imports
 # seconds for the claims of one stage: at most, for all stages together, and at least however many were spent
+PLUGIN = 600.0  # of a registered integrator
 VERDICT, QUICK_VERDICT = (45.0, 120.0, 15.0), (12.0, 40.0, 6.0)
-WORDS = 160  # characters of what a process says before it ends
 
 
 def judge(
     target: Any, *, form: str | None = None, chart: str = "axis", scene: "str | Scene" = "spheroid",
     order: int | None = None, symplectic: bool | None = None, symmetric: bool | None = None,
     explicit: bool | None = None, conserves: Collection[str] | None = None, energy: str | None = None,
-    adaptive: bool = False, quick: bool = False, tell: Listener | None = None,
+    adaptive: bool = False, autonomous: bool = False, quick: bool = False, seed: int | None = None,
+    tell: Listener | None = None,
 ) -> StepLedger:  # fmt: skip
     """Judge anything that steps: its order, structure, invariants and drift on the top, beside what is claimed of it.
 
@@ -91,7 +82,9 @@ def judge(
     `chart` says what y is: "axis" (e, L), shape (6,); "attitude" (q, L), shape (7,); "angles" (theta, phi, psi and
     their rates), shape (6,), in radians and the units of the scene's top. Claims that are not made are measured all
     the same. `conserves` holds names such as "p_phi", "energy"; `energy` is "kept" or "bounded". The step runs in a
-    process of its own: one that hangs or crashes costs a verdict and says so. `quick` takes ten seconds at most.
+    process of its own: one that hangs or crashes costs a verdict and says so. `quick` takes ten seconds at most. It is
+    also tried at starts, times and steps that are drawn at random; `seed`, which the findings name, draws the same
+    again. `autonomous` says that it was written for y' = f(y), whatever f is called with.
     `tell` is handed what is judged and then each finding, as they are made.
 
     Returns a `StepLedger`: ``ledger["order"]`` is a finding, ``print(ledger)`` shows all of them,
@@ -103,12 +96,16 @@ def judge(
         raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {shown(energy)}", "energy")
     claims = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
     claims_of_energy = {"conserves": conserves, "energy_error": energy}
+    chosen = secrets.randbelow(SEEDS) if seed is None else whole("seed", seed, 0, SEEDS)
     flags = boolean("adaptive", adaptive), find_scene(scene), boolean("quick", quick)
-    request = Request(target, form, chart, *flags, claims | claims_of_energy)
+    given = target, form, chart, *flags, claims | claims_of_energy, chosen
+    request = Request(*given, boolean("autonomous", autonomous))
     made = request.claimed()  # claims that make no sense are refused before anything is loaded
-    implied = {"time"} | ({"energy"} if energy is None and "energy" not in (made.conserves or ()) else set())
+    implied = ({"time"} - ({"time"} if autonomous else set())) | (
+        {"energy"} if energy is None and "energy" not in (made.conserves or ()) else set()
+    )
     table = isinstance(target, (xr.Dataset, Mapping))
-    file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES) and " " not in str(target)
+    file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES)
     if form is None and (table or file):
         if {order, symplectic, symmetric, explicit} != {None}:
             raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
@@ -123,15 +120,19 @@ def judge(
     findings: list[Finding] = []
     traces: dict[str, Any] = {}
     listen = tell or (lambda _: None)
-    for event in events:
-        if isinstance(event, About):
-            about = event
-            listen(about)
-            continue
-        for one in event.findings:
-            listen(one)
-        findings += event.findings
-        traces |= event.traces
+    try:
+        for event in events:
+            if isinstance(event, About):
+                about = event
+                listen(about)
+                continue
+            for one in event.findings:
+                listen(one)
+            findings += event.findings
+            traces |= event.traces
+    finally:
+        if isinstance(events, Generator):
+            events.close()  # also where the one that listens has raised: its process ends
     if not findings:
         raise SymtopError("it cannot be judged: its process ended before it was open")
     return StepLedger(about.name, request.scene.name, tuple(findings), traces, about, frozenset(implied))
@@ -252,132 +253,47 @@ class Results(NamedTuple):
     traces: dict[str, Any]
 
 
-class _LostError(Exception):
-    """A process was ended, or ended by itself: why, and whether it was in a step of -h."""
-
-
 def run(request: Request) -> Iterator[About | Results]:
-    """First what is judged, then findings as they are made; SymtopError if it cannot be opened."""
-    todo = stages("step")
-    if "fork" not in multiprocessing.get_all_start_methods() or THREADED in sys.modules:
-        yield from _work(request, todo)
-        return
+    """First what is judged, then findings as they are made; SymtopError if it cannot be opened or makes no step."""
     heartbeat.reset(quick=request.quick)
-    opened, began = False, time.monotonic()
-    while todo:
+    began, todo = time.monotonic(), stages("step")
+    with Process(lambda: table_of(request.opened)) as process:
+        process.allow(OPENING)
         try:
-            for event in _isolated(request, todo, began):
-                if isinstance(event, Results):
-                    todo.pop(0)
-                if isinstance(event, Results) or not opened:
-                    yield event
-                opened = True
-        except _LostError as failure:
-            if not opened:
-                raise SymtopError(f"it cannot be judged: {failure.args[0]}") from None
-            yield from _left_open(request, todo, *failure.args)
-        else:
+            subject = request.open(Remote(process))
+        except SymtopError as error:
+            raise SymtopError(f"it cannot be judged: {error}") if process.lost else error from None
+        stepper = subject.stepper
+        yield About(stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step, request.seed)
+        yield from _measured(todo, subject, process, began, QUICK_VERDICT if request.quick else VERDICT)
+
+
+def _measured(
+    todo: list[Stage], subject: Subject, process: Process, began: float, limits: tuple[float, float, float]
+) -> Iterator[Results]:
+    """The findings of each stage, undecided where its process was lost: all of a step that makes no call."""
+    most, together, least = limits
+    for stage in todo:
+        process.allow(max(least, min(most, together - (time.monotonic() - began))))
+        try:
+            findings = measure(stage, subject)
+        except SymtopError:
+            if not process.lost:
+                raise
+        if not process.lost:
+            yield Results(findings, subject.traces)
+            continue
+        for left in todo if stage[0].name == "calls" else [stage]:
+            yield Results(unmeasured(left, subject.method, process.lost), {})
+        if stage[0].name == "calls":
             return
 
 
-def _left_open(request: Request, todo: list[Stage], why: str, backwards: bool) -> Iterator[Results]:
-    """What a failure leaves undecided: one stage; all without a call; none if it was a step of -h, then refused."""
-    if backwards and not heartbeat.forward_only:
-        heartbeat.forward_only = True
-        return
-    for stage in todo[:] if todo[0][0].name == "calls" else todo[:1]:
-        todo.remove(stage)
-        yield Results(unmeasured(stage, request.claimed(), why), {})
-
-
-def _work(request: Request, todo: list[Stage]) -> Iterator[About | Results]:
-    """The stages, in this process."""
-    subject = request.open()
-    stepper = subject.stepper
-    yield About(stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step)
-    for stage in todo:
-        yield Results(measure(stage, subject), subject.traces)
-
-
-def _isolated(request: Request, todo: list[Stage], first: float) -> Iterator[About | Results]:
-    """The stages in a forked process; `first` is when the judging began."""
-    context: Any = multiprocessing.get_context("fork")
-    ours, theirs = context.Pipe()
-    with tempfile.TemporaryFile() as output, ours:
-        process = context.Process(target=_child, args=(request, list(todo), theirs, output), daemon=True)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # newer versions of Python warn of threads; the child uses none of theirs
-            heartbeat.inside = False
-            process.start()
-        theirs.close()
-        try:
-            yield from _events(process, ours, output, first, quick=request.quick)
-        finally:
-            if process.is_alive():
-                with contextlib.suppress(OSError):
-                    os.killpg(process.pid, signal.SIGKILL)
-                process.kill()
-            process.join()
-
-
-def _child(request: Request, todo: list[Stage], pipe: Any, output: Any) -> None:
-    os.setsid()  # what it starts is ended with it
-    for stream in (1, 2):
-        os.dup2(output.fileno(), stream)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    faulthandler.disable()  # a crash is reported by the one that waits
-    try:
-        for event in _work(request, todo):
-            pipe.send(event)
-    except BaseException as error:  # noqa: BLE001  (somebody else's code)
-        pipe.send(error if isinstance(error, SymtopError) else _LostError(words_of(error), False))
-    pipe.send(None)
-
-
-def _events(process: Any, pipe: Any, output: Any, first: float, *, quick: bool) -> Iterator[About | Results]:
-    """What the process sends; _LostError if it ends otherwise, hangs in a call or takes too long for a stage."""
-    limit, began = OPENING, _clock(process.pid)
-    calls, since = heartbeat.calls, began
-    while True:
-        if pipe.poll(LOOK):
-            try:
-                event = pipe.recv()
-            except EOFError:
-                event = _LostError(_death(process, output), False)
-            if isinstance(event, Exception):
-                raise event
-            if event is None:
-                return
-            yield event
-            began = _clock(process.pid)
-            most, together, least = QUICK_VERDICT if quick else VERDICT
-            limit = max(least, min(most, together - (began - first)))
-            continue
-        now = _clock(process.pid)
-        if heartbeat.calls != calls or not heartbeat.inside:
-            calls, since = heartbeat.calls, now
-        if now - since > heartbeat.allowed:
-            why = f"a step of h = {heartbeat.step:.3g} had not returned after {now - since:.0f} s"
-            raise _LostError(why, heartbeat.step < 0)
-        if now - began > limit:
-            raise _LostError(f"it was not judged within {limit:.0f} s", False)
-
-
-def _clock(pid: int) -> float:
-    """Seconds, less those that a process has waited for a processor, which Linux counts; elsewhere all time counts."""
-    try:
-        waited = int(Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii").split()[1]) * 1e-9
-    except (OSError, IndexError, ValueError):
-        waited = 0.0
-    return time.monotonic() - waited
-
-
-def _death(process: Any, output: Any) -> str:
-    process.join(2.0)
-    code = process.exitcode
-    if code is not None and code < 0:
-        during = f" in a step of h = {heartbeat.step:.3g}" if heartbeat.inside else ""
-        return f"its process was ended by {signal.Signals(-code).name}{during}"
-    output.seek(0)
-    words = " ".join(output.read()[-4 * WORDS :].decode(errors="replace").split())[-WORDS:]
-    return f"its process ended with code {code}{': ' if words else ''}{words}"
+def apart(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
+    """The ledger of a registered integrator, of `symtop.judging.battery.judge`, with what is not ours in a process."""
+    heartbeat.reset(quick=quick)
+    with Process(lambda: solvers_of(method)) as process:
+        subject = Subject(separated(method, process), scene, quick, seed=secrets.randbelow(SEEDS))
+        parts = list(_measured(stages("integrator"), subject, process, time.monotonic(), (PLUGIN, math.inf, PLUGIN)))
+    findings = tuple(finding for part in parts for finding in part.findings)
+    return Ledger(method.name, scene.name, findings, subject.traces)

@@ -21,7 +21,6 @@ from symtop.core.errors import SymtopError
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.report import method, tables, template
 from symtop.report.html import Writer, slug
-from symtop.report.legacy import modern
 from symtop.report.sources import report_files, report_hash
 from symtop.report.style import look
 from symtop.run import plugins
@@ -73,14 +72,13 @@ def gather(results: Path) -> list[dict[str, Any]]:
             continue
         shipped = runner.page_of(name) if name in studies else None
         try:
-            findings = modern(findings)
             kept = {"measured": findings.get("measured", ""), "dataset": f"{name}.nc"}
             kept["dataset"] *= (results / f"{name}.nc").is_file()
             missing = [f"figures/{one['file']}" for one in findings["pictures"]]
             missing += [f"tables/{one['file']}" for one in findings["tables"]]
             for file in (file for file in missing if not (results / file).is_file()):
                 raise FileNotFoundError(f"{file} is missing")
-            page = findings["page"] if shipped is None or not findings["facts"] else shipped.read_text(encoding="utf-8")
+            page = findings["page"] if shipped is None else shipped.read_text(encoding="utf-8")
             gathered.append({**findings, **kept, "page": page})
         except (OSError, KeyError, TypeError) as error:
             command = f"make {name}" if name in others else f"symtop study {name}"

@@ -15,7 +15,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from symtop.core import netcdf
-from symtop.report.formats import FIRM, RAISED, number  # noqa: F401  (of drawings)
 
 if TYPE_CHECKING:
     from PIL import Image

@@ -8,7 +8,7 @@ from typing import Any
 from symtop.core import netcdf
 from symtop.core.errors import label, shown
 from symtop.measure.datasets import Combined
-from symtop.runner.study import LONGEST, Chart, Opening, Picture, Save, Study, StudyError, Table, each, failing
+from symtop.runner.study import LONGEST, Chart, Picture, Save, Study, StudyError, each, failing
 
 QUICK = "quick pass: coarse grid"  # beside a figure of one
 
@@ -25,10 +25,6 @@ def findings_of(
         "failures": failures, "cases": cases, "quick": quick,
         "provenance": netcdf.provenance(changes=True),
     }  # fmt: skip
-    if study.how_to_read:
-        return found | _sentences(study, data) | {
-            "pictures": [] if save is None else list(_saved(study, data, results, save, quick=quick))
-        }  # fmt: skip
     return found | {
         "facts": _facts(study, data),
         "tables": list(_tables(study, data, results)),
@@ -88,9 +84,6 @@ def _tables(study: Study, data: Combined, results: Path) -> Iterator[dict[str, A
 def _saved(study: Study, data: Combined, results: Path, save: Save, *, quick: bool) -> Iterator[dict[str, str]]:
     """Save the pictures one by one; StudyError for what is none."""
     for picture in each(study.name, "pictures", lambda: study.pictures(data), Picture, "or yield Pictures"):
-        words = {key: getattr(picture, key) for key in ("name", "caption", "alt", "lead")}
-        for key in (key for key, text in words.items() if not isinstance(text, str)):
-            raise StudyError(f"study {study.name}: a Picture must have a {key} that is text, not {shown(words[key])}")
         if not hasattr(picture.figure, "savefig"):
             kind = type(picture.figure).__name__
             raise StudyError(f"study {study.name}: the figure of a Picture must be one of matplotlib, not a {kind}")
@@ -102,21 +95,4 @@ def _saved(study: Study, data: Combined, results: Path, save: Save, *, quick: bo
                 0.998, 0.01, QUICK, rotation=90.0, ha="right", va="bottom", fontsize=6.0, color="#AD4A00"
             )
         save(picture.figure, results / "figures" / file)
-        yield {"file": file} | words
-
-
-def _sentences(study: Study, data: Combined) -> dict[str, Any]:
-    """What a study without a template says."""
-    verdict = each(study.name, "verdict", lambda: study.verdict(data), str, "a list of sentences")
-    tables = each(study.name, "tables", lambda: study.tables(data), Table, "a list of Table")
-    opening = None
-    if study.opening is not None:
-        with failing(study.name, "opening"):
-            first = study.opening(data)
-        if not isinstance(first, Opening):
-            raise StudyError(f"study {study.name}: opening must return an Opening, not {shown(first)[:LONGEST]}")
-        opening = first._asdict() | {"table": first.table._asdict(), "explained": dict(first.explained)}
-    return {
-        "how_to_read": study.how_to_read, "verdict": list(verdict), "tables": [table._asdict() for table in tables],
-        "opening": opening,
-    }  # fmt: skip
+        yield {"name": picture.name, "file": file}

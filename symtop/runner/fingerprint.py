@@ -67,10 +67,7 @@ def digests(study: Study, cases: Iterable[Case]) -> list[str]:
 
 def drawing_digest(study: Study, beside: Iterable[Path | None], *drawing: Any) -> str:
     """Hash of what makes a study's facts, figures and tables, and of the files beside it that they fill."""
-    shown = (
-        study.facts, study.pictures, study.tables, study.charts, study.verdict, study.opening,
-        study.title, study.question, study.how_to_read,
-    )  # fmt: skip
+    shown = (study.facts, study.pictures, study.tables, study.charts, study.title, study.question)
     code = _code().reasons("drawing", shown, drawing)
     texts = {f"file {file.name}": code_hash.hashed(file.read_text(encoding="utf-8")) for file in beside if file}
     return code_hash.digest(code | texts | code_hash.packages("matplotlib"))

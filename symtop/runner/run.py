@@ -142,6 +142,6 @@ def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> 
         netcdf.write_json(words, findings)
         if not cases.failures and made_of:
             pictures = [results / "figures" / picture["file"] for picture in findings["pictures"]]
-            tables = [results / "tables" / table["file"] for table in findings["tables"] if "file" in table]
+            tables = [results / "tables" / table["file"] for table in findings["tables"]]
             manifest.note(results, study.name, made_of, [dataset, words, *pictures, *tables, *cases.cases])
     return findings

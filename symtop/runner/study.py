@@ -17,6 +17,7 @@ from symtop.measure.datasets import Combined
 from symtop.methods.framework.registry import split_name
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 REFERENCE = "exact"  # the integrator that is the closed form
@@ -57,9 +58,6 @@ class Picture(NamedTuple):
 
     name: str
     figure: "Figure"
-    caption: str = ""
-    alt: str = ""
-    lead: str = ""
 
 
 class Series(NamedTuple):
@@ -85,23 +83,6 @@ class Chart(NamedTuple):
     panels: Mapping[str, Sequence[Series]]
     choices: Sequence[str] = ("Show",)
     marks: Mapping[str, tuple[float, float]] = MappingProxyType({})
-
-
-class Table(NamedTuple):
-    """A table of the report; cells are shown as they are."""
-
-    title: str
-    header: Sequence[str]
-    rows: Sequence[Sequence[str]]
-
-
-class Opening(NamedTuple):
-    """What the page says first: an answer in sentences, the table they come from, and the studies that explain it."""
-
-    question: str
-    sentences: Sequence[str]
-    table: Table
-    explained: Mapping[str, str] = MappingProxyType({})  # by studies, with what they are called here
 
 
 @dataclass(frozen=True)
@@ -168,11 +149,8 @@ class Study:
     measure: Callable[[Case], xr.Dataset]
     facts: Callable[[Any], Mapping[str, Any]] | None = None
     pictures: Callable[[Any], Iterable[Picture]] = lambda _: []
-    tables: Callable[[Any], Any] = lambda _: {}
-    how_to_read: str = ""
-    verdict: Callable[[Any], list[str]] = lambda _: []
+    tables: Callable[[Any], Mapping[str, "pd.DataFrame"]] = lambda _: {}
     charts: Callable[[Any], list[Chart]] = lambda _: []
-    opening: Callable[[Any], Opening] | None = None  # for the first screen of the page
     full: Callable[[], list[Case]] | None = None  # a grid that takes much longer, for `--full`
     timed: bool = False  # all cases are
     follow_up: Callable[[Any], list[Case]] | None = None  # a second round, made from what the first one found
@@ -233,9 +211,7 @@ class Study:
             return answer and answered
 
         full, later = self.full, self.follow_up
-        answers = {
-            name: able(getattr(self, name)) for name in ("facts", "pictures", "verdict", "tables", "charts", "opening")
-        }
+        answers = {name: able(getattr(self, name)) for name in ("facts", "pictures", "tables", "charts")}
         return replace(
             self, cases=first, full=full and (lambda: chosen(full())),
             follow_up=later and (lambda data: chosen(later(data))), **answers,

@@ -31,7 +31,7 @@ def judge(*arguments):
 def test_a_file_with_a_step_says_what_it_is(mine, tmp_path):
     code, output = judge(mine, "--quick", "--output", str(tmp_path / "found.nc"))
     assert code == 0
-    assert re.search(r"^mine in the axis chart on spheroid, \S+ us a step$", output, re.MULTILINE)
+    assert re.search(r"^mine in the axis chart on spheroid, \S+ us a step, seed \d+$", output, re.MULTILINE)
     assert re.search(r"^order +- +2\.00", output, re.MULTILINE)
     assert "It is: order 2, not symplectic, not reversible, keeps p_phi; not the energy" in output
     with xr.open_dataset(tmp_path / "found.nc") as data:

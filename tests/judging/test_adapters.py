@@ -17,12 +17,12 @@ from scipy.spatial.transform import Rotation
 import symtop
 from symtop.cli.judge import FORMS as OFFERED
 from symtop.cli.main import main
-from symtop.judging import judge_step
 from symtop.judging.adapters.adapter import heartbeat, integrator, integrator as adapted, label_of
 from symtop.judging.adapters.python_step import PythonStep, RotationStep, SeparableStep, to_body, to_space
 from symtop.judging.battery import CLAIMS, TABLE
 from symtop.judging.claims.subject import FORMS, open_target
 from symtop.judging.findings import VERDICTS, description, read
+from symtop.judging.remote import clock
 
 SPHEROID = symtop.scene("spheroid")
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no C compiler")
@@ -168,7 +168,7 @@ def program(folder, body):
 
 def test_a_program_gets_one_line_and_writes_states(tmp_path):
     echo = "n, stride = map(int, numbers[4:6])\nfor k in range(0, n + 1, stride): print(*numbers[6:12])"
-    stepper = open_target(program(tmp_path, echo), None, "axis")
+    stepper = open_target(program(tmp_path, echo), "program", "axis")
     par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
     states, _ = stepper.march(SPHEROID.top, par, np.array(state), 0.5, np.array([0, 6, 9]))
     np.testing.assert_array_equal(states, [state] * 3)
@@ -183,7 +183,7 @@ def test_a_program_gets_one_line_and_writes_states(tmp_path):
     ],
 )
 def test_a_program_that_writes_anything_else_is_told_so(tmp_path, body, words):
-    stepper = open_target(program(tmp_path, body), None, "axis")
+    stepper = open_target(program(tmp_path, body), "program", "axis")
     with pytest.raises(symtop.SymtopError, match=words):
         stepper.march(SPHEROID.top, None, np.zeros(6), 0.1, np.array([0, 1, 2, 3]))
 
@@ -196,7 +196,9 @@ def test_a_program_that_writes_anything_else_is_told_so(tmp_path, body, words):
     [
         ("nothing.py:step", {}, "FILE.py:NAME with a file that is there"),
         ("nothing.so", {}, "must be a file that is there"),
-        ("no-such-program-anywhere -x", {}, "must be a command that can be run"),
+        ("no-such-program-anywhere -x", {"form": "program"}, "must be a command that can be run"),
+        ("true", {}, "or a command with form program, not 'true'"),
+        ("python engine.py", {}, "a command needs form program"),
         (midpoint, {"form": "rotation"}, r"must take \(q, w, h, inertia, torque\), not \(f, t, y, h\)"),
         (lambda y, h: y, {"form": "separable"}, r"must take \(state, h, dT, dV\), not \(y, h\)"),
         (lambda y, h: y, {}, r"must take \(f, t, y, h\), not \(y, h\)"),
@@ -320,13 +322,13 @@ def test_waiting_for_a_processor_takes_none_of_the_time_that_judging_has():
     try:
         for process in (0, busy.pid):
             os.sched_setaffinity(process, {min(allowed)})
-        wall, counted, worked = time.monotonic(), judge_step._clock(os.getpid()), time.process_time()
+        wall, counted, worked = time.monotonic(), clock(os.getpid()), time.process_time()
         while time.process_time() < worked + 0.3:
             pass
-        assert judge_step._clock(os.getpid()) - counted < 0.8 * (time.monotonic() - wall)
-        counted = judge_step._clock(os.getpid())
+        assert clock(os.getpid()) - counted < 0.8 * (time.monotonic() - wall)
+        counted = clock(os.getpid())
         time.sleep(0.2)
-        assert judge_step._clock(os.getpid()) - counted > 0.19
+        assert clock(os.getpid()) - counted > 0.19
     finally:
         os.sched_setaffinity(0, allowed)
         busy.kill()

@@ -96,13 +96,14 @@ def test_it_needs_no_more_evaluations_than_scipys_adams_codes_and_errs_no_more(n
 def test_errors_follow_the_tolerance_and_orders_rise_with_it(chart):
     runs = [
         symtop.simulate("spheroid", f"adams[{chart}]", tolerance=tolerance, samples=161, guard=False)
-        for tolerance in (1e-3, 1e-6, 1e-9, 1e-12)
+        for tolerance in (1e-5, 1e-8, 1e-11)  # at 1e-4 a quaternion is longer than one by more than 0.1 %, an outcome
     ]
+    assert [run.attrs["outcome"] for run in runs] == ["ok"] * 3
     errors = [float(symtop.errors(run)["axis"].max()) for run in runs]
     assert all(50.0 * fine < coarse for coarse, fine in itertools.pairwise(errors))
     assert errors[-1] < 1e-9
     counts = [run.attrs["force_evaluations"] for run in runs]
-    assert counts[-1] < 12 * counts[0]  # of one order k it would be 1000^(3/k) times: k = 8 and more
+    assert counts[-1] < 5.6 * counts[0]  # of one order k it would be 1000^(2/k) times: k = 8 and more
     assert all(2 * run.attrs["steps"] <= run.attrs["force_evaluations"] for run in runs)
 
 

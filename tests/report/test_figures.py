@@ -9,7 +9,7 @@ from matplotlib.text import Text
 
 import symtop
 from symtop.core import netcdf
-from symtop.report import figures, style
+from symtop.report import figures, formats, style
 from symtop.runner import run as runner
 
 MOST_LINES, MOST_ENTRIES = 10, 8
@@ -109,8 +109,8 @@ def test_labels_keep_their_order_and_their_distance(places):
      (30012.0, "3 × 10⁴"), (7.0, "7")],
 )  # fmt: skip
 def test_a_number_of_a_title(value, said):
-    assert style.number(value).replace(style.FIRM, " ") == said
-    assert " " not in style.number(value)
+    assert formats.number(value).replace(formats.FIRM, " ") == said
+    assert " " not in formats.number(value)
 
 
 def test_a_published_figure_has_a_vector_beside_it_and_the_same_bytes_again(tmp_path):

@@ -22,11 +22,14 @@ and dV the slope of V, both of one number. The chart ends at theta = 0 and pi.
 
 *scipy*, a class derived from ``scipy.integrate.OdeSolver``: max_step = first_step = h with tolerances that accept any
 error make steps of h, so that the formula is judged and not its step control; the end of the interval lies beyond the
-last step, which is never cut short. With a tolerance, rtol = atol, the class chooses its steps, as for ``solve_ivp``.
+last step, which is never cut short. The stages of an implicit class are solved nevertheless: the tolerances of Newton's
+iteration, which SciPy's classes and others like them keep in `newton_tol`, `kappa` and `tiny_err`, are set to `SOLVED`,
+and it may take `MOST_NEWTON` rounds. With a tolerance, rtol = atol, the class chooses its steps, as for ``solve_ivp``.
 """
 
 import contextlib
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,6 +48,8 @@ from symtop.model.top import Angles, SymmetricTop, effective_force
 Field = Callable[[float, Array], Array]
 PROBE = 1e-3  # step of the call that shows whether a rotation is a matrix
 ANY = 1e300  # a tolerance that every step meets; infinity times a component of zero would be no number
+LOOSE = 1e8  # one that every step meets, and beside which an update of Newton's iteration can be seen
+SOLVED, MOST_NEWTON, NEWTON = 1e-14, 50, "NEWTON_MAXITER"  # of a stage, absolute; rounds, and what modules call them
 SAME = 1e-9  # of a step: one that is this near to h has its length
 
 
@@ -103,6 +108,8 @@ class FunctionStep(Stepper):
 class PythonStep(FunctionStep):
     """A stepper around a function ``step(f, t, y, h) -> y``."""
 
+    takes_field = True
+
     def __init__(self, function: Callable[..., Any], chart: str, name: str = "") -> None:
         super().__init__(function, name)
         self.chart, self.form = chart, FORMULATIONS[chart]
@@ -110,7 +117,7 @@ class PythonStep(FunctionStep):
     def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks."""
         f = Equations(self.chart, par)
-        states = self.along(f, 0.0, y, h, marks)
+        states = self.along(f, self.since, y, h, marks)
         return March(states, f.calls)
 
     def along(self, f: Field, t: float, y: Array, h: float, marks: Marks) -> Array:
@@ -120,6 +127,8 @@ class PythonStep(FunctionStep):
 
 class ScipySolver(PythonStep):
     """A stepper around a class of SciPy's kind; with `adaptive`, it chooses its steps by a tolerance."""
+
+    own_loop = True  # it may remember what it likes in a run
 
     def __init__(self, kind: type, chart: str, *, adaptive: bool = False) -> None:
         if not callable(getattr(kind, "step", None)):
@@ -131,12 +140,17 @@ class ScipySolver(PythonStep):
         """The states at the marks for any right-hand side, from a time t on; SymtopError for steps that are not h."""
         end, size = t + (int(marks[-1]) + 2) * h, abs(h)
         with heartbeat.call(h):
-            made: Any = self.function(f, t, y, end, max_step=size, first_step=size, rtol=ANY, atol=ANY)
+            options = {"max_step": size, "first_step": size}
+            made: Any = self.function(f, t, y, end, **options, rtol=ANY, atol=ANY)
+            if hasattr(made, "newton_tol") or hasattr(made, "kappa"):
+                made = self.function(f, t, y, end, **options, rtol=LOOSE, atol=LOOSE)
+                for name in ("newton_tol", "kappa", "tiny_err"):
+                    setattr(made, name, SOLVED / LOOSE)
 
         def once(k: int, y: Array) -> Array:
             if made.status != "running" or not np.isfinite(y).all():
                 return np.full(y.shape, np.nan)
-            with heartbeat.call(h):
+            with heartbeat.call(h), self._patient():
                 made.step()
             if abs(made.t - (t + (k + 1) * h)) > SAME * size * (k + 1):
                 raise SymtopError(
@@ -146,6 +160,20 @@ class ScipySolver(PythonStep):
             return state_like(y, made.y, "a solver")
 
         return repeat(once, state_like(y, made.y, "a solver"), marks)
+
+    @contextlib.contextmanager
+    def _patient(self) -> Iterator[None]:
+        """Newton's iteration goes on until it is solved."""
+        kinds = self.function.__mro__  # type: ignore[attr-defined]
+        modules = filter(None, {sys.modules.get(kind.__module__) for kind in kinds})
+        counts = {module: vars(module)[NEWTON] for module in modules if NEWTON in vars(module)}
+        try:
+            for module in counts:
+                setattr(module, NEWTON, MOST_NEWTON)
+            yield
+        finally:
+            for module, count in counts.items():
+                setattr(module, NEWTON, count)
 
 
 class Body(NamedTuple):

@@ -23,9 +23,11 @@ from typing import NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError
+from symtop.judging.adapters.adapter import AdapterSolver
 from symtop.judging.claims.subject import CONSTANTS, PLANE, Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
 from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, residuals, tops
+from symtop.measure.step_map import one_step
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import NOT_FINITE, OK, OUTCOMES, Array, Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator
@@ -53,6 +55,7 @@ OF_A_RUN = (*CONSTANTS, "reported", "invariant", "explicit", "work")
 KINDS = ("kept", "bounded", "random walk", "growing", "drift")  # from best to worst
 OWN = "its states'"  # what every run says of the momenta that it reports
 BADNESS = ("inapplicable", "measured", "confirmed", "undecided", "refuted")
+CUTS, SAME_RUN, OF_RUN = 8, 1e-9, "state"  # runs that are compared with parts of longer ones, and within what
 WINDOWS = 160  # of a long run, evenly spaced in the logarithm of time: what a figure shows of it
 
 Rows = dict[str, Array]  # by the names of constants
@@ -132,7 +135,7 @@ def _run(
 
 
 def long_run(
-    method: Integrator, scene: Scene, chart: str, *, quick: bool = False, most: float | None = None
+    method: Integrator, scene: Scene, chart: str, *, quick: bool = False, most: float | None = None, seed: int = 0
 ) -> LongRun:
     """A million steps of a compiled method in one of its charts, or `most`; fewer where that would take minutes."""
     for finer in FINER:  # a motion that passes close to a pole needs shorter steps
@@ -152,8 +155,27 @@ def long_run(
         reported = from_increments(method, scene, plan) if method.fixed_step else None
     else:
         reported = _difference(scene, shown, run)
+    if chart and method.fixed_step and not isinstance(method.solvers[chart], AdapterSolver):
+        reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
     steady = len({one.force_evaluations / max(one.steps, 1) for one in (first, other)}) == 1
     return found_in(run, scene, chart, plan.times, constants(scene, shown), constants(scene, pilot), steady, reported)
+
+
+def _contradiction(
+    method: Integrator, scene: Scene, chart: str, long: tuple[Run, Plan], pilot: Run, h: float, seed: int
+) -> Difference | None:
+    """How far a run of n steps, n drawn at random, is from the first n of a longer one: a step knows nothing of it."""
+    draw, step = np.random.default_rng(seed), one_step(method, chart, scene, h)
+    for k in range(CUTS):
+        run, marks = (long[0], long[1].marks) if k % 2 else (pilot, np.arange(pilot.states.shape[0]))
+        i = min(int(marks.size ** draw.uniform(0.0, 1.0)), marks.size - 1)
+        state = step.scaled(run.states[i], run.p_phi[i], run.p_psi[i])
+        if marks[i] > 0 and np.isfinite(state).all():
+            gap = step.gap(step.shown(step.run(scene.start, h, int(marks[i]))), state)
+            if gap > SAME_RUN:
+                how = f"in a run of {marks[i]} steps from the first of one of {marks[-1]} (seed {seed})"
+                return Difference(OF_RUN, gap, SAME_RUN, how)
+    return None
 
 
 def found_in(
@@ -256,7 +278,9 @@ def measure(subject: Subject) -> list[Finding]:
         return of_run(method, run)
     for chart in method.charts():
         try:
-            run = long_run(method, subject.scene, chart, quick=subject.quick, most=subject.long_steps)
+            run = long_run(
+                method, subject.scene, chart, quick=subject.quick, most=subject.long_steps, seed=subject.seed
+            )
             runs.append(run)
             findings = of_run(method, run)
         except SymtopError as error:
@@ -322,6 +346,11 @@ def _reported(run: LongRun) -> Finding:
     if other.size <= other.floor:
         why = f"they differ from those of the states by {other.size:.1e} at most"
         return Finding("reported", "", Measured(OWN), "measured", why, other.size, other.floor)
+    if other.name == OF_RUN:
+        why = (
+            f"a run contradicts itself, as if the method knew of it: the state differs by {other.size:.1e} {other.how}"
+        )
+        return Finding("reported", OWN, Measured("another run", other.size), "refuted", why, other.size, other.floor)
     why = f"it reports other momenta than its states have: {other.name} differs by {other.size:.1e} {other.how}"
     return Finding("reported", OWN, Measured("others", other.size), "refuted", why, other.size, other.floor)
 

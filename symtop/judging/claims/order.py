@@ -45,7 +45,7 @@ from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order as order_of, 
 from symtop.measure.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
-from symtop.measure.step_map import generic_start, restart_gap
+from symtop.measure.step_map import StepMap, aligned, drawn, generic_start, one_step, restart_gap
 from symtop.measure.step_series import AGREES, SURE, Series, compared, step_series
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.loop import FixedStep
@@ -70,6 +70,10 @@ SHARE = 0.37  # of a nutation: length of the runs that are extrapolated to h = 0
 STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the coarsest of them; 200 beyond order 6
 TRUE_LIMIT = 1e-11  # a limit as close as this is the true motion
 SHOWN = 24  # settings of the order that are kept
+DRAWS = {False: 96, True: 32}  # starts at which the order of one step is looked at; the second with --quick
+HALVINGS, SHORT = 10, 80.0  # steps that are tried from each, and how many of a short one make a nutation
+LOWER, JUMP = 0.6, 3.0  # an order is lower by so much, or jumps by so much
+LARGE, SEEN = 1e-3, 1e-11  # a miss beyond the first is of no power, below the second rounding
 TURNS = 0.7  # of the frame in a nutation
 BEGIN = 0.23  # of a nutation: t0
 CLEAR = 1e-9  # noise of the h^1 term: a step that is rounded to single precision leaves 1e-8
@@ -89,7 +93,74 @@ def measure(subject: Subject) -> list[Finding]:
         if table.order < min(power, len(table.defect)):
             words, verdict = words + _visible_from(table, power, subject.scene), "refuted"
         finding = finding._replace(verdict=verdict, why=f"{words}; {finding.why}")
+    if method.order is not None and finding.verdict == "confirmed":
+        lower = _elsewhere(subject, method.order)
+        if lower is not None:
+            measured = Measured("order", lower[0], text=f"{lower[0]:.1f} elsewhere")
+            finding = Finding("order", finding.declared, measured, "refuted", lower[1], lower[0], LOWER)
     return [finding]
+
+
+def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
+    """The order of one step, and a sentence, where it is lower than `power`; starts, tops, times and steps are drawn.
+
+    Steps of h, h/2, h/4 ... err by d(h) ~ h^(order + 1). Steps that are too long do neither of two things: have a lower
+    order at the finest pairs, which are short, or jump, with an order far above `power` below one that is lower.
+    """
+    if subject.in_plane or not subject.method.fixed_step or subject.method.exact_steps:
+        return None
+    draw, stepper = np.random.default_rng(subject.seed), subject.stepper
+    scenes = drawn(subject.scene, DRAWS[subject.quick], subject.seed, same_top=subject.knows_top)
+    for k, scene in enumerate(scenes):
+        since, scale = (
+            scene.time_scale() * 10.0 ** draw.uniform(0.0, 3.0),
+            scene.time_scale() * math.sin(scene.start.theta),
+        )
+        coarsest = scale / draw.uniform(9.0, 18.0)
+        if stepper is not None:
+            stepper.since = since * (k % 2)
+        for chart in subject.charts:
+            with contextlib.suppress(SymtopError):
+                step = one_step(subject.method, chart, scene, coarsest)
+                if restart_gap(step, scene.start) <= ONE_MAP:
+                    sizes: Array = coarsest / 2.0 ** np.arange(float(HALVINGS))
+                    order, h = _lower(sizes, _misses(step, scene, sizes), power, scale / SHORT)
+                    if order < power:
+                        at = f", t = {stepper.since:.3g}" if stepper is not None and stepper.since else ""
+                        how = (
+                            f"a step of h = {h:.2g} from start {k + 1} of seed {subject.seed}{at} has order {order:.1f}"
+                        )
+                        return order, f"{how}, in the {chart} chart"
+        if stepper is not None:
+            stepper.since = 0.0
+    return None
+
+
+def _misses(step: StepMap, scene: Scene, sizes: Array) -> Array:
+    """How far steps of these sizes end from the motion; NaN where a step fails."""
+    exact, z, before, misses = closed_form(scene)(sizes), step.point(scene.start), step.at(scene.start), []
+    for h, *angles in zip(sizes.tolist(), *(values.tolist() for values in exact), strict=True):
+        try:
+            misses.append(
+                step.gap(
+                    aligned(step.chart, step.image(z, h), before), aligned(step.chart, step.at(Angles(*angles)), before)
+                )
+            )
+        except SymtopError:
+            misses.append(math.nan)
+    return np.array(misses)
+
+
+def _lower(sizes: Array, misses: Array, power: int, short: float) -> tuple[float, float]:
+    """The order where it is lower than `power`, and the step; infinity where it is not."""
+    with np.errstate(all="ignore"):
+        orders = np.log2(misses[:-1] / misses[1:]) - 1.0
+    clear = (misses[:-1] < LARGE) & (misses[1:] > SEEN)
+    fine = np.flatnonzero(clear & (sizes[:-1] <= short))[-2:]
+    if fine.size == 2 and (orders[fine] < power - LOWER).all():
+        return float(orders[fine].max()), float(sizes[fine[0]])
+    jumps = np.flatnonzero(clear[1:] & clear[:-1] & (orders[1:] > power + JUMP) & (orders[:-1] < power - LOWER))
+    return (float(orders[jumps[0]]), float(sizes[jumps[0]])) if jumps.size else (math.inf, math.nan)
 
 
 class ChartSeries(NamedTuple):
@@ -377,20 +448,31 @@ def _visible_from(table: Conditions, power: int, scene: Scene) -> str:
 
 def time_order(subject: Subject) -> list[Finding]:
     """The finding on the order in a frame that turns."""
-    if not subject.method.fixed_step or not hasattr(subject.stepper, "along"):
+    if not subject.method.fixed_step or not subject.stepper.takes_field:
         return [inapplicable("time", "it takes no right-hand side")]
+    if subject.autonomous:
+        return [inapplicable("time", "it was written for f(y)")]
+    return [_in_frame(subject)]
+
+
+def _in_frame(subject: Subject) -> Finding:
     order, rate = subject.method.order, 2.0 * math.pi * TURNS / subject.scene.time_scale()
     turning, calls = series_in_frame(subject, rate)
     if not calls:
-        return [inapplicable("time", "it asks for no right-hand side")]
+        return inapplicable("time", "it asks for no right-hand side")
     if turning.order < 0:
-        return [inapplicable("time", "a step of no length moves a state that is not of its chart")]
+        return inapplicable("time", "a step of no length moves a state that is not of its chart")
     series, power = turning.series, turning.order if order is None else order
     shown = min(turning.order, power)
     declared, measured, verdict = yes_no(order), Measured("order", shown, text=str(shown)), "measured"
     if turning.order >= min(power, series.resolved):
-        verdict = "measured" if order is None else "confirmed"
+        if turning.order < power:  # no higher term is resolved
+            measured, verdict = Measured("order", shown, text=f"{shown} or more"), "undecided"
+        elif order is not None:
+            verdict = "confirmed"
         why = f"where f depends on t, {turning.words(power)}"
+    elif subject.knows_top:
+        return inapplicable("time", "it knows equations of the top beside f, which depend on no time")
     elif calls == {BEGIN * subject.scene.time_scale()}:  # a step for f(y): no fault on a top
         declared, measured = "", Measured("f(y) only", shown, text=f"f(y) only, {shown}")
         why = "f is asked at the start of a step alone, which is right for f(y); where f depends on t, "
@@ -399,7 +481,28 @@ def time_order(subject: Subject) -> list[Finding]:
         declared, why = "", f"{turning.wrong_term()}, as for f(y)"
     else:
         verdict, why = "refuted", f"where f depends on t, {turning.wrong_term()}: f is asked at wrong times"
-    return [Finding("time", declared, measured, verdict, why, *turning.term(power))]
+    return Finding("time", declared, measured, verdict, why, *turning.term(min(power, turning.order + 1)))
+
+
+class TurningField:
+    """y' = f(t, y) on the axis in a frame that turns about x at a rate; it keeps the times it sees."""
+
+    def __init__(self, par: Any, rate: float) -> None:
+        self.par, self.rate, self.times = par, rate, set[float]()
+
+    def turned(self, t: float, y: Array, sign: float) -> Array:
+        """R(t) y for sign 1, R(t)^T y for -1."""
+        c, s = math.cos(self.rate * t), sign * math.sin(self.rate * t)
+        x, v, w, lx, lv, lw = y
+        return np.array([x, c * v - s * w, s * v + c * w, lx, c * lv - s * lw, s * lv + c * lw])
+
+    def __call__(self, t: float, z: Any) -> Array:
+        """z'."""
+        z = np.asarray(z, dtype=float)
+        swept = self.rate * np.array([0.0, -z[2], z[1], 0.0, -z[5], z[4]])
+        self.times.add(t)
+        rates = FORMULATIONS["axis"].field(self.par, self.turned(t, z, 1.0).tolist())
+        return self.turned(t, np.array(rates), -1.0) - swept
 
 
 def series_in_frame(subject: Subject, rate: float) -> tuple[ChartSeries, set[float]]:
@@ -407,29 +510,15 @@ def series_in_frame(subject: Subject, rate: float) -> tuple[ChartSeries, set[flo
     scene, start = subject.scene, generic_start(subject.scene)
     begin, unit = BEGIN * scene.time_scale(), np.repeat([1.0, scene.momentum_scale], 3)
     form, exact = FORMULATIONS["axis"], closed_form(Scene("start", scene.top, start, 1.0))
-    par, _ = form.prepare(scene.top, start)
-    times: set[float] = set()
-
-    def turned(t: float, y: Array, sign: float) -> Array:
-        """R(t) y for sign 1, R(t)^T y for -1; the frame turns about x."""
-        c, s = math.cos(rate * t), sign * math.sin(rate * t)
-        x, v, w, lx, lv, lw = y
-        return np.array([x, c * v - s * w, s * v + c * w, lx, c * lv - s * lw, s * lv + c * lw])
-
-    def f(t: float, z: Any) -> Array:
-        z = np.asarray(z, dtype=float)
-        swept = rate * np.array([0.0, -z[2], z[1], 0.0, -z[5], z[4]])
-        times.add(t)
-        rates: Array = turned(t, np.array(form.field(par, turned(t, z, 1.0).tolist())), -1.0) - swept
-        return rates
+    f = TurningField(form.prepare(scene.top, start)[0], rate)
 
     def motion(h: float) -> Any:
         at = Angles(*(float(value[0]) for value in exact(np.array([h]))))
-        return turned(begin + h, charts.space_state("axis", scene.top, at), -1.0) / unit
+        return f.turned(begin + h, charts.space_state("axis", scene.top, at), -1.0) / unit
 
     def image(h: float) -> Any:
         return subject.stepper.along(f, begin, first.copy(), h, np.array([1]))[0] / unit
 
     first = motion(0.0) * unit
 
-    return ChartSeries("turning", compared(image, motion, scene.time_scale())), times
+    return ChartSeries("turning", compared(image, motion, scene.time_scale())), f.times

@@ -11,6 +11,7 @@ A map of (theta, p_theta) is symplectic if it keeps the area, {theta, p_theta} =
 momentum.
 """
 
+import contextlib
 import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -36,6 +37,7 @@ STANDS = 0.2  # the raw defect of a symplectic map falls to 1/256 over the width
 RETURNED = 1e-10  # a return as close as this is exact
 MISSED = 1e-8
 ONE_MAP = 1e-9  # two steps are twice one step within this
+DRAWS = {False: 8, True: 4}  # starts that are drawn; the second with --quick
 POLE_STEPS = 400
 POLE_RIGHT = 1e-7  # rad: right, whatever the step
 # the axis passes theta = 0 exactly: I1 = I3 = mgl = 1, w3 = 1, p_phi = p_psi, theta' = -1.2 at theta = 1
@@ -57,6 +59,8 @@ def measure(subject: Subject) -> list[Finding]:
             answers.append(_bracket(chart, defect, gap))
             subject.traces.update(defect_width=defect.widths, bracket_defect=defect.raw)
             answers.append(_returned(maps.return_miss(step, start), gap))
+            if subject.method.fixed_step and not subject.in_plane:
+                answers = _elsewhere(subject, step, answers)
         except SymtopError as error:
             answers += [(None, math.nan, math.nan, undecided("", "", str(error)).why)] * (2 - len(answers))
         names = ("symplectic", "symmetric")
@@ -156,6 +160,23 @@ def _returned(miss: float, gap: float) -> Answer:
         return None, miss, RETURNED, f"two steps differ from twice one step by {gap:.0e}: no one map"
     why = f"a step forth and back misses the start by {miss:.1e}"
     return True if miss <= RETURNED else False if miss > MISSED else None, miss, RETURNED, why
+
+
+def _elsewhere(subject: Subject, step: maps.StepMap, answers: list[Answer]) -> list[Answer]:
+    """The answers, or a no that a step gives at a start, on a top, that is drawn at random."""
+    scenes = maps.drawn(subject.scene, DRAWS[subject.quick], subject.seed, same_top=subject.knows_top)
+    for k, scene in enumerate(scenes):
+        with contextlib.suppress(SymtopError):
+            other = maps.moved(step, scene)
+            gap = maps.restart_gap(other, scene.start)
+            found = (
+                _bracket(step.chart, maps.symplectic_defect(other, scene.start), gap),
+                _returned(maps.return_miss(other, scene.start), gap),
+            )
+            for i, (yes, value, resolution, why) in enumerate(found):
+                if yes is False and answers[i][0]:
+                    answers[i] = yes, value, resolution, f"{why} (start {k + 1} of seed {subject.seed})"
+    return answers
 
 
 class Passage(NamedTuple):

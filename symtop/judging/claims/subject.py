@@ -7,12 +7,13 @@ implementation is given by default.
 A bare step is given as a function, a class, a solver, a file or a command; its adapter is chosen by what it is.
 """
 
+import functools
 import inspect
 import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from symtop.core.errors import SymtopError, foreign_code, one_of
 from symtop.core.files import execute, python_file
 from symtop.judging.adapters.adapter import Stepper, integrator
 from symtop.judging.adapters.external import BatchStep, DiffraxSolver, Program, SharedObject, is_solver
-from symtop.judging.adapters.python_step import PythonStep, RotationStep, ScipySolver, SeparableStep
+from symtop.judging.adapters.python_step import REDUCED, PythonStep, RotationStep, ScipySolver, SeparableStep
 from symtop.judging.findings import yes_no
 from symtop.measure.conservation import CONSTANTS as MOTION
 from symtop.measure.step_map import generic_start
@@ -39,7 +40,18 @@ SAMPLES = 4000  # intervals of a long run: a program that writes every so many s
 FINEST = {"compiled": 2e5, "python": 1e4}  # most steps of a run of the order
 FEWEST = 300  # steps of the longest run of the order, however slow
 LADDER = 2.5  # times the steps of the longest run: what all of them take
+ENOUGH_STEPS, AT_REST = 50.0, 1e-9  # steps a nutation with a right-hand side of zero, and how far they may go
 ENOUGH = 0.03  # seconds after which the time of a step is known
+
+
+class Rest:
+    """y' = 0, as a right-hand side; it keeps no times."""
+
+    times: ClassVar[set[float]] = set()
+
+    def __call__(self, _: float, y: Any) -> Any:
+        """y'."""
+        return np.zeros(np.shape(y))
 
 
 @dataclass(frozen=True)
@@ -51,12 +63,29 @@ class Subject:
     quick: bool = False
     stepper: Any = None  # a `Stepper`, of a bare step
     seconds_a_step: float = 0.0
+    seed: int = 0  # of the starts, times and steps that are drawn
+    autonomous: bool = False  # was a step written for f(y)?
     traces: dict[str, Any] = field(default_factory=dict)
 
     @property
     def in_plane(self) -> bool:
         """Is it a map of (theta, p_theta)?"""
-        return isinstance(self.stepper, SeparableStep)
+        return self.stepper is not None and self.stepper.form is REDUCED
+
+    @functools.cached_property
+    def knows_top(self) -> bool:
+        """Does it move a state where f is zero? A method for y' = f(t, y) alone does not: this one knows the top."""
+        if self.stepper is None or not self.stepper.takes_field or self.method.adaptive:
+            return False
+        h, y = (
+            self.scene.time_scale() / ENOUGH_STEPS,
+            np.array(self.stepper.form.prepare(self.scene.top, self.scene.start)[1]),
+        )
+        try:
+            end = self.stepper.along(Rest(), h, y.copy(), h, np.array([1]))[0]
+        except SymtopError:  # it divides by f
+            return True
+        return not np.max(np.abs(end - y)) <= AT_REST * np.max(np.abs(y))
 
     @property
     def charts(self) -> tuple[str, ...]:
@@ -90,6 +119,8 @@ class Request(NamedTuple):
     scene: Scene
     quick: bool
     claims: dict[str, Any]
+    seed: int = 0
+    autonomous: bool = False
 
     def claimed(self) -> Integrator:
         """The claims as a record without a step, checked before anything is loaded; SymtopError for nonsense."""
@@ -99,12 +130,15 @@ class Request(NamedTuple):
 
         return Integrator("claims", "other", "", {self.chart: refuse}, **self.claims)
 
-    def open(self) -> Subject:
-        """Load the step and time it; SymtopError if it cannot be loaded or makes no step."""
-        stepper = open_target(self.target, self.form, self.chart, adaptive=self.adaptive)
+    def opened(self) -> Stepper:
+        """Load the step; SymtopError if it cannot be loaded."""
+        return open_target(self.target, self.form, self.chart, adaptive=self.adaptive)
+
+    def open(self, stepper: Stepper) -> Subject:
+        """Time what was loaded; SymtopError if it makes no step."""
         method = integrator(stepper, **self.claims)
         seconds = seconds_a_step(stepper, self.scene) if method.fixed_step else 0.0
-        return Subject(method, self.scene, self.quick, stepper, seconds)
+        return Subject(method, self.scene, self.quick, stepper, seconds, self.seed, self.autonomous)
 
 
 def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
@@ -122,6 +156,7 @@ def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
         steps *= 4
         taken = seconds(steps)
         if taken - first > max(ENOUGH, first) or steps > 1e7:  # what a start costs scatters as much as it costs
+            taken = min(taken, seconds(steps), seconds(steps))  # others may have been at work
             return max(taken - first, 1e-9) / steps
 
 
@@ -146,13 +181,15 @@ def declared(method: Integrator, claim: str) -> str:
 
 
 def form_of(target: Any) -> str:
-    """The form of what is given, where it shows: a class, a function, FILE.py:NAME, a library, or else a program."""
+    """The form of what is given, where it shows: a class, a function, FILE.py:NAME or a library."""
     if isinstance(target, type):
         return "scipy"
     if callable(target) or is_solver(target):
         return "diffrax" if is_solver(target) else "ode"
-    path = "" if " " in str(target).strip() else str(target).partition(":")[0]
-    return "ode" if path.endswith(".py") else "shared" if path.endswith(LIBRARIES) else "program"
+    path = str(target).partition(":")[0]
+    if path.endswith(".py") or path.endswith(LIBRARIES):
+        return "ode" if path.endswith(".py") else "shared"
+    raise SymtopError(f"a step must be FILE.py:NAME or FILE.so, or a command with form program, not {str(target)!r}")
 
 
 def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = False) -> Stepper:
@@ -192,7 +229,7 @@ def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = F
 def _from_file(target: str | Path) -> tuple[Any, str]:
     """What FILE.py:NAME names, and its name; without a name the function ``step``."""
     path, _, name = str(target).partition(":")
-    file = python_file(path, "a step", "FILE.py:NAME with a file that is there")
+    file = python_file(path, "a step", "FILE.py:NAME with a file that is there (a command needs form program)")
     with foreign_code(f"the file {file.name}"):
         sys.path.insert(0, str(file.parent))  # what stands beside it, as Python has it for a script
         module = execute(f"symtop_judged_{Path(file).stem}", file)
