@@ -18,6 +18,7 @@ from symtop.methods.framework.registry import integrator
 from symtop.runner import scripts
 
 NAME, STEPS, TOPS, SEED = "takahashi-imada[axis]", 8.74, 8, 1
+FINE = 1118.72  # steps a nutation of the runs that show the walk of rounding
 FITTED = 1e4  # nutations
 
 
@@ -33,11 +34,13 @@ def main() -> None:
     facts, tops = measured.circumstances(), far.tops_of(TOPS, SEED)
     ends = far.horizons()[far.horizons() <= 1.0001 * options.nutations]
     ((errors, work),) = far.measured(integrator(NAME), tops, [far.Asked(STEPS, ends, np.inf)])
+    ((fine, more),) = far.measured(integrator(NAME), tops, [far.Asked(FINE, ends[ends <= 1.0001 * FITTED], np.inf)])
     every = far.horizons()
-    seen = np.full((len(far.QUANTITIES), 1, every.size, TOPS), np.nan)
+    seen = np.full((len(far.QUANTITIES), 2, every.size, TOPS), np.nan)
     fitted = ends <= 1.0001 * FITTED
     seen[:, 0, : ends.size][:, fitted] = errors[:, fitted]
-    told = far.predicted(seen, work[np.newaxis], every, far.grain_of(tops), drifts=far.drifts_of(integrator(NAME)))
+    seen[:, 1, : fine.shape[1]], drifts = fine, far.drifts_of(integrator(NAME))
+    told = far.predicted(seen, np.stack([work, more]), every, far.grain_of(tops), drifts=drifts)
     lines = []
     for place, quantity in enumerate(far.QUANTITIES):
         largest = np.maximum.accumulate(errors[place], axis=0)

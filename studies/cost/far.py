@@ -270,7 +270,7 @@ def predicted(seen: Array, work: Array, far: Array, grain: Array, *, drifts: boo
             runs = seen[q, s].T
             law = laws.fit(far, runs, MOST[name], drifts=drifts)
             noise = laws.rounding(name, w[:, np.newaxis], far, evaluations[s])
-            noise *= laws.least(runs, noise)[:, np.newaxis]
+            noise *= laws.least(runs, law.at(far), noise)[:, np.newaxis]
             beyond = np.hypot(law.at(far), noise)
             beyond = np.where(np.isinf(runs).any(axis=1, keepdims=True), np.inf, beyond)
             error[q, s] = np.maximum.accumulate(np.where(np.isnan(runs), beyond, runs), axis=1).T

@@ -21,9 +21,9 @@ showed, but no more than the rounding of the energy itself,
     energy, shape   w sqrt(N)                        N evaluations up to the horizon
     axis            2 pi H w sqrt(N) / sqrt(3)       the phase under a walk of the energy, whose period changes with it
 
-both with coefficient one, so that they are orders of magnitude, and no more than the largest error that the run itself
-showed: the period of a fast top hardly changes with the energy of its nutation, and the axis walks much less than that.
-They are added in quadrature.
+both with coefficient one, so that they are orders of magnitude, and no more than what the run itself leaves room for:
+the period of a fast top hardly changes with the energy of its nutation, and the axis walks much less than that. They
+are added in quadrature.
 """
 
 import math
@@ -42,6 +42,7 @@ SATURATED = 0.2
 FEWEST = 4  # points of a fit
 DOUBT, LOOSE = 1e-4, 0.025
 SHARE = 0.1  # of the error at the end
+LATE = 4  # points a decade
 
 
 class Laws(NamedTuple):
@@ -126,11 +127,17 @@ def rounding(quantity: str, w: Array, horizons: Array, evaluations: Array) -> Ar
     return np.asarray(walked * 2.0 * math.pi * horizons / math.sqrt(3.0) if quantity == "axis" else walked)
 
 
-def least(errors: Array, noise: Array) -> Array:
-    """What a run's `noise` (n, horizons) is multiplied with, (n,), so as not to exceed its measured errors."""
-    measured = np.isfinite(errors)
+def least(errors: Array, told: Array, noise: Array) -> Array:
+    """What a run's `noise` (n, horizons) is multiplied with, (n,), so as not to exceed what its measured errors allow.
+
+    Where the law `told` fits them to a part m, noise in quadrature is at most sqrt(2 m) of the last error.
+    """
+    measured = np.isfinite(errors) & (errors > 0.0)
     last = np.max(np.where(measured, np.arange(errors.shape[1]), 0), axis=1)[:, np.newaxis]
-    largest = np.max(np.where(measured, errors, 0.0), axis=1)
     with np.errstate(all="ignore"):
-        ratio = largest / np.take_along_axis(noise, last, axis=1)[:, 0]
+        late = measured & (np.arange(errors.shape[1]) > last - DECADES * LATE)
+        misfit = np.max(np.where(late, np.abs(errors / told - 1.0), 0.0), axis=1)
+        room = np.sqrt(np.minimum(2.0 * np.where(np.isfinite(misfit), misfit, 1.0), 1.0))
+        largest = np.max(np.where(measured, errors, 0.0), axis=1)
+        ratio = room * largest / np.take_along_axis(noise, last, axis=1)[:, 0]
     return np.where(measured.any(axis=1) & np.isfinite(ratio), np.minimum(ratio, 1.0), 1.0)
