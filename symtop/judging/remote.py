@@ -98,7 +98,7 @@ class Process:
         context: Any = multiprocessing.get_context("fork")
         self.pipe, theirs = context.Pipe()
         self.output = tempfile.TemporaryFile()  # noqa: SIM115  (closed with the process)
-        self.process = context.Process(target=_serve, args=(self.make, theirs, self.output), daemon=True)
+        self.process = context.Process(target=_serve, args=(self.make, self.pipe, theirs, self.output), daemon=True)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # newer versions of Python warn of threads; the child uses none of theirs
             heartbeat.inside = False
@@ -137,8 +137,9 @@ class _LostError(Exception):
     """A process was ended, or ended by itself: why."""
 
 
-def _serve(make: Callable[[], Table], pipe: Any, output: Any) -> None:
+def _serve(make: Callable[[], Table], asking: Any, pipe: Any, output: Any) -> None:
     os.setsid()  # what it starts is ended with it
+    asking.close()  # forked along; open, it would keep this process waiting for a judge that was killed
     for stream in (1, 2):
         os.dup2(output.fileno(), stream)
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -490,3 +490,33 @@ def test_a_figure_shows_a_step_beside_four_methods(tmp_path):
     assert f"written to {drawn}" in done.output
     refused = CliRunner().invoke(main, ["judge", f"{file}:step", "--figure", "step.doc"])
     assert refused.exit_code == 2
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no fork")
+def test_the_process_of_a_method_ends_with_a_judge_that_is_killed():
+    """kill -9 leaves no process behind that waits for it; before the kill it does wait."""
+    code = (
+        "import time\n"
+        "from symtop.judging.remote import Process\n"
+        "first, second = Process(lambda: {'ping': lambda: 1}), Process(lambda: {'ping': lambda: 1})\n"
+        "first.call('ping'), second.call('ping')\n"
+        "print(first.process.pid, second.process.pid, flush=True)\n"
+        "time.sleep(600)\n"
+    )
+    judge = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    waiting = [int(pid) for pid in judge.stdout.readline().split()]
+    assert all(map(_lives, waiting))
+    judge.kill()
+    judge.communicate()
+    deadline = time.monotonic() + 20.0
+    while any(map(_lives, waiting)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(map(_lives, waiting))
+
+
+def _lives(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
