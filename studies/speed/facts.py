@@ -43,10 +43,10 @@ def costs(data: xr.Dataset, target: float) -> dict[str, float]:
     return dict(sorted(((name, one) for name, one in known.items() if one < math.inf), key=lambda item: item[1]))
 
 
-def made_for_it(name: str) -> bool:
-    """Does a method need this top's own equations?"""
+def for_any_body(name: str) -> bool:
+    """Does a method exist for a body without symmetry?"""
     method = split_name(name)[0]
-    return method in integrators() and integrator(name).needs in ("this-top", "solution")
+    return method in integrators() and bool(integrator(method).general)
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
@@ -61,7 +61,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "bound": float(part["axis_bound"].min()),  # rad, what the truth can judge
     }  # fmt: skip
     for target in TARGETS:
-        first = next(((name, one) for name, one in costs(data, target).items() if not made_for_it(name)), (None, None))
+        first = next(((name, one) for name, one in costs(data, target).items() if for_any_body(name)), (None, None))
         found |= {
             f"fastest_{-math.log10(target):.0f}": first[0],
             f"fastest_{-math.log10(target):.0f}_seconds": first[1],

@@ -27,7 +27,12 @@ def test_a_run_is_that_of_its_setting(data):
     run = symtop.simulate(scene, "rk4[axis]", step_size=step, horizon=10.0 * scene.nutation_period, guard=False)
     assert float(symtop.errors(run)["axis"].max()) == pytest.approx(float(cell["axis"][2]), rel=0.05)
     assert np.isfinite(cell["seconds"]).all()
-    assert np.isfinite(facts.shown(data)["attitude"].sel(variant="rk4[attitude]")).all()
+    attitude = facts.shown(data).sel(variant="rk4[attitude]")
+    ended = symtop.simulate(scene, "rk4[attitude]", step_size=float(attitude["step_size"][0]),
+                            horizon=10.0 * scene.nutation_period, guard=False).attrs["outcome"]  # fmt: skip
+    assert ended == "not_normalised"  # so long a step loses the quaternion's length, and is neither judged nor timed
+    assert not np.isfinite(attitude[["attitude", "seconds"]].isel(setting=0).to_array()).any()
+    assert np.isfinite(attitude[["attitude", "seconds"]].isel(setting=slice(1, None)).to_array()).all()
     assert not np.isfinite(facts.shown(data)["axis"].sel(variant="rk4[attitude]")).any()
 
 
@@ -60,3 +65,9 @@ def test_the_page_says_what_was_measured(data, tmp_path):
     found = facts.facts(data)
     assert found["fastest_6"] in text
     assert found["scipy"] is None
+
+
+def test_a_method_for_symmetric_bodies_is_not_called_one_for_any_body():
+    assert facts.for_any_body("rk4[axis]")
+    assert not facts.for_any_body("takahashi-imada[axis]")
+    assert not facts.for_any_body("series[axis]")
