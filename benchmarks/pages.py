@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from symtop.report.tables import table
 
-ROWS = 10  # of a table that the page shows
+ROWS, TABLES = 5, 4  # that the page shows; the rest stands in what the command prints
 
 
 class Table(NamedTuple):
@@ -29,7 +29,7 @@ def findings(
         f'{{% call figure("{figure}", title={title!r}, alt={alt!r}) %}}{_raw(caption)}{{% endcall %}}'
         for figure, (caption, alt) in (captions or {}).items()
     ]
-    shown = [_raw(f"**{one.title}**{_count(one)}\n\n{table(one.header, one.rows[:ROWS])}") for one in tables]
+    shown = [_raw(f"**{one.title}**{_count(one)}\n\n{table(one.header, one.rows[:ROWS])}") for one in tables[:TABLES]]
     listed = _raw("\n".join(f"- {sentence}" for sentence in sentences))
     page = "\n\n".join(["# {{ question }}", listed, *figures, _raw(f"**How to read it.** {how_to_read}"), *shown])
     return {
