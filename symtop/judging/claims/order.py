@@ -31,6 +31,7 @@ frame at rest, w = 0, is one of wrong times. A step that asks f at t0 alone was 
 
 import contextlib
 import math
+import time
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -71,6 +72,7 @@ STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the c
 TRUE_LIMIT = 1e-11  # a limit as close as this is the true motion
 SHOWN = 24  # settings of the order that are kept
 DRAWS = {False: 96, True: 32}  # starts at which the order of one step is looked at; the second with --quick
+DRAWING = {False: 10.0, True: 3.0}  # seconds for them
 HALVINGS, SHORT = 10, 80.0  # steps that are tried from each, and how many of a short one make a nutation
 LOWER, JUMP = 0.6, 3.0  # an order is lower by so much, or jumps by so much
 LARGE, SEEN = 1e-3, 1e-11  # a miss beyond the first is of no power, below the second rounding
@@ -111,7 +113,10 @@ def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
         return None
     draw, stepper = np.random.default_rng(subject.seed), subject.stepper
     scenes = drawn(subject.scene, DRAWS[subject.quick], subject.seed, same_top=subject.knows_top)
+    began = time.monotonic()
     for k, scene in enumerate(scenes):
+        if time.monotonic() - began > DRAWING[subject.quick]:  # a program that takes long to start
+            break
         since, scale = (
             scene.time_scale() * 10.0 ** draw.uniform(0.0, 3.0),
             scene.time_scale() * math.sin(scene.start.theta),

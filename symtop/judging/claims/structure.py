@@ -13,6 +13,7 @@ momentum.
 
 import contextlib
 import math
+import time
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -38,6 +39,7 @@ RETURNED = 1e-10  # a return as close as this is exact
 MISSED = 1e-8
 ONE_MAP = 1e-9  # two steps are twice one step within this
 DRAWS = {False: 8, True: 4}  # starts that are drawn; the second with --quick
+DRAWING = {False: 10.0, True: 2.0}  # seconds for them
 POLE_STEPS = 400
 POLE_RIGHT = 1e-7  # rad: right, whatever the step
 # the axis passes theta = 0 exactly: I1 = I3 = mgl = 1, w3 = 1, p_phi = p_psi, theta' = -1.2 at theta = 1
@@ -165,7 +167,10 @@ def _returned(miss: float, gap: float) -> Answer:
 def _elsewhere(subject: Subject, step: maps.StepMap, answers: list[Answer]) -> list[Answer]:
     """The answers, or a no that a step gives at a start, on a top, that is drawn at random."""
     scenes = maps.drawn(subject.scene, DRAWS[subject.quick], subject.seed, same_top=subject.knows_top)
+    began = time.monotonic()
     for k, scene in enumerate(scenes):
+        if time.monotonic() - began > DRAWING[subject.quick]:  # a program that takes long to start
+            break
         with contextlib.suppress(SymtopError):
             other = maps.moved(step, scene)
             gap = maps.restart_gap(other, scene.start)
