@@ -120,13 +120,13 @@ def long(
     check_outputs(output=output, checkpoint=checkpoint)
     with ticking("loading"):
         from symtop.model import scenes
-        from symtop.run.long_run import PER_NUTATION, long_run
+        from symtop.run.long_run import MOST_STEPS, PER_NUTATION, long_run
 
     period, step_size = scenes.scene(scene).nutation_period, common.step_of(scene, settings)
     if step_size is None and period == math.inf:
         raise SymtopError(f"{scene} has no nutation to take a step from: give --step-size")
     h = period / PER_NUTATION if step_size is None else step_size
-    count = whole("steps", steps, 1)
+    count = whole("steps", steps, 1, MOST_STEPS)
     if count > FEW:
         with ticking("timing some steps"):
             took = 0.0

@@ -136,9 +136,7 @@ def long_run(
     cannot be written.
     """
     chosen, method = find_scene(scene), find_integrator(integrator)
-    count, h = whole("steps", steps, 1), positive("step_size", step_size)
-    if count > MOST_STEPS:
-        raise SymtopError(f"steps must be at most {MOST_STEPS}, not {count}", "steps")
+    count, h = whole("steps", steps, 1, MOST_STEPS), positive("step_size", step_size)
     _, solver = chart_of(method)
     assert isinstance(solver.loop, Loop)  # noqa: S101
     loop = solver.loop if compensated else solver.loop.plain()

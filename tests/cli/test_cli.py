@@ -159,7 +159,7 @@ def test_a_folder_is_no_output_and_nothing_is_computed_for_it(words, computes, t
     [
         (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
         (["recommend", "spheroid", "--accuracy", "1e-3"], "symtop.advise.recommend"),
-        (["claims", "strang", "--quick"], "symtop.judging.battery.judge"),
+        (["claims", "strang", "--quick"], "symtop.judging.judge_step.apart"),
     ],
 )
 def test_ctrl_c_is_neither_a_failed_case_nor_bad_input(words, called, monkeypatch):

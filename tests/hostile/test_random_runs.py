@@ -14,7 +14,7 @@ from symtop.model.scenes import steady
 from symtop.run.guard import forecast, landmarks
 from symtop.run.linear_stability import nutation_growth, trace
 from symtop.run.simulation import make_plan
-from tests.hostile.random_runs import LONGEST, drawn, one, run_all, told
+from tests.hostile.random_runs import LONGEST, NEWER, drawn, one, run_all, told
 
 # runs of the first 20,000 that were wrong in silence, and of the next 40,000
 SILENT = [
@@ -46,13 +46,21 @@ def test_a_draw_is_its_own():
 
 @pytest.mark.parametrize("count", [300, pytest.param(1500, marks=pytest.mark.slow)])
 def test_random_runs_are_not_wrong_in_silence(count, tmp_path):
-    runs = [*run_all(count, tmp_path / "runs.jsonl", seed=3).values()]
+    runs = [*run_all(count, tmp_path / "runs.jsonl", seed=3, without=NEWER).values()]
     assert len(runs) == count
     assert not [run for run in runs if run.wrong and not run.warning], told(runs)
     assert not [run for run in runs if run.outcome in ("endless", "crashed") or run.seconds > LONGEST], told(runs)
     right = [run for run in runs if run.right]
     assert len(right) > count / 4
     assert sum(bool(run.warning) for run in right) < max(0.01 * len(right), 3), told(runs)
+
+
+def test_newer_methods_are_not_wrong_in_silence(tmp_path):
+    older = tuple(name for name in symtop.integrators() if name not in NEWER)
+    runs = [*run_all(40, tmp_path / "runs.jsonl", seed=3, without=older).values()]
+    assert {run.integrator for run in runs} <= {*NEWER}
+    assert sum(run.wrong for run in runs) > 2
+    assert not [run for run in runs if run.wrong and not run.warning], told(runs)
 
 
 def nutating():
