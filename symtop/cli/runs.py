@@ -120,7 +120,8 @@ def long(
     check_outputs(output=output, checkpoint=checkpoint)
     with ticking("loading"):
         from symtop.model import scenes
-        from symtop.run.long_run import MOST_STEPS, PER_NUTATION, long_run
+        from symtop.run.guard import MOST_STEPS
+        from symtop.run.long_run import PER_NUTATION, long_run
 
     period, step_size = scenes.scene(scene).nutation_period, common.step_of(scene, settings)
     if step_size is None and period == math.inf:
