@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.colors import to_rgb
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from symtop.methods.framework.registry import integrator, split_name
 from symtop.report import style
+from symtop.report.figures import label_lines
 from symtop.report.style import LEAST_TEXT, few_ticks, grid, panels
 from symtop.runner.study import Picture
 
@@ -29,7 +29,7 @@ FAMILIAR = (  # of figure 1: methods that people know
 )  # fmt: skip
 TOP = "this-top"
 PALEST = "#AAAAAA"  # of methods made for this top
-NAMED = 8  # variants of the run lengths with a label
+NAMED = 7  # variants of the run lengths with a label
 BESIDE = ("rk4[axis]", "strang[axis]", "dop853-compiled-fixed[axis]")  # named in any case
 MARKS, LATEST = 9, 0.995
 HALF = 0.5
@@ -73,17 +73,18 @@ def draw_accuracy(data: xr.DataTree) -> Any:
                 if one.name in names and math.isfinite(one.seconds):
                     lines.setdefault(one.name, []).append((one.seconds, target, one.low, one.high))
     figure, axes = panels(1, 1, height=4.0)
-    axis = axes[0, 0]
+    axis, ends = axes[0, 0], []
     for name in (name for name in names if name in lines):
         x, y, low, high = np.array(lines[name]).T
         own = integrator(name).needs == TOP
         style_of = style.line(name) | ({"color": PALEST} if own else {})
-        axis.plot(1e6 * x, y, lw=1.0 if own else 1.6, zorder=2 if own else 3, **style_of,
-                  label=f"{short_name(name)} (made for this top)" if own else short_name(name))  # fmt: skip
+        axis.plot(1e6 * x, y, lw=1.0 if own else 1.6, zorder=2 if own else 3, **style_of)
+        label = f"{short_name(name)} (made for this top)" if own else short_name(name)
+        ends.append((label, style_of["color"], 1e6 * x, y))
         axis.hlines(y, 1e6 * low, 1e6 * high, color=style_of["color"], lw=3.0, alpha=0.35, zorder=2)
     axis.set(xscale="log", yscale="log", ylim=(2e-13, 5e-3), ylabel="axis error that 95 % of the tops keep (rad)")
     axis.set_xlabel("time of a safe run: evaluations × price + call (µs)")
-    style.legend_below(figure, axes)
+    label_lines(axis, ends)
     return figure
 
 
@@ -137,12 +138,7 @@ def draw_map(data: xr.DataTree) -> Any:
         axis.set(title=TITLES[quantity], xlabel="run length (nutations)")
     axes[0][0].set_ylabel("largest error allowed")
     keys = [Patch(facecolor=colors[name], label=_key(name, rows)) for name, rows in groups.items()]
-    keys += [
-        Patch(facecolor="#CFCFCF", edgecolor="#777777", hatch=HATCH, label="pale, hatched: predicted, not run"),
-        Patch(facecolor=UNREACHED, edgecolor="#BBBBBB", label="reached by no method"),
-        Line2D([], [], ls="none", marker="o", ms=2.4, mfc="white", mec="black", mew=0.3,
-               label=f"dot: another costs less than {far.TIE:g} times as much"),
-    ]  # fmt: skip
+    keys.append(Patch(facecolor=UNREACHED, edgecolor="#BBBBBB", label="reached by no method"))
     figure.legend(handles=keys, loc="outside lower center", ncols=2, frameon=False)
     return figure
 
