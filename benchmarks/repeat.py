@@ -86,9 +86,11 @@ def compare_prices(one: pricing.Prices, other: pricing.Prices) -> None:
     for what, part in (("prices", 0), ("calls", 1)):
         mine, theirs = (np.array([known.at(name, np.array([pricing.TOLERANCE]))[part][0] for name in one.names])
                         for known in (one, other))  # fmt: skip
-        low, middle, high = np.nanquantile(theirs / mine, (0.1, 0.5, 0.9))
+        good = (mine > 0.0) & (theirs > 0.0)
+        ratio = theirs[good] / mine[good]
+        low, middle, high = np.quantile(ratio, (0.1, 0.5, 0.9))
         print(f"{what}, second over first: median {middle:.3f}, 80 % from {low:.3f} to {high:.3f}, all from "
-              f"{np.nanmin(theirs / mine):.3f} to {np.nanmax(theirs / mine):.3f}")  # fmt: skip
+              f"{ratio.min():.3f} to {ratio.max():.3f}")  # fmt: skip
     print(f"marked: {one.marked} and {other.marked}")
 
 
