@@ -24,9 +24,9 @@ def parts(data: xr.Dataset) -> tuple[xr.Dataset, pd.DataFrame]:
     return data.isel(variant=~false), ledger(data.isel(variant=false))
 
 
-def caught(found: pd.DataFrame) -> pd.Series:
+def caught(entries: pd.DataFrame) -> pd.Series:
     """Of each planted integrator, by its name: is its false claim refuted?"""
-    lies = found[found["claim"] == found["integrator"].map(LIES)]
+    lies = entries[entries["claim"] == entries["integrator"].map(LIES)]
     return lies.set_index("integrator")["verdict"] == "refuted"
 
 
@@ -54,16 +54,16 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     """How many claims have each verdict, which defects are real, and how many steps the long runs have."""
     data, false = parts(data)
     told = caught(false)
-    found, measured = ledger(data), defects(data)
-    count = Counter(found["verdict"])
+    entries, measured = ledger(data), defects(data)
+    count = Counter(entries["verdict"])
     falling = [name for name, (_, defect) in measured.items() if defect[-1] < defect[0] / REFINED]
     made = data["steps_run"].isel(scene=0).to_series()
     made = made[made > 0].astype(int)
-    undecided = Counter(found["claim"][found["verdict"] == "undecided"].map(claim_name))
+    undecided = Counter(entries["claim"][entries["verdict"] == "undecided"].map(claim_name))
     ((open_claim, open_most),) = undecided.most_common(1) or [(None, None)]
     ((usual, usual_runs),) = Counter(made).most_common(1) or [(None, None)]
     return {
-        "integrators": found["integrator"].nunique() or None,
+        "integrators": entries["integrator"].nunique() or None,
         "scene": SCENE,
         "declared": count["confirmed"] + count["refuted"] or None,  # and judged
         "held": count["confirmed"],

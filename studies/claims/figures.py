@@ -41,19 +41,19 @@ CAUGHT = "#BFE3D0"  # a planted false claim that is refuted
 def pictures(data: xr.Dataset) -> Iterator[Picture]:
     """The matrix of verdicts, and the defect of the bracket against the differencing width."""
     data, false = parts(data)
-    if len(found := ledger(data)):
-        yield draw_ledger(found, caught(false))
+    if len(entries := ledger(data)):
+        yield draw_ledger(entries, caught(false))
     if measured := defects(data):
         yield draw_bracket(measured)
 
 
-def draw_ledger(found: pd.DataFrame, told: pd.Series) -> Picture:
+def draw_ledger(entries: pd.DataFrame, told: pd.Series) -> Picture:
     """One row a claim, one column a family of methods: how many of its methods have each verdict.
 
     The last column has the planted false claims, and how many of them are refuted.
     """
-    counts = found.groupby(["family", "claim"])["verdict"].value_counts()
-    sizes = found.groupby("family")[["scene", "integrator"]].apply(lambda part: len(part.drop_duplicates()))
+    counts = entries.groupby(["family", "claim"])["verdict"].value_counts()
+    sizes = entries.groupby("family")[["scene", "integrator"]].apply(lambda part: len(part.drop_duplicates()))
     names = [family for family in (*FAMILIES, "other") if family in sizes]
     figure, axes = style.panels(1, 1, height=0.8 + 0.24 * len(CLAIMS))
     axis = axes[0, 0]

@@ -81,12 +81,12 @@ def first(costs: pd.DataFrame) -> tuple[str | None, float | None]:
 def constants(data: xr.Dataset) -> dict[str, float | None]:
     """C of error = C h^2, rad/s^2, of the quoted variants at the end of the run on `QUOTED_ON`."""
     ends = fits(data, MAIN, at_end=True)
-    found = {}
+    answers = {}
     for name in QUOTED:
         end = ends.get((QUOTED_ON, name))
         key = f"constant_{split_name(name)[0].replace('-', '_')}"
-        found[key] = None if end is None or not np.isfinite(end.slope) else float(end.constant)
-    return found
+        answers[key] = None if end is None or not np.isfinite(end.slope) else float(end.constant)
+    return answers
 
 
 def cheapest(data: xr.Dataset) -> pd.DataFrame:

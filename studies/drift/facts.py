@@ -56,7 +56,7 @@ OF_CONSTANT = [f"{word}{what}" for word in ("kept", "bounded", "lost") for what 
 def facts(data: xr.DataTree) -> dict[str, Any]:
     """What was held fixed, and what became of constants and phase; changes are relative."""
     names = [*" ".join(NAMES.values()).split(), *(f"{one}_{what}" for one in CONSTANTS for what in OF_CONSTANT)]
-    found: dict[str, Any] = dict.fromkeys(names) | {
+    answers: dict[str, Any] = dict.fromkeys(names) | {
         "rounding": RUN_ROUNDING,  # the largest change that a million steps of rounding explain
         "apart_times": APART,
         "per_nutation": PER_NUTATION,  # steps of the long runs
@@ -67,8 +67,8 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     measures = {HISTORIES: of_histories, WINDOWS: of_windows, ROUNDINGS: of_walks, HORIZONS: of_losses}
     for group, of_group in measures.items():
         if group in data:
-            found |= of_group(data[group].to_dataset())
-    return found
+            answers |= of_group(data[group].to_dataset())
+    return answers
 
 
 def of_histories(every: xr.Dataset) -> dict[str, Any]:
@@ -107,12 +107,12 @@ def of_histories(every: xr.Dataset) -> dict[str, Any]:
 
 def of_constant(fate: pd.DataFrame, constant: str) -> dict[str, Any]:
     """How many variants keep a constant, bound its error or lose it, with the largest change of each."""
-    found: dict[str, Any] = {}
+    answers: dict[str, Any] = {}
     for word, chosen in (("kept", BEHAVIOURS[:1]), ("bounded", BEHAVIOURS[1:2]), ("lost", BEHAVIOURS[2:])):
         largest = fate[f"{constant}_largest"][fate[constant].isin(chosen)]
-        found |= {word: len(largest), f"{word}_most": float(largest.max()) if len(largest) else None}
-        found[f"{word}_worst"] = str(largest.idxmax()) if len(largest) else None
-    return found
+        answers |= {word: len(largest), f"{word}_most": float(largest.max()) if len(largest) else None}
+        answers[f"{word}_worst"] = str(largest.idxmax()) if len(largest) else None
+    return answers
 
 
 def of_windows(windows: xr.Dataset) -> dict[str, Any]:

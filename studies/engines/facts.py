@@ -100,7 +100,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     beside = every.loc[BESIDE] if BESIDE in every.index else dict.fromkeys(every.columns)
     members = read(data, "population", "steps_a_nutation")
     long = {name: maps[name].abs()[maps["slow"].notna()] for name in ("energy", "spin")}
-    found: dict[str, Any] = {
+    answers: dict[str, Any] = {
         "slow": SLOW, "fast": FAST, "slow_nutation": scene(SLOW).nutation_period,
         "fast_nutation": scene(FAST).nutation_period,  # s
         "beside": BESIDE, "near": NEAR, "usual": USUAL,
@@ -125,8 +125,8 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     for name, column, of, pick in (("best", "slow", turned, "min"), ("worst", "slow", turned, "max"),
                                    ("level_slow", "slow_level", maps, "min"), ("level_fast", "fast_level", maps, "min"),
                                    ):  # fmt: skip
-        found[f"{name}_variant"], found[name] = at(of[column], pick)
-    return found | {f"beside_{name}": beside[name] for name in ("slow_level", "fast_level", "share")}
+        answers[f"{name}_variant"], answers[name] = at(of[column], pick)
+    return answers | {f"beside_{name}": beside[name] for name in ("slow_level", "fast_level", "share")}
 
 
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:

@@ -122,13 +122,13 @@ def first_goal(frame: pd.DataFrame) -> pd.DataFrame:
 
 def pairs(frame: pd.DataFrame) -> pd.DataFrame:
     """What changing one factor does, wherever the other three can be held: the ratio of every pair of times."""
-    found = []
+    answers = []
     for factor, before, after in STEPS if len(frame) else ():
         held = [*GOAL, *(other for other in FACTORS if other != factor)]
         both = frame[frame[factor] == before].merge(frame[frame[factor] == after], on=held)
-        found.append(both[held].assign(factor=factor, before=before, after=after,
+        answers.append(both[held].assign(factor=factor, before=before, after=after,
                                        ratio=both["seconds_x"] / both["seconds_y"]))  # fmt: skip
-    return pd.concat(found) if found else pd.DataFrame(columns=["factor", "before", "after", "ratio"])
+    return pd.concat(answers) if answers else pd.DataFrame(columns=["factor", "before", "after", "ratio"])
 
 
 def effects(frame: pd.DataFrame) -> pd.DataFrame:
@@ -170,7 +170,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     every, frame, (loud, count) = timed(data), compared(data), noisy(data)
     share = every[Column.AXIS] / every["target"] if len(every) else pd.Series(dtype=float)
     beside, ratios = against_scipy(frame), charts(frame)
-    found: dict[str, Any] = {
+    answers: dict[str, Any] = {
         "busy": every.shape != frame.shape or None,
         "times": count or None, "loud": loud, "noisy": NOISY, "usual_spread": float(every["spread"].median()),
         "samples": SAMPLES, "near": LEAST, "near_share": float((share >= LEAST).mean()) if len(share) else None,
@@ -180,14 +180,14 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     part = first_goal(frame)
     for name, call_first in (("late", False), ("first", True)):
         bars = waterfall(part, call_first=call_first)
-        found |= {f"{name}_{factor}": _most(bars["times faster"][bars["factor"] == factor]) for factor in FACTORS}
-    found |= _ends(part, bars)
+        answers |= {f"{name}_{factor}": _most(bars["times faster"][bars["factor"] == factor]) for factor in FACTORS}
+    answers |= _ends(part, bars)
     for name, column in (("user", "times, as called"), ("author", "times, kernels")):
-        found |= {f"{name}_least": _least(beside[column]), f"{name}_most": _most(beside[column])}
+        answers |= {f"{name}_least": _least(beside[column]), f"{name}_most": _most(beside[column])}
     for chart in CHARTS:
         middles = ratios.groupby("family")[f"{chart} / axis"].median().dropna()
-        found |= {f"{chart}_{family.replace('-', '_').lower()}": middles.get(family) for family in FAMILIES}
-    return found
+        answers |= {f"{chart}_{family.replace('-', '_').lower()}": middles.get(family) for family in FAMILIES}
+    return answers
 
 
 def _least(values: pd.Series) -> float | None:

@@ -54,7 +54,7 @@ def of_the_solver(data: xr.Dataset, discrete: xr.Dataset) -> dict[str, Any]:
         parts = (f"{part}_{name}" for part in PARTS.values() for name in BY_PART)
         return dict.fromkeys((*OF_SOLVER, *parts))
     solver, runs = data.sel(variant=SOLVER), discrete["variant"].values
-    found: dict[str, Any] = {
+    answers: dict[str, Any] = {
         "followed": float(np.abs(solver[Column.SOLVER_THETA] - solver[Column.TRUE_THETA]).sel(scene="spheroid").max()),
         "ways": float(solver[Column.DERIVATIONS_GAP].max()),  # rad
         "energies": float(solver[Column.ENERGY_GAP].max()),  # relative
@@ -65,10 +65,10 @@ def of_the_solver(data: xr.Dataset, discrete: xr.Dataset) -> dict[str, Any]:
     }
     for scene, part in PARTS.items():
         limit, largest = float(solver["energy_largest"].sel(scene=scene)), discrete["energy_largest"].sel(scene=scene)
-        named, ends = [name for name in ORDER_TWO if name in runs], (notebook_end(data, scene), found["long"])
+        named, ends = [name for name in ORDER_TWO if name in runs], (notebook_end(data, scene), answers["long"])
         since = [better_from(data, scene, name) for name in named]
         until = [[energy_until(data, scene, name, time) for time in ends] for name in named]
-        found |= {
+        answers |= {
             f"{part}_end": ends[0],  # s
             f"{part}_energy": limit,  # the solver's largest relative energy error to the notebook's end
             # variants with a larger error than the solver to then, of `compared` and of `discrete`
@@ -76,11 +76,11 @@ def of_the_solver(data: xr.Dataset, discrete: xr.Dataset) -> dict[str, Any]:
             f"{part}_behind_all": int((largest > limit).sum()) if largest.size else None,
             f"{part}_ahead": sum(map(math.isfinite, since)) if named else None,  # with a smaller one in the end
             f"{part}_last": max(filter(math.isfinite, since), default=None),  # s: the last of these gets ahead
-            f"{part}_long": energy_until(data, scene, SOLVER, found["long"]),  # the solver's error to then
+            f"{part}_long": energy_until(data, scene, SOLVER, answers["long"]),  # the solver's error to then
             f"{part}_grown": max((late / early for early, late in until), default=None),  # the others', late over early
             f"{part}_turned": turned(data, scene),  # degrees
         }
-    return found
+    return answers
 
 
 def present(data: xr.Dataset) -> list[str]:

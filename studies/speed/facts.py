@@ -25,14 +25,14 @@ def cost(cell: xr.Dataset, target: float, unit: str = "seconds", quantity: str =
     error, paid = cell[quantity].values, cell[unit].values
     good = np.isfinite(error) & np.isfinite(paid) & (error > 0.0)
     error, paid = np.log(error[good]), np.log(paid[good])
-    found = [math.inf]
+    answers = [math.inf]
     for k in np.flatnonzero(error <= math.log(target)):
         if k and error[k - 1] > math.log(target):
             part = (math.log(target) - error[k - 1]) / (error[k] - error[k - 1])
-            found.append(math.exp(paid[k - 1] + part * (paid[k] - paid[k - 1])))
+            answers.append(math.exp(paid[k - 1] + part * (paid[k] - paid[k - 1])))
         else:
-            found.append(math.exp(paid[k]))
-    return min(found)
+            answers.append(math.exp(paid[k]))
+    return min(answers)
 
 
 def costs(data: xr.Dataset, target: float) -> dict[str, float]:
@@ -52,7 +52,7 @@ def for_any_body(name: str) -> bool:
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """The fastest methods for any body at each error (s), the closed form (s), and what SciPy's loop costs."""
     part = shown(data)
-    found: dict[str, Any] = {
+    answers: dict[str, Any] = {
         "scene": str(part["scene"].values), "nutations": float(part["nutations"]),
         "scenes": ", ".join(map(str, data["scene"].values)),
         "lengths": " and ".join(f"{length:g}" for length in data["nutations"].values),
@@ -62,13 +62,13 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     }  # fmt: skip
     for target in TARGETS:
         first = next(((name, one) for name, one in costs(data, target).items() if for_any_body(name)), (None, None))
-        found |= {
+        answers |= {
             f"fastest_{-math.log10(target):.0f}": first[0],
             f"fastest_{-math.log10(target):.0f}_seconds": first[1],
         }
     taken = costs(data, 1e-6)
     both = SCIPY in taken and SAME in taken
-    return found | {"scipy": taken[SCIPY] / taken[SAME] if both else None}  # times as long, at 1e-6 rad
+    return answers | {"scipy": taken[SCIPY] / taken[SAME] if both else None}  # times as long, at 1e-6 rad
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:

@@ -38,15 +38,15 @@ NAMES = (  # of all facts that are measured
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """How far methods are accurate and how they fail; what each mechanism does. Steps of maps are in nutations."""
-    found: dict[str, Any] = dict.fromkeys(NAMES)
-    found |= {"periods": PERIODS, "slow": SLOW, "fast": FAST, "near": NEAR, "barely": BARELY, "sought": SOUGHT_PHASE,
+    answers: dict[str, Any] = dict.fromkeys(NAMES)
+    answers |= {"periods": PERIODS, "slow": SLOW, "fast": FAST, "near": NEAR, "barely": BARELY, "sought": SOUGHT_PHASE,
               "lost": LOST, "common": COMMON, "curve_steps": CURVE_STEPS}  # fmt: skip
     if family := next(iter(families(data)), None):
-        found |= atlas_facts(data, family)
+        answers |= atlas_facts(data, family)
     for scene, variable, read in READ:
         if measured(data, scene, variable):
-            found |= read(data.sel(scene=scene))
-    return found
+            answers |= read(data.sel(scene=scene))
+    return answers
 
 
 def atlas_facts(data: xr.Dataset, family: str) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def atlas_facts(data: xr.Dataset, family: str) -> dict[str, Any]:
         sum(values) for values in zip(*((one.made.size, one.made.sum()) for one in shown.values()), strict=True)
     )
     silent = [one.silent for one in shown.values() if math.isfinite(one.silent)]
-    found = {
+    answers = {
         "family": family,
         "silent": float(np.median(silent)) if silent else None,  # share of the inaccurate runs, median variant
         "cells": cells,
@@ -68,12 +68,12 @@ def atlas_facts(data: xr.Dataset, family: str) -> dict[str, Any]:
     if steps:
         for kind in ("fast", "slow"):
             best = max(steps, key=lambda name: np.nan_to_num(steps[name].usual_reach[kind]))
-            found |= {f"{kind}_variant": best, f"{kind}_reach": steps[best].usual_reach[kind]}
-        found |= {"stepped": len(steps), "shortest": min(float(one.settings[0]) for one in steps.values()),
+            answers |= {f"{kind}_variant": best, f"{kind}_reach": steps[best].usual_reach[kind]}
+        answers |= {"stepped": len(steps), "shortest": min(float(one.settings[0]) for one in steps.values()),
                   "slow_none": sum(one.usual_reach["slow"] == 0.0 for one in steps.values())}  # fmt: skip
     if QUOTED in steps:
-        found |= {"quoted_fast": steps[QUOTED].usual_reach["fast"], "quoted_fails": steps[QUOTED].failure.setting}
-    return found
+        answers |= {"quoted_fast": steps[QUOTED].usual_reach["fast"], "quoted_fails": steps[QUOTED].failure.setting}
+    return answers
 
 
 def pole_facts(part: xr.Dataset) -> dict[str, Any]:
@@ -84,8 +84,8 @@ def pole_facts(part: xr.Dataset) -> dict[str, Any]:
         if effect is not None and method.control == "step_size":
             halved[method.charts() == ("angles",)].append(effect.halves)
     groups = {"angles": halved[True], "others": halved[False]}
-    found = {name: len(group) for name, group in groups.items() if group}
-    return found | {f"{name}_halved": sum(groups[name]) for name in found}
+    answers = {name: len(group) for name, group in groups.items() if group}
+    return answers | {f"{name}_halved": sum(groups[name]) for name in answers}
 
 
 def resonance_facts(part: xr.Dataset) -> dict[str, Any]:
@@ -101,7 +101,7 @@ def resonance_facts(part: xr.Dataset) -> dict[str, Any]:
 
 def sleeping_facts(part: xr.Dataset) -> dict[str, Any]:
     """The spin from which a top sleeps at the longest step, and how far all of them are from theory."""
-    found: dict[str, Any] = {"sleep_step": float(part[Column.SLEEPING_STEP].max())}
+    answers: dict[str, Any] = {"sleep_step": float(part[Column.SLEEPING_STEP].max())}
     misses_ = []
     for name, method in methods_of(part).items():
         cell = part.sel(variant=name).dropna("rung", subset=[Column.SLEEPING_THRESHOLD])
@@ -109,8 +109,8 @@ def sleeping_facts(part: xr.Dataset) -> dict[str, Any]:
             steps, spins = (cell[key].values for key in (Column.SLEEPING_STEP, Column.SLEEPING_THRESHOLD))
             misses_ += [abs(one - method.sleeps_from(float(h))) for h, one in zip(steps, spins, strict=True)]
             if split_name(name)[0] in ("strang", "cayley"):
-                found[f"{split_name(name)[0]}_sleeps"] = float(spins[-1])
-    return found | {"sleep_miss": max(misses_, default=None)}
+                answers[f"{split_name(name)[0]}_sleeps"] = float(spins[-1])
+    return answers | {"sleep_miss": max(misses_, default=None)}
 
 
 def separatrix_facts(part: xr.Dataset) -> dict[str, Any]:
@@ -125,14 +125,14 @@ def sampling_facts(part: xr.Dataset) -> dict[str, Any]:
     """What an energy error sampled once a nutation hides, and the share of the solver in that of the midpoint rule."""
     hidden, ratios = sampled(part)
     worst = max(ratios, key=lambda name: ratios[name], default=None)
-    found = {"sampled": len(hidden) + len(ratios), "hidden": len(hidden),
+    answers = {"sampled": len(hidden) + len(ratios), "hidden": len(hidden),
              "small": sum(ratio > 10.0 for ratio in ratios.values()),
              "small_most": ratios.get(worst), "small_variant": worst}  # fmt: skip
     if Column.TEXTBOOK_ENERGY in part:
         rule = part.dropna("variant", how="all", subset=[Column.ONE_ITERATION_ENERGY]).isel(variant=0)
-        found |= {"one_iteration": float(rule[Column.ONE_ITERATION_ENERGY]),
+        answers |= {"one_iteration": float(rule[Column.ONE_ITERATION_ENERGY]),
                   "solved": float(rule[Column.TEXTBOOK_ENERGY][-1])}  # fmt: skip
-    return found
+    return answers
 
 
 READ = (

@@ -144,15 +144,3 @@ def test_nothing_that_belongs_to_the_map_of_one_step_is_claimed():
     method = symtop.integrator("adams")
     assert (method.order, method.symplectic, method.symmetric) == (None, None, None)
     assert math.isclose(method.least_tolerance, symtop.integrator("dop853-compiled").least_tolerance)
-
-
-def test_a_pole_ends_a_run_in_angles_alone():
-    pole = symtop.Scene(
-        "pole", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0, theta_dot=-2.0), 5.0, observes="axis"
-    )
-    outcome = {
-        chart: symtop.simulate(pole, f"adams[{chart}]", tolerance=1e-6, guard=False).attrs["outcome"]
-        for chart in FORMULATIONS
-    }
-    assert outcome["axis"] == outcome["attitude"] == "ok"
-    assert outcome["angles"] in ("left_chart", "step_too_small")

@@ -7,6 +7,7 @@ import pytest
 
 import symtop
 from symtop.methods.framework.adaptive import Adaptive
+from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
@@ -100,3 +101,16 @@ def test_a_run_in_pieces_has_the_bits_of_a_run_in_one():
         whole, parts = (one.many(numbers, tolerance, times, counts)[0] for one in (solver, replace(solver, block=9)))
         np.testing.assert_array_equal(whole.states, parts.states)
         np.testing.assert_array_equal(whole.work, parts.work)
+
+
+@pytest.mark.parametrize("name", ["adams", "extrapolation"])
+def test_a_pole_ends_a_run_in_angles_alone(name):
+    pole = symtop.Scene(
+        "pole", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0, theta_dot=-2.0), 5.0, observes="axis"
+    )
+    outcome = {
+        chart: symtop.simulate(pole, f"{name}[{chart}]", tolerance=1e-6, guard=False).attrs["outcome"]
+        for chart in FORMULATIONS
+    }
+    assert outcome["axis"] == outcome["attitude"] == "ok"
+    assert outcome["angles"] in ("left_chart", "step_too_small")

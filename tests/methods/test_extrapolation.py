@@ -75,15 +75,3 @@ def test_samples_take_no_part_in_the_steps():
     np.testing.assert_array_equal(few["axis"][-1], many["axis"][-1])
     error = symtop.errors(many)["axis"].values
     assert error.max() < 3.0 * error[-1]
-
-
-def test_a_pole_ends_a_run_in_angles_alone():
-    pole = symtop.Scene(
-        "pole", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0, theta_dot=-2.0), 5.0, observes="axis"
-    )
-    outcome = {
-        chart: symtop.simulate(pole, f"extrapolation[{chart}]", tolerance=1e-6, guard=False).attrs["outcome"]
-        for chart in FORMULATIONS
-    }
-    assert outcome["axis"] == outcome["attitude"] == "ok"
-    assert outcome["angles"] in ("left_chart", "step_too_small")

@@ -248,8 +248,8 @@ def measured_order(method: Integrator, scene: Scene, *, quick: bool = False, fin
     if not (quick or not method.fixed_step or method.order is None or method.implementation == "python"):
         runs += [(find_scene(FALLBACK), nutations) for nutations in LONGER]
     tried: list[Order] = []
-    for where, nutations in runs:
-        tried.append(_slopes(method, where, nutations, quick, finest))
+    for chosen, nutations in runs:
+        tried.append(_slopes(method, chosen, nutations, quick, finest))
         if math.isfinite(tried[-1].main.slope):
             return tried[-1]
     return tried[0]
