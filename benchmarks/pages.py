@@ -7,7 +7,7 @@ template, since it is measured again and again.
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from symtop.report.tables import table
+from symtop.report.formats import table
 
 ROWS, TABLES = 5, 4  # that the page shows; the rest stands in what the command prints
 

@@ -39,7 +39,9 @@ def take(results: Path, snapshot: Path) -> list[str]:
     (snapshot / "figures").mkdir(parents=True)
     for name in names:
         shutil.copyfile(results / "figures" / name, snapshot / "figures" / name)
-    (snapshot / "report.md").write_text(STORED.sub(lambda found: found[1] or "", text), encoding="utf-8")
+    for file in (results / name for name in ("report.md", "reference.md") if (results / name).is_file()):
+        text = STORED.sub(lambda found: found[1] or "", file.read_text(encoding="utf-8"))
+        (snapshot / file.name).write_text(text, encoding="utf-8")
     return names
 
 

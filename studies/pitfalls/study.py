@@ -64,36 +64,15 @@ def run_of(data: xr.Dataset, on: str, name: str) -> xr.Dataset | None:
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """How wrong each is: largest errors of the axis (rad) and of the energy (1), and when the run at the pole ended."""
-    without, falling = run_of(data, TERM, WITHOUT), run_of(data, FALLING, ANGLES)
-    ended, through = run_of(data, POLE, ANGLES), run_of(data, POLE, AXIS)
-    known: dict[str, Any] = dict.fromkeys(
-        (
-            "steps",
-            "without",
-            "without_energy",
-            "falling",
-            "falling_energy",
-            "falling_steps",
-            "ended",
-            "outcome",
-            "through",
-        )
-    )
-    if without is not None:
+    known: dict[str, Any] = dict.fromkeys(("steps", "without", "without_energy", "falling", "falling_energy", "ended"))
+    if (without := run_of(data, TERM, WITHOUT)) is not None:
         last = without.isel(setting=-1)
         known |= {"steps": float(last["steps"]), "without": float(np.degrees(last["axis"].max())),  # degrees
                   "without_energy": float(last["energy"].max())}  # fmt: skip
-    if falling is not None:
-        known |= {"falling": float(falling["axis"].max()), "falling_energy": float(falling["energy"].max()),
-                  "falling_steps": float(falling["steps"][0])}  # fmt: skip
-    if ended is not None:
-        one = ended.isel(setting=0)
-        known |= {
-            "ended": float(one["time"].where(np.isfinite(one["axis"])).max()),
-            "outcome": str(one["outcome"].values),
-        }
-    if through is not None:
-        known["through"] = float(through["axis"].max())
+    if (falling := run_of(data, FALLING, ANGLES)) is not None:
+        known |= {"falling": float(falling["axis"].max()), "falling_energy": float(falling["energy"].max())}
+    if (ended := run_of(data, POLE, ANGLES)) is not None:
+        known["ended"] = float(ended["time"].where(np.isfinite(ended["axis"])).max())
     return known
 
 

@@ -11,7 +11,7 @@ import click
 from symtop import __version__
 from symtop.cli.common import File, as_text, completing, facts, json_option, plugin_option, table, terminal_width
 from symtop.core.errors import SymtopError
-from symtop.report import tables
+from symtop.report import formats
 
 if TYPE_CHECKING:
     from symtop.methods.framework.registry import Integrator
@@ -34,9 +34,9 @@ def _list(records: list[Record], short: list[Record], note: str, wide: bool, as_
     if as_json:
         click.echo(as_text(records))
     elif wide:
-        click.echo(table(*tables.columns(records)))
+        click.echo(table(*formats.columns(records)))
     else:
-        click.echo(table(*tables.columns(short), terminal_width()))
+        click.echo(table(*formats.columns(short), terminal_width()))
         click.echo(textwrap.fill(note, terminal_width()))
 
 
@@ -64,7 +64,7 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, eng
     methods = [registry.integrator(name)] if name is not None else list(listed.values())
     records: list[Record] = [method.record() for method in methods]
     if markdown and not as_json:
-        click.echo(tables.table(*tables.columns(records)))
+        click.echo(formats.table(*formats.columns(records)))
     elif name is not None and (as_json or not wide):
         described = _described(methods[0])
         click.echo(as_text([described]) if as_json else _integrator_page(described))
