@@ -48,7 +48,7 @@ def short_name(name: str) -> str:
 def titled(name: str) -> str:
     """The same in a table of classes, with the word for what exists for symmetric bodies alone."""
     method = integrator(name)
-    return short_name(name) + ("" if method.general or method.needs == "this-top" else " (symmetric bodies)")
+    return short_name(name) + ("" if method.general or method.needs == "this-top" else " (symmetric bodies only)")
 
 
 def setting_words(name: str, value: float) -> str:
@@ -135,7 +135,7 @@ def guard_facts(data: xr.DataTree) -> dict[str, int]:
 def far_facts(data: xr.DataTree) -> dict[str, Any]:
     """The map: who has the most cells, how many were predicted, and what the checks of those say."""
     names = [f"map_{quantity}{end}" for quantity in far.QUANTITIES for end in ("", "_share")]
-    names += ["map_tops", "map_variants", "predicted", "checks", "checks_held", "checks_longest"]
+    names += ["map_tops", "predicted", "checks", "checks_held", "checks_longest"]
     names += ["checks_low", "checks_middle", "checks_high"]  # error of a run, measured over predicted
     named: dict[str, Any] = dict.fromkeys(names)
     if "far" not in data.children:
@@ -194,7 +194,7 @@ def keeps(name: str) -> str:
     words = {claim: declared(integrator(name), claim) for claim in ("energy", "p_phi", "p_psi")}
     momenta = "momenta" if words["p_phi"] == words["p_psi"] == "kept" else ""
     energy = {"kept": "energy", "bounded": "energy bounded"}.get(words["energy"], "")
-    return ", ".join(filter(None, (momenta, energy))) or "all to its error"
+    return ", ".join(filter(None, (momenta, energy))) or "nothing exactly"
 
 
 def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:

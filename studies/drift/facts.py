@@ -35,7 +35,7 @@ MEANING = {
 CLOSE = 0.1  # a prediction that is further off, relative, counts as missed
 WHOLE = 0.99  # of the longest run of a scene: a shorter run counts as shortened
 NAMES = {  # of the facts of each group
-    HISTORIES: "scenes nutations steps tolerance own variants holding ended shortened shortest energy_lost "
+    HISTORIES: "scenes nutations steps tolerance own variants holding shortened shortest energy_lost "
     "energy_lost_most energy_lost_worst bounded_runs bounded_as_t lost_runs lost_faster",
     WINDOWS: "long_steps long_scene moved scattered long_momenta",
     ROUNDINGS: "members walk_least walk_most gain_least gain_most",
@@ -72,7 +72,6 @@ def of_histories(every: xr.Dataset) -> dict[str, Any]:
         "own": int(own.sum()),  # variants that ran at their own tolerance, the rounding of the arithmetic
         "variants": len(fate),
         "holding": int(fate[list(CONSTANTS)].isin(HELD).all(axis=1).sum()),
-        "ended": int((fate["energy"] == FAILED).sum()),  # early
         "shortened": int((length < WHOLE).sum()),
         "shortest": float(length.min()),  # share of the run length
         "energy_lost": len(lost),

@@ -77,17 +77,16 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
-    """Every run with its largest errors and how it ended."""
-    rows = []
+    """Every run with its largest errors and how it ended, the shortest step of each variant first."""
+    parts = []
     for on in map(str, data["scene"].values):
         for name in map(str, data["variant"].values):
-            one = run_of(data, on, name)
-            for k in range(0 if one is None else one.sizes["setting"]):
-                run = one.isel(setting=k)  # type: ignore[union-attr]
-                rows.append([on, name, float(run["steps"]), float(run["axis"].max()), float(run["energy"].max()),
-                             str(run["outcome"].values)])  # fmt: skip
-    header = ["scene", "variant", "steps a nutation", "axis error (rad)", "energy error / (E0 - min V)", "outcome"]
-    return {"runs": pd.DataFrame(rows, columns=header)}
+            if (one := run_of(data, on, name)) is not None:
+                worst = one[["steps", "outcome"]].assign(one[["axis", "energy"]].max("sample"))
+                parts.append(worst.isel(setting=slice(None, None, -1)).to_pandas().assign(scene=on, variant=name))
+    names = {"steps": "steps a nutation", "axis": "axis error (rad)", "energy": "energy error / (E0 - min V)"}
+    rows = pd.concat([part.reset_index(drop=True) for part in parts]).sort_index(kind="stable").rename(columns=names)
+    return {"runs": rows[["scene", "variant", *names.values(), "outcome"]]}
 
 
 def lines(data: xr.Dataset) -> list[list[tuple[str, str, Any, Any]]]:

@@ -172,7 +172,7 @@ def states_csv(chosen: Iterable[Scene]) -> str:
         for scene in chosen
         for time, state in zip(times_of(scene), precise(scene), strict=True)
     ]
-    return pd.DataFrame(lines, columns=["scene", "time", *COLUMNS]).to_csv(index=False)
+    return str(pd.DataFrame(lines, columns=["scene", "time", *COLUMNS]).to_csv(index=False))
 
 
 def scenes_csv(chosen: Iterable[Scene]) -> str:
@@ -183,7 +183,7 @@ def scenes_csv(chosen: Iterable[Scene]) -> str:
          scene.units or "any consistent", scene.purpose]
         for scene in chosen
     ]  # fmt: skip
-    return pd.DataFrame(lines, columns=header).to_csv(index=False)
+    return str(pd.DataFrame(lines, columns=header).to_csv(index=False))
 
 
 def states(chosen: Sequence[Scene]) -> xr.Dataset:

@@ -488,7 +488,7 @@ def test_facts_and_tables_are_those_of_the_cells(small):
     assert tables["use"].iloc[3]["1e-12 rad"] == facts.NOTHING
     assert said["nutations_long"] is None  # nothing was run over a thousand
     assert "takahashi-imada" not in set(winners.loc[GENERAL]["safe"])  # it exists for symmetric bodies alone
-    assert "takahashi-imada (symmetric bodies)" in tables["use"].iloc[3]["1e-3 rad"]
+    assert "takahashi-imada (symmetric bodies only)" in tables["use"].iloc[3]["1e-3 rad"]
     assert tables["use"].iloc[3]["keeps, at 1e-6 rad"] == "momenta, energy bounded"
     assert ranking.TIE in set(tables["ties"]["level within"])
     assert len(tables["prices"]) == 4
