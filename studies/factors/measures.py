@@ -26,8 +26,8 @@ from .cells import CALLS, COMPILED, NUMPY, SCIPY_NUMBA, SCIPY_PYTHON, Cell, call
 LEAST = 0.7  # of the target: the search ends with an error from here to the target, if nine runs suffice
 PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
 FINER = 1e-3  # of the target: the tolerance that a second search begins with
-NOISY = 0.25  # the distance of the quartiles over the median of a time that is taken once more
-ENOUGH = 0.2  # seconds of a function's samples in one process; those that are longer have two
+NOISY, TRIES = 0.25, 3  # the distance of the quartiles over the median of a time that is taken again; how often
+ENOUGH = 0.08  # seconds of a function's samples in one process; those that are longer have two
 START = (
     "from symtop.runner import scripts; scripts.install(); from symtop_studies.factors import measures; measures.{}()"
 )
@@ -114,10 +114,12 @@ def spread(samples: Array) -> Array:
 
 
 def settled_times(asked: Runs, processes: int) -> Array:
-    """As `timed`, with those that are noisy taken once more."""
+    """As `timed`, with those that are noisy taken again."""
     taken = timed(asked, processes)
-    loud = np.flatnonzero(spread(taken) > NOISY)
-    if loud.size:
+    for _ in range(TRIES - 1):
+        loud = np.flatnonzero(spread(taken) > NOISY)
+        if not loud.size:
+            break
         again = timed(asked._replace(runs=[asked.runs[i] for i in loud]), processes)
         closer = spread(again) < spread(taken[loud])
         taken[loud[closer]] = again[closer]
