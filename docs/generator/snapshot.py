@@ -16,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SHOWN = re.compile(r"\]\(figures/([^)]+)\)")
 STORED = re.compile(  # links to what is not tracked
-    r" \(\[CSV\]\(tables/[^)]+\)\)|; \[CSV\]\(tables/[^)]+\)"
+    r" \(\[[^]]+\]\(tables/[^)]+\)\)|; \[CSV\]\(tables/[^)]+\)"
     r"|\[([^]]+)\]\((?:tables/[^)]+|[\w-]+\.nc)\)|<!-- \w+ [\w-]+ -->\n\n"
 )
 QUOTED = {
