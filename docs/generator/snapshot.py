@@ -56,7 +56,7 @@ def answer(report: str, question: str) -> str:
 
 def beginning(report: str) -> str:
     """The front page from its first figure to what will go wrong, figures where the README finds them."""
-    text = report.partition("\n\n")[2].partition("\n\n")[2].partition("## What will go wrong")[0].strip()
+    text = re.split(r"(?:## |\*\*)What will go wrong", report.partition("\n\n")[2].partition("\n\n")[2])[0].strip()
     return text.replace("](figures/", "](docs/snapshot/figures/") + "\n"
 
 

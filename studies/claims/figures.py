@@ -62,7 +62,7 @@ def draw_ledger(entries: pd.DataFrame, told: pd.Series) -> Picture:
                 left += width
             axis.add_patch(Rectangle((column - 0.5, line - 0.5), 1.0, 1.0, fill=False, edgecolor="white", lw=1.5))
             axis.text(
-                column, line, ", ".join(f"{count[word]} {SYMBOLS[word]}" for word in there), ha="center", va="center",
+                column, line, " ".join(f"{count[word]}{SYMBOLS[word]}" for word in there), ha="center", va="center",
                 fontsize=style.LEAST_TEXT, fontweight="bold" if "refuted" in there else "normal",
             )  # fmt: skip
     right = len(names) + 0.25
@@ -74,9 +74,9 @@ def draw_ledger(entries: pd.DataFrame, told: pd.Series) -> Picture:
         )
     axis.set(xlim=(-0.5, (right if len(told) else len(names) - 1) + 0.5), ylim=(len(CLAIMS) - 0.5, -0.5))
     axis.set_yticks(range(len(CLAIMS)), [ROWS.get(claim, claim_name(claim)) for claim in CLAIMS])
-    heads = [f"{TITLES.get(name, name)}\n{sizes[name]} method{'' if sizes[name] == 1 else 's'}" for name in names]
+    heads = [f"{TITLES.get(name, name)}\n({sizes[name]})".replace("-", "\n") for name in names]
     places = [*range(len(names)), right] if len(told) else range(len(names))
-    heads = [head.replace("-", "\n") for head in heads] + ["false claims,\nplanted:\ncaught"][: len(told)]
+    heads += ["false claims,\nplanted:\ncaught"][: len(told)]
     axis.set_xticks(places, heads)
     axis.tick_params(length=0, bottom=False, labelbottom=False, labeltop=True)
     axis.grid(visible=False)

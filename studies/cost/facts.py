@@ -8,7 +8,7 @@ import pandas as pd
 import xarray as xr
 
 from symtop.judging.claims.subject import declared
-from symtop.methods.framework.registry import NEEDS, integrator
+from symtop.methods.framework.registry import integrator
 from symtop.report.formats import duration, number
 
 from . import cells, far
@@ -24,7 +24,10 @@ LEFT_OUT = {  # methods, by the reason, which the page states
     "a step of any size is the motion itself": ("exact-discrete",),
 }  # fmt: skip
 NOTHING = "none within the budget"
-TIES = (1.0, 1.1, 1.25, 1.5)
+HAVE = {  # what each class needs, in a table
+    "derivative": "f(t, y)", "expression": "f as a formula", "lagrangian": "a Lagrangian",
+    "kicks": "torque, free motion", "group": "torque, inertia", "this-top": "this top's equations",
+}  # fmt: skip
 STEPS = (4.37, 17.48, 69.92)  # a nutation, of the table of silent failures
 QUOTED, FINE = "rk4[axis]", 69.92  # whose wrong runs the page quotes, at so many steps a nutation
 KNOWN = (
@@ -48,7 +51,7 @@ def short_name(name: str) -> str:
 def titled(name: str) -> str:
     """The same in a table of classes, with the word for what exists for symmetric bodies alone."""
     method = integrator(name)
-    return short_name(name) + ("" if method.general or method.needs == "this-top" else " (symmetric bodies only)")
+    return short_name(name) + ("" if method.general or method.needs == "this-top" else " (symmetric)")
 
 
 def setting_words(name: str, value: float) -> str:
@@ -159,15 +162,14 @@ def far_facts(data: xr.DataTree) -> dict[str, Any]:
 
 
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
-    """What to use; winners in both protocols; by kind of top; other quantities; by tie; prices; silent runs; guard."""
+    """What to use; winners in both protocols; by kind of top; other quantities; prices; silent runs; guard."""
     kinds = [Cell("short", "axis", target, kind) for kind in KINDS[:-1] for target in cells.targets(data)]
     others = [cell for quantity in ("attitude", "energy") for cell in cells.cells(data, quantity)]
     return {
         "use": use(data), "winners": winners(data, cells.winners(data)),
         "kinds": winners(data, [cells.winner(data, cell) for cell in kinds]),
         "quantities": winners(data, [cells.winner(data, cell) for cell in others]),
-        "ties": ties(data), "prices": price_list(data),
-        "silent": silent(data), "guard": cells.guard_counts(data), "checks": checked(data),
+        "prices": price_list(data), "silent": silent(data), "guard": cells.guard_counts(data), "checks": checked(data),
     }  # fmt: skip
 
 
@@ -175,7 +177,7 @@ def use(data: xr.DataTree) -> pd.DataFrame:
     """The safe choice of each class at each error, over the shorter runs, and what that at `AT` keeps."""
     rows = []
     for needs in CLASSES[:-1]:
-        line = {"you can supply": NEEDS[needs] if needs != "this-top" else "this very top's equations, no other body's"}
+        line = {"you can supply": HAVE[needs]}
         kept = ""
         for target in cells.targets(data):
             one = cells.winner(data, Cell("short", "axis", target, NATURAL, needs))
@@ -222,20 +224,6 @@ def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:
 def lead(called: bool, best: Any, marked: list[str]) -> str:
     """Is the lead beyond the intervals?"""
     return "" if best is None else "called" if called else "price too noisy" if best.name in marked else "none"
-
-
-def ties(data: xr.DataTree) -> pd.DataFrame:
-    """The winner in hindsight if costs within another ratio are level."""
-    rows = []
-    for target in cells.targets(data):
-        taken = cells.costs(data, Cell("short", "axis", target, NATURAL))
-        solved = taken.values[:, np.isfinite(taken.values).any(axis=0)] if taken.values.size else taken.values
-        for tie in TIES:
-            level = solved < tie * (1.0 + 1e-12) * solved.min(axis=0, initial=np.inf)
-            won = (level & (level.sum(axis=0) == 1)).mean(axis=1) if solved.size else np.zeros(1)
-            first = short_name(taken.names[int(won.argmax())]) if won.any() else "none"
-            rows.append([target, tie, first, float(won.max())])
-    return pd.DataFrame(rows, columns=["axis error (rad)", "level within", "first", "share"])
 
 
 def price_list(data: xr.DataTree) -> pd.DataFrame:

@@ -108,7 +108,8 @@ def lines(data: xr.Dataset) -> list[list[tuple[str, str, Any, Any]]]:
 
 def pictures(data: xr.Dataset) -> list[Picture]:
     """Three small panels beside each other."""
-    figure, axes = panels(1, 3, height=1.9)
+    figure, axes = panels(1, 3)
+    figure.set_figheight(2.2)  # inches; the front page shows it among others
     titles = ("no gyroscopic term", "energy kept, motion wrong", "a pole in Euler's angles")
     drawn = lines(data)
     for place, (axis, title, each) in enumerate(zip(axes[0], titles, drawn, strict=True)):

@@ -15,7 +15,7 @@ from typing import Any
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
-LONG = 42  # letters of a cell whose line may break
+LONG = 27  # characters of a cell that may be broken into lines
 AT_ONCE = 2  # figures
 MATHML = "http://www.w3.org/1998/Math/MathML"
 PIECES = re.compile(r"^<!-- (?P<kind>chart|table) (?P<name>\S+) -->$|^\$\$(?P<formula>.+?)\$\$$", re.MULTILINE)
