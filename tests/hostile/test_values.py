@@ -78,7 +78,8 @@ MORE = {
         symtop.ensemble,
         {"members": SMALL, "integrator": "strang", "step_size": 0.05, "horizon": 0.2, "samples": 3, "quiet": True},
         {
-            "members": NOT_DATA[:4], "integrator": UNKNOWN, "step_size": NO_NUMBER, "horizon": NO_NUMBER[1:],
+            "members": [*NOT_DATA[:4], xr.Dataset({"I1": 1.0}), [symtop.scene("spheroid"), 3], SMALL.to_dataframe()],
+            "integrator": UNKNOWN, "step_size": NO_NUMBER, "horizon": NO_NUMBER[1:],
             "samples": [*NOT_WHOLE, 1], "observe": [value for value in UNKNOWN if value is not None],
             "threads": [value for value in NOT_WHOLE if value is not None],
         },

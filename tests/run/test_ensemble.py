@@ -182,14 +182,12 @@ def test_bad_members_are_refused_by_number_and_reason(spoilt, reason):
     [({"step_size": None}, "needs step_size or per_nutation"), ({"per_nutation": 9}, "not both"),
      ({"nutations": 2}, "not both"), ({"horizon": None}, "no horizon of their own"),
      ({"tolerance": 1e-6}, "fixed step"),
-     ({"step_size": [0.1, 0.2]}, "one for each of 36 members"), ({"step_size": -1.0}, "above zero"),
+     ({"step_size": [0.1, 0.2]}, "one for each of 36 members"),
      ({"step_size": [0.1] * 35 + [np.nan]}, "step_size of member 35 must be a finite number"),
      ({"step_size": 3.0}, "at most the horizon"), ({"step_size": 1e-12}, "member 0 asks for"),
-     ({"samples": 1}, "samples"),
      ({"samples": 10_000_000}, "give a path to stream them"),
      ({"variables": ["psi"]}, "variables in the axis chart are theta, .* not 'psi'"),
-     ({"variables": "axis"}, "a list of names"), ({"threads": 0}, "threads"), ({"observe": "phi"}, "observe"),
-     ({"budget": 5}, "limit is 5")],
+     ({"variables": "axis"}, "a list of names"), ({"budget": 5}, "limit is 5")],
 )  # fmt: skip
 def test_settings_that_make_no_sense_are_refused(changed, reason):
     asked = {"step_size": 0.1, "horizon": 2.0, **changed}
@@ -207,12 +205,6 @@ def test_settings_that_make_no_sense_are_refused(changed, reason):
 def test_settings_of_other_methods_are_refused(name, changed, reason):
     with pytest.raises(symtop.SymtopError, match=reason):
         symtop.ensemble(SOME, name, quiet=True, **{"horizon": 2.0, **changed})
-
-
-@pytest.mark.parametrize("members", [[], "spheroid", 3, xr.Dataset({"I1": 1.0}), [symtop.scene("spheroid"), 3]])
-def test_members_that_are_none_are_refused(members):
-    with pytest.raises(symtop.SymtopError):
-        symtop.ensemble(members, "strang", step_size=0.1, horizon=1.0)
 
 
 def test_a_member_without_a_nutation_has_no_steps_per_nutation():
@@ -447,12 +439,6 @@ def test_a_member_of_enormous_inertia_is_refused_without_a_warning():
     members.I1[2] = members.I3[2] = 1e308
     with pytest.raises(symtop.SymtopError, match="member 2: I1 must be between"):
         symtop.ensemble(members, "strang[axis]", per_nutation=20, nutations=2, quiet=True)
-
-
-@pytest.mark.parametrize("change", [dict, xr.Dataset.to_dataframe, xr.Dataset.to_dataarray])
-def test_members_in_another_dress_are_told_what_they_may_be(change):
-    with pytest.raises(symtop.SymtopError, match=r"members must be an xarray.Dataset or a list of scenes, not a"):
-        symtop.ensemble(change(SOME.drop_vars("stratum")), "strang[axis]", step_size=0.1, horizon=1.0)
 
 
 def test_a_path_may_begin_at_home(tmp_path, monkeypatch):

@@ -252,9 +252,7 @@ def test_a_failed_run_shows_the_windows_it_had():
     ("integrator", "settings", "said"),
     [
         ("rk45", {"steps": 10, "step_size": 0.1}, "rk45 has no compiled loop of fixed steps"),
-        ("midpoint", {"steps": 0, "step_size": 0.1}, "steps must be a whole number of at least 1"),
         ("midpoint", {"steps": 10**12, "step_size": 0.1}, "steps must be at most"),
-        ("midpoint", {"steps": 10, "step_size": -0.1}, "step_size must be above zero"),
     ],
 )
 def test_bad_input_gets_one_sentence(integrator, settings, said):

@@ -19,14 +19,7 @@ from symtop.model.exact import closed_form
 from symtop.model.exact.constants import RATE
 from symtop.model.exact.digits import PreciseForm
 from symtop.run.reference.independent_checks import check_times, integrate, integrate_with_checks, precise_attitude
-from symtop.run.reference.truth import (
-    UNCERTIFIED,
-    Certificate,
-    _cache_path,
-    closed_bounds,
-    closed_values,
-    reference as reference_function,
-)
+from symtop.run.reference.truth import UNCERTIFIED, Certificate, _cache_path, closed_bounds, closed_values
 
 
 @pytest.fixture
@@ -352,20 +345,8 @@ def test_checks_reach_the_horizon_and_the_fastest_moments():
     assert np.abs(symtop.ClosedForm(where.top, where.start)(checks).theta_dot).max() > 0.98 * speed
 
 
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (("spheroid", []), "times must be a row of finite numbers"),
-        (("spheroid", [-1.0]), "of at least 0"),
-        (("spheroid", [1.0, math.inf]), "finite"),
-        (("spheroid", [[1.0]]), "times must be a row"),
-        (("spheroid", [1.0], "octuple"), "precision 'octuple' is unknown"),
-        (("spheroid", [1.0], "closed-form", "twice"), "certify 'twice' is unknown"),
-        (("spheroid", [1.0], "quad", "digits"), "certify is for the closed form"),
-        (("nowhere", [1.0]), "scene 'nowhere' is unknown"),
-    ],
-)
-def test_bad_requests_are_refused_in_one_sentence(arguments, says):
-    certify = dict(zip(["certify"], arguments[3:], strict=False))
-    with pytest.raises(symtop.SymtopError, match=says):
-        reference_function(*arguments[:3], **certify)
+def test_a_certificate_is_of_a_kind_that_is_known_and_of_the_closed_form():
+    with pytest.raises(symtop.SymtopError, match="certify 'twice' is unknown"):
+        symtop.reference("spheroid", [1.0], certify="twice")
+    with pytest.raises(symtop.SymtopError, match="certify is for the closed form"):
+        symtop.reference("spheroid", [1.0], "quad", certify="digits")

@@ -18,7 +18,7 @@ from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool
 from symtop.runner.run import analyse_stored, drawing_digest
 from symtop.runner.study import Case
-from tests.commands import contents, leftovers
+from tests.commands import leftovers, same
 
 SCRIPT = """
 import os, signal
@@ -77,10 +77,7 @@ def test_each_of_several_is_concluded_by_another_process_to_the_same_files(scrip
     for file in files:
         assert studied(tmp_path / "alone", file)[0] == 0  # the control: one by itself has nothing to run beside
     assert {said_by(tmp_path / "alone", name) for name in ("first", "second")} == {os.getpid()}
-    one, other = contents(tmp_path / "together"), contents(tmp_path / "alone")
-    assert one.keys() == other.keys()
-    assert len(one) == 6
-    assert all(one[name].identical(other[name]) for name in one)
+    assert same(tmp_path / "together", tmp_path / "alone") == 6
     assert "0 of 2 cases computed" in studied(tmp_path / "together", *files)[1]
     assert not leftovers(tmp_path / "together")
 

@@ -21,7 +21,7 @@ from symtop.core import files, jit, netcdf
 from symtop.core.errors import SymtopError
 from symtop.core.signals import at_most
 from symtop.runner import pool as work, run as runner, store
-from tests.commands import PROBE, contents, ended, leftovers, stop, symtop
+from tests.commands import PROBE, contents, ended, leftovers, same, stop, symtop
 from tests.kills import survive
 
 
@@ -245,9 +245,7 @@ def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
     assert len(begun) == len(set(begun)) == 12
     code, _, err = ended(symtop("study", PROBE, "--results", tmp_path / "alone"))
     assert code == 0, err
-    shared, alone = contents(tmp_path / "shared"), contents(tmp_path / "alone")
-    assert shared.keys() == alone.keys()
-    assert all(shared[name].identical(alone[name]) for name in alone)
+    same(tmp_path / "shared", tmp_path / "alone")
     assert not leftovers(tmp_path / "shared")
 
 
@@ -433,8 +431,7 @@ def test_a_clock_that_jumps(tmp_path, monkeypatch):
     monkeypatch.setattr(time, "time", lambda: draw.uniform(-1e9, 4e9))
     assert probe(tmp_path / "r")[0] == 0
     monkeypatch.undo()
-    calm, other = contents(tmp_path / "calm"), contents(tmp_path / "r")
-    assert all(calm[name].identical(other[name]) for name in calm)
+    same(tmp_path / "calm", tmp_path / "r")
 
 
 def test_paths_that_are_not_ascii(tmp_path):
