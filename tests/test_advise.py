@@ -306,16 +306,3 @@ def test_limits_leave_out_what_a_user_cannot_use():
     slow = symtop.recommend(scene, accuracy=1e-3, step_size=0.002, time_a_step=1e-12)
     assert slow.integrator is None
     assert any(words.startswith("A step takes over 1e-12 s") for words in slow.fails)
-
-
-@pytest.mark.parametrize(
-    ("limit", "sentence"),
-    [
-        ({"step_size": 0.0}, "step_size must be above zero"), ({"max_step": -1.0}, "max_step must be above zero"),
-        ({"time_a_step": math.nan}, "time_a_step must be"), ({"general": "yes"}, "general must be"),
-        ({"keeps": "time"}, "keeps 'time' is unknown"),
-    ],
-)  # fmt: skip
-def test_a_limit_that_makes_no_sense_is_refused(limit, sentence):
-    with pytest.raises(symtop.SymtopError, match=sentence):
-        symtop.recommend("spheroid", accuracy=1e-3, **limit)

@@ -1,9 +1,6 @@
 """Splitting methods: coefficients, orders, symplecticity, reversibility, constants, and what each is good at."""
 
 import math
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -384,22 +381,6 @@ def test_a_new_composition_compiles_nothing():
     fifths, halves = composition("fifths", (0.25,) * 4, (0.2,) * 5, chart="space"), METHODS["strang"]
     assert fifths.solvers["axis"]._whole.alone[0] is march
     assert halves.solvers["axis"]._whole.alone[0] is not march
-
-
-@pytest.mark.slow
-def test_the_first_use_in_a_new_process_is_quick():
-    code = (
-        "import time, symtop\n"
-        "symtop.simulate('spheroid', 'strang', step_size=0.01, observe='attitude')\n"
-        "start = time.perf_counter()\n"
-        "symtop.simulate('spheroid', 'kahan-li-8', step_size=0.01, observe='attitude')\n"
-        "print(time.perf_counter() - start)\n"
-    )
-    seconds = []
-    for _ in range(4):  # the first one may compile; the best of the others is what a user waits
-        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ)
-        seconds.append(float(done.stdout))
-    assert min(seconds[1:]) < 0.05
 
 
 @pytest.mark.parametrize(

@@ -145,12 +145,6 @@ def test_results_that_are_a_file_or_cannot_be_made(tmp_path):
     refused("/proc/nowhere", "/proc/nowhere")
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_that_is_read_only(tmp_path):
-    tmp_path.chmod(0o500)
-    refused(tmp_path, "Permission denied")
-
-
 def test_a_folder_refused_by_the_system(tmp_path, monkeypatch):
     def refuse(*arguments, **options):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
