@@ -23,7 +23,7 @@ from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning
 from symtop.explore import answers
-from symtop.explore.server import STATIC, address, serve
+from symtop.explore.server import STATIC, address
 from symtop.methods.framework.registry import engines
 from symtop.model import charts
 from symtop.model.scenes import closed_form
@@ -152,15 +152,6 @@ def test_a_hundred_thousand_steps_take_less_than_a_tenth_of_a_second():
         if spent[-1] < 0.1:
             return
     pytest.fail(f"the fastest of twelve answers took {min(spent):.3f} s")
-
-
-@pytest.fixture(scope="module")
-def site():
-    server = serve()
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield server
-    server.shutdown()
-    server.server_close()
 
 
 def request(site, method, path, body=None, **headers):

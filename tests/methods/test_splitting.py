@@ -347,9 +347,7 @@ def test_generalised_orders_remove_the_first_power_of_gravity(name):
 
 
 def test_the_pole_benchmark_of_bruls_cardona_arnold():
-    top = symtop.SymmetricTop(15.234375, 0.46875, 147.15)
-    start = symtop.Angles(math.pi / 2, math.pi, math.pi / 2, 0.0, -4.61538, 150.0)
-    scene = symtop.Scene("bca", top, start, 2.0)
+    scene = symtop.scene("bruls-cardona-arnold")
     table = error_table(scene, METHODS["strang"], [2.0 / n for n in (2000, 4000, 8000, 16000, 32000)], 2.0, "axis")
     assert table["axis"][0] < 1e-5
     assert power_law(table["step_size"].values, table["axis"].values).slope == pytest.approx(2.0, abs=0.02)

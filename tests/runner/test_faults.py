@@ -119,16 +119,6 @@ def test_a_full_disk_under_the_cache_of_kernels_costs_time_and_no_run(kernel, tm
     assert list(tmp_path.rglob("*.nbc"))
 
 
-@pytest.mark.parametrize("kind", ["*.nbc", "*.nbi"])
-def test_a_damaged_cache_of_kernels_costs_time_and_no_run(kernel, tmp_path, kind):
-    assert kernel()(2.0) == 4.0
-    (victim,) = tmp_path.rglob(kind)
-    victim.write_bytes(victim.read_bytes()[:40])
-    again = kernel()
-    assert again(2.0) == 4.0
-    assert not again.stats.cache_hits
-
-
 @pytest.mark.parametrize("place", ["quick", "quick/cases", "quick/cases/probe", "quick/figures"])
 def test_a_file_where_a_folder_should_be(tmp_path, place):
     (tmp_path / place).parent.mkdir(parents=True, exist_ok=True)
