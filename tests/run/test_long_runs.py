@@ -271,6 +271,7 @@ def test_compensated_sums_drift_less_than_plain_ones(name):
     assert max(float(found["p_phi"]), float(found["p_psi"])) < 2e-14
 
 
+@pytest.mark.slow
 def test_a_small_correction_is_not_rounded_to_one_side():
     """This start lost 1.5e-14 of its energy in 5e7 steps while midpoint rounded its last correction by itself."""
     start = members(WHERE, 15)[14]

@@ -282,7 +282,7 @@ except KeyboardInterrupt:
     ("name", "setting", "long", "threads"),
     [pytest.param("strang[axis]", "per_nutation=200", 20_000, 1, marks=pytest.mark.slow),
      ("strang[axis]", "per_nutation=200", 20_000, 2),
-     ("gauss-12[attitude]", "per_nutation=50", 2000, 2),
+     pytest.param("gauss-12[attitude]", "per_nutation=50", 2000, 2, marks=pytest.mark.slow),
      pytest.param("rk45-compiled[axis]", "tolerance=1e-9", 10_000, 2, marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_an_interrupt_is_heard_within_a_second(name, setting, long, threads):

@@ -63,6 +63,7 @@ def test_timed_cases_that_alone_are_missing_run_in_new_workers(study, tmp_path, 
     assert set(np.ravel(again["later"])) == {2.0}
 
 
+@pytest.mark.slow
 def test_methods_are_timed_again_when_nothing_else_is_missing(tmp_path, monkeypatch):
     """The study that times methods, with two of them, in workers."""
     whole, names = runner.load("cost"), ["midpoint[angles]", "strang[axis]"]
