@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import xarray as xr
+from tqdm import tqdm
 
 from symtop.core import netcdf
 from symtop.measure.datasets import differences
@@ -46,6 +47,7 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
     command = ["study", *words, "--jobs", 2, "--results"]
     _through(command, calm)
     count = lost = most = rounds = 0
+    bar = tqdm(total=kills, desc="kills", disable=None)  # on a terminal
     done: dict[Path, tuple[int, int]] = {}  # finished cases: the identity of their file and when it was written
     while count < kills:
         before, start = _begun(results), time.time()
@@ -59,6 +61,7 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
             alone = draw.random() < 0.5
             (os.kill if alone else os.killpg)(process.pid, signal.SIGKILL)
             count += 1
+            bar.update()
         _, said = process.communicate()
         assert process.returncode in (0, -signal.SIGKILL), said
         time.sleep(1.5)  # workers whose parent was killed have ended by then
@@ -73,6 +76,7 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
             rounds += 1
             shutil.rmtree(results)
             done = {}
+    bar.close()
     _through(command, results)
     assert_same(results, calm)
     assert not leftovers(results)
