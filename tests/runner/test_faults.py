@@ -17,7 +17,7 @@ import xarray as xr
 from click.testing import CliRunner
 
 from symtop.cli.main import main
-from symtop.core import files, jit, netcdf
+from symtop.core import files, netcdf
 from symtop.core.errors import SymtopError
 from symtop.core.signals import at_most
 from symtop.runner import pool as work, run as runner, store
@@ -91,32 +91,6 @@ def test_a_real_limit_on_the_size_of_files(tmp_path):
     assert "Traceback" not in done.stderr
     assert not list((tmp_path / "small").rglob("*.npz"))
     assert not leftovers(tmp_path / "small")
-
-
-TWICE = "def twice(x):\n    return 2.0 * x\n"
-
-
-@pytest.fixture
-def kernel(tmp_path, monkeypatch):
-    """Compiles a small function, as a new process would, with a cache of its own."""
-    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "cache"))
-    (tmp_path / "twice.py").write_text(TWICE)
-    space = {"__name__": "twice", "__file__": str(tmp_path / "twice.py")}
-    exec(compile(TWICE, str(tmp_path / "twice.py"), "exec"), space)
-    return lambda: jit.compile_kernel(space["twice"])
-
-
-def test_a_full_disk_under_the_cache_of_kernels_costs_time_and_no_run(kernel, tmp_path, monkeypatch):
-    def full(*arguments):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(jit._Index, "_save_data", full)
-    assert kernel()(2.0) == 4.0
-    assert not list(tmp_path.rglob("*.nbc"))
-    monkeypatch.undo()
-    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "cache"))
-    assert kernel()(2.0) == 4.0
-    assert list(tmp_path.rglob("*.nbc"))
 
 
 @pytest.mark.parametrize("place", ["quick", "quick/cases", "quick/cases/probe", "quick/figures"])
