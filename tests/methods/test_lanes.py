@@ -88,13 +88,13 @@ def times_faster(solver, numbers, h, marks):
 @pytest.mark.parametrize(("name", "ends"), [(name, ends) for ends, names in ENDS.items() for name in names])
 def test_members_have_the_bits_of_runs_alone(name, ends):
     """Those that fail, too; what is not left to a run alone has ended well."""
-    solver, given = SOLVERS[name], members(400, seed=7)
+    solver, given = SOLVERS[name], members(seed=7)
     done = solver.many(*given)
     assert_runs_alone(solver, *given, done)
     assert {OUTCOMES[k] for k in done.outcome} == {"ok", *ends}
     left = left_alone(solver, *given)
     assert set(np.flatnonzero(done.outcome != 0)) <= set(left.tolist())
-    assert len(left) < 100
+    assert len(left) < 200
 
 
 @pytest.mark.parametrize("name", ALONE)

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from conftest import random_scenes
 
 import symtop
 from symtop.model import charts, top
+from tests.conftest import random_scenes
 
 POLES = [((1.0, 0.0, 0.0, 0.0), 0.0), ((0.0, 1.0, 0.0, 0.0), math.pi), ((0.6, 0.0, 0.0, 0.8), 0.0)]
 
