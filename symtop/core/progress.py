@@ -70,6 +70,7 @@ def telling(words: str) -> Iterator[None]:
             yield
         finally:
             _listeners.remove(lines)
+            lines.kill()  # it has nothing to finish; its start alone takes longer than most commands that are refused
 
 
 _listeners: "list[subprocess.Popen[str]]" = []  # of the command that runs
