@@ -308,7 +308,9 @@ class Code:
             if part is function.__code__ and constants[:1] == [function.__doc__]:
                 del constants[0]
             self._note(part.co_code.hex(), part.co_exceptiontable.hex(), *map(_constant, constants))
-            counts = part.co_argcount, part.co_kwonlyargcount, _flags(part)
+            # every function has `CO_OPTIMIZED`, but numba clears it where a profiler watches
+            flags = part.co_flags | (inspect.CO_OPTIMIZED if part.co_flags & inspect.CO_NEWLOCALS else 0)
+            counts = part.co_argcount, part.co_kwonlyargcount, flags
             self._note(repr((part.co_names, part.co_freevars, *counts)))
         self._add_all(held(function))
         self._add_all(self._also(function))
@@ -337,11 +339,6 @@ def codes(code: CodeType) -> Iterator[CodeType]:
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from codes(constant)
-
-
-def _flags(code: CodeType) -> int:
-    """The flags of a code object; every function has `CO_OPTIMIZED`, but numba clears it where a profiler watches."""
-    return code.co_flags | (inspect.CO_OPTIMIZED if code.co_flags & inspect.CO_NEWLOCALS else 0)
 
 
 def _constant(value: Any) -> str:

@@ -50,7 +50,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable, set_item
-from symtop.core.multiprecision import context
+from symtop.core.numbers import context
 from symtop.methods.framework import space
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
