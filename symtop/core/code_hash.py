@@ -362,15 +362,15 @@ def named(function: FunctionType) -> Iterator[tuple[str, object]]:
     inside = list(codes(function.__code__))
     names = sorted({name for code in inside for name in code.co_names})
     package = function.__globals__.get("__package__") or ""
-    found = [(name, function.__globals__[name]) for name in names if name in function.__globals__]
-    found += [pair for code in inside for pair in _imports(code, package)]
+    reached = [(name, function.__globals__[name]) for name in names if name in function.__globals__]
+    reached += [pair for code in inside for pair in _imports(code, package)]
     expanded = set[str]()
-    while found:
-        name, value = found.pop()
+    while reached:
+        name, value = reached.pop()
         yield name, value
         if isinstance(value, ModuleType) and value.__name__ not in expanded and not _of_library(value.__name__):
             expanded.add(value.__name__)
-            found += [(f"{name}.{part}", getattr(value, part)) for part in names if hasattr(value, part)]
+            reached += [(f"{name}.{part}", getattr(value, part)) for part in names if hasattr(value, part)]
 
 
 def _imports(code: CodeType, package: str) -> Iterator[tuple[str, object]]:

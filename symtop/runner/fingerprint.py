@@ -38,8 +38,8 @@ def used(study: Study, case: Case) -> list[str]:
 
 def settings_key(study: Study, case: Case) -> str:
     """Hash of what a case was asked to do, which an edit of the code does not change."""
-    asked = [study.name, case.scene, case.integrator, case.group, dict(case.settings)]
-    return code_hash.hashed(json.dumps(asked, sort_keys=True))
+    question = [study.name, case.scene, case.integrator, case.group, dict(case.settings)]
+    return code_hash.hashed(json.dumps(question, sort_keys=True))
 
 
 def reasons(study: Study, case: Case) -> Reasons:

@@ -181,8 +181,8 @@ def kernel_loop(  # noqa: C901  (one loop, read in one piece)
             rule = scale(kind(coefficients), top, at, h)
             state = enter(par, rule, state, h)
             if marks[0] == 0:
-                begun = conserved(top, at)
-                momenta[0, 0], momenta[1, 0] = begun.p_phi, begun.p_psi
+                constants = conserved(top, at)
+                momenta[0, 0], momenta[1, 0] = constants.p_phi, constants.p_psi
             carry, stop = begin(par, rule, state, h), marks[-1]
             _, _, _, k, j, work, outcome = march(
                 par, rule, state, zero(state), carry, h, 0, 0, stop, marks, states, momenta
