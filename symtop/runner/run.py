@@ -134,9 +134,8 @@ def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> 
         for file in (dataset, words):
             netcdf.sweep(file)
         combined = cases.combined()
-        units = (
-            "SI" if {getattr(catalogue.get(case.scene), "units", "") for case in cases.cases.values()} == {"SI"} else ""
-        )
+        systems = {getattr(catalogue.get(case.scene), "units", "") for case in cases.cases.values()}
+        units = "SI" if systems == {"SI"} else ""
         combined = columns.described(combined, units, netcdf.read_columns(file_beside(study.name, "columns.tsv")))
         combined = netcdf.describe(combined, study.title, units=units, question=study.question)
         netcdf.write(combined, dataset)
