@@ -42,7 +42,8 @@ def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -
     dithered[1:last] += np.mod(GOLDEN * uniform[1:last], 1.0) - 0.5
     given = period, horizon, np.zeros(0, np.int64) if steps is None else steps
     rows = [np.require(values, requirements=("C", "W")) for values in (*given, np.stack([uniform, dithered]) / last)]
-    (_layer.compiled if _layer.ready(SECONDS * n * samples) else _lay_out)(*rows, *laid_out)
+    fill: Any = _layer.compiled if _layer.ready(SECONDS * n * samples) else _lay_out
+    fill(*rows, *laid_out)
     return laid_out
 
 

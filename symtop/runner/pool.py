@@ -164,7 +164,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
     def submit(self, function: Callable[..., Any], *args: Any, limit: float | None = None) -> "Future[Any]":
         """Call a function in a worker; after `limit` seconds the worker is ended, and the result is TimeoutError."""
         assert self._workers is not None  # noqa: S101
-        return self._workers.schedule(function, args=args, timeout=limit)  # type: ignore[no-any-return]
+        return self._workers.schedule(function, args=args, timeout=limit)
 
     def analyse(self, function: Callable[..., Any], *args: Any) -> "Future[Any]":
         """Call a function in a worker beside the cases of the next study; timed ones wait until it is done."""

@@ -14,7 +14,7 @@ from symtop.measure.errors import ERRORS, QUANTITIES
 from symtop.runner.scripts import file_beside, names
 from tests.core.test_conventions import lacking
 
-UNITS = {"1", "rad", "rad s-1", "s", "s-1", "s-2", "kg m2 s-2", "kg m2 s-1"}
+UNITS = {"1", "rad", "rad s-1", "s", "kg m2", "s-1", "s-2", "kg m2 s-2", "kg m2 s-1"}
 ROOT = Path(__file__).resolve().parents[2]
 PEERS = netcdf.read_columns(ROOT / "benchmarks" / "peers" / "columns.tsv")
 OWN = {name: netcdf.read_columns(file_beside(name, "columns.tsv")) for name in names()}

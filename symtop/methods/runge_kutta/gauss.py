@@ -44,7 +44,6 @@ Differential Equations II, IV.3 (A-stability), IV.8; Allgower, Georg, Introducti
 """
 
 import functools
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -223,15 +222,17 @@ def packed(rule: GaussRule) -> tuple[Callable[[Any], GaussRule], Array]:
 
 def _antiderivative(roots: list[Any], x: Any) -> Any:
     """int_0^x prod (t - root) dt, in the arithmetic of its arguments."""
-    return np.polyval(np.polyint(np.atleast_1d(np.poly(np.array(roots, dtype=object)))), x)
+    polynomial = np.atleast_1d(np.poly(np.array(roots, dtype=object)) * x**0)  # no integer is divided by another
+    return np.polyval(np.polyint(polynomial), x)
 
 
 @functools.lru_cache(maxsize=len(STAGES))
 def gauss_rule(stages: int) -> GaussRule:
     """Coefficients of the method with that many stages, from `DIGITS` digits."""
     mp = context(DIGITS)
-    signed = [(-1) ** (stages + k) * math.comb(stages, k) * math.comb(stages + k, k) for k in range(stages, -1, -1)]
-    c = mp.polyroots(signed, extraprec=DIGITS)  # of the shifted Legendre polynomial, in ascending order
+    guesses = [mp.cos(mp.pi * (k - 0.25) / (stages + 0.5)) for k in range(stages, 0, -1)]
+    roots = [mp.findroot(functools.partial(mp.legendre, stages), (x, x + 0.001)) for x in guesses]
+    c = [(1 + root) / 2 for root in roots]
     others = [[node for k, node in enumerate(c) if k != j] for j in range(stages)]
     tops = [mp.fprod(c[j] - node for node in others[j]) for j in range(stages)]
     b = [_antiderivative(others[j], mp.one) / tops[j] for j in range(stages)]
