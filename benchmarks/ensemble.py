@@ -23,8 +23,7 @@ from symtop.core.parallel import cores
 from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.loop import FixedStep
 from symtop.run.ensemble import inputs as reading
-from symtop.run.ensemble.chunks import Job, nutation_periods
-from symtop.run.sampling import schedule
+from symtop.run.ensemble.chunks import Job, nutation_periods, schedule
 
 METHOD, CHART, PER_NUTATION, NUTATIONS, SAMPLES = "strang", "axis", 100, 10, 11
 MEMBERS, ALONE, ROUNDS = 10_000, 300, 9

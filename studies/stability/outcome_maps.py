@@ -37,7 +37,7 @@ from symtop.model import charts, scenes
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, flat
-from symtop.run.sampling import sample_times
+from symtop.run.simulation import sample_times
 
 from .many_verdicts import Judged, judge_runs, truths
 

@@ -1,7 +1,8 @@
 """simulate(): one scene, one integrator, one step or tolerance -> one dataset.
 
 Samples never bend the step: a fixed-step run has h = T/N exactly and is sampled at whole steps, t = k h. Samples are
-uniform unless they would miss phases of the nutation (`sampling`); then they are dithered, and the dataset says so.
+uniform unless they would fall on the same few phases of the nutation again and again (where an energy error may read
+1e5 times too small); then they are dithered by the golden ratio, and the dataset says so.
 """
 
 import functools
@@ -10,22 +11,67 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, boolean, one_of, positive, shown, whole
+from symtop.core.numbers import GOLDEN
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import OBSERVABLES, Scene, horizon_of, scene as find_scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.guard import MOST_STEPS, warning
-from symtop.run.sampling import sample_times
 from symtop.run.trajectory import Trajectory, dataset
 
 MOST_SAMPLES = 10_000_000
 MOST_SWINGS = 1e8  # of an adaptive run: several minutes of the fastest, taylor
+WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider stretch of phases unseen are dithered
 USUAL = 1e-3  # rad, the accuracy of a step that is proposed where none was given
+STRETCHES = 17  # of a nutation: two of them are less than `WIDEST_GAP`
+
+
+def _unseen(times: Any, period: float) -> float:
+    """The widest stretch of nutation phases, as a fraction of a period, in which no sample falls, or a bound of it.
+
+    Where each of 17 equal stretches has a sample, none of 2/17 is without one, and nothing is sorted.
+    """
+    phases = np.mod(times / period, 1.0)
+    if np.bincount((STRETCHES * phases).astype(np.int64), minlength=STRETCHES)[:STRETCHES].all():
+        return 2.0 / STRETCHES
+    phases.sort()
+    return float(np.max(np.diff(phases, append=phases[0] + 1.0)))
+
+
+def _marks(steps: int, place: Any, last: int) -> Any:
+    """Whole steps next to places 0 .. last in a run of so many steps, each once."""
+    marks: Any = np.rint(steps * (place / last)).astype(np.int64)
+    return marks if (marks[1:] > marks[:-1]).all() else np.unique(marks)
+
+
+def sample_times(horizon: float, samples: int, period: float, steps: int | None = None) -> tuple[Any, Any, bool]:
+    """Times and step marks of the samples, and whether they had to be dithered.
+
+    With `steps`, times are whole multiples of horizon/steps; the first sample is 0 and the last the horizon.
+    """
+    last = samples - 1
+    if steps is not None and steps <= last:  # every step is shown
+        marks: Any = np.arange(steps + 1)
+        return marks * (horizon / steps), marks, False
+    place: Any = np.arange(samples, dtype=float)
+    for dithered in (False, True):
+        if dithered:
+            place[1:last] += np.mod(GOLDEN * place[1:last], 1.0) - 0.5
+        if steps is None:
+            marks, times = np.empty(0, dtype=np.int64), horizon * (place / last)
+        else:
+            marks = _marks(steps, place, last)
+            times = marks * (horizon / steps)
+        long_enough = math.isfinite(period) and horizon > 2.0 * period
+        if dithered or not long_enough or _unseen(times, period) < WIDEST_GAP:
+            break
+    return times, marks, dithered
 
 
 def chart_of(method: Integrator, watched: str, observe: str | None = None) -> str:

@@ -9,10 +9,9 @@ import xarray as xr
 import symtop
 from symtop.methods.framework.lanes import W, members_of
 from symtop.model.exact.closed_form import NUMBERS, ClosedForms
-from symtop.run import sampling
 from symtop.run.ensemble import chunks
-from symtop.run.ensemble.chunks import nutation_periods
-from symtop.run.sampling import SECONDS, sample_times, schedule
+from symtop.run.ensemble.chunks import nutation_periods, schedule
+from symtop.run.simulation import sample_times
 
 SOME = symtop.population(36, seed=5)
 COUNTS = ("steps", "force_evaluations", "newton_iterations", "reached_time")
@@ -226,10 +225,8 @@ def test_a_member_without_a_nutation_has_no_steps_per_nutation():
 
 @pytest.mark.parametrize("steps", [None, 7, 40, 1000, 12_347])
 @pytest.mark.parametrize("samples", [2, 9, 33, 41, 50, 101])
-def test_a_schedule_has_the_rows_of_runs_alone_whether_it_is_compiled_or_not(steps, samples, monkeypatch):
+def test_a_schedule_has_the_rows_of_sample_times(steps, samples):
     """Commensurate samples among them: every whole and half number of samples a nutation."""
-    sampling._layer.compile()
-    monkeypatch.setattr(sampling._layer, "ready", lambda seconds: seconds > SECONDS * samples)
     members = symtop.population(60, seed=9)
     numbers = numbers_of(members)
     period = nutation_periods(numbers)

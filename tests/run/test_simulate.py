@@ -11,8 +11,7 @@ import symtop
 from symtop.core import netcdf
 from symtop.core.numbers import GOLDEN
 from symtop.run import trajectory as trajectories
-from symtop.run.sampling import WIDEST_GAP, sample_times
-from symtop.run.simulation import integrate
+from symtop.run.simulation import WIDEST_GAP, integrate, sample_times
 from symtop.run.trajectory import Trajectory, dataset
 
 

@@ -3,6 +3,10 @@
 A member has the bits of `simulate` alone: the same steps, samples and observables. Steps are made in one compiled call
 (`FixedStep.many`, or the closed form's) where the method has one, or in one for each member (`Adaptive.many`); any
 other method runs its members one after another by `calling.solve`, as anybody's solver is called.
+
+Whether samples have to be dithered, `simulation.sample_times` decides for one run by the widest stretch of nutation
+phases that none of them shows; `schedule` decides it for row after row in compiled code, by the same operations on the
+same nutation period.
 """
 
 import contextlib
@@ -19,6 +23,7 @@ from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError
 from symtop.core.jit import compile_kernel, register_jitable
+from symtop.core.numbers import GOLDEN
 from symtop.core.parallel import heed
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
@@ -33,7 +38,7 @@ from symtop.model import charts, top as model
 from symtop.model.charts import View
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import SymmetricTop
-from symtop.run.sampling import Schedule, schedule
+from symtop.run.simulation import STRETCHES, WIDEST_GAP
 from symtop.run.trajectory import LABELS
 
 Array = NDArray[np.float64]
@@ -58,6 +63,31 @@ SHOWN = {  # by each chart
 PER_MEMBER = (  # columns, beside what a member shows
     "outcome", "steps", "force_evaluations", "newton_iterations", "reached_time", "step_size", "horizon", "dithered",
 )  # fmt: skip
+
+
+class Schedule(NamedTuple):
+    """When n runs are sampled. A run of fewer steps than samples shows every step; the rest of its row is padded."""
+
+    step_size: Array  # (n,), NaN where a method chooses its steps
+    marks: Whole  # (n, samples) whole steps; the last one again beyond `counts`, zeros without a step
+    times: Array  # (n, samples), NaN beyond `counts`
+    counts: Whole  # (n,) samples of each
+    dithered: NDArray[np.bool_]  # (n,)
+
+
+def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -> Schedule:
+    """Times and marks of n runs with so many steps each, or without steps of their own (None)."""
+    n, last = len(horizon), samples - 1
+    h = np.full(n, np.nan) if steps is None else horizon / steps
+    marks, times = np.zeros((n, samples), np.int64), np.full((n, samples), np.nan)
+    laid_out = Schedule(h, marks, times, np.full(n, samples), np.zeros(n, dtype=bool))
+    uniform = np.arange(samples, dtype=float)
+    dithered = uniform.copy()
+    dithered[1:last] += np.mod(GOLDEN * uniform[1:last], 1.0) - 0.5
+    by_steps = np.zeros(0, np.int64) if steps is None else np.ascontiguousarray(steps)
+    places = np.stack([uniform / last, dithered / last])
+    _lay_out()(np.ascontiguousarray(period), np.ascontiguousarray(horizon), by_steps, places, *laid_out)
+    return laid_out
 
 
 def nutation_periods(numbers: Array) -> Array:
@@ -95,6 +125,70 @@ def _all_periods() -> Any:
                 periods[first + j] = period_between(top, start, 0.5 * (low + below), 0.5 * (high + above))
 
     return compile_kernel(all_periods)
+
+
+@register_jitable
+def unseen(times: Any, period: float, phases: Any) -> Any:
+    """`simulation._unseen` of one row; `phases` is room for as many numbers."""
+    seen = 0
+    for k in range(len(times)):
+        turns = times[k] / period
+        phases[k] = turns - np.floor(turns)  # the remainder, exactly, and 50 ns less
+        seen |= 1 << int(STRETCHES * phases[k])
+    every = (1 << STRETCHES) - 1
+    if seen & every == every:
+        return 2.0 / STRETCHES
+    phases.sort()
+    gap = phases[0] + 1.0 - phases[-1]
+    for k in range(1, len(phases)):
+        gap = max(gap, phases[k] - phases[k - 1])
+    return gap
+
+
+@functools.cache
+def _lay_out() -> Any:  # noqa: C901  (one loop, read in one piece)
+    """The compiled loop over rows of a `Schedule`."""
+
+    def lay_out(period, horizon, steps, places, h, marks, times, counts, dithered):  # type: ignore[no-untyped-def]
+        samples = places.shape[1]
+        phases = np.empty(samples)
+        for i in range(len(horizon)):
+            if len(steps) and steps[i] < samples:  # every step is shown
+                counts[i] = steps[i] + 1
+                for k in range(samples):
+                    marks[i, k] = min(k, steps[i])
+                for k in range(counts[i]):
+                    times[i, k] = k * h[i]
+            else:
+                long_enough = np.isfinite(period[i]) and horizon[i] > 2.0 * period[i]
+                for row in range(2):
+                    dithered[i] = row == 1
+                    if len(steps) == 0:
+                        for k in range(samples):
+                            times[i, k] = horizon[i] * places[row, k]
+                    else:
+                        counts[i] = _distinct(steps[i], places[row], marks[i])
+                        for k in range(counts[i]):
+                            times[i, k] = marks[i, k] * h[i]
+                    times[i, counts[i] :] = np.nan
+                    judged = row == 0 and long_enough
+                    if not judged or unseen(times[i, : counts[i]], period[i], phases[: counts[i]]) < WIDEST_GAP:
+                        break
+
+    return compile_kernel(lay_out)
+
+
+@register_jitable
+def _distinct(steps: int, places: Any, marks: Any) -> int:
+    """Whole steps next to places that ascend, each once, and the last again in the rest of the row; how many."""
+    count = 0
+    for k in range(len(places)):
+        mark = np.int64(np.rint(steps * places[k]))
+        if k == 0 or mark > marks[count - 1]:
+            marks[count] = mark
+            count += 1
+    marks[count:] = marks[count - 1]
+    return count
 
 
 class _Runs(NamedTuple):
