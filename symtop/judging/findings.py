@@ -248,11 +248,11 @@ def _runs(ledger: StepLedger) -> str:
     traces, words = ledger.traces, []
     if "steps_run" in traces and (steps := float(traces["steps_run"])):
         nutations = float(traces["nutations_run"])
-        words += [f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.3g} a nutation) for the rest"]
+        words += [f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation) for the rest"]
     tried = ledger.about.nutation / np.asarray(traces.get("step_size", []))  # NaN where no run was made
     if np.isfinite(tried).any():
         failed = tried[np.isnan(traces["error"]) & np.isfinite(tried)]
-        fails = f", of which {failed.max():.3g} and fewer fail" if failed.size else ""
-        words.insert(0, f"{np.nanmin(tried):.3g} to {np.nanmax(tried):.3g} steps a nutation for the order{fails}")
+        fails = f", of which {failed.max():.0f} and fewer fail" if failed.size else ""
+        words.insert(0, f"{np.nanmin(tried):.0f} to {np.nanmax(tried):.0f} steps a nutation for the order{fails}")
     joined = ";\n    ".join(words)
     return f"Its runs: {joined}.\n" if words else ""

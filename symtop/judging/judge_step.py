@@ -99,7 +99,7 @@ def judge(
     for name, flag in told.items():
         boolean(name, flag)
     drawn = secrets.randbelow(SEEDS) if seed is None else whole("seed", seed, 0, SEEDS)
-    structure = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
+    structure: dict[str, Any] = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
     claims = structure | {"conserves": conserves, "energy_error": energy}
     made = Integrator("claims", "other", "", {chart: _no_solver}, **claims)  # checked before anything is loaded
     kept = made.conserves or frozenset()
@@ -109,14 +109,15 @@ def judge(
             raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
         found = tuple(of_trajectory(target, chosen, kept, energy))
         about = About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory", "", "", 0.0)
-        for event in (about, *found):
-            listen(event)
+        listen(about)
+        for finding in found:
+            listen(finding)
         return StepLedger(about.name, chosen.name, found, {}, about)
     implied = {"time": not autonomous, "energy": energy is None and "energy" not in kept}
     heartbeat.reset(quick=quick)
     began, findings = time.monotonic(), list[Finding]()
     load = functools.partial(open_target, target, form, chart, adaptive=adaptive)
-    with Process(lambda: table_of(load())) as process:
+    with Process(lambda: table_of(load)) as process:
         process.allow(OPENING)
         try:
             stepper = Remote(process)

@@ -377,7 +377,8 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset():
     assert told_of["work"] == "2.0 force evaluations a step"
     assert told_of["pole"].startswith("passes theta = 0, the axis off by ")
     steps, nutations = float(data["steps_run"]), float(data["nutations_run"])
-    assert f"{steps:.0f} steps over {nutations:.3g} nutations (118 a nutation) for the rest." in str(ledger)
+    length = f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation) for the rest."
+    assert length in str(ledger)
 
 
 def test_a_line_says_what_was_measured_and_of_a_claim_that_fails_why():
@@ -439,7 +440,7 @@ def run_judge(*arguments):
     ],
 )
 def test_the_example_of_a_form_is_what_it_says(arguments, words, only):
-    only("order", "symplectic", "symmetric", "energy")
+    only("order", "symplectic", "symmetric", *(["energy"] if "energy" in words else []))
     code, output = run_judge(*arguments)
     assert code == 0, output
     assert words in output

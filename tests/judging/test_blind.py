@@ -127,7 +127,7 @@ def test_the_stages_of_an_implicit_class_are_solved_and_newton_is_left_as_it_was
     only("order")
     assert radau.NEWTON_MAXITER == 6
     ledger = symtop.judge(integrate.Radau, quick=True, order=5)
-    confirmed(ledger, "order")
+    assert ledger.refuted == [], str(ledger)
     assert "h^5" in ledger["order"].why
     assert symtop.judge(integrate.Radau, quick=True, order=6).refuted == ["order"]  # the control
     assert radau.NEWTON_MAXITER == 6

@@ -409,7 +409,6 @@ CLAIMS = {  # name: claims, and options of judge
     "RK23": ({"order": 3}, {}),
     "RK45": ({"order": 5, "symplectic": False}, {}),
     "DOP853": ({"order": 8, "explicit": True}, {}),
-    "Radau": ({"order": 5}, {}),
     "BDF": ({}, {"adaptive": True}),
     "LSODA": ({}, {"adaptive": True}),
     "AtTolerance": ({"symplectic": False, "symmetric": False}, {"adaptive": True}),
