@@ -248,7 +248,9 @@ def _runs(ledger: StepLedger) -> str:
     traces, words = ledger.traces, []
     if "steps_run" in traces and (steps := float(traces["steps_run"])):
         nutations = float(traces["nutations_run"])
-        words += [f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation) for the rest"]
+        length = f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation)"
+        relative = "changes of the energy are relative to the nutation's, of momenta to the larger one"
+        words += [f"{length} for the constants", relative]
     tried = ledger.about.nutation / np.asarray(traces.get("step_size", []))  # NaN where no run was made
     if np.isfinite(tried).any():
         failed = tried[np.isnan(traces["error"]) & np.isfinite(tried)]

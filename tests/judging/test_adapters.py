@@ -377,7 +377,7 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset():
     assert told_of["work"] == "2.0 force evaluations a step"
     assert told_of["pole"].startswith("passes theta = 0, the axis off by ")
     steps, nutations = float(data["steps_run"]), float(data["nutations_run"])
-    length = f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation) for the rest."
+    length = f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation) for the constants;"
     assert length in str(ledger)
 
 
