@@ -15,9 +15,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SHOWN = re.compile(r"\]\(figures/([^)]+)\)")
-STORED = re.compile(
-    r"\[([^]]+)\]\((?:tables/[^)]+|[\w-]+\.nc)\)|<!-- \w+ [\w-]+ -->\n\n"
-)  # links to what is not tracked
+STORED = re.compile(  # links to what is not tracked
+    r" \(\[CSV\]\(tables/[^)]+\)\)|; \[CSV\]\(tables/[^)]+\)"
+    r"|\[([^]]+)\]\((?:tables/[^)]+|[\w-]+\.nc)\)|<!-- \w+ [\w-]+ -->\n\n"
+)
 QUOTED = {
     "choosing.md": "Which method is the cheapest at the accuracy I need, with what I have?",
     "results.md": "What makes",

@@ -22,9 +22,9 @@ from .cells import (
     SOLVE_IVP,
     cells,
 )  # fmt: skip
-from .measures import LEAST, Column
+from .measures import LEAST, NOISY, Column
 
-NOISY, NOISY_SHARE = 0.25, 0.02  # spread of a noisy time, and the share of such times beyond which none is compared
+NOISY_SHARE = 0.02  # of noisy times, beyond which none is compared
 TIE = 0.1  # times that differ by less are level
 GOAL = ["scene", "horizon", "target"]  # at which times are compared
 FACTORS = ["method", "chart", "language", "call"]

@@ -26,7 +26,8 @@ from .cells import CALLS, COMPILED, NUMPY, SCIPY_NUMBA, SCIPY_PYTHON, Cell, call
 LEAST = 0.7  # of the target: the search ends with an error from here to the target, if nine runs suffice
 PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
 FINER = 1e-3  # of the target: the tolerance that a second search begins with
-ENOUGH = 0.2  # seconds of a function's samples in one process; those that are longer have two
+NOISY, TRIES = 0.25, 3  # the distance of the quartiles over the median of a time that is taken again; how often
+ENOUGH = 0.08  # seconds of a function's samples in one process; those that are longer have two
 START = (
     "from symtop.runner import scripts; scripts.install(); from symtop_studies.factors import measures; measures.{}()"
 )
@@ -106,6 +107,25 @@ def timed(asked: Runs, processes: int) -> Array:
     return np.array(answers).T
 
 
+def spread(samples: Array) -> Array:
+    """The distance of the quartiles over the median, of samples (..., processes)."""
+    low, middle, high = np.quantile(samples, (0.25, 0.5, 0.75), axis=-1)
+    return (high - low) / middle
+
+
+def settled_times(asked: Runs, processes: int) -> Array:
+    """As `timed`, with those that are noisy taken again."""
+    taken = timed(asked, processes)
+    for _ in range(TRIES - 1):
+        loud = np.flatnonzero(spread(taken) > NOISY)
+        if not loud.size:
+            break
+        again = timed(asked._replace(runs=[asked.runs[i] for i in loud]), processes)
+        closer = spread(again) < spread(taken[loud])
+        taken[loud[closer]] = again[closer]
+    return taken
+
+
 def factorial(
     scene: Scene, schemes: Sequence[str] | None, goals: Sequence[Goal], rounds: int, batch: float, processes: int
 ) -> Any:
@@ -132,7 +152,7 @@ def factorial(
                 if caller(scene, cell, call, met.setting, met.horizon) is not None:
                     places.append((grid.index(cell), *at, CALLS.index(call)))
                     runs.append((cell.name, call, met.setting, met.horizon))
-    for place, taken in zip(places, timed(Runs(scene, runs, rounds, batch), processes), strict=True):
+    for place, taken in zip(places, settled_times(Runs(scene, runs, rounds, batch), processes), strict=True):
         samples[place] = taken
     dims = ("variant", "horizon", "target")
     table = xr.Dataset(
@@ -142,6 +162,5 @@ def factorial(
             "variant": [cell.name for cell in grid], "horizon": horizons, "target": targets, "call": list(CALLS),
         },
     )  # fmt: skip
-    low, middle, high = table[Column.SAMPLES].quantile((0.25, 0.5, 0.75), "process", skipna=False).values
     dims = (*dims, "call")
-    return table.assign({Column.SECONDS: (dims, middle), Column.SPREAD: (dims, (high - low) / middle)})
+    return table.assign({Column.SECONDS: (dims, np.median(samples, -1)), Column.SPREAD: (dims, spread(samples))})

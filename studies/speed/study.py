@@ -30,7 +30,7 @@ SCENES = (facts.SHOWN, "spheroid", "hairer-lubich-wanner", "bruls-cardona-arnold
 LENGTHS = (10.0, 100.0)  # nutations
 QUANTITIES = ("axis", "attitude", "energy", "p_phi")
 KEPT = ("step_size", "tolerance", "force_evaluations", "seconds", *QUANTITIES, "axis_bound")
-SETTINGS, MOST_STEPS = 14, 1e6
+SETTINGS, MOST_STEPS = 12, 3e5
 
 
 def cases(quick: bool) -> list[Case]:

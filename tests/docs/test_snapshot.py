@@ -118,12 +118,27 @@ def test_what_pages_quote_is_what_the_stored_report_says():
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is no checkout")
 def test_what_a_run_of_the_studies_writes_is_not_tracked():
-    written = ["convergence.nc", "convergence.json", "report.md", "report.html", "figures/x.png", "cases/x/y.nc"]
+    written = [
+        "convergence.nc",
+        "convergence.json",
+        "report.md",
+        "report.html",
+        "figures/x.png",
+        "tables/x.csv",
+        "cases/x/y.npz",
+    ]
     paths = [f"results/{name}" for name in written]
     done = subprocess.run(["git", "check-ignore", *paths], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.stdout.split() == paths
     kept = subprocess.run(["git", "ls-files", "results"], cwd=ROOT, capture_output=True, text=True, check=True)
-    benchmarks = ("bench.json", "live-engines.json", "peers.json", "peers.nc", "figures/peers-fronts.png")
+    benchmarks = (
+        "bench.json",
+        "live-engines.json",
+        "peers.json",
+        "horizon.json",
+        "peers.nc",
+        "figures/peers-fronts.png",
+    )
     assert set(kept.stdout.split()) == {f"results/{name}" for name in benchmarks}
     shown = [
         f"results/figures/{picture['file']}"
