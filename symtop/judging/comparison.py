@@ -108,7 +108,7 @@ def compare(
         name: columns.ERROR_TABLE[f"{quantity}{name.removeprefix('error')}"] for name in ("error", "error_bound")
     }
     entries["target"] = "error that is accepted, largest over the run", *entries["error"][1:]
-    own = {name: columns.Column(entry, {}) for name, entry in entries.items()}
+    own = {name: netcdf.Column(entry, {}) for name, entry in entries.items()}
     return netcdf.describe(
         columns.described(data, chosen.units, own), f"error against cost on {chosen.name}", units=chosen.units,
         quantity=quantity, cost=cost, horizon=end, nutations=end / chosen.nutation_period,
@@ -179,3 +179,14 @@ def cheapest(data: xr.Dataset, target: float) -> np.ndarray:
     cost = data["seconds" if data.attrs["cost"] == "time" else "force_evaluations"].values
     good = (data["outcome"].values == "ok") & (data["error"].values <= target) & np.isfinite(cost)
     return np.where(good.any(axis=1), np.argmin(np.where(good, cost, np.inf), axis=1), -1)
+
+
+def ranked(data: xr.Dataset) -> tuple[float, dict[str, float]]:
+    """Force evaluations that every variant can spend, and the least error of each within them, the best first.
+
+    A variant whose evaluations nobody counts has no place.
+    """
+    work = data["force_evaluations"].where((data["outcome"] == "ok") & (data["force_evaluations"] > 0.0))
+    most = float(work.max("setting").min())
+    errors = data["error"].where(work <= most).min("setting").to_series().dropna()
+    return most, {str(name): float(error) for name, error in errors.sort_values().items()}

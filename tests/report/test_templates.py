@@ -11,7 +11,7 @@ from symtop.report.page import TEMPLATES
 from symtop.runner import run as runner
 
 OTHERS = {name: TEMPLATES / f"{name}.md" for name in ("front", "measured", "equations")}
-PAGES = {name: page for name in runner.names() if (page := runner.page_of(name)) is not None}
+PAGES = {name: page for name in runner.names() if (page := runner.file_beside(name, "page.md")) is not None}
 TEXTS = {name: page.read_text(encoding="utf-8") for name, page in {**OTHERS, **PAGES}.items()}
 CALL = re.compile(r"{% call figure\((.*?)\) %}(.*?){% endcall %}", re.DOTALL)
 MOST_LINES, MOST_FIGURES, MOST_WORDS = 120, 3, 1100  # of a template
