@@ -77,8 +77,8 @@ def of_histories(every: xr.Dataset) -> dict[str, Any]:
         "energy_lost": len(lost),
         "energy_lost_most": float(lost.max()) if len(lost) else None,
         "energy_lost_worst": str(lost.idxmax()) if len(lost) else None,
-        "bounded_runs": phases["bounded"].size, "bounded_as_t": int(as_time(phases["bounded"]).sum()),
-        "lost_runs": phases["lost"].size, "lost_faster": int(faster(phases["lost"]).sum()),
+        "bounded_runs": phases["bounded"].size or None, "bounded_as_t": int(as_time(phases["bounded"]).sum()),
+        "lost_runs": phases["lost"].size or None, "lost_faster": int(faster(phases["lost"]).sum()),
     }  # fmt: skip
 
 
