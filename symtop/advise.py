@@ -480,9 +480,9 @@ def i_use(
         limits["step_size"] = step_size
     elif limits.get("quantity", "axis") != "axis":
         raise SymtopError(f"quantity must be axis where there is no accuracy, not {limits['quantity']!r}", "quantity")
-    asked = error if accuracy is None else accuracy
-    found = accuracy is not None or error <= WORST
-    advice = recommend(start, accuracy=asked, horizon=end, **limits) if found else None
+    target = error if accuracy is None else accuracy
+    sought = accuracy is not None or error <= WORST
+    advice = recommend(start, accuracy=target, horizon=end, **limits) if sought else None
     if advice is None or advice.integrator is None:
         return EngineAdvice(start.name, engine, h, end, off, best, math.nan, None if accuracy is None else advice)
     setting: dict[str, Any] = {"step_size": advice.step_size, "tolerance": advice.tolerance}

@@ -17,7 +17,7 @@ def checked(name: str, data: object, folder: Path, elsewhere: Collection[str] = 
 
     Figures and tables that are shown `elsewhere` stand on the front page.
     """
-    study, page = runner.load(name), runner.page_of(name)
+    study, page = runner.load(name), runner.file_beside(name, "page.md")
     assert page is not None
     found = runner.findings_of(
         study, data, folder, lambda figure, _: plt.close(figure), failures=[], cases=1, page=page

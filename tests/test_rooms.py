@@ -181,7 +181,7 @@ def small(tmp_path):
         "symtop/core/__init__.py": "",
         "symtop/core/plain.py": "from symtop import __version__\n",
         "symtop/core/up.py": "from symtop.model import good\n",
-        "symtop/core/lazy_kernel.py": "def look():\n    import symtop.model.good\n",
+        "symtop/core/progress.py": "def look():\n    import symtop.model.good\n",
         "symtop/core/typed.py": "from typing import TYPE_CHECKING\n"
         "if TYPE_CHECKING:\n    from ..model.good import value\n",
         "symtop/model/__init__.py": "",
@@ -204,7 +204,7 @@ def small(tmp_path):
 
 def test_imports_that_run_upward_are_reported(small):
     assert upward(small) == [
-        "symtop.core.lazy_kernel:2 imports symtop.model.good (lazy)",
+        "symtop.core.progress:2 imports symtop.model.good (lazy)",
         "symtop.core.typed:3 imports symtop.model.good (type)",
         "symtop.core.up:1 imports symtop.model.good (top)",
         "symtop.extra lies in no room of ORDER",

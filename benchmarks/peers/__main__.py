@@ -32,7 +32,7 @@ def main() -> None:
         peers, missing = load(tuple(options.only))
         for sentence in missing:
             print(sentence)
-        own = columns.read(Path(__file__).parent / "columns.tsv")
+        own = netcdf.read_columns(Path(__file__).parent / "columns.tsv")
         data = columns.described(measure(peers, options.scenes), own=own)
         data = netcdf.describe(data, STUDY.title, question=STUDY.question)
         netcdf.write(data, file)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.core.multiprecision import context
+from symtop.core.numbers import context
 from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.run.reference.independent_checks import integrate, integrate_with_checks, iterate_map, precise_form

@@ -182,8 +182,8 @@ PERIODS = 0.02  # of a nutation: the length of a run that compiles
 
 def _run(name: str) -> str:
     """Compile what a variant runs alone and in an ensemble, or the truth without a name; returns why it could not."""
-    from symtop.core.lazy_kernel import LAZY
     from symtop.methods.framework.registry import integrator
+    from symtop.model.lazy_kernel import LAZY
     from symtop.model.scenes import scene
     from symtop.run.ensemble.ensemble import ensemble
     from symtop.run.reference.truth import reference

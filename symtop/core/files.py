@@ -7,7 +7,6 @@ until the folder is small enough. Another process may be doing the same.
 
 import contextlib
 import errno
-import functools
 import importlib.util
 import os
 import shutil
@@ -44,12 +43,7 @@ on_cold: list[Callable[[], object]] = [_tell]  # called when a kernel is not in 
 
 def cache_root() -> Path:
     """The folder for everything symtop caches: ``$SYMTOP_CACHE`` or ``symtop`` in the user's cache folder."""
-    return _root(*map(os.environ.get, ("SYMTOP_CACHE", "XDG_CACHE_HOME", "HOME", "USERPROFILE")))
-
-
-@functools.lru_cache(maxsize=16)
-def _root(chosen: str | None, caches: str | None, *_homes: str | None) -> Path:
-    """The folder in these surroundings, of which `Path.home` reads the last; each new start asks four times."""
+    chosen, caches = os.environ.get("SYMTOP_CACHE"), os.environ.get("XDG_CACHE_HOME")
     return Path(chosen) if chosen else Path(caches or Path.home() / ".cache") / "symtop"
 
 

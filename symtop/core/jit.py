@@ -34,7 +34,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from symtop.core.code_hash import Code, Part, by_file, by_name, digest, hashed
 from symtop.core.errors import SymtopError
 from symtop.core.files import cache_root, is_trusted, locked, make_private, on_cold, prune, touch
-from symtop.core.jit_functions import Function, fused, inlined_parts, shared_parts, two_product
+from symtop.core.jit_functions import Function, fused, marked, two_product
 from symtop.core.sines import polynomials, sincos
 
 __all__ = [
@@ -72,10 +72,8 @@ def register_jitable(function: Function, options: dict[str, Any] = INLINED) -> F
 
 def _register_parts() -> None:
     """Register what modules without numba have marked so far."""
-    for function in inlined_parts:
-        register_jitable(function)
-    for function in shared_parts:
-        register_jitable(function, OPTIONS | WITHIN)
+    for function, is_inlined in marked:
+        register_jitable(function, INLINED if is_inlined else OPTIONS | WITHIN)
 
 
 def _overloads(function: FunctionType) -> Iterator[object]:

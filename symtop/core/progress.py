@@ -14,25 +14,20 @@ from symtop.core.files import is_terminal
 
 BEAT = 1.0  # seconds from one drawing to the next
 FIRST, EVERY = 2.0, 9.0  # seconds to the first line of a command in a pipe, and from one to the next
-LINES = """\
-import signal, sys, threading, time
-signal.signal(signal.SIGINT, signal.SIG_IGN)
-began, ended, words, wait = time.monotonic(), threading.Event(), [sys.argv[1]], float(sys.argv[2])
-threading.Thread(target=lambda: (words.extend(map(str.strip, sys.stdin)), ended.set()), daemon=True).start()
-while not ended.wait(wait):
-    print(f"symtop: {words[-1]}, {time.monotonic() - began:.0f} s", file=sys.stderr, flush=True)
-    wait = float(sys.argv[3])
-"""
-CLOCK = """\
+LINES = "symtop: {words}, {seconds:.0f} s\n", ""  # what is written, and what at the end
+CLOCK = "\r{words}: {minutes:02d}:{rest:02d}", "\r\x1b[K"
+WRITER = """\
 import signal, sys, threading, time
 signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
-began, ended = time.monotonic(), threading.Event()
-threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
-while not ended.is_set():
-    minutes, seconds = divmod(int(time.monotonic() - began), 60)
-    print(f"\\r{sys.argv[1]}: {minutes:02d}:{seconds:02d}", end="", file=sys.stderr, flush=True)
-    ended.wait(float(sys.argv[2]))
-print("\\r\\x1b[K", end="", file=sys.stderr, flush=True)
+began, ended, (words, shape, last), wait = time.monotonic(), threading.Event(), sys.argv[1:4], float(sys.argv[4])
+words = [words]
+threading.Thread(target=lambda: (words.extend(map(str.strip, sys.stdin)), ended.set()), daemon=True).start()
+while not ended.wait(wait):
+    seconds = time.monotonic() - began
+    values = {"words": words[-1], "seconds": seconds, "minutes": int(seconds) // 60, "rest": int(seconds) % 60}
+    print(shape.format(**values), end="", file=sys.stderr, flush=True)
+    wait = float(sys.argv[5])
+print(last, end="", file=sys.stderr, flush=True)
 """
 
 
@@ -58,13 +53,20 @@ def beating(bar: Any) -> Iterator[Any]:
 
 
 @contextlib.contextmanager
+def _writing(form: tuple[str, str], words: str, first: float, every: float) -> "Iterator[subprocess.Popen[str]]":
+    """A process that writes some words, or the last line that it was given, and the time since, until the end."""
+    command = [sys.executable, "-I", "-S", "-c", WRITER, words, *form, str(first), str(every)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, text=True) as writer:  # noqa: S603  (our own words)
+        yield writer
+
+
+@contextlib.contextmanager
 def telling(words: str) -> Iterator[None]:
     """Some words, or those of `ticking`, in lines on a standard error that is no terminal, from two seconds on."""
     if is_terminal(sys.stderr):
         yield
         return
-    command = [sys.executable, "-I", "-S", "-c", LINES, words, str(FIRST), str(EVERY)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, text=True) as lines:  # noqa: S603  (our own words)
+    with _writing(LINES, words, FIRST, EVERY) as lines:
         _listeners.append(lines)
         try:
             yield
@@ -81,17 +83,8 @@ def ticking(words: str) -> Iterator[None]:
     for lines in _listeners:
         with contextlib.suppress(OSError):  # somebody has ended it
             print(words, file=lines.stdin, flush=True)
-    if not is_terminal(sys.stderr):
+    with _writing(CLOCK, words, 0.0, BEAT) if is_terminal(sys.stderr) else contextlib.nullcontext():
         yield
-        return
-    command = [sys.executable, "-I", "-S", "-c", CLOCK, words, str(BEAT)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE) as clock:  # noqa: S603  (our own words)
-        try:
-            yield
-        finally:
-            assert clock.stdin is not None  # noqa: S101
-            clock.stdin.close()
-            clock.wait()
 
 
 def progress_bar(words: str, *, quiet: bool, **options: Any) -> Any:

@@ -108,7 +108,7 @@ def compare(
         name: columns.ERROR_TABLE[f"{quantity}{name.removeprefix('error')}"] for name in ("error", "error_bound")
     }
     entries["target"] = "error that is accepted, largest over the run", *entries["error"][1:]
-    own = {name: columns.Column(entry, {}) for name, entry in entries.items()}
+    own = {name: netcdf.Column(entry, {}) for name, entry in entries.items()}
     return netcdf.describe(
         columns.described(data, chosen.units, own), f"error against cost on {chosen.name}", units=chosen.units,
         quantity=quantity, cost=cost, horizon=end, nutations=end / chosen.nutation_period,

@@ -241,13 +241,13 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         if name in columns:
             length = np.sqrt(np.sum(columns[name] ** 2, axis=-1))
             if (off := np.abs(length - 1.0) > LENGTH).any():  # false where it is NaN
-                where = f"{length[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
-                raise SymtopError(f"{name} must be of length 1 within {LENGTH:g}, but its length is {where}")
+                place = f"{length[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
+                raise SymtopError(f"{name} must be of length 1 within {LENGTH:g}, but its length is {place}")
             columns[name] = columns[name] / length[:, None]
     theta = columns.get("theta", np.zeros(1))
     if (off := (theta < 0.0) | (theta > np.pi)).any():
-        where = f"{theta[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
-        raise SymtopError(f"theta must be radians from the vertical in [0, pi], but it is {where}")
+        place = f"{theta[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
+        raise SymtopError(f"theta must be radians from the vertical in [0, pi], but it is {place}")
     return Trajectory(time, **columns)
 
 

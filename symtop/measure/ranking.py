@@ -87,8 +87,8 @@ def _counted(
     target = min(group["target"].values.tolist(), key=lambda value: abs(math.log(value / accuracy)))
     priced = data["prices"].to_dataset()[["price", "call"]].sel(priced_at=PRICED_AT, method="nearest")
     price = priced.median("scene").sel(variant=group["variant"].values)
-    asked = group[["cost", "met_at"]].sel(quantity=quantity, target=target).transpose("variant", "member")
-    cost = asked["cost"].values * price["price"].values[:, np.newaxis] + price["call"].values[:, np.newaxis]
+    answers = group[["cost", "met_at"]].sel(quantity=quantity, target=target).transpose("variant", "member")
+    cost = answers["cost"].values * price["price"].values[:, np.newaxis] + price["call"].values[:, np.newaxis]
     rows = ~np.isnan(cost).all(axis=1)
     regimes = data["tops"].to_dataset()["regime"].sel(scene=span).transpose(..., "member", "number").values
     far = distances(regimes.reshape(-1, 4)[: cost.shape[1]], regime(scene))
@@ -96,7 +96,7 @@ def _counted(
     chosen = np.argsort(far, kind="stable")[: min(NEAREST, int(np.isfinite(far).sum()))]
     if not chosen.size:
         return None
-    met = np.where(np.isfinite(cost), asked["met_at"].values, np.nan)[np.ix_(rows, chosen)]
+    met = np.where(np.isfinite(cost), answers["met_at"].values, np.nan)[np.ix_(rows, chosen)]
     cost = np.where(np.isnan(cost), np.inf, cost)[np.ix_(rows, chosen)]
     best = cost.min(axis=0)
     served = ((cost <= WITHIN * best) & np.isfinite(cost)).sum(axis=1)

@@ -18,6 +18,7 @@ from tqdm import tqdm
 
 from symtop.core import code_hash, netcdf
 from symtop.core.errors import SymtopError, boolean, file_path, foreign_code, positive, row, whole
+from symtop.core.jit import code
 from symtop.core.parallel import MOST_THREADS, cores, in_threads
 from symtop.core.progress import beating
 from symtop.measure import columns
@@ -36,6 +37,7 @@ TIMED = (
     f"of at most {BATCHES} batches of at least {1e3 * BATCH:g} ms each, in random order among those of the other runs"
 )
 MOST_NAMED = 4  # cells that a message lists
+_code = functools.cache(code)
 
 
 class _Cell(NamedTuple):
@@ -94,8 +96,8 @@ def sweep(
     }
     clock = boolean("timed", timed)
     grid = [[_cell(one, method, given, horizon, observe, clock) for method in methods] for one in chosen]
-    asked = [cell for row in grid for cell in row]
-    pairs = [(cell.scene.name, cell.method.name) for cell in asked]
+    cells = [cell for row in grid for cell in row]
+    pairs = [(cell.scene.name, cell.method.name) for cell in cells]
     file = None if path is None else file_path("path", path)
     stored, done = _stored(file)
     if others := [f"{name} on {of}" for of, name in stored if (of, name) not in pairs]:
@@ -103,10 +105,10 @@ def sweep(
         must = "ask for these as well, or name another path"
         raise SymtopError(f"path {str(file)!r} holds what was not asked for, {few}: {must}")
     # what raised is tried again: the cause may have been of the moment
-    rest = [cell for cell in asked if cell.made_of not in done or RAISED in done[cell.made_of]["outcome"].values]
+    rest = [cell for cell in cells if cell.made_of not in done or RAISED in done[cell.made_of]["outcome"].values]
 
     def combined() -> xr.Dataset:
-        size = max(len(cell.settings) for cell in asked)
+        size = max(len(cell.settings) for cell in cells)
         tables = [[_padded(done.get(cell.made_of), cell, size) for cell in row] for row in grid]
         data = xr.concat([xr.concat(row, "variant") for row in tables], "scene")
         data = data.assign_coords(scene=[one.name for one in chosen], variant=[one.name for one in methods])
@@ -118,19 +120,19 @@ def sweep(
         words = {"timed": TIMED if timed else "nothing: timed was not asked for"}
         return netcdf.describe(columns.described(data, units), "errors and work of a sweep", units=units, **words)
 
-    kept = time.monotonic()
+    written = time.monotonic()
     with beating(
-        tqdm(total=len(asked), initial=len(asked) - len(rest), desc="sweep", disable=silent or None, leave=False)
+        tqdm(total=len(cells), initial=len(cells) - len(rest), desc="sweep", disable=silent or None, leave=False)
     ) as bar:
         try:
             for cell, table in zip(rest, in_threads(_table, rest, workers), strict=True):
                 done[cell.made_of] = table
                 bar.update()
-                if file is not None and time.monotonic() - kept > KEEP_EVERY:
+                if file is not None and time.monotonic() - written > KEEP_EVERY:
                     netcdf.write(combined(), file)
-                    kept = time.monotonic()
+                    written = time.monotonic()
             bar.set_description("timing")
-            changed = _time([cell for cell in asked if timed], done) or bool(rest)
+            changed = _time([cell for cell in cells if timed], done) or bool(rest)
         except BaseException:
             if file is not None and done:
                 netcdf.write(combined(), file)
@@ -187,16 +189,9 @@ def _cell(
     for value in settings:
         make_plan(scene, method, **method.setting(value).kwargs(), horizon=until, samples=enough_samples(scene, until))
     made_of = _code().reasons("sweep", error_row, scene, method) | code_hash.packages()
-    asked = (settings, until, observe, "timed") if timed else (settings, until, observe)
-    digest = code_hash.digest(made_of | {"settings": repr(asked)})
+    question = (settings, until, observe, "timed") if timed else (settings, until, observe)
+    digest = code_hash.digest(made_of | {"settings": repr(question)})
     return _Cell(scene, method, tuple(settings), until, observe, timed, digest)
-
-
-@functools.cache
-def _code() -> code_hash.Code:
-    from symtop.core.jit import code  # numba
-
-    return code()
 
 
 def _table(cell: _Cell) -> xr.Dataset:
@@ -219,14 +214,14 @@ def error_row_or_message(
 def _time(cells: list[_Cell], done: dict[str, xr.Dataset]) -> bool:
     """Time the cells that have no times; False if all have."""
     waiting = [(cell, done[cell.made_of]) for cell in cells if done[cell.made_of]["seconds"].isnull().all()]
-    asked: list[tuple[Scene, Integrator, float, list[dict[str, Any]]]] = []
+    runs: list[tuple[Scene, Integrator, float, list[dict[str, Any]]]] = []
     for cell, table in waiting:
         outcomes = zip(cell.settings, table["outcome"].values, strict=True)
         rows = [{"setting_value": setting, "outcome": outcome} | SPENT for setting, outcome in outcomes]
         chart = chart_of(cell.method, cell.scene.observes, cell.observe)
-        asked.append((cell.scene, cell.method.variant(chart), cell.horizon, rows))
-    timed_rows(asked)
-    for (cell, table), (*_, rows) in zip(waiting, asked, strict=True):
+        runs.append((cell.scene, cell.method.variant(chart), cell.horizon, rows))
+    timed_rows(runs)
+    for (cell, table), (*_, rows) in zip(waiting, runs, strict=True):
         done[cell.made_of] = table.assign({name: ("setting", [one[name] for one in rows]) for name in SPENT})
     return bool(waiting)
 

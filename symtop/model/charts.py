@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.core.lazy_kernel import LazyKernel
+from symtop.model.lazy_kernel import LazyKernel
 from symtop.model.top import Angles, Momenta, SymmetricTop
 
 Array = NDArray[np.float64]

@@ -70,7 +70,7 @@ def gather(results: Path) -> list[dict[str, Any]]:
         findings = netcdf.read_json(results / f"{name}.json")
         if findings is None or (name in others and not (isinstance(findings, dict) and "pictures" in findings)):
             continue
-        shipped = runner.page_of(name) if name in studies else None
+        shipped = runner.file_beside(name, "page.md") if name in studies else None
         try:
             kept = {"measured": findings.get("measured", ""), "dataset": f"{name}.nc"}
             kept["dataset"] *= (results / f"{name}.nc").is_file()

@@ -60,8 +60,7 @@ class StudyCases:
 
     def add(self, cases: Iterable[Case]) -> dict[Path, Case]:
         """Take cases in; returns them by their files."""
-        chosen = list(cases)
-        new = dict(zip(store.case_paths(self.results, self.study, chosen), chosen, strict=True))
+        new = {store.case_path(self.results, self.study, case): case for case in cases}
         self.cases |= new
         return new
 

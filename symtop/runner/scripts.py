@@ -47,8 +47,8 @@ def install() -> ModuleType:
 def names() -> list[str]:
     """Names of the studies that ship with symtop, in the order of the report, which their package says."""
     shipped = sorted(path.parent.name for path in folder().glob("*/study.py"))
-    order = [name for name in install().ORDER if name in shipped]
-    return order + [name for name in shipped if name not in order]
+    order = install().ORDER
+    return sorted(shipped, key=lambda name: [*order, name].index(name))
 
 
 def file_of(name: str) -> Path:
@@ -60,19 +60,14 @@ def file_of(name: str) -> Path:
     return _elsewhere.get(name) or folder() / one_of("study", name, names()) / "study.py"
 
 
-def page_of(name: str) -> Path | None:
-    """The template of a study's page: page.md beside study.py, NAME.md beside any other script; None without one."""
-    return _beside(file_of(name), "page.md")
+def file_beside(name: str, file: str) -> Path | None:
+    """A file of a study beside its script: page.md, the template of its page, or columns.tsv, the table of its columns.
 
-
-def columns_of(name: str) -> Path | None:
-    """The table of a study's columns, columns.tsv or NAME.tsv, likewise."""
-    return _beside(file_of(name), "columns.tsv")
-
-
-def _beside(script: Path, name: str) -> Path | None:
-    file = script.with_name(name) if script.stem == "study" else script.with_suffix(Path(name).suffix)
-    return file if file.is_file() else None
+    Beside study.py it has that name, beside any other script, NAME.py, it is NAME.md or NAME.tsv; None without one.
+    """
+    script = file_of(name)
+    path = script.with_name(file) if script.stem == "study" else script.with_suffix(Path(file).suffix)
+    return path if path.is_file() else None
 
 
 def _module(file: Path) -> ModuleType:

@@ -39,9 +39,7 @@ def each(study: str, function: str, make: Callable[[], Any], kind: type, wanted:
     with failing(study, function):
         made = make()
     if isinstance(made, (str, bytes, Mapping, kind)) or not isinstance(made, Iterable):
-        text = " ".join(shown(made).split())
-        text = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
-        raise StudyError(f"study {study}: {function} must return {wanted}, not {text}")
+        raise StudyError(f"study {study}: {function} must return {wanted}, not {shown(made)[:LONGEST]}")
     entries, end = iter(made), object()
     while True:
         with failing(study, function):
@@ -119,11 +117,6 @@ class Case:
     def integrators(self) -> tuple[str, ...]:
         """The integrators that it measures: its own, or those that its settings list."""
         return self.integrator, *self.settings.get("integrators", ())
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The scene and the integrators."""
-        return self.scene, *self.integrators
 
     @property
     def label(self) -> str:

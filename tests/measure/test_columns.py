@@ -11,15 +11,15 @@ from symtop.core import netcdf
 from symtop.core.errors import SymtopError
 from symtop.measure import columns
 from symtop.measure.errors import ERRORS, QUANTITIES
-from symtop.runner.scripts import columns_of, names
+from symtop.runner.scripts import file_beside, names
 from tests.core.test_conventions import lacking
 
-UNITS = {"1", "rad", "rad s-1", "s", "s-1", "s-2", "kg m2 s-2", "kg m2 s-1"}
+UNITS = {"1", "rad", "rad s-1", "s", "kg m2", "s-1", "s-2", "kg m2 s-2", "kg m2 s-1"}
 ROOT = Path(__file__).resolve().parents[2]
-PEERS = columns.read(ROOT / "benchmarks" / "peers" / "columns.tsv")
-OWN = {name: columns.read(columns_of(name)) for name in names()}
+PEERS = netcdf.read_columns(ROOT / "benchmarks" / "peers" / "columns.tsv")
+OWN = {name: netcdf.read_columns(file_beside(name, "columns.tsv")) for name in names()}
 CHECKS = "checks"  # a group of the study of cost, of a second round that a quick pass may not have
-ENTRIES = {"any": columns.ANY, "errors": columns.ERROR_TABLE} | {
+ENTRIES = {"any": netcdf.VARIABLES, "errors": columns.ERROR_TABLE} | {
     study: {name: column.entry for name, column in own.items()} for study, own in (OWN | {"peers": PEERS}).items()
 }
 
@@ -60,9 +60,9 @@ def test_a_study_of_ones_own_keeps_its_names_or_declares_them_beside_it(tmp_path
     assert data["gap"].attrs == data["energy"].attrs == given
     file = tmp_path / "columns.tsv"
     file.write_text("variable\tunits\twithout_units\tflags\tlong_name\naxis\tm\t\t\tlength of the axle\n")
-    mine = columns.described(table_of(axis=given), "SI", columns.read(file))
+    mine = columns.described(table_of(axis=given), "SI", netcdf.read_columns(file))
     assert mine["axis"].attrs == {"long_name": "length of the axle", "units": "m"}
-    assert columns.read(None) == {}
+    assert netcdf.read_columns(None) == {}
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_a_line_that_declares_no_column_is_refused(tmp_path, line):
     file = tmp_path / "columns.tsv"
     file.write_text(f"variable\tunits\twithout_units\tflags\tlong_name\n{line}\n")
     with pytest.raises(SymtopError, match=f"line {len(line.splitlines() or [line]) + 1} must be .* not '"):
-        columns.read(file)
+        netcdf.read_columns(file)
 
 
 def test_flags_are_numbers_with_meanings():
@@ -99,7 +99,7 @@ def bare(data: netcdf.Tree) -> xr.DataTree:
     return xr.DataTree.from_dict({path or "/": group.drop_attrs() for path, group in netcdf.groups(data).items()})
 
 
-def assert_declared(data: xr.Dataset | xr.DataTree, own: dict[str, columns.Column]) -> None:
+def assert_declared(data: xr.Dataset | xr.DataTree, own: dict[str, netcdf.Column]) -> None:
     """Every variable has its name and units, none of which comes from elsewhere, and no line is left over."""
     assert lacking(data) == []
     assert len(lacking(bare(data))) > 4
@@ -111,7 +111,7 @@ def assert_declared(data: xr.Dataset | xr.DataTree, own: dict[str, columns.Colum
         for name, variable in group.variables.items():
             errors = columns.ERROR_TABLE if "axis_bound" in group else {}
             column = own.get(f"{path}/{name}", own.get(name))
-            entry = column.entry if column else errors.get(name, (netcdf.VARIABLES | columns.ANY).get(name, ("",)))
+            entry = column.entry if column else errors.get(name, netcdf.VARIABLES.get(name, ("",)))
             assert variable.attrs["long_name"].startswith(entry[0]), name
             assert ("flag_values" in variable.attrs) is bool(column and column.flags), name
 

@@ -37,7 +37,9 @@ def faults(name, figure) -> list[str]:
     least, text = least_text(figure)
     if least < style.LEAST_TEXT - 1e-9:
         found.append(f"{text!r} has {least:.1f} points")
-    if not figure.get_suptitle() and runner.page_of(name) is None:  # a template has the titles of its figures
+    if (
+        not figure.get_suptitle() and runner.file_beside(name, "page.md") is None
+    ):  # a template has the titles of its figures
         found.append("no message")
     legends = [*figure.legends, *(axis.get_legend() for axis in figure.axes if axis.get_legend())]
     most = max((len(one.get_texts()) for one in legends), default=0)
@@ -62,7 +64,7 @@ def test_every_figure_can_be_read_in_print(name, quick_results):
 
 
 def test_a_figure_that_cannot_be_read_is_found(monkeypatch):
-    monkeypatch.setattr(runner, "page_of", lambda name: None)  # as of a study without a template
+    monkeypatch.setattr(runner, "file_beside", lambda *_: None)  # as of a study without a template
     figure, axes = style.panels(1, 1)
     axes[0, 0].plot([0.0, 1.0], [0.0, 1.0], label="one")
     style.headline(figure, "A message")

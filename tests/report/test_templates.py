@@ -10,7 +10,7 @@ from symtop.report.page import TEMPLATES
 from symtop.runner import run as runner
 
 FRONT = TEMPLATES / "front.md"
-PAGES = {name: page for name in runner.names() if (page := runner.page_of(name)) is not None}
+PAGES = {name: page for name in runner.names() if (page := runner.file_beside(name, "page.md")) is not None}
 TEXTS = {name: page.read_text(encoding="utf-8") for name, page in {"front": FRONT, **PAGES}.items()}
 CALL = re.compile(r"{% call figure\((.*?)\) %}(.*?){% endcall %}", re.DOTALL)
 MOST_LINES, MOST_FIGURES, MOST_WORDS = 120, 3, 1400  # of a template

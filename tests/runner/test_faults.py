@@ -463,7 +463,7 @@ def test_errors_of_the_place_are_not_errors_of_a_case(tmp_path):
     """Sources that changed under a running study end it: nothing else would do better."""
     study = runner.load(str(PROBE))
     case = study.cases(True)[0]
-    [path] = store.case_paths(tmp_path, study, [case])
+    path = store.case_path(tmp_path, study, case)
     task = work.Task(str(PROBE), case, path, (), 10.0)
     assert work.execute_case(task).state == "computed"
     assert work.execute_case(task).state == "found"

@@ -99,6 +99,6 @@ def test_cases_that_differ_in_their_group_alone_have_files_of_their_own(tmp_path
 
     study = load("drift")
     cases = [Case("spheroid", "strang", {"steps": 1}, group=group) for group in ("windows", "rounding")]
-    paths = store.case_paths(tmp_path, study, cases)
+    paths = [store.case_path(tmp_path, study, case) for case in cases]
     assert len({store.identity_of(path) for path in paths}) == 2
     assert len({store.digest_of(path) for path in paths}) == 2

@@ -46,16 +46,16 @@ def edited(place):
 
 def forget():
     fingerprint._known.clear()
-    fingerprint._code.cache_clear()
+    fingerprint.reached.cache_clear()
 
 
 def stale_after(place, study):
     """Integrators of a study's cases whose digest changes with an edit."""
     cases = study.cases(True)
-    before = fingerprint.digests(study, cases)
+    before = [fingerprint.digest(study, case) for case in cases]
     with edited(place):
-        after = fingerprint.digests(study, cases)
-    assert before == fingerprint.digests(study, cases)
+        after = [fingerprint.digest(study, case) for case in cases]
+    assert before == [fingerprint.digest(study, case) for case in cases]
     return {case.integrator for case, one, two in zip(cases, before, after, strict=True) if one != two}
 
 
@@ -166,13 +166,15 @@ def test_all_digests_of_all_studies_are_the_same_whatever_the_process_has_run():
     """Values that calls have left in modules are state and count for nothing."""
     studies = [runner.load(name) for name in ("convergence", "cost", "notebook")]
     grids = [study.cases(True)[:20] for study in studies]
-    before = [fingerprint.digests(study, grid) for study, grid in zip(studies, grids, strict=True)]
+    before = [[fingerprint.digest(study, case) for case in grid] for study, grid in zip(studies, grids, strict=True)]
     symtop.simulate("spheroid", "strang", step_size=0.01)
     symtop.reference("cusp", [0.0, 1.0])
     symtop.ensemble(symtop.population(5, seed=1), "rk4", step_size=0.01, horizon=0.1, samples=3)
     studies[0].measure(grids[0][0])
     forget()
-    assert [fingerprint.digests(study, grid) for study, grid in zip(studies, grids, strict=True)] == before
+    assert [
+        [fingerprint.digest(study, case) for case in grid] for study, grid in zip(studies, grids, strict=True)
+    ] == before
 
 
 def test_a_function_counts_alike_before_and_after_a_kernel_registers_it():
@@ -237,7 +239,7 @@ def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
         importlib.invalidate_caches()
         shutil.rmtree(tmp_path / "__pycache__", ignore_errors=True)
         study = runner.load(str(script))
-        digests.add(fingerprint.digests(study, study.cases(True))[0])
+        digests.add(fingerprint.digest(study, study.cases(True)[0]))
     assert len(digests) == 9  # the caption alone changes nothing
 
 

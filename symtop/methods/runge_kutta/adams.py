@@ -30,7 +30,8 @@ from symtop.core.jit import register_jitable
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import add, row_of, store
-from symtop.methods.runge_kutta.pairs import Method, integrator, nothing_more, rms, zero
+from symtop.methods.runge_kutta.pairs import Method, integrator, nothing_more, rms
+from symtop.methods.vectors import zero
 
 HIGHEST = 12  # of k
 SUMS, NUMBERS = HIGHEST + 2, 2 * HIGHEST + 2  # rows of the memory: phi, then sums of phi*, then numbers of order i

@@ -20,7 +20,7 @@ from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import LEAST_TOLERANCE, chart_outcome, on_angles
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.runge_kutta.explicit import row_of, store
+from symtop.methods.runge_kutta.explicit import row_of, store, written_out
 from symtop.methods.runge_kutta.pair_tables import Row
 from symtop.methods.runge_kutta.pairs import Method, rms, solver, summed, trying
 from symtop.methods.splitting.angles import force_angles
@@ -72,21 +72,18 @@ def kicks(par: Any, theta: Any) -> Any:
 
 
 def _stages(nodes: Sequence[float], rows: Sequence[Row]) -> Any:
-    """``(par, state, first, h)`` to the k of a step, a tuple of tuples."""
-    if not rows:
+    """``(par, state, first, slopes, h)`` to the k of a step, a tuple of tuples; nothing is read from `slopes`."""
 
-        def alone(par, state, first, h):  # type: ignore[no-untyped-def]
-            return (first,)
+    def stage(i: int) -> Callable[..., Any]:
+        bend, node = summed(rows[i - 1]), nodes[i - 1]
 
-        return register_jitable(alone)
-    before, bend, node = _stages(nodes[:-1], rows[:-1]), summed(rows[-1]), nodes[-1]
+        def k(par, state, made, slopes, h):  # type: ignore[no-untyped-def]
+            flown = state[0] + node * h * state[1] / par.I1
+            return kicks(par, bend((flown,), made, h * h / par.I1)[0])
 
-    def stages(par, state, first, h):  # type: ignore[no-untyped-def]
-        made = before(par, state, first, h)
-        flown = state[0] + node * h * state[1] / par.I1
-        return (*made, kicks(par, bend((flown,), made, h * h / par.I1)[0]))
+        return k
 
-    return register_jitable(stages)
+    return written_out(len(rows) + 1, stage)
 
 
 def _total(weights: Row, velocity: Row) -> Any:
@@ -134,7 +131,7 @@ class Nystrom(NamedTuple):
         @register_jitable
         def made_of(par, state, slopes, h):  # type: ignore[no-untyped-def]
             first = row_of(slopes, 0, state)
-            return stages(par, state, (first[1], first[2], first[3], state[0]), h)
+            return stages(par, state, (first[1], first[2], first[3], state[0]), slopes, h)
 
         @register_jitable
         def after(par, state, made, h):  # type: ignore[no-untyped-def]

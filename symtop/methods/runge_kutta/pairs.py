@@ -36,8 +36,9 @@ from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import Body, Start, as_it_steps
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.runge_kutta.explicit import Tableau, add, plus, row_of, store, weighted
+from symtop.methods.runge_kutta.explicit import Tableau, add, plus, row_of, store, weighted, written_out
 from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5, VERN9, Row, Table
+from symtop.methods.vectors import zero
 
 BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
 EVALUATIONS = 1_000_000_000  # a run's limit: about half a minute
@@ -54,14 +55,6 @@ class Method(NamedTuple):
     rows: int
     last: int  # the row of f(y+) after a step
     power: float  # of the error in the choice of the first step
-
-
-@register_jitable
-def zero(state: Any) -> Any:
-    """A state of zeros."""
-    for m in range(len(state)):
-        state = set_item(state, m, 0.0)
-    return state
 
 
 @register_jitable
@@ -119,9 +112,7 @@ def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, toleran
     """SciPy's initial step: 1 % of |y|/|f|, then from the size of the second derivative, by one evaluation of f."""
     d0, d1 = rms(state, state, state, tolerance), rms(slope, state, state, tolerance)
     trial = min(1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1, end)
-    bent = field(par, add(state, slope, trial))
-    for m in range(len(state)):
-        bent = set_item(bent, m, bent[m] - slope[m])
+    bent = add(field(par, add(state, slope, trial)), slope, -1.0)
     d2 = rms(bent, state, state, tolerance) / trial
     guess = max(1e-6, 1e-3 * trial) if max(d1, d2) <= 1e-15 else (0.01 / max(d1, d2)) ** -power
     return min(100.0 * trial, guess, end)
@@ -223,21 +214,18 @@ def summed(weights: Sequence[float]) -> Any:
 
 def _stages(field: Callable[..., Any], rows: Sequence[Row], keep: Callable[..., Any]) -> Any:
     """``(par, state, first, slopes, h)`` to the slopes of a step, a tuple of tuples; `keep` writes each down."""
-    if not rows:
 
-        def alone(par, state, first, slopes, h):  # type: ignore[no-untyped-def]
-            return (first,)
+    def stage(i: int) -> Callable[..., Any]:
+        place = summed(rows[i - 1])
 
-        return register_jitable(alone)
-    before, place, last = _stages(field, rows[:-1], keep), summed(rows[-1]), len(rows)
+        def slope(par, state, made, slopes, h):  # type: ignore[no-untyped-def]
+            new = field(par, place(state, made, h))
+            keep(slopes, i, new)
+            return new
 
-    def stages(par, state, first, slopes, h):  # type: ignore[no-untyped-def]
-        made = before(par, state, first, slopes, h)
-        slope = field(par, place(state, made, h))
-        keep(slopes, last, slope)
-        return (*made, slope)
+        return slope
 
-    return register_jitable(stages)
+    return written_out(len(rows) + 1, stage)
 
 
 class Pair(NamedTuple):

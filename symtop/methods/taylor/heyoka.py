@@ -21,8 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.multiprecision import context
-from symtop.core.numbers import EPSILON
+from symtop.core.numbers import EPSILON, context
 from symtop.methods.framework.plan import Plan, Run
 from symtop.methods.framework.registry import Array, Integrator, Solver
 from symtop.model import charts

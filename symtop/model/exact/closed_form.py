@@ -34,12 +34,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symtop.core.errors import SymtopError
-from symtop.core.lazy_kernel import LazyKernel
 from symtop.core.numbers import real_numbers
 from symtop.model.charts import Array
 from symtop.model.exact import layout as at, samples
 from symtop.model.exact.constants import DONE, OUT_OF_RANGE, UNMET, UNRESOLVED, all_constants
 from symtop.model.exact.digits import Motion
+from symtop.model.lazy_kernel import LazyKernel
 from symtop.model.top import LARGEST, NUMBERS, Angles, SymmetricTop, flat
 
 ARITHMETIC = ("double", "double-double", "quad-double", "40 digits")  # by `layout.EXACTLY`, `layout.DOUBLE_DOUBLE`, ...

@@ -171,8 +171,8 @@ def _lay_out() -> Any:  # noqa: C901  (one loop, read in one piece)
                         for k in range(counts[i]):
                             times[i, k] = marks[i, k] * h[i]
                     times[i, counts[i] :] = np.nan
-                    asked = row == 0 and long_enough
-                    if not asked or unseen(times[i, : counts[i]], period[i], phases[: counts[i]]) < WIDEST_GAP:
+                    judged = row == 0 and long_enough
+                    if not judged or unseen(times[i, : counts[i]], period[i], phases[: counts[i]]) < WIDEST_GAP:
                         break
 
     return compile_kernel(lay_out)

@@ -5,7 +5,7 @@ import math
 import pytest
 from scipy.optimize import brentq
 
-from symtop.core.numbers import newton_between
+from symtop.model.top import newton_between
 
 LN2 = 0.6931471805599453
 FUNCTIONS = {
