@@ -73,6 +73,7 @@ def telling(words: str) -> Iterator[None]:
             yield
         finally:
             _listeners.remove(lines)
+            lines.kill()  # it has nothing to finish; its start alone takes longer than most commands that are refused
 
 
 def post(words: str) -> None:
