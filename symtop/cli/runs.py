@@ -105,7 +105,9 @@ def run(
 
 def estimate(steps: float, run: Callable[[int], object]) -> None:
     """Say before a run of so many steps how long it takes, if that is above ten seconds; `run` makes a few steps."""
-    if steps < MANY * FEW:
+    from symtop.run.guard import MOST_STEPS
+
+    if not MANY * FEW < steps <= MOST_STEPS:  # more are refused
         return
     with ticking("timing some steps"):
         took = 0.0
