@@ -123,8 +123,7 @@ SWEEP = [
     pytest.param(name, scene, marks=[] if name in QUICK and scene == "spheroid" else pytest.mark.slow)
     for name in METHODS
     for scene in ("spheroid", "goldstein")
-    if (name, scene)
-    != ("sofroniou-spaletta-10", "spheroid")  # rounding comes first: `test_accuracy` has it in long double
+    if (name, scene) != ("sofroniou-spaletta-10", "spheroid")  # rounding comes first; see `test_accuracy`
 ]
 
 
