@@ -6,6 +6,7 @@ runs: silent 20 and 0 of 7218 wrong ones, false alarms 1.8 % and 0.4 % of 8787 r
 
 import math
 import time
+import warnings
 
 import pytest
 
@@ -79,6 +80,24 @@ def test_growth_is_that_of_linear_theory_for_methods_that_are_not_symmetric():
     for name, sign in (("physx", 1.0), ("rapier", 1.0), ("yade", -1.0), ("bullet", -1.0)):
         found = nutation_growth(symtop.integrator(name), scene, 0.1 / frequency, "axis", frequency)
         assert sign * (found.factor - 1.0) > 1e-3
+
+
+def test_growth_says_how_far_rounding_hides_it():
+    """In fifty fine steps the motion hardly turns, and two roots cannot be told apart: that is no growth."""
+    scene = nutating()
+    method, frequency = symtop.integrator("rk4"), landmarks(scene).frequency
+    for turn in (1e-3, 1e-4, 1e-5, 1e-6):  # the truth is 1 - turn^6/144
+        growth = nutation_growth(method, scene, turn / frequency, "axis", frequency)
+        assert abs(growth.factor - 1.0) <= growth.doubt
+    assert nutation_growth(method, scene, 0.5 / frequency, "axis", frequency).doubt < 1e-7
+    engine = nutation_growth(symtop.integrator("rapier"), scene, 0.01 / frequency, "axis", frequency)
+    assert engine.factor - 1.0 > 10.0 * engine.doubt  # the control: growth that is there is seen
+
+
+def test_a_run_of_very_fine_steps_is_not_warned_of():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        symtop.simulate("spheroid", "rk4", step_size=1e-6, horizon=0.5, samples=2)
 
 
 def test_growth_does_not_see_what_two_runs_share():
