@@ -5,7 +5,6 @@ import errno
 import functools
 import importlib
 import json
-import math
 import shutil
 import sys
 import tempfile
@@ -176,15 +175,7 @@ def warn(sentence: str) -> None:
 
 def as_text(content: Any) -> str:
     """JSON of anything; a number that is not finite, of which JSON knows none, is null."""
-    return json.dumps(_finite(content), indent=1, allow_nan=False)
-
-
-def _finite(content: Any) -> Any:
-    if isinstance(content, dict):
-        return {name: _finite(value) for name, value in content.items()}
-    if isinstance(content, (list, tuple)):
-        return [_finite(value) for value in content]
-    return None if isinstance(content, float) and not math.isfinite(content) else content
+    return json.dumps(json.loads(json.dumps(content), parse_constant=lambda _: None), indent=1)
 
 
 def say(sentence: str) -> None:

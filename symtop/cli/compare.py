@@ -57,6 +57,7 @@ def compare(
     with ticking("loading"):
         from symtop.core import netcdf
         from symtop.judging import comparison
+        from symtop.judging.findings import pace
         from symtop.measure.sweep import failed_setting
         from symtop.measure.timing import NOISY
 
@@ -91,7 +92,7 @@ def compare(
         if any(words):
             say(f"{cell['variant'].item()}: {'; '.join(filter(None, words))}")
     if timed:
-        exact = _time(data["exact_seconds"].item())
+        exact = pace(data["exact_seconds"].item())
         say(f"The exact motion takes {exact}. A time is that of one call of the solver, with nothing around it.")
         if float((data["seconds_spread"] > NOISY).sum() / data["seconds_spread"].notnull().sum()) > 0.5:
             warn("the machine is busy: times are the least of some, and most others took a quarter longer")
@@ -109,12 +110,9 @@ def _record(cell: "xr.Dataset", target: float, place: int) -> dict[str, Any]:
 def _cell(record: dict[str, Any], timed: bool) -> str:
     if not record["reached"]:
         return f"not: {record['reason']}"
+    from symtop.judging.findings import pace
+
     steps, tolerance = record["steps_per_nutation"], record["tolerance"]
     fixed, formula = not math.isnan(record["step_size"]), math.isnan(tolerance)
     setting = (f"{steps:.3g}" if steps < 1e3 else f"{steps:.0f}") if fixed else "-" if formula else f"{tolerance:.0e}"
-    return f"{setting:>6} {_time(record['seconds']) if timed else '':>{7 * timed}} {record['force_evaluations']:.1e}"
-
-
-def _time(seconds: float) -> str:
-    unit, name = (1e6, "us") if seconds < 1e-3 else (1e3, "ms") if seconds < 1.0 else (1.0, "s")
-    return f"{seconds * unit:.3g} {name}"
+    return f"{setting:>6} {pace(record['seconds']) if timed else '':>{7 * timed}} {record['force_evaluations']:.1e}"

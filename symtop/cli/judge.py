@@ -13,7 +13,7 @@ from symtop.core.errors import SymtopError
 from symtop.core.progress import ticking
 
 CHARTS = ("axis", "attitude", "angles")
-BESIDE, MOST_BESIDE = ("rk4", "strang", "dop853", "taylor"), 2e4  # methods, and force evaluations of a run
+BESIDE, NUTATIONS, MOST_BESIDE = ("rk4", "strang", "dop853", "taylor"), 10.0, 2e4  # of runs, and their evaluations
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
 
 
@@ -80,7 +80,7 @@ def judge(
     if as_json:
         click.echo(as_text([finding.plain() for finding in ledger.findings]))
     else:
-        click.echo(findings.summary(ledger.findings, ledger.implied))
+        click.echo(findings.summary(ledger))
     if output is not None:
         from symtop.core import netcdf
 
@@ -91,30 +91,32 @@ def judge(
         for file, write in ((card, cards.card), (badge, cards.write_badge)):
             if file is not None:
                 write(ledger, file)
-    _draw_beside(target, scene, figure, options)
+    _draw_beside(target, scene, figure, as_json, options)
     say_written(output, card, badge, figure, err=as_json)
     if ledger.refuted:
         sys.exit(1)
 
 
-def _draw_beside(target: str, scene: str, file: str | None, options: dict[str, Any]) -> None:
-    """The figure of a step's error against force evaluations beside `BESIDE`, if a file was named."""
+def _draw_beside(target: str, scene: str, file: str | None, quiet: bool, options: dict[str, Any]) -> None:
+    """Draw a step's error against force evaluations beside `BESIDE`, if a file was named, and say who comes first."""
     if file is None:
         return
     with ticking("comparing"):
         from symtop.judging.adapters.adapter import integrator
         from symtop.judging.claims.subject import open_target
-        from symtop.judging.comparison import compare
+        from symtop.judging.comparison import compare, ranked
         from symtop.report.plot import draw_compare
 
         stepper = open_target(target, options["form"], options["chart"], adaptive=options["adaptive"])
         if stepper.chart not in CHARTS:
             raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
-        method = integrator(stepper, order=options["order"])
-        data = compare(
-            scene, [method, *BESIDE], cost="evaluations", nutations=10.0, budget=MOST_BESIDE, quiet=True
-        )  # fmt: skip
+        methods = [integrator(stepper, order=options["order"]), *BESIDE]
+        data = compare(scene, methods, cost="evaluations", nutations=NUTATIONS, budget=MOST_BESIDE, quiet=True)
         draw_compare(data, file)
+    most, errors = ranked(data)
+    if not quiet and errors:
+        words = ", ".join(f"{name} {error:.0e}" for name, error in errors.items())
+        say(f"Axis error (rad) for {most:.0f} force evaluations in {NUTATIONS:g} nutations: {words}.")
 
 
 @click.command(short_help="Measure what integrators claim about themselves.")

@@ -179,3 +179,14 @@ def cheapest(data: xr.Dataset, target: float) -> np.ndarray:
     cost = data["seconds" if data.attrs["cost"] == "time" else "force_evaluations"].values
     good = (data["outcome"].values == "ok") & (data["error"].values <= target) & np.isfinite(cost)
     return np.where(good.any(axis=1), np.argmin(np.where(good, cost, np.inf), axis=1), -1)
+
+
+def ranked(data: xr.Dataset) -> tuple[float, dict[str, float]]:
+    """Force evaluations that every variant can spend, and the least error of each within them, the best first.
+
+    A variant whose evaluations nobody counts has no place.
+    """
+    work = data["force_evaluations"].where((data["outcome"] == "ok") & (data["force_evaluations"] > 0.0))
+    most = float(work.max("setting").min())
+    errors = data["error"].where(work <= most).min("setting").to_series().dropna()
+    return most, {str(name): float(error) for name, error in errors.sort_values().items()}

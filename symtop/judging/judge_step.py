@@ -18,12 +18,13 @@ time, elapsed since the start of the scene, and any of
 A netCDF file has time, axis (n, 3), quaternion (n, 4), momentum (n, 3) and the same scalars, or is one of `simulate`.
 """
 
+import functools
 import math
 import secrets
 import time
-from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -33,7 +34,7 @@ from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, who
 from symtop.judging.adapters.adapter import heartbeat
 from symtop.judging.battery import Stage, measure, stages, unmeasured
 from symtop.judging.claims.constants import KEPT, Constant
-from symtop.judging.claims.subject import Request, Subject
+from symtop.judging.claims.subject import Subject, open_target, timed
 from symtop.judging.findings import NOTHING, About, Finding, Ledger, Measured, StepLedger, undecided
 from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
 from symtop.measure.conservation import CONSTANTS, constant_of
@@ -43,7 +44,6 @@ from symtop.model.charts import CHARTS, space_energy
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.trajectory import Trajectory
 
-Listener = Callable[[About | Finding], object]
 FILES = (".csv", ".txt", ".dat", ".nc")
 VECTORS = {"axis": ("ex", "ey", "ez"), "quaternion": ("qw", "qx", "qy", "qz"), "momentum": ("Lx", "Ly", "Lz")}
 SCALARS = ("time", "theta", "phi", "psi", *CONSTANTS)
@@ -60,7 +60,7 @@ def judge(
     order: int | None = None, symplectic: bool | None = None, symmetric: bool | None = None,
     explicit: bool | None = None, conserves: Collection[str] | None = None, energy: str | None = None,
     adaptive: bool = False, autonomous: bool = False, quick: bool = False, seed: int | None = None,
-    tell: Listener | None = None,
+    tell: Callable[[About | Finding], object] | None = None,
 ) -> StepLedger:  # fmt: skip
     """Judge anything that steps: its order, structure, invariants and drift on the top, beside what is claimed of it.
 
@@ -94,48 +94,48 @@ def judge(
     one_of("chart", chart, CHARTS)
     if not isinstance(energy, str | None) or energy not in ENERGY_ERRORS:
         raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {shown(energy)}", "energy")
-    claims = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
-    claims_of_energy = {"conserves": conserves, "energy_error": energy}
-    chosen = secrets.randbelow(SEEDS) if seed is None else whole("seed", seed, 0, SEEDS)
-    flags = boolean("adaptive", adaptive), find_scene(scene), boolean("quick", quick)
-    given = target, form, chart, *flags, claims | claims_of_energy, chosen
-    request = Request(*given, boolean("autonomous", autonomous))
-    made = request.claimed()  # claims that make no sense are refused before anything is loaded
-    implied = ({"time"} - ({"time"} if autonomous else set())) | (
-        {"energy"} if energy is None and "energy" not in (made.conserves or ()) else set()
-    )
-    table = isinstance(target, (xr.Dataset, Mapping))
+    chosen, listen = find_scene(scene), tell or (lambda _: None)
+    told = {"adaptive": adaptive, "autonomous": autonomous, "quick": quick}
+    for name, flag in told.items():
+        boolean(name, flag)
+    drawn = secrets.randbelow(SEEDS) if seed is None else whole("seed", seed, 0, SEEDS)
+    structure: dict[str, Any] = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
+    claims = structure | {"conserves": conserves, "energy_error": energy}
+    made = Integrator("claims", "other", "", {chart: _no_solver}, **claims)  # checked before anything is loaded
+    kept = made.conserves or frozenset()
     file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES)
-    if form is None and (table or file):
-        if {order, symplectic, symmetric, explicit} != {None}:
+    if form is None and (file or isinstance(target, (xr.Dataset, Mapping))):
+        if set(structure.values()) != {None}:
             raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
-        implied, about = (
-            set(),
-            About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory", "", "", 0.0),
-        )
-        findings_of_it = of_trajectory(target, request.scene, made.conserves or (), energy)
-        events: Iterable[About | Results] = [about, Results(findings_of_it, {})]
-    else:
-        events = run(request)
-    findings: list[Finding] = []
-    traces: dict[str, Any] = {}
-    listen = tell or (lambda _: None)
-    try:
-        for event in events:
-            if isinstance(event, About):
-                about = event
-                listen(about)
-                continue
-            for one in event.findings:
-                listen(one)
-            findings += event.findings
-            traces |= event.traces
-    finally:
-        if isinstance(events, Generator):
-            events.close()  # also where the one that listens has raised: its process ends
-    if not findings:
-        raise SymtopError("it cannot be judged: its process ended before it was open")
-    return StepLedger(about.name, request.scene.name, tuple(findings), traces, about, frozenset(implied))
+        found = tuple(of_trajectory(target, chosen, kept, energy))
+        about = About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory", "", "", 0.0)
+        listen(about)
+        for finding in found:
+            listen(finding)
+        return StepLedger(about.name, chosen.name, found, {}, about)
+    implied = {"time": not autonomous, "energy": energy is None and "energy" not in kept}
+    heartbeat.reset(quick=quick)
+    began, findings = time.monotonic(), list[Finding]()
+    load = functools.partial(open_target, target, form, chart, adaptive=adaptive)
+    with Process(lambda: table_of(load)) as process:
+        process.allow(OPENING)
+        try:
+            stepper = Remote(process)
+            subject = timed(stepper, chosen, claims, quick=quick, seed=drawn, autonomous=autonomous)
+        except SymtopError as error:
+            raise SymtopError(f"it cannot be judged: {error}") if process.lost else error from None
+        facts = stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step
+        about = About(*facts, drawn, chosen.time_scale())
+        listen(about)
+        for finding in _measured("step", subject, process, began, QUICK_VERDICT if quick else VERDICT):
+            listen(finding)
+            findings.append(finding)
+    follow = frozenset(name for name, follows in implied.items() if follows)
+    return StepLedger(about.name, chosen.name, tuple(findings), subject.traces, about, follow)
+
+
+def _no_solver(*_: Any) -> Any:
+    raise SymtopError("these are claims alone, without a step to run")
 
 
 def read(target: Any) -> dict[str, Any]:
@@ -144,25 +144,24 @@ def read(target: Any) -> dict[str, Any]:
         return {name: np.asarray(target[name]) for name in (*VECTORS, *SCALARS) if name in target}
     path = at_home(target)
     try:
-        head, *lines = path.read_text(encoding="utf-8-sig").splitlines()
+        head, *lines = path.read_text(encoding="utf-8-sig").replace(",", " ").splitlines()
     except (OSError, UnicodeDecodeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is no text, or empty"
         raise SymtopError(f"the trajectory {path} cannot be read: {reason}") from None
-    names = head.lstrip("# ").replace(",", " ").split()
+    names = head.lstrip("# ").split()
     known = (*SCALARS, *(part for parts in VECTORS.values() for part in parts))
     if not set(names) <= set(known) or "time" not in names or len(set(names)) < len(names):
         raise SymtopError(
             f"{path.name} must begin with a line of names, time and of {', '.join(known[1:])}, not {head[:60]!r}"
         )
-    rows = [line.replace(",", " ").split() for line in lines if line.strip()]
+    rows = [line.split() for line in lines if line.strip()]
     for k, row in enumerate(rows):
         if len(row) != len(names):
             raise SymtopError(f"{path.name} must have {len(names)} numbers a line, and row {k + 1} has {len(row)}")
     try:
-        table = np.array(rows, dtype=float).reshape(-1, len(names))
+        columns = dict(zip(names, np.array(rows, dtype=float).reshape(-1, len(names)).T, strict=True))
     except ValueError as error:
         raise SymtopError(f"{path.name} must hold numbers: {error}") from None
-    columns = dict(zip(names, table.T, strict=True))
     for name, parts in VECTORS.items():
         if set(parts) <= set(columns):
             columns[name] = np.stack([columns[part] for part in parts], axis=-1)
@@ -228,51 +227,26 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     """What became of a constant of the motion, beside what is claimed of it."""
     scale, grain = (scene.energy_scale, scene.energy_grain) if name == "energy" else (scene.momentum_scale, 1.0)
     true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)
-    change = (values - values[0]) / scale
-    constant = Constant(constant_of(time, change), math.nan, KEPT * grain, grain)
-    largest, off = constant.changed.largest, abs(values[0] - true) / scale
-    why = f"largest relative change {largest:.1e} in {time.size} samples; it begins {off:.1e} from the scene's"
-    kind = constant.kind if time.size >= FEWEST else "kept" if largest <= constant.floor else "unknown"
-    if kind == "unknown":
-        why = f"{why}; no law of growth to judge it by"
-        return Finding(name, declared, NOTHING, "undecided", why, largest, constant.floor)
-    if kind != "kept":
-        why += f", growth exponent {constant.changed.exponent:.2f} +- {constant.changed.exponent_interval:.2f}"
-    if declared == "bounded" and constant.grows is None:
-        why = f"{why}, which leaves open whether it grows"
-        return Finding(name, declared, NOTHING, "undecided", why, largest, constant.floor)
-    holds = {"kept": kind == "kept" or largest <= constant.floor, "bounded": not constant.grows}.get(declared)
-    verdict = "measured" if holds is None else "confirmed" if holds else "refuted"
-    return Finding(name, declared, Measured(kind, largest), verdict, why, largest, constant.floor)
-
-
-class Results(NamedTuple):
-    """The findings of one stage, and what a figure shows of all stages so far."""
-
-    findings: list[Finding]
-    traces: dict[str, Any]
-
-
-def run(request: Request) -> Iterator[About | Results]:
-    """First what is judged, then findings as they are made; SymtopError if it cannot be opened or makes no step."""
-    heartbeat.reset(quick=request.quick)
-    began, todo = time.monotonic(), stages("step")
-    with Process(lambda: table_of(request.opened)) as process:
-        process.allow(OPENING)
-        try:
-            subject = request.open(Remote(process))
-        except SymtopError as error:
-            raise SymtopError(f"it cannot be judged: {error}") if process.lost else error from None
-        stepper = subject.stepper
-        yield About(stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step, request.seed)
-        yield from _measured(todo, subject, process, began, QUICK_VERDICT if request.quick else VERDICT)
+    changed = constant_of(time, (values - values[0]) / scale)
+    if time.size < FEWEST:
+        changed = changed._replace(exponent=math.nan)
+    constant = Constant(changed, math.nan, KEPT * grain, grain)
+    kind, verdict, off = constant.kind, constant.verdict(declared), abs(values[0] - true) / scale
+    why = f"largest relative change {changed.largest:.1e} in {time.size} samples; it begins {off:.1e} from the scene's"
+    if kind not in ("kept", "unknown"):
+        why += f", growth exponent {changed.exponent:.2f} +- {changed.exponent_interval:.2f}"
+    if verdict == "undecided":
+        why += "; no law of growth to judge it by" if kind == "unknown" else ", which leaves open whether it grows"
+    measured = NOTHING if kind == "unknown" else Measured(kind, changed.largest)
+    return Finding(name, declared, measured, verdict, why, changed.largest, constant.floor)
 
 
 def _measured(
-    todo: list[Stage], subject: Subject, process: Process, began: float, limits: tuple[float, float, float]
-) -> Iterator[Results]:
-    """The findings of each stage, undecided where its process was lost: all of a step that makes no call."""
+    kind: str, subject: Subject, process: Process, began: float, limits: tuple[float, float, float]
+) -> Iterator[Finding]:
+    """The findings on each claim, undecided where the process was lost: all of a step that makes no call."""
     most, together, least = limits
+    todo: list[Stage] = stages(kind)
     for stage in todo:
         process.allow(max(least, min(most, together - (time.monotonic() - began))))
         try:
@@ -280,20 +254,20 @@ def _measured(
         except SymtopError:
             if not process.lost:
                 raise
-        if not process.lost:
-            yield Results(findings, subject.traces)
-            continue
-        for left in todo if stage[0].name == "calls" else [stage]:
-            yield Results(unmeasured(left, subject.method, process.lost), {})
-        if stage[0].name == "calls":
+        first = stage[0].name == "calls"
+        if process.lost:
+            left = [claim for one in (todo if first else [stage]) for claim in one]
+            findings = unmeasured(tuple(left), subject.method, process.lost)
+        yield from findings
+        if process.lost and first:
             return
 
 
 def apart(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
     """The ledger of a registered integrator, of `symtop.judging.battery.judge`, with what is not ours in a process."""
     heartbeat.reset(quick=quick)
+    limits = PLUGIN, math.inf, PLUGIN
     with Process(lambda: solvers_of(method)) as process:
         subject = Subject(separated(method, process), scene, quick, seed=secrets.randbelow(SEEDS))
-        parts = list(_measured(stages("integrator"), subject, process, time.monotonic(), (PLUGIN, math.inf, PLUGIN)))
-    findings = tuple(finding for part in parts for finding in part.findings)
+        findings = tuple(_measured("integrator", subject, process, time.monotonic(), limits))
     return Ledger(method.name, scene.name, findings, subject.traces)

@@ -38,6 +38,7 @@ THREADED = "jax"  # hangs in a process that was forked after its import
 LOOK = 0.05  # seconds between two looks
 WORDS = 160  # characters of what a process says before it ends
 FORMS = {"rotation": ROTATION, "matrix": MATRIX, "plane": REDUCED}  # others have that of their chart
+FACTS = ("name", "chart", "implementation", "own_loop", "takes_field")  # of a stepper, that are sent
 
 
 class Process:
@@ -182,27 +183,21 @@ def tried(call: Callable[[], Any], what: str, seconds: float = 60.0) -> None:
 
 def table_of(opened: Callable[[], Stepper]) -> Table:
     """The functions of a stepper that `Remote` asks for."""
-    stepper = opened()
+    stepper: Any = opened()
 
-    def march(since: float, *args: Any) -> dict[str, Any]:
+    def march(since: float, *args: Any) -> tuple[Any, ...]:
         stepper.since = since
-        done = stepper.march(*args)
-        return {"states": done.states, "evaluations": done.evaluations, "wrote": stepper.wrote}
+        return *stepper.march(*args), stepper.wrote
 
-    def along(f: Any, *args: Any) -> dict[str, Any]:
-        return {"states": getattr(stepper, "along")(f, *args), "times": sorted(f.times)}  # noqa: B009
+    def along(f: Any, *args: Any) -> tuple[Any, ...]:
+        return stepper.along(f, *args), sorted(f.times)
 
     def about() -> dict[str, Any]:
-        names = ("name", "chart", "implementation", "own_loop", "takes_field")
-        facts = {name: getattr(stepper, name) for name in names}
+        facts = {name: getattr(stepper, name) for name in FACTS}
         kind = next((name for name, form in FORMS.items() if form is stepper.form), "")
         return facts | {"kind": kind, "adaptive": stepper.adaptive is not None}
 
-    def adaptive(*args: Any) -> dict[str, Any]:
-        assert stepper.adaptive is not None  # noqa: S101
-        return stepper.adaptive(*args)._asdict()
-
-    return {"march": march, "along": along, "about": about, "adaptive": adaptive}
+    return {"march": march, "along": along, "about": about, "adaptive": lambda *args: stepper.adaptive(*args)._asdict()}
 
 
 class Remote(Stepper):
@@ -212,7 +207,7 @@ class Remote(Stepper):
         self.process, facts = process, process.call("about")
         self.form = FORMS.get(facts["kind"]) or FORMULATIONS[facts["chart"]]
         self.adaptive = functools.partial(_run, process, "adaptive") if facts["adaptive"] else None
-        for name in ("name", "chart", "implementation", "own_loop", "takes_field"):
+        for name in FACTS:
             setattr(self, name, facts[name])
 
     def renew(self) -> None:
@@ -221,15 +216,15 @@ class Remote(Stepper):
 
     def march(self, top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks."""
-        done = self.process.call("march", self.since, top, par, y, h, marks)
-        self.wrote = bool(done["wrote"])
-        return March(np.array(done["states"], dtype=float).reshape(marks.size, y.size), int(done["evaluations"]))
+        states, evaluations, wrote = self.process.call("march", self.since, top, par, y, h, marks)
+        self.wrote = bool(wrote)
+        return March(np.array(states, dtype=float).reshape(marks.size, y.size), int(evaluations))
 
     def along(self, f: Any, t: float, y: Array, h: float, marks: Marks) -> Array:
         """The states at the marks for a right-hand side that can be sent, from a time t on."""
-        done = self.process.call("along", f, t, y, h, marks)
-        f.times.update(map(float, done["times"]))
-        return np.array(done["states"], dtype=float).reshape(marks.size, y.size)
+        states, times = self.process.call("along", f, t, y, h, marks)
+        f.times.update(map(float, times))
+        return np.array(states, dtype=float).reshape(marks.size, y.size)
 
 
 # ---- a registered integrator -----------------------------------------------------------------------------------------

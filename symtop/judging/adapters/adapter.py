@@ -54,6 +54,15 @@ class Stepper:
         """The state after marks[0], marks[1], ... steps of h from y."""
         raise NotImplementedError
 
+    def from_start(self, top: SymmetricTop, start: Angles, h: float) -> tuple[Array, Callable[..., Array]]:
+        """The state of a start, and a function (state, *marks) -> the states after so many steps of h."""
+        par, state = self.form.prepare(top, start)
+
+        def run(y: Array, *marks: int) -> Array:
+            return self.march(top, par, y.copy(), h, np.array(marks)).states
+
+        return np.array(state, dtype=float), run
+
 
 def repeat(once: Callable[[int, Any], Any], y: Any, marks: Marks, show: Callable[[Any], Array] = np.asarray) -> Array:
     """The states at the marks as `show` has them, of steps y = once(k, y); NaN once a state is not finite."""

@@ -28,6 +28,7 @@ and it may take `MOST_NEWTON` rounds. With a tolerance, rtol = atol, the class c
 """
 
 import contextlib
+import math
 import sys
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -195,6 +196,12 @@ def to_body(q: Any, vector: Any) -> Any:
     return to_space(q * np.array([1.0, -1.0, -1.0, -1.0]), vector)
 
 
+def _up_in_body(w: float, x: float, y: float, z: float) -> tuple[float, float]:
+    """The first two components of R(q)^T e_z for q of any length."""
+    size = w * w + x * x + y * y + z * z or math.nan
+    return 2.0 * (x * z - w * y) / size, 2.0 * (y * z + w * x) / size
+
+
 def _body_of(top: SymmetricTop, at: Angles) -> tuple[Body, tuple[float, ...]]:
     """The body and the state (q, w) of a start."""
     state = np.array(on_attitude(top, at)[1])
@@ -254,14 +261,14 @@ class RotationStep(FunctionStep):
 
     def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks."""
-        calls, down, shape = 0, np.array([0.0, 0.0, -par.mgl]), (3, 3) if self.form is MATRIX else (4,)
+        calls, shape = 0, (3, 3) if self.form is MATRIX else (4,)
 
         def torque(q: Any) -> Array:
             nonlocal calls
             calls += 1
             at = np.asarray(q, dtype=float)
-            moment: Array = np.cross([0.0, 0.0, 1.0], at.T @ down if shape == (3, 3) else to_body(at, down))
-            return moment
+            up = at[2] if shape == (3, 3) else _up_in_body(*at.tolist())
+            return np.array([par.mgl * up[1], -par.mgl * up[0], 0.0])
 
         def once(_: float, y: Array) -> Array:
             q = y[:-3].reshape(shape)
@@ -284,13 +291,18 @@ def _plane_of(top: SymmetricTop, at: Angles) -> tuple[Any, tuple[float, ...]]:
     return par, state[:2]
 
 
+def _plane_shown(_par: Any, _times: Array, states: Array) -> Array:
+    """States in angles, whose phi and psi, which the reduced motion has not, stand still."""
+    return np.pad(states, ((0, 0), (0, 2)))
+
+
 def _plane_momenta(par: Any, states: Array) -> tuple[Array, Array]:
     """p_phi and p_psi, which are parameters of the reduced motion."""
     p_phi = 0.5 * (par.north + par.south)
     return np.full(len(states), p_phi), np.full(len(states), par.p_psi)
 
 
-REDUCED = Formulation(_no_field, lambda y: chart_outcome(y[0]), _no_field, _plane_of, None, _plane_momenta)
+REDUCED = Formulation(_no_field, lambda y: chart_outcome(y[0]), _no_field, _plane_of, _plane_shown, _plane_momenta)
 
 
 class SeparableStep(FunctionStep):

@@ -11,9 +11,10 @@ import functools
 import inspect
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from symtop.judging.adapters.external import BatchStep, DiffraxSolver, Program, 
 from symtop.judging.adapters.python_step import REDUCED, PythonStep, RotationStep, ScipySolver, SeparableStep
 from symtop.judging.findings import yes_no
 from symtop.measure.conservation import CONSTANTS as MOTION
-from symtop.measure.step_map import generic_start
+from symtop.measure.step_map import drawn, generic_start
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import CHARTS
 from symtop.model.scenes import Scene
@@ -77,15 +78,22 @@ class Subject:
         """Does it move a state where f is zero? A method for y' = f(t, y) alone does not: this one knows the top."""
         if self.stepper is None or not self.stepper.takes_field or self.method.adaptive:
             return False
-        h, y = (
-            self.scene.time_scale() / ENOUGH_STEPS,
-            np.array(self.stepper.form.prepare(self.scene.top, self.scene.start)[1]),
-        )
+        h = self.scene.time_scale() / ENOUGH_STEPS
+        y, _ = self.stepper.from_start(self.scene.top, self.scene.start, h)
         try:
             end = self.stepper.along(Rest(), h, y.copy(), h, np.array([1]))[0]
         except SymtopError:  # it divides by f
             return True
         return not np.max(np.abs(end - y)) <= AT_REST * np.max(np.abs(y))
+
+    def elsewhere(self, draws: tuple[int, int], seconds: tuple[float, float]) -> Iterator[tuple[str, Scene]]:
+        """Starts that are drawn, with a name for each, while there are draws and seconds; the second with --quick."""
+        began = time.monotonic()
+        scenes = drawn(self.scene, draws[self.quick], self.seed, same_top=self.knows_top)
+        for k, scene in enumerate(scenes, start=1):
+            if time.monotonic() - began > seconds[self.quick]:  # a program that takes long to start
+                return
+            yield f"start {k} of seed {self.seed}", scene
 
     @property
     def charts(self) -> tuple[str, ...]:
@@ -109,46 +117,20 @@ class Subject:
         return max(steps, FEWEST)
 
 
-class Request(NamedTuple):
-    """A bare step as it was given, and the claims that are made for it."""
-
-    target: Any
-    form: str | None
-    chart: str
-    adaptive: bool
-    scene: Scene
-    quick: bool
-    claims: dict[str, Any]
-    seed: int = 0
-    autonomous: bool = False
-
-    def claimed(self) -> Integrator:
-        """The claims as a record without a step, checked before anything is loaded; SymtopError for nonsense."""
-
-        def refuse(*_: Any) -> Any:
-            raise SymtopError("these are claims alone, without a step to run")
-
-        return Integrator("claims", "other", "", {self.chart: refuse}, **self.claims)
-
-    def opened(self) -> Stepper:
-        """Load the step; SymtopError if it cannot be loaded."""
-        return open_target(self.target, self.form, self.chart, adaptive=self.adaptive)
-
-    def open(self, stepper: Stepper) -> Subject:
-        """Time what was loaded; SymtopError if it makes no step."""
-        method = integrator(stepper, **self.claims)
-        seconds = seconds_a_step(stepper, self.scene) if method.fixed_step else 0.0
-        return Subject(method, self.scene, self.quick, stepper, seconds, self.seed, self.autonomous)
+def timed(stepper: Stepper, scene: Scene, claims: dict[str, Any], **options: Any) -> Subject:
+    """A bare step and what it claims, after its steps have been timed; SymtopError if it makes none."""
+    method = integrator(stepper, **claims)
+    seconds = seconds_a_step(stepper, scene) if method.fixed_step else 0.0
+    return Subject(method, scene, stepper=stepper, seconds_a_step=seconds, **options)
 
 
 def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
     """Seconds a step, from runs of more and more steps; what a run costs at its start is left out."""
-    par, state = stepper.form.prepare(scene.top, generic_start(scene))
-    h, start = scene.time_scale() / 1000.0, np.array(state)
+    start, run = stepper.from_start(scene.top, generic_start(scene), scene.time_scale() / 1000.0)
 
     def seconds(steps: int) -> float:
         began = time.perf_counter()
-        stepper.march(scene.top, par, start.copy(), h, np.array([steps]))
+        run(start, steps)
         return time.perf_counter() - began
 
     first, steps = min(seconds(1), seconds(1)), 1

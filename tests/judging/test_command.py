@@ -32,13 +32,14 @@ def test_a_file_with_a_step_says_what_it_is(mine, tmp_path):
     code, output = judge(mine, "--quick", "--output", str(tmp_path / "found.nc"))
     assert code == 0
     assert re.search(r"^mine in the axis chart on spheroid, \S+ us a step, seed \d+$", output, re.MULTILINE)
-    assert re.search(r"^order +- +2\.00", output, re.MULTILINE)
+    assert re.search(r"^order +2\.00", output, re.MULTILINE)
     assert "It is: order 2, not symplectic, not reversible, keeps p_phi; not the energy" in output
     with xr.open_dataset(tmp_path / "found.nc") as data:
         assert str(data.sel(claim="order")["verdict"].values) == "measured"
 
 
-def test_a_false_claim_gives_code_1_and_says_why(mine):
+def test_a_false_claim_gives_code_1_and_says_why(mine, only):
+    only("order", "symplectic")
     code, output = judge(f"{mine}:step", "--order", "3", "--not-symplectic", "--quick", "--json")
     rows = {row["claim"]: row for row in json.loads(output)}
     assert code == 1
@@ -62,7 +63,8 @@ def test_bad_input_to_the_command(mine, arguments, words):
     assert words in output
 
 
-def test_a_target_may_be_at_home(mine, tmp_path, monkeypatch):
+def test_a_target_may_be_at_home(mine, tmp_path, monkeypatch, only):
+    only("order", "energy")
     monkeypatch.setenv("HOME", str(tmp_path))
     code, output = judge("~/mine.py", "--quick", "--card=~/card.html", "--badge", "~/badge.svg")
     assert code == 0, output
