@@ -223,7 +223,7 @@ class Remote(Stepper):
     def along(self, f: Any, t: float, y: Array, h: float, marks: Marks) -> Array:
         """The states at the marks for a right-hand side that can be sent, from a time t on."""
         states, times = self.process.call("along", f, t, y, h, marks)
-        getattr(f, "times", set()).update(map(float, times))
+        getattr(f, "times", set[float]()).update(map(float, times))
         return np.array(states, dtype=float).reshape(marks.size, y.size)
 
 
