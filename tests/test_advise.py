@@ -5,7 +5,6 @@ import random
 
 import numpy as np
 import pytest
-import xarray as xr
 from click.testing import CliRunner
 
 import symtop
@@ -122,16 +121,6 @@ def test_the_advised_lines_are_the_run_that_was_checked(horizon, monkeypatch):
     assert error[advice.step_size] == advice.expected_error
 
 
-def test_a_rounded_setting_that_misses_the_accuracy_is_not_advised(monkeypatch):
-    scene, method = symtop.scene("spheroid"), symtop.integrator("strang")
-    met = settings.attempt(scene, method, 0.0123456789, 8.0, "axis")
-    assert settings.rounded(scene, met, 1.0, "axis").setting == 0.012345
-    assert settings.rounded(scene, met, 1e-12, "axis") is met
-    short = settings.attempt(scene, method, 0.01, 8.0, "axis")
-    monkeypatch.setattr(settings, "attempt", lambda *_: pytest.fail("it runs what it knows"))
-    assert settings.rounded(scene, short, 1.0, "axis") is short
-
-
 def few(monkeypatch, count):
     """Only the first of some cheap methods are candidates."""
     names = ("strang", "takahashi-imada", "srkn-6-4", "kahan-li-6", "gauss-6")[:count]
@@ -153,13 +142,6 @@ def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_wi
     assert run.attrs["integrator"] == advice.integrator
 
 
-def test_an_older_study_is_refused_with_a_remedy(tmp_path):
-    tree = xr.DataTree.from_dict({"short": xr.Dataset({"cost": ("x", [1.0])})})
-    tree.to_netcdf(tmp_path / "cost.nc", engine="netcdf4")
-    with pytest.raises(symtop.SymtopError, match=r"older version, without .*nutations.*--fresh"):
-        symtop.recommend("spheroid", accuracy=1e-3, results=tmp_path)
-
-
 def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch):
     few(monkeypatch, 5)
     real, ended = settings.search, []
@@ -177,11 +159,6 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
     assert advice.integrator not in ended
     assert all(name in " ".join(advice.fails) for name in ended)
     assert "not to the end (stopped by rounding" in " ".join(advice.fails)
-
-
-def test_a_folder_without_a_study_is_refused():
-    with pytest.raises(symtop.SymtopError, match="symtop study cost first"):
-        symtop.recommend("spheroid", accuracy=1e-6, results="/nowhere")
 
 
 def test_the_command_prints_and_refuses(tmp_path, monkeypatch):
@@ -306,16 +283,3 @@ def test_limits_leave_out_what_a_user_cannot_use():
     slow = symtop.recommend(scene, accuracy=1e-3, step_size=0.002, time_a_step=1e-12)
     assert slow.integrator is None
     assert any(words.startswith("A step takes over 1e-12 s") for words in slow.fails)
-
-
-@pytest.mark.parametrize(
-    ("limit", "sentence"),
-    [
-        ({"step_size": 0.0}, "step_size must be above zero"), ({"max_step": -1.0}, "max_step must be above zero"),
-        ({"time_a_step": math.nan}, "time_a_step must be"), ({"general": "yes"}, "general must be"),
-        ({"keeps": "time"}, "keeps 'time' is unknown"),
-    ],
-)  # fmt: skip
-def test_a_limit_that_makes_no_sense_is_refused(limit, sentence):
-    with pytest.raises(symtop.SymtopError, match=sentence):
-        symtop.recommend("spheroid", accuracy=1e-3, **limit)

@@ -13,6 +13,7 @@ from symtop import __version__
 from symtop.cli import compare, doctor, judge, lists, runs, study
 from symtop.cli.common import Group, warn
 from symtop.core import files
+from symtop.core.progress import post
 
 
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -26,11 +27,11 @@ def main() -> None:
     symtop report
     """
 
-    def announce() -> None:
+    def announce() -> None:  # once, before the first kernel is compiled
         files.on_cold.clear()
-        warn(files.COMPILING)
+        (warn if files.is_terminal(sys.stderr) else post)(files.COMPILING)
 
-    files.on_cold[:] = [announce] if files.is_terminal(sys.stderr) else []  # once, before the first kernel is compiled
+    files.on_cold[:] = [announce]
 
 
 for command in (

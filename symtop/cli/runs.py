@@ -4,6 +4,8 @@ import math
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import click
@@ -13,7 +15,7 @@ from symtop.cli.common import File, as_text, check_outputs, completing, say, say
 from symtop.core.errors import SymtopError, whole
 from symtop.core.progress import ticking
 
-FEW = 100_000  # steps that are timed before a long run
+FEW, MANY = 100_000, 20  # steps that are timed before a run of many times as many
 SAME = 0.01  # relative difference of the step used from --step-size that is printed
 COMPARED = 100_000  # tops whose errors are shown, the first of the population: those of a million take 1 GB
 
@@ -62,7 +64,11 @@ def run(
         from symtop.run.reference.truth import reference
         from symtop.run.simulation import simulate
 
-        settings["step_size"] = common.step_of(scene, settings)
+        settings["step_size"] = h = common.step_of(scene, settings)
+        if h is not None and h > 0.0:
+            few_steps = partial(simulate, scene, integrator, step_size=h, samples=2, guard=False)
+            horizon = settings["horizon"] or scenes.scene(scene).horizon
+            estimate(horizon / h, lambda few: few_steps(horizon=min(few * h, horizon)))
         data = simulate(scene, integrator, guard=warn if guard else False, **settings)
         if output is not None:
             netcdf.write(data, output)
@@ -97,6 +103,22 @@ def run(
         sys.exit(3)
 
 
+def estimate(steps: float, run: Callable[[int], object]) -> None:
+    """Say before a run of so many steps how long it takes, if that is above ten seconds; `run` makes a few steps."""
+    from symtop.run.guard import MOST_STEPS
+
+    if not MANY * FEW < steps <= MOST_STEPS:  # more are refused
+        return
+    with ticking("timing some steps"):
+        took = 0.0
+        for few in (1000, FEW):  # the first of them compiles
+            began = time.monotonic()
+            run(few)
+            took = (time.monotonic() - began) * steps / FEW
+    if took > 10.0:
+        warn(f"{steps:.3g} steps take about {f'{took:.2g} s' if took < 100.0 else f'{took / 60.0:.2g} min'}")
+
+
 @click.command(short_help="Run up to billions of steps in little memory.")
 @click.argument("scene", shell_complete=completing("scenes"))
 @click.argument("integrator", shell_complete=completing("integrators"))
@@ -128,16 +150,7 @@ def long(
         raise SymtopError(f"{scene} has no nutation to take a step from: give --step-size")
     h = period / PER_NUTATION if step_size is None else step_size
     count = whole("steps", steps, 1, MOST_STEPS)
-    if count > FEW:
-        with ticking("timing some steps"):
-            took = 0.0
-            for few in (1000, FEW):  # the first of them compiles
-                began = time.monotonic()
-                long_run(scene, integrator, steps=few, step_size=h, quiet=True)
-                took = (time.monotonic() - began) * count / FEW
-        if took > 10.0:
-            said = f"{took:.2g} s" if took < 100.0 else f"{took / 60.0:.2g} min"
-            warn(f"{count:.3g} steps take about {said}")
+    estimate(count, lambda few: long_run(scene, integrator, steps=few, step_size=h, quiet=True))
     try:
         data = long_run(scene, integrator, steps=count, step_size=h, checkpoint=checkpoint or True, output=output)
     except KeyboardInterrupt:
@@ -193,8 +206,9 @@ def ensemble(
     with ticking("drawing tops"):
         from symtop.report.spread import LEVELS, QUANTITIES, largest, member_errors, spread
         from symtop.run.ensemble import ensemble as runs
-        from symtop.run.ensemble.population import population
+        from symtop.run.ensemble.population import check_memory, population
 
+        check_memory("members", members)
         tops = population(members, seed=seed, kind=kind)
     compared = [name for name in QUANTITIES if variables is None or name in variables]
     if figure is not None and not compared:

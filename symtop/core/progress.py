@@ -15,6 +15,7 @@ from symtop.core.files import is_terminal
 BEAT = 1.0  # seconds from one drawing to the next
 FIRST, EVERY = 2.0, 9.0  # seconds to the first line of a command in a pipe, and from one to the next
 LINES = "symtop: {words}, {seconds:.0f} s\n", ""  # what is written, and what at the end
+_listeners: "list[subprocess.Popen[str]]" = []  # of the command that runs
 CLOCK = "\r{words}: {minutes:02d}:{rest:02d}", "\r\x1b[K"
 WRITER = """\
 import signal, sys, threading, time
@@ -72,17 +73,20 @@ def telling(words: str) -> Iterator[None]:
             yield
         finally:
             _listeners.remove(lines)
+            lines.kill()  # it has nothing to finish; its start alone takes longer than most commands that are refused
 
 
-_listeners: "list[subprocess.Popen[str]]" = []  # of the command that runs
+def post(words: str) -> None:
+    """What the next lines say in a pipe."""
+    for lines in _listeners:
+        with contextlib.suppress(OSError):  # somebody has ended it
+            print(words, file=lines.stdin, flush=True)
 
 
 @contextlib.contextmanager
 def ticking(words: str) -> Iterator[None]:
     """Some words and the time since, on the standard error if that is a terminal, drawn each second until the end."""
-    for lines in _listeners:
-        with contextlib.suppress(OSError):  # somebody has ended it
-            print(words, file=lines.stdin, flush=True)
+    post(words)
     with _writing(CLOCK, words, 0.0, BEAT) if is_terminal(sys.stderr) else contextlib.nullcontext():
         yield
 

@@ -20,6 +20,7 @@ import csv
 import functools
 import hashlib
 import io
+import math
 import os
 import platform
 import tempfile
@@ -39,6 +40,7 @@ from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import Scene, scenes
 from symtop.report import page
 from symtop.report.tables import table
+from symtop.run.ensemble.population import memory
 
 NAME = f"symtop-{__version__}-data"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every file in the bundle: zip has none before
@@ -133,8 +135,8 @@ def _machine() -> str:
     """The machine that makes the bundle, a fact a line."""
     facts = {key: value for key, value in netcdf.provenance().items() if key != "dependencies"}
     facts |= {"cores": str(os.cpu_count()), "system": platform.platform()}
-    if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
-        facts["memory"] = f"{os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') / 2**30:.1f} GiB"
+    if math.isfinite(memory()):
+        facts["memory"] = f"{memory() / 2**30:.1f} GiB"
     return "".join(f"{key}: {value}\n" for key, value in facts.items())
 
 

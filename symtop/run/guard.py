@@ -363,7 +363,7 @@ def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expec
     growth, steps = _growth(scene, method, chart, step, frequency), plan.horizon / step
     beside = marks.gap if marks.gap < BESIDE else 0.0  # of a pole, what grows is the tilt
     size, folds = marks.width + beside + growth.size, steps * math.log(max(growth.factor, 1.0))
-    grows = growth.factor > 1.0 + max(NO_GROWTH, NONLINEAR * growth.size)
+    grows = growth.factor > 1.0 + max(NO_GROWTH, NONLINEAR * growth.size, growth.doubt)
     if not grows or not size * math.expm1(min(folds, MOST_FOLDS)) > EXPECTED:
         return None
     good, bad = SMALL_TURN / frequency, step

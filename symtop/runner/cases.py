@@ -20,7 +20,7 @@ from typing import Any, Self
 import xarray as xr
 
 from symtop.core import code_hash, netcdf
-from symtop.core.progress import beating, progress_bar
+from symtop.core.progress import beating, post, progress_bar
 from symtop.measure.datasets import Combined, combine, differences
 from symtop.run import plugins
 from symtop.runner import fingerprint, store
@@ -97,6 +97,7 @@ class StudyCases:
                     self.failures.append(result.message)
                     bar.set_postfix_str(f"{len(self.failures)} failed", refresh=False)
                 self.computed += result.state == "computed"
+                post(f"{self.study.name}: {self.computed + len(self.failures)} of {len(tasks)} cases")
                 bar.update()
 
             pool.run(self.study, tasks, on_result)

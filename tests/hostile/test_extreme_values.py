@@ -15,7 +15,7 @@ from symtop.model.exact.closed_form import ClosedForm, ClosedForms
 ODD_TIMES = [
     10**400, [10**400], 1j, [1j], np.array([1.0 + 0j]), {1: 2}, {}, {0.0}, "abc", "1", ["1"], b"1", np.array(["1"]),
     None, [None], object(), [object()], [[1.0, 2.0], [3.0]], np.datetime64("2020"), datetime.date(2020, 1, 1), [True],
-    True, iter([1.0]), lambda: 1.0, [math.nan], [math.inf],
+    True, iter([1.0]), lambda: 1.0, [math.nan], [math.inf], 1e101,
 ]  # fmt: skip
 SPHEROID = symtop.scene("spheroid")
 FORM = ClosedForm(SPHEROID.top, SPHEROID.start)

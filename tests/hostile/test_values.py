@@ -10,12 +10,25 @@ import math
 import time
 import warnings
 
+import hypothesis.strategies as st
 import numpy as np
 import pytest
 import xarray as xr
+from hypothesis import given
 
 import symtop
-from tests.cli.test_bad_input import CALLS, NOT_FINITE, NOT_POSITIVE, NOT_ROW, NOT_WHOLE, START, TOP, UNKNOWN
+from tests.cli.test_bad_input import (
+    ANYTHING,
+    CALLS,
+    CALM,
+    NOT_FINITE,
+    NOT_POSITIVE,
+    NOT_ROW,
+    NOT_WHOLE,
+    START,
+    TOP,
+    UNKNOWN,
+)
 
 SECONDS = 20.0  # of processor time for one call
 
@@ -69,7 +82,11 @@ MORE = {
     "recommend": (
         symtop.recommend,
         {"scene": "spheroid", "accuracy": 1e-2, "horizon": 0.1},
-        {"scene": UNKNOWN, "accuracy": NOT_POSITIVE, "quantity": UNKNOWN, "horizon": NOT_HORIZONS},
+        {
+            "scene": UNKNOWN, "accuracy": NOT_POSITIVE, "quantity": UNKNOWN, "horizon": NOT_HORIZONS,
+            **dict.fromkeys(("step_size", "max_step", "time_a_step"), NOT_HORIZONS), "general": ["yes", 2],
+            "keeps": ["time", 3],
+        },
     ),
     "population": (
         symtop.population, {"n": 3, "seed": 1}, {"n": NOT_WHOLE, "seed": [None, "x", -1, 1.5, math.nan, [], 1j]}
@@ -78,7 +95,8 @@ MORE = {
         symtop.ensemble,
         {"members": SMALL, "integrator": "strang", "step_size": 0.05, "horizon": 0.2, "samples": 3, "quiet": True},
         {
-            "members": NOT_DATA[:4], "integrator": UNKNOWN, "step_size": NO_NUMBER, "horizon": NO_NUMBER[1:],
+            "members": [*NOT_DATA[:4], xr.Dataset({"I1": 1.0}), [symtop.scene("spheroid"), 3], SMALL.to_dataframe()],
+            "integrator": UNKNOWN, "step_size": NO_NUMBER, "horizon": NO_NUMBER[1:],
             "samples": [*NOT_WHOLE, 1], "observe": [value for value in UNKNOWN if value is not None],
             "threads": [value for value in NOT_WHOLE if value is not None],
         },
@@ -168,3 +186,24 @@ def test_anything_is_used_or_refused(function, good, argument, values):
         except Exception as error:  # noqa: BLE001
             faults.append((k, type(value).__name__, type(error).__name__, str(error)[:200]))
     assert not faults
+
+
+PLACES = [(name, key) for name, call in MORE.items() if name not in COST for key in sorted({*call[1], *call[2]})]
+
+
+def _cheap(value):
+    """Is it no number of steps, samples or members that would be computed for minutes?"""
+    try:
+        size = abs(float(value))
+    except Exception:  # noqa: BLE001
+        return True
+    return not (1e-13 < size < 1e-3 or 1e4 < size < 1e13)
+
+
+@CALM
+@given(place=st.sampled_from(PLACES), value=ANYTHING.filter(_cheap))
+def test_anything_at_all_is_used_or_refused(place, value):
+    """The same for the functions of `tests.cli.test_bad_input` stands there."""
+    name, argument = place
+    function, good, _ = MORE[name]
+    came(function, {**good, argument: value})

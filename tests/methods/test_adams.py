@@ -131,15 +131,6 @@ def test_it_starts_with_order_one_and_keeps_the_length_of_steps():
     assert np.median([k for _, k in steps_of(1e-3)]) < np.median(orders)
 
 
-def test_samples_inside_steps_are_as_good_as_their_ends_and_cost_nothing():
-    few, many = (symtop.simulate("spheroid", "adams[axis]", tolerance=1e-9, samples=n, guard=False) for n in (2, 801))
-    for count in ("steps", "force_evaluations"):
-        assert few.attrs[count] == many.attrs[count]
-    np.testing.assert_array_equal(few["axis"][-1], many["axis"][-1])
-    error = symtop.errors(many)["axis"].values
-    assert error.max() < 3.0 * error[-1]
-
-
 def test_nothing_that_belongs_to_the_map_of_one_step_is_claimed():
     method = symtop.integrator("adams")
     assert (method.order, method.symplectic, method.symmetric) == (None, None, None)

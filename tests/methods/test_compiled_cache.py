@@ -1,11 +1,13 @@
 """Kernels that are on disk are loaded and not compiled again, in every family."""
 
+import errno
 import os
 import subprocess
 import sys
 
 import pytest
 
+from symtop.core import jit
 from symtop.core.jit import compile_kernel
 
 EVERY = "midpoint galerkin-simpson midpoint-unreduced stormer-verlet strang gauss-4 rk4"
@@ -82,3 +84,16 @@ def test_the_code_of_another_signature_is_not_run(monkeypatch, tmp_path):
     again = compile_kernel(_doubled)
     assert (again(2), again(2.5)) == (4, 5.0)
     assert {signature[0].name for signature in again.signatures} == {"int64", "float64"}
+
+
+def test_a_full_disk_costs_time_and_no_run(monkeypatch, tmp_path):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
+    with monkeypatch.context() as patch:
+        patch.setattr(jit._Index, "_save_data", full)
+        assert compile_kernel(_doubled)(2.0) == 4.0
+    assert not list(tmp_path.rglob("*.nbc"))
+    assert compile_kernel(_doubled)(2.0) == 4.0
+    assert list(tmp_path.rglob("*.nbc"))

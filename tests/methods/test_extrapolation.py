@@ -1,15 +1,11 @@
 """Extrapolation: the order of each line of its table, variable order, samples, blocks, and failures."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import symtop
 from symtop.core.jit import compile_kernel
 from symtop.methods.framework.equations import FORMULATIONS
-from symtop.methods.framework.plan import Plan
-from symtop.methods.framework.registry import integrator
 from symtop.methods.runge_kutta import extrapolation
 from symtop.model.scenes import closed_form
 
@@ -53,25 +49,3 @@ def test_errors_follow_the_tolerance_and_orders_rise_with_it(chart):
     evaluations = [run.attrs["force_evaluations"] / run.attrs["steps"] for run in runs]
     assert evaluations[0] < evaluations[1] < evaluations[2]  # a step
     assert runs[2].attrs["steps"] < 2.5 * runs[0].attrs["steps"]  # of one order: hundreds of times as many
-
-
-def test_runs_in_pieces_have_the_same_bits_and_budgets_end_them():
-    solver = integrator("extrapolation").solvers["axis"]
-    plan = Plan.until(np.linspace(0.0, 8.0, 33), 1e-9)
-    whole, pieces = (chosen(SPHEROID.top, SPHEROID.start, plan) for chosen in (solver, replace(solver, block=1)))
-    np.testing.assert_array_equal(whole.states, pieces.states)
-    assert whole[3:] == pieces[3:]
-    short = solver(SPHEROID.top, SPHEROID.start, plan._replace(budget=500))
-    assert short.outcome == "out_of_budget"
-    assert 0.0 < short.reached < 8.0
-
-
-def test_samples_take_no_part_in_the_steps():
-    few, many = (
-        symtop.simulate(SPHEROID, "extrapolation[axis]", tolerance=1e-9, samples=n, guard=False) for n in (2, 501)
-    )
-    for count in ("steps", "force_evaluations"):
-        assert few.attrs[count] == many.attrs[count]
-    np.testing.assert_array_equal(few["axis"][-1], many["axis"][-1])
-    error = symtop.errors(many)["axis"].values
-    assert error.max() < 3.0 * error[-1]

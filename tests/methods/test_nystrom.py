@@ -141,18 +141,3 @@ def test_momenta_stay_those_of_the_start():
     run = symtop.simulate("spheroid", "dprkn8", tolerance=1e-6, samples=501, guard=False)
     for name in ("p_phi", "p_psi"):
         np.testing.assert_allclose(run[name], run[name][0], rtol=1e-13)
-
-
-def test_samples_inside_steps_are_as_good_as_their_ends():
-    run = symtop.simulate("spheroid", "dprkn8", tolerance=1e-8, samples=801, guard=False)
-    error = symtop.errors(run)["axis"].values
-    assert error.max() < 3.0 * error[-1] < 1e-7
-
-
-def test_a_pole_ends_a_run():
-    pole = symtop.Scene(
-        "pole", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0, theta_dot=-2.0), 5.0, observes="axis"
-    )
-    assert symtop.simulate(pole, "dprkn8", tolerance=1e-6, guard=False).attrs["outcome"] in (
-        "left_chart", "step_too_small",
-    )  # fmt: skip

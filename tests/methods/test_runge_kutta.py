@@ -108,16 +108,10 @@ def test_rk4_is_not_reversible():
         (KUTTA_A[:3], KUTTA_B, None, "a must have one row for each"),
         (((0.5,),), (1.0,), None, "row 1 of a"),
         (((), (0.5, 0.1, 0.0), (0.0, 0.5, 0.5)), (0.2, 0.3, 0.5), None, "row 2 of a"),
-        (((),), (math.nan,), None, "an entry of b"),
-        ((), (), None, "at least one"),
         (np.zeros((2, 3)), np.array([0.5, 0.5]), None, "row 1 of a must have 0 entries"),
         (np.array([[0.0, 1.0], [1.0, 0.0]]), (0.5, 0.5), None, "row 1 of a must have 0 entries"),
         (np.zeros((3, 3)), (0.5, 0.5), None, "a must have one row for each of the 2"),
-        (np.zeros(2), (0.5, 0.5), None, "a must be a row of numbers"),
         (np.zeros((2, 2, 2)), (0.5, 0.5), None, "an entry of a must be a finite number"),
-        (np.array(1.0), (1.0,), None, r"a must be rows of numbers, not array\(1.\)"),
-        (None, (1.0,), None, "a must be rows of numbers, not None"),
-        ("ab", (0.5, 0.5), None, "a must be rows of numbers, not 'ab'"),
     ],
 )
 def test_bad_tableaux_are_refused(a, b, c, words):
@@ -207,43 +201,6 @@ def test_rk4_counts_four_evaluations_a_step(chart):
     assert (run.attrs["steps"], run.attrs["force_evaluations"]) == (100, 400)
 
 
-class Counted(float):
-    """A number that counts its multiplications and divisions."""
-
-    total = 0
-
-    def __mul__(self, other):
-        Counted.total += 1
-        return Counted(float(self) * float(other))
-
-    def __truediv__(self, other):
-        Counted.total += 1
-        return Counted(float(self) / float(other))
-
-    def __rtruediv__(self, other):
-        return Counted(other) / self
-
-    def __add__(self, other):
-        return Counted(float(self) + float(other))
-
-    def __sub__(self, other):
-        return Counted(float(self) - float(other))
-
-    def __neg__(self):
-        return Counted(-float(self))
-
-    __rmul__, __radd__ = __mul__, __add__
-
-
-def test_only_the_angles_have_a_pole():
-    for name in ("rk45", "rk45-compiled"):
-        assert symtop.simulate(POLE, f"{name}[angles]", tolerance=1e-3, guard=False).attrs["outcome"] == "left_chart"
-        for chart in ("axis", "attitude"):
-            run = symtop.simulate(POLE, f"{name}[{chart}]", tolerance=1e-8, guard=False)
-            assert run.attrs["outcome"] == "ok"
-            assert float(symtop.errors(run)["axis"].max()) < 1e-5
-
-
 # --- Dormand-Prince -------------------------------------------------------------------------------------------------
 
 
@@ -301,14 +258,6 @@ def test_a_wrong_error_estimate_is_caught():
         _assert_same_steps(symtop.scene("spheroid"), 1e-6, 20.0, 1e-9, wrong)
 
 
-def test_both_rk45_are_one_method():
-    first, second = (symtop.simulate("spheroid", name, tolerance=1e-7) for name in ("rk45", "rk45-compiled"))
-    assert first.attrs["steps"] == second.attrs["steps"]
-    assert first.attrs["force_evaluations"] == second.attrs["force_evaluations"]
-    for name in ("theta", "phi", "psi", "energy", "p_phi", "p_psi"):
-        np.testing.assert_allclose(second[name], first[name], atol=1e-10)
-
-
 def test_adaptive_outcomes():
     scene, pair = symtop.scene("spheroid"), pairs.RK45
     for error in (math.inf, math.nan):
@@ -321,14 +270,6 @@ def test_adaptive_outcomes():
     assert np.array_equal(np.isfinite(run.states[:, 0]), plan.times <= run.reached)
 
 
-def test_blocks_do_not_show():
-    scene = symtop.scene("spheroid")
-    whole = _walk(scene, 1e-7, 8.0)[1]
-    parts = _walk(scene, 1e-7, 8.0, block=100)[1]
-    np.testing.assert_array_equal(parts.states, whole.states)
-    assert (parts.steps, parts.force_evaluations) == (whole.steps, whole.force_evaluations)
-
-
 # --- libraries ------------------------------------------------------------------------------------------------------
 
 
@@ -337,13 +278,6 @@ def _error(name, tolerance, quantity="axis", **controls):
     run = symtop.simulate(scene, name, tolerance=tolerance, **controls)
     assert run.attrs["outcome"] == "ok"
     return run, float(symtop.errors(run)[quantity].max())
-
-
-@pytest.mark.parametrize("name", ["rk45", "dop853", "lsoda", "radau"])
-def test_scipys_solvers_follow_their_tolerance(name):
-    coarse, fine = _error(name, 1e-6)[1], _error(name, 1e-9)[1]
-    assert fine < 1e-6
-    assert fine < coarse / 100.0
 
 
 @pytest.mark.parametrize("name", ["rk45", "dop853", "lsoda", "radau"])

@@ -76,17 +76,6 @@ def test_it_follows_the_reduced_series_at_equal_steps_and_counts_as_much():
     assert runs[0].attrs["force_evaluations"] == runs[1].attrs["force_evaluations"]
 
 
-def test_samples_are_the_polynomial_and_cost_nothing():
-    few, many = (
-        symtop.simulate("spheroid", "series-general-adaptive[axis]", tolerance=1e-9, samples=n, guard=False)
-        for n in (2, 801)
-    )
-    for count in ("steps", "force_evaluations"):
-        assert few.attrs[count] == many.attrs[count]
-    error = symtop.errors(many)["axis"].values
-    assert error.max() < 3.0 * error[-1]
-
-
 def test_a_motion_without_end_of_steps_is_one_step():
     """At rest on its axis every coefficient but the first is zero."""
     rest = symtop.Scene("rest", symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(1.0), 5.0, observes="axis")

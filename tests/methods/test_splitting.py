@@ -1,9 +1,6 @@
 """Splitting methods: coefficients, orders, symplecticity, reversibility, constants, and what each is good at."""
 
 import math
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -350,9 +347,7 @@ def test_generalised_orders_remove_the_first_power_of_gravity(name):
 
 
 def test_the_pole_benchmark_of_bruls_cardona_arnold():
-    top = symtop.SymmetricTop(15.234375, 0.46875, 147.15)
-    start = symtop.Angles(math.pi / 2, math.pi, math.pi / 2, 0.0, -4.61538, 150.0)
-    scene = symtop.Scene("bca", top, start, 2.0)
+    scene = symtop.scene("bruls-cardona-arnold")
     table = error_table(scene, METHODS["strang"], [2.0 / n for n in (2000, 4000, 8000, 16000, 32000)], 2.0, "axis")
     assert table["axis"][0] < 1e-5
     assert power_law(table["step_size"].values, table["axis"].values).slope == pytest.approx(2.0, abs=0.02)
@@ -386,32 +381,14 @@ def test_a_new_composition_compiles_nothing():
     assert halves.solvers["axis"]._whole.alone[0] is not march
 
 
-@pytest.mark.slow
-def test_the_first_use_in_a_new_process_is_quick():
-    code = (
-        "import time, symtop\n"
-        "symtop.simulate('spheroid', 'strang', step_size=0.01, observe='attitude')\n"
-        "start = time.perf_counter()\n"
-        "symtop.simulate('spheroid', 'kahan-li-8', step_size=0.01, observe='attitude')\n"
-        "print(time.perf_counter() - start)\n"
-    )
-    seconds = []
-    for _ in range(4):  # the first one may compile; the best of the others is what a user waits
-        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ)
-        seconds.append(float(done.stdout))
-    assert min(seconds[1:]) < 0.05
-
-
 @pytest.mark.parametrize(
     ("words", "arguments", "more"),
     [
         ("kick must have one coefficient more", ((1.0,), (1.0,)), {}),
         ("drift coefficients must sum to 1", ((0.9,), (0.5, 0.5)), {}),
-        ("an entry of kick must be a finite number", ((1.0,), (math.nan, 0.5)), {}),
         ("gradient must have as many", ((1.0,), (0.5, 0.5), (0.0,)), {"chart": "space"}),
         ("gradient must be zero where kick is", ((0.5, 0.5), (0.0, 1.0, 0.0), (0.1, 0.0, 0.0)), {"chart": "space"}),
         ("chart must be 'space'", ((1.0,), (0.5, 0.5), (0.1, 0.1)), {}),
-        ("chart 'axes' is unknown", ((1.0,), (0.5, 0.5)), {"chart": "axes"}),
         ("rotation 'caley' is unknown; did you mean cayley", ((1.0,), (0.5, 0.5)), {"rotation": "caley"}),
     ],
 )

@@ -12,7 +12,6 @@ from symtop.methods.lagrangian import unreduced as kernel
 from symtop.methods.lagrangian.discrete_lagrangian import RULES, Quadrature
 from symtop.methods.lagrangian.unreduced import march, unreduced, with_momenta
 from tests.conftest import random_scenes
-from tests.methods.test_integrators import fitted
 
 PAIRS = ("midpoint", "trapezoidal")
 TWIN = "-unreduced"
@@ -47,22 +46,6 @@ def test_every_twin_is_of_a_registered_method_and_its_history_is_rounding():
     assert float(history[Column.P_PHI_DRIFT].max()) < 1e-13
 
 
-@pytest.mark.parametrize("quantity", ["attitude", "theta", "energy"])
-@pytest.mark.parametrize("scene_name", SCENES)
-@pytest.mark.parametrize("name", [*(name + TWIN for name in PAIRS), "simpson-linear"])
-def test_order_two_on_the_nonlinear_top(scene_name, name, quantity):
-    fit = fitted(scene_name, name, quantity)
-    assert abs(fit.slope - 2.0) + fit.interval < 0.05
-
-
-@pytest.mark.parametrize("where", random_scenes(6, seed=11), ids=lambda s: s.name)
-@pytest.mark.parametrize("name", [name + TWIN for name in PAIRS])
-def test_the_six_dimensional_step_map_is_symplectic(name, where):
-    defect = symplectic_defect(one_step(symtop.integrator(name), "angles", where, 0.02), where.start)
-    assert defect.size < 2e-10
-    assert defect.raw[-1] < defect.raw[0] / 100.0  # what is left is the differencing, which falls as its square
-
-
 def test_a_map_that_invents_its_momenta_is_not_symplectic():
     """The negative control: a p_phi moved by 1e-4 sin(theta) after an otherwise right step is seen."""
     good = symtop.integrator("midpoint" + TWIN)
@@ -75,12 +58,6 @@ def test_a_map_that_invents_its_momenta_is_not_symplectic():
     where = random_scenes(1, seed=11)[0]
     step = one_step(wrong, "angles", where, 0.02)
     assert symplectic_defect(step, where.start).size * step.unit > 1e-5
-
-
-@pytest.mark.parametrize("where", random_scenes(6, seed=12), ids=lambda s: s.name)
-@pytest.mark.parametrize("name", [name + TWIN for name in PAIRS])
-def test_a_step_and_its_reverse_return_to_the_start(name, where):
-    assert return_miss(one_step(symtop.integrator(name), "angles", where, 0.02), where.start) < 1e-13
 
 
 def test_a_lopsided_rule_misses_the_start():

@@ -134,7 +134,7 @@ def test_a_variant_is_made_once_and_again_when_its_method_is_replaced(monkeypatc
     assert (first.order, symtop.integrator("rk4[axis]").order) == (4, 3)
 
 
-@pytest.mark.parametrize("name", ["strang[angles]", "rk4[nutation]", "rk5[axis]", "[axis]"])
+@pytest.mark.parametrize("name", ["strang[angles]", "rk4[nutation]", "rk5[axis]", "[axis]", "rk4[]", "rk4[ ]", "[]"])
 def test_a_row_that_does_not_exist_is_refused(name):
     with pytest.raises(symtop.SymtopError, match=r"is unknown; (known|did you mean)"):
         symtop.integrator(name)

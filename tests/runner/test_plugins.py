@@ -57,9 +57,7 @@ def test_functions_count_wherever_they_stand_and_however_they_were_imported(tmp_
     assert "code other.py" not in before
     write(tmp_path, coeffs="# a comment\ndef twice(x):\n    return 2 * x\n", other="x = 2\n", plug=f"# moved\n{PLUGIN}")
     assert made_of(plugin) == before
-    write(tmp_path, lazily="def late(x):\n    return -x\n")
-    assert changes(before, made_of(plugin)) == ["code lazily.py"]
-    write(tmp_path, coeffs="def twice(x):\n    return 3 * x\n")
+    write(tmp_path, lazily="def late(x):\n    return -x\n", coeffs="def twice(x):\n    return 3 * x\n")
     assert changes(before, made_of(plugin)) == ["code coeffs.py", "code lazily.py"]
 
 

@@ -1,15 +1,12 @@
 """Two rounds of cases: what is computed again if the second is incomplete, and timed cases in new workers."""
 
 import dataclasses
-import json
-import math
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from symtop.measure.ranking import Near
 from symtop.runner import pool as pools, run as runner, store
 from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool
@@ -46,33 +43,8 @@ def study(tmp_path):
     return runner.load(str(tmp_path / "rounds.py"))
 
 
-def manifest_of(results: Path) -> dict:
-    return json.loads((results / "cases" / "manifest.json").read_text())
-
-
 def cases_of(results: Path, timed: bool) -> list[Path]:
     return [path for path in (results / "cases" / "rounds").glob("*.npz") if ("--together--" in path.name) == timed]
-
-
-def test_a_case_that_is_missing_is_computed_again_whichever_its_round(study, tmp_path):
-    results = tmp_path / "r"
-
-    def computed():
-        return runner.run(study, results, quiet=True)["computed"]
-
-    assert computed() == 3
-    assert computed() == 0
-    first = manifest_of(results)
-    (later,) = cases_of(results, timed=True)
-    later.unlink()
-    assert computed() == 1
-    assert later.is_file()
-    assert manifest_of(results)["rounds"]["made_of"] == first["rounds"]["made_of"]
-    cases_of(results, timed=False)[0].unlink()
-    assert computed() == 1
-    later.write_bytes(later.read_bytes()[:100])
-    assert computed() == 1
-    assert computed() == 0
 
 
 def test_timed_cases_that_alone_are_missing_run_in_new_workers(study, tmp_path, monkeypatch):
@@ -91,6 +63,7 @@ def test_timed_cases_that_alone_are_missing_run_in_new_workers(study, tmp_path, 
     assert set(np.ravel(again["later"])) == {2.0}
 
 
+@pytest.mark.slow
 def test_methods_are_timed_again_when_nothing_else_is_missing(tmp_path, monkeypatch):
     """The study that times methods, with two of them, in workers."""
     whole, names = runner.load("cost"), ["midpoint[angles]", "strang[axis]"]
@@ -105,31 +78,3 @@ def test_methods_are_timed_again_when_nothing_else_is_missing(tmp_path, monkeypa
     with Pool(2) as pool:
         done = runner.run(small, tmp_path, quiet=True, pool=pool)
     assert (done["computed"], done["failures"]) == (len(few), [])
-
-
-def plain(value: object) -> bool:
-    """Is it made of what JSON has, so that no process needs a study's own classes to read it? A tuple is a list."""
-    if type(value) in (list, tuple):
-        return all(map(plain, value))
-    if type(value) is dict:
-        return all(type(key) is str and plain(one) for key, one in value.items())
-    return value is None or type(value) in (str, bool, int, float)
-
-
-def survives(settings: dict) -> bool:
-    """Are settings, written as JSON and read again, what they were? Compared as text, since NaN is not itself."""
-    text = json.dumps(settings)
-    return plain(settings) and json.dumps(json.loads(text)) == text
-
-
-def test_a_record_among_settings_is_noticed():
-    assert survives({"runs": [["midpoint", 0, 0.1, (1, 2)]], "longest": math.nan, "none": None})
-    assert not survives({"runs": [Near({"midpoint[angles]": 1}, 50, "axis", 0.1, 10.0, {})]})
-    assert not survives({"counts": {1: "one"}})
-
-
-@pytest.mark.parametrize("name", runner.names())
-def test_settings_of_the_first_round_are_values_of_json(name):
-    study = runner.load(name)
-    for case in [*study.grid(quick=True), *study.grid(), *study.grid(full=True)]:
-        assert survives(dict(case.settings)), case

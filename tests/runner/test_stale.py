@@ -218,21 +218,17 @@ def test_no_case_runs_an_integrator_that_it_is_not_said_to_depend_on(name, monke
 def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
     script = tmp_path / "counted.py"
     text = PROBE.read_text()
-    digests = set()
-    for version in (
-        text,
-        text.replace('"Energy."', '"Another caption."'),
-        text.replace("samples=51", "samples=STEPS").replace("METHODS = (", "STEPS = 51\nMETHODS = ("),
-        text.replace("samples=51", "samples=STEPS").replace("METHODS = (", "STEPS = 52\nMETHODS = ("),
-        text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(51)\n",
-        text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(53)\n",
-        text.replace("samples=51", "samples=cached()") + "\n\n@functools.cache\ndef cached():\n    return 51\n",
-        text.replace("samples=51", "samples=cached()") + "\n\n@functools.cache\ndef cached():\n    return 53\n",
-        text.replace("samples=51", "samples=Few().count()")
-        + "\n\nclass Few:\n    def count(self):\n        return 51\n",
-        text.replace("samples=51", "samples=Few().count()")
-        + "\n\nclass Few:\n    def count(self):\n        return 53\n",
+    versions = [text, text.replace("Is it whole?", "Is it?").replace("figsize=(2, 2)", "figsize=(3, 2)")]
+    for call, made in (
+        ("STEPS", "STEPS = {}"),
+        ("len(helper())", "def helper():\n    return range({})"),
+        ("cached()", "@functools.cache\ndef cached():\n    return {}"),
+        ("Few().count()", "class Few:\n    def count(self):\n        return {}"),
     ):
+        assert text.count("samples=51") == 1
+        versions += [f"{text.replace('samples=51', f'samples={call}')}\n\n{made.format(n)}\n" for n in (51, 53)]
+    digests = set()
+    for version in versions:
         script.write_text("import functools\n" + version)
         sys.modules.pop("symtop_study_counted", None)
         linecache.checkcache()
@@ -240,7 +236,8 @@ def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
         shutil.rmtree(tmp_path / "__pycache__", ignore_errors=True)
         study = runner.load(str(script))
         digests.add(fingerprint.digest(study, study.cases(True)[0]))
-    assert len(digests) == 9  # the caption alone changes nothing
+    assert len({*versions}) == 10
+    assert len(digests) == 9  # what is asked and drawn changes nothing
 
 
 PLUGIN = """

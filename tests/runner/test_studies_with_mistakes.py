@@ -124,12 +124,6 @@ def test_a_step_that_is_nan_in_a_measure_is_no_option_of_the_command(tmp_path):
     assert "study mine: no case could be measured; rk4 on spheroid failed: step_size must be a finite" in output
 
 
-def test_measures_that_do_not_fit_together_are_told_of(tmp_path):
-    shape = "('k', [1.0]) if case.integrator == 'rk4' else 1.0"
-    code, output = ran(tmp_path, f"measure = lambda case: xr.Dataset({{'err': {shape}}})")
-    assert code in (0, 2), output  # what fits is the store's matter; a traceback it is not
-
-
 def test_an_answer_may_come_in_any_order_of_things():
     names = lambda make: list(each("mine", "names", make, str, "a list of names"))
     assert names(lambda: ("a", "b")) == ["a", "b"]
