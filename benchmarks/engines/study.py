@@ -8,7 +8,7 @@ from benchmarks.engines.measure import COMPARED, COUNT, LEVEL, STEPS, agrees
 from benchmarks.pages import Table
 from symtop.core import netcdf
 from symtop.methods.framework.registry import integrator
-from symtop.report.sentences import counted, few
+from symtop.report.formats import FEW, counted
 
 NAME = "live-engines"  # of the findings; `engines` is the study of the maps
 UNRUN = "YADE is not run: its map is held by its formula and a reference value alone."
@@ -42,6 +42,11 @@ def cells(made: dict[str, Any]) -> list[str]:
 
 def _largest(rows: Sequence[dict[str, Any]], what: str) -> str:
     return f"{max((made[f'{name}_{what}'] for made in rows for name in STEPS), default=0.0):.0e}"
+
+
+def few(names: Sequence[str], noun: str) -> str:
+    """The names, if they are few; otherwise how many there are."""
+    return ", ".join(names) if len(names) <= FEW else counted(len(names), noun)
 
 
 def verdict(rows: Sequence[dict[str, Any]]) -> list[str]:

@@ -16,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SHOWN = re.compile(r"\]\(figures/([^)]+)\)")
 STORED = re.compile(  # links to what is not tracked
-    r" \(\[CSV\]\(tables/[^)]+\)\)|; \[CSV\]\(tables/[^)]+\)"
+    r" \(\[[^]]+\]\(tables/[^)]+\)\)|; \[CSV\]\(tables/[^)]+\)"
     r"|\[([^]]+)\]\((?:tables/[^)]+|[\w-]+\.nc)\)|<!-- \w+ [\w-]+ -->\n\n"
 )
 QUOTED = {
@@ -40,7 +40,9 @@ def take(results: Path, snapshot: Path) -> list[str]:
     (snapshot / "figures").mkdir(parents=True)
     for name in names:
         shutil.copyfile(results / "figures" / name, snapshot / "figures" / name)
-    (snapshot / "report.md").write_text(STORED.sub(lambda found: found[1] or "", text), encoding="utf-8")
+    for file in (results / name for name in ("report.md", "reference.md") if (results / name).is_file()):
+        text = STORED.sub(lambda found: found[1] or "", file.read_text(encoding="utf-8"))
+        (snapshot / file.name).write_text(text, encoding="utf-8")
     return names
 
 
@@ -54,7 +56,7 @@ def answer(report: str, question: str) -> str:
 
 def beginning(report: str) -> str:
     """The front page from its first figure to what will go wrong, figures where the README finds them."""
-    text = report.partition("\n\n")[2].partition("\n\n")[2].partition("## What will go wrong")[0].strip()
+    text = re.split(r"(?:## |\*\*)What will go wrong", report.partition("\n\n")[2].partition("\n\n")[2])[0].strip()
     return text.replace("](figures/", "](docs/snapshot/figures/") + "\n"
 
 

@@ -3,7 +3,6 @@
 from collections import Counter
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import xarray as xr
 
@@ -13,8 +12,6 @@ from symtop.methods.framework.registry import integrators
 
 from .planted import LIES
 
-MARKED = ("midpoint", "strang", "galerkin-simpson", "sofroniou-spaletta-10", "gauss-4", "gauss-12", "rk4", "rk45")
-REFINED = 100.0  # a defect that falls by more than this over the differencing widths is an error of the differencing
 FIRST = ("refuted", "undecided", "confirmed", "measured", "inapplicable")  # of the verdicts
 
 
@@ -41,22 +38,12 @@ def ledger(data: xr.Dataset) -> pd.DataFrame:
     return frame.sort_values(list(ranks), key=lambda column: column.map(ranks[str(column.name)]), kind="stable")
 
 
-def defects(data: xr.Dataset) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Differencing widths and how far one step is from preserving the bracket, of `MARKED`, or else of all."""
-    first = data[["defect_width", "bracket_defect"]].isel(scene=0)
-    every = [str(name) for name in data["variant"].values]
-    cells = {name: first.sel(variant=name).dropna("width") for name in [one for one in every if one in MARKED] or every}
-    return {name: (cell["defect_width"].values, cell["bracket_defect"].values)
-            for name, cell in cells.items() if cell.sizes["width"]}  # fmt: skip
-
-
 def facts(data: xr.Dataset) -> dict[str, Any]:
-    """How many claims have each verdict, which defects are real, and how many steps the long runs have."""
+    """How many claims have each verdict, how many lies are caught, and how many steps the long runs have."""
     data, false = parts(data)
     told = caught(false)
-    entries, measured = ledger(data), defects(data)
+    entries = ledger(data)
     count = Counter(entries["verdict"])
-    falling = [name for name, (_, defect) in measured.items() if defect[-1] < defect[0] / REFINED]
     made = data["steps_run"].isel(scene=0).to_series()
     made = made[made > 0].astype(int)
     undecided = Counter(entries["claim"][entries["verdict"] == "undecided"].map(claim_name))
@@ -67,19 +54,14 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "scene": SCENE,
         "declared": count["confirmed"] + count["refuted"] or None,  # and judged
         "held": count["confirmed"],
-        **{word: count[word] for word in ("refuted", "undecided", "measured")},
+        **{word: count[word] for word in ("refuted", "undecided")},
         "planted": len(told) or None,  # integrators that make a false claim
         "caught": int(told.sum()),
-        "escaped": ", ".join(told.index[~told]) or None,
         "open_claim": open_claim,  # that most of the undecided findings are on
         "open_most": open_most,
-        "falling": ", ".join(falling) or None,  # methods whose defect is that of the differences
-        "level": ", ".join(name for name in measured if name not in falling) or None,
         "runs": len(made) or None,
         "usual": usual,  # steps of a long run
         "usual_runs": usual_runs,
-        "least": min(made, default=None),
-        "least_integrator": made.idxmin() if len(made) else None,
     }
 
 

@@ -1,21 +1,18 @@
-"""Figures of the study: the verdicts at a glance, and what tells a symplectic step from one that is not."""
+"""The figure of the study: the verdicts at a glance."""
 
 from collections.abc import Iterator
 
-import numpy as np
 import pandas as pd
 import xarray as xr
 from matplotlib.patches import Patch, Rectangle
-from matplotlib.ticker import NullLocator
 
 from symtop.judging.battery import CLAIMS
 from symtop.judging.findings import claim_name
 from symtop.methods.framework.registry import FAMILIES
 from symtop.report import style
-from symtop.report.figures import name_ends
 from symtop.runner.study import Picture
 
-from .facts import FIRST, caught, defects, ledger, parts
+from .facts import FIRST, caught, ledger, parts
 from .planted import LIES
 
 SYMBOLS = {"confirmed": "✓", "refuted": "✗", "measured": "○", "undecided": "?", "inapplicable": "∅"}
@@ -39,12 +36,10 @@ CAUGHT = "#BFE3D0"  # a planted false claim that is refuted
 
 
 def pictures(data: xr.Dataset) -> Iterator[Picture]:
-    """The matrix of verdicts, and the defect of the bracket against the differencing width."""
+    """The matrix of verdicts."""
     data, false = parts(data)
     if len(entries := ledger(data)):
         yield draw_ledger(entries, caught(false))
-    if measured := defects(data):
-        yield draw_bracket(measured)
 
 
 def draw_ledger(entries: pd.DataFrame, told: pd.Series) -> Picture:
@@ -67,7 +62,7 @@ def draw_ledger(entries: pd.DataFrame, told: pd.Series) -> Picture:
                 left += width
             axis.add_patch(Rectangle((column - 0.5, line - 0.5), 1.0, 1.0, fill=False, edgecolor="white", lw=1.5))
             axis.text(
-                column, line, ", ".join(f"{count[word]} {SYMBOLS[word]}" for word in there), ha="center", va="center",
+                column, line, " ".join(f"{count[word]}{SYMBOLS[word]}" for word in there), ha="center", va="center",
                 fontsize=style.LEAST_TEXT, fontweight="bold" if "refuted" in there else "normal",
             )  # fmt: skip
     right = len(names) + 0.25
@@ -79,9 +74,9 @@ def draw_ledger(entries: pd.DataFrame, told: pd.Series) -> Picture:
         )
     axis.set(xlim=(-0.5, (right if len(told) else len(names) - 1) + 0.5), ylim=(len(CLAIMS) - 0.5, -0.5))
     axis.set_yticks(range(len(CLAIMS)), [ROWS.get(claim, claim_name(claim)) for claim in CLAIMS])
-    heads = [f"{TITLES.get(name, name)}\n{sizes[name]} method{'' if sizes[name] == 1 else 's'}" for name in names]
+    heads = [f"{TITLES.get(name, name)}\n({sizes[name]})".replace("-", "\n") for name in names]
     places = [*range(len(names)), right] if len(told) else range(len(names))
-    heads = [head.replace("-", "\n") for head in heads] + ["false claims,\nplanted:\ncaught"][: len(told)]
+    heads += ["false claims,\nplanted:\ncaught"][: len(told)]
     axis.set_xticks(places, heads)
     axis.tick_params(length=0, bottom=False, labelbottom=False, labeltop=True)
     axis.grid(visible=False)
@@ -92,23 +87,3 @@ def draw_ledger(entries: pd.DataFrame, told: pd.Series) -> Picture:
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
     return Picture("ledger", figure)
-
-
-def draw_bracket(measured: dict[str, tuple[np.ndarray, np.ndarray]]) -> Picture:
-    """How far a step is from preserving the bracket, against the width of the differences that measure it."""
-    figure, axes = style.panels(1, 1, height=2.8)
-    axis, ends = axes[0, 0], {}
-    for name, (width, defect) in measured.items():
-        look = style.line(name)
-        axis.plot(width, defect, **look, mec="white", mew=0.5)  # so that one marker shows within another
-        least = int(np.argmin(width))
-        ends[name] = float(width[least]), float(defect[least]), str(look["color"])
-    label = "width of the finite differences that measure the defect (not the step), finer to the right"
-    axis.set(xscale="log", yscale="log", xlabel=label, ylabel="defect of the Poisson bracket\nafter one step")
-    axis.invert_xaxis()
-    widths, sizes = (np.concatenate(values) for values in zip(*measured.values(), strict=True))
-    axis.set_xticks(np.unique(widths), [f"{tick:.2g}" for tick in np.unique(widths)])
-    axis.xaxis.set_minor_locator(NullLocator())
-    style.slope_guide(axis, 2.0, (1.4 * widths.min(), 0.7 * widths.max()), 0.5 * sizes.min(), "width$^2$")
-    name_ends(axis, ends)
-    return Picture("bracket", figure)

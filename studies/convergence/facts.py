@@ -8,10 +8,8 @@ import pandas as pd
 import xarray as xr
 
 from symtop.measure.order import BESIDE
-from symtop.methods.framework.registry import split_name
 
 from .measures import (
-    LARGE,
     MAIN,
     OTHERS,
     TARGET,
@@ -20,7 +18,6 @@ from .measures import (
     efficiencies,
     fits,
     judged,
-    least_work,
     merged,
     named_variants,
     ratios,
@@ -28,45 +25,29 @@ from .measures import (
     tolerance_fits,
 )
 
-QUOTED = ("midpoint[angles]", "stormer-verlet[angles]")  # whose error constants are quoted
-QUOTED_ON = "spheroid"
-
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """How many orders are confirmed, what the named methods and the best of each order pay, how tolerances are met."""
     words = [one.verdict for one in judged(data).values()]
-    intervals = [fit.interval for fit in fits(data, MAIN).values() if np.isfinite(fit.slope)]
-    part, labels = named_variants(data)
-    paid = least_work(part, labels)
-    least, most = (paid[0], paid[-1]) if paid else ((None, None), (None, None))
+    part, _ = named_variants(data)
     every = cheapest(data)
     best, second = (first(part) for part in (every, every[every["order"] == 2]))
     spans = every.groupby("order")["work"].agg(lambda works: works.max() / works.min())
-    powers = [fit.slope for fit in tolerance_fits(data).values() if np.isfinite(fit.slope)]
     met = {name: values for name, values in ratios(data).items() if values.size}
     together = np.concatenate([np.full(1, np.nan), *met.values()])
     return {
         "scenes": ", ".join(map(str, data["scene"].values)),
         "scene": str(part["scene"].values),
         "target": TARGET,  # rad
-        "large": LARGE,  # rad
         "beside": BESIDE,
         "pairs": len(words) or None,  # of a variant and a scene
         **{word: words.count(word) if words else None for word in ("confirmed", "refuted", "undecided")},
-        "widest": max(intervals, default=None),
-        "least_variant": least[0],
-        "least_work": least[1],  # force evaluations a nutation
-        "most_variant": most[0],
-        "most_work": most[1],
         "best_variant": best[0],
         "best_work": best[1],
         "second_variant": second[0],
         "second_work": second[1],
         "span": float(spans.max()) if len(spans) else None,  # most work over least within an order
         "span_order": int(spans.idxmax()) if len(spans) else None,
-        **constants(data),
-        "power_least": min(powers, default=None),
-        "power_most": max(powers, default=None),
         "ratio_middle": float(np.nanmedian(together)) if met else None,  # error over tolerance
         "ratio_most": float(np.nanmax(together)) if met else None,
         "ratio_most_variant": max(met, key=lambda name: met[name].max(), default=None),
@@ -76,17 +57,6 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
 def first(costs: pd.DataFrame) -> tuple[str | None, float | None]:
     """Variant and work of the first line, if there is one."""
     return (None, None) if costs.empty else (str(costs.iloc[0]["variant"]), float(costs.iloc[0]["work"]))
-
-
-def constants(data: xr.Dataset) -> dict[str, float | None]:
-    """C of error = C h^2, rad/s^2, of the quoted variants at the end of the run on `QUOTED_ON`."""
-    ends = fits(data, MAIN, at_end=True)
-    answers = {}
-    for name in QUOTED:
-        end = ends.get((QUOTED_ON, name))
-        key = f"constant_{split_name(name)[0].replace('-', '_')}"
-        answers[key] = None if end is None or not np.isfinite(end.slope) else float(end.constant)
-    return answers
 
 
 def cheapest(data: xr.Dataset) -> pd.DataFrame:

@@ -4,7 +4,6 @@ The dataset has the columns of `symtop.measure.accuracy.error_table`, over ``sce
 ``rk4[axis]``) and ``setting``, and ``horizon`` over the first two.
 """
 
-from collections.abc import Mapping
 from itertools import product
 from typing import NamedTuple
 
@@ -51,14 +50,6 @@ def stepping(data: xr.Dataset) -> xr.Dataset:
 def adaptive(data: xr.Dataset) -> xr.Dataset:
     """The variants that have a tolerance to choose."""
     return data.sel(variant=np.isfinite(data["tolerance"]).any(["scene", "setting"]))
-
-
-def by_order(data: xr.Dataset) -> dict[int, list[str]]:
-    """Variants by their declared order, 0 for none, from low to high."""
-    groups: dict[int, list[str]] = {}
-    for name in data["variant"].values:
-        groups.setdefault(declared_order(str(name)) or 0, []).append(str(name))
-    return dict(sorted(groups.items()))
 
 
 @of_one_dataset
@@ -186,20 +177,6 @@ def named_variants(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
     named = every if len(every) <= FEW or not named else named
     names = [name for name in named if name.replace("[attitude]", "[axis]") not in named or "[attitude]" not in name]
     return data.sel(variant=names).isel(scene=0), merged(data.sel(variant=names), MAIN)
-
-
-def least_work(part: xr.Dataset, labels: Mapping[str, str]) -> list[tuple[str, float]]:
-    """What each variant pays for an error below `TARGET`: force evaluations per nutation, the least first.
-
-    `part` is one scene.
-    """
-    paid, scene = {}, str(part["scene"].values)
-    for name in labels:
-        cell = part.sel(variant=name)
-        work = evaluations_a_nutation(cell, scene)[cell[MAIN].values <= TARGET]
-        if work.size:
-            paid[name] = float(np.min(work))
-    return sorted(paid.items(), key=lambda one: one[1])
 
 
 def ratios(data: xr.Dataset) -> dict[str, np.ndarray]:

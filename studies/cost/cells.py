@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 from symtop_studies.memoize import of_one_dataset
@@ -191,9 +192,9 @@ def winner(data: xr.DataTree, cell: Cell) -> dict[str, Any]:
     return {
         "quantity": cell.quantity, "tops": cell.tops, "needs": cell.needs,
         "nutations": nutations(data, cell.horizon), "target": cell.target,
-        "asked": int(asked_tops(data, cell).sum()), "safe": best, "safe_next": choices[1] if len(choices) > 1 else None,
+        "asked": int(asked_tops(data, cell).sum()), "safe": best,
         "safe_called": called, "hindsight": judged.first, "hindsight_called": judged.called,
-        "hindsight_next": judged.standings[1] if len(judged.standings) > 1 else None, "solved": judged.solved,
+        "solved": judged.solved,
     }  # fmt: skip
 
 
@@ -203,7 +204,6 @@ def winner(data: xr.DataTree, cell: Cell) -> dict[str, Any]:
 class Health(NamedTuple):
     """Of one variant over ten nutations, by setting and kind of top: numbers of tops, (settings, kinds)."""
 
-    fixed_step: bool
     setting: Array  # steps a nutation, or tolerances
     drawn: Array  # (kinds,)
     wrong: Array
@@ -211,38 +211,29 @@ class Health(NamedTuple):
     dropped: Array  # not run any more: the budget of a run would have been exceeded
 
 
-def health(data: xr.DataTree, name: str, horizon: str = "short") -> Health:
+def health(data: xr.DataTree, name: str) -> Health:
     """Wrong runs, silent failures and tops that were dropped."""
-    group = data[horizon].to_dataset().isel(scene=0).sel(variant=name)
+    group = data["short"].to_dataset().isel(scene=0).sel(variant=name)
     there = np.isfinite(group["setting"].values)
     drawn = group["drawn"].values
     runs, wrong, silent = (group[key].transpose("level", "kind").values[there] for key in ("runs", "wrong", "silent"))
-    return Health(str(group["control"].values) == "step_size", group["setting"].values[there], drawn, wrong, silent,
+    return Health(group["setting"].values[there], drawn, wrong, silent,
                   drawn - runs)  # fmt: skip
 
 
-def guard_counts(data: xr.DataTree) -> list[dict[str, Any]]:
+def guard_counts(data: xr.DataTree) -> pd.DataFrame:
     """What the guard says of runs, by chart and whether its trial covers the run whole: warned of wrong and of others.
 
     ``between`` are runs off by more than `EXPECTED`, at which it warns, and less than `WRONG`.
     """
-    group, rows = data["short"].to_dataset().isel(scene=0), []
-    charts, control = group["chart"].values, group["control"].values
-    for label, mask in {
-        "fixed step, axis": (control == "step_size") & (charts == "axis"),
-        "fixed step, angles": (control == "step_size") & (charts == "angles"),
-        "adaptive": control == "tolerance",
-    }.items():
-        part = group.isel(variant=np.flatnonzero(mask))
-        told, error = (part[key].values.ravel() for key in ("foretold", "measured"))
-        whole, watched = part["whole"].values.ravel() > 0.0, part["watched"].values.ravel()
-        for covered in (False, True):
-            asked = ~np.isnan(told) & (whole == covered)
-            wrong, right = asked & (error > WRONG), asked & (error <= EXPECTED)
-            between = asked & ~wrong & ~right
-            counts = {key: int(one.sum()) for key, one in (("wrong", wrong), ("between", between), ("right", right))}
-            warned = {f"{key}_warned": int((one & (told > EXPECTED)).sum())
-                      for key, one in (("wrong", wrong), ("between", between), ("right", right))}  # fmt: skip
-            rows.append({"variants": label, "whole": covered, **counts, **warned,
-                         "wrong_seen": int((wrong & (watched > KEPT)).sum())})  # fmt: skip
-    return rows
+    group = data["short"].to_dataset().isel(scene=0)[["foretold", "measured", "watched", "whole", "chart", "control"]]
+    runs = group.to_dataframe().dropna(subset=["foretold"])
+    runs = runs[(runs["control"] == "tolerance") | (runs["chart"] != "attitude")]
+    kinds = {"wrong": runs["measured"] > WRONG, "right": runs["measured"] <= EXPECTED}
+    kinds["between"] = ~kinds["wrong"] & ~kinds["right"]
+    warned = {f"{name}_warned": one & (runs["foretold"] > EXPECTED) for name, one in kinds.items()}
+    counted = pd.DataFrame({**kinds, **warned, "wrong_seen": kinds["wrong"] & (runs["watched"] > KEPT)})
+    adaptive = np.where(runs["control"] == "tolerance", "adaptive", "fixed step, " + runs["chart"])
+    return (
+        counted.assign(variants=adaptive, whole=runs["whole"] > 0.0).groupby(["variants", "whole"]).sum().reset_index()
+    )

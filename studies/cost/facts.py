@@ -7,15 +7,15 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from symtop.methods.framework.registry import NEEDS, integrator
+from symtop.judging.claims.subject import declared
+from symtop.methods.framework.registry import integrator
 from symtop.report.formats import duration, number
-from symtop.run.guard import EXPECTED
 
 from . import cells, far
 from .cells import CLASSES, EVALUATIONS, Cell
 from .ladder import KEPT, WRONG
-from .prices import FLOOR, NOISY, PROCESSES, TOLERANCE, prices
-from .ranking import SAFE, TIE, Safe
+from .prices import NOISY, PROCESSES, TOLERANCE, prices
+from .ranking import SAFE, TIE
 from .tops import KINDS, NATURAL
 
 LEFT_OUT = {  # methods, by the reason, which the page states
@@ -23,8 +23,11 @@ LEFT_OUT = {  # methods, by the reason, which the page states
     "the same steps as taylor in slower arithmetic": ("taylor-longdouble", "taylor-quad"),
     "a step of any size is the motion itself": ("exact-discrete",),
 }  # fmt: skip
-NOTHING = "no setting within the budget"
-TIES = (1.0, 1.1, 1.25, 1.5)
+NOTHING = "none within the budget"
+HAVE = {  # what each class needs, in a table
+    "derivative": "f(t, y)", "expression": "f as a formula", "lagrangian": "a Lagrangian",
+    "kicks": "torque, free motion", "group": "torque, inertia", "this-top": "this top's equations",
+}  # fmt: skip
 STEPS = (4.37, 17.48, 69.92)  # a nutation, of the table of silent failures
 QUOTED, FINE = "rk4[axis]", 69.92  # whose wrong runs the page quotes, at so many steps a nutation
 KNOWN = (
@@ -48,7 +51,7 @@ def short_name(name: str) -> str:
 def titled(name: str) -> str:
     """The same in a table of classes, with the word for what exists for symmetric bodies alone."""
     method = integrator(name)
-    return short_name(name) + ("" if method.general or method.needs == "this-top" else " (symmetric bodies)")
+    return short_name(name) + ("" if method.general or method.needs == "this-top" else " (symmetric)")
 
 
 def setting_words(name: str, value: float) -> str:
@@ -58,21 +61,17 @@ def setting_words(name: str, value: float) -> str:
 
 def facts(data: xr.DataTree) -> dict[str, Any]:
     """What is safe, and the fastest in hindsight; what is wrong unseen; the guard; the map; the prices; the effort."""
-    spans = cells.horizons(data)
-    known, group = prices(data), data["short"].to_dataset()
-    made, evaluated = (sum(float(np.nansum(data[span][key].values)) for span in spans) for key in ("made", "evaluated"))
+    known, group, spans = prices(data), data["short"].to_dataset(), cells.horizons(data)
     return {
-        "safe": SAFE, "tie": TIE, "wrong": WRONG, "kept": KEPT, "warned_above": EXPECTED, "near": far.TIE,
-        "processes": PROCESSES, "floor": FLOOR, "noisy": NOISY, "within": cells.WITHIN, "often": cells.OFTEN,
-        "at": AT, "longest": 10.0**far.LAST,
+        "safe": SAFE, "tie": TIE, "wrong": WRONG, "kept": KEPT, "near": far.TIE, "processes": PROCESSES,
+        "noisy": NOISY, "at": AT,
         **winners_facts(data), **{f"{part}_{span}": value for span in cells.HORIZONS
                                   for part, value in span_facts(data, span).items()},
         **silent_facts(data), **guard_facts(data), **far_facts(data),
         "variants": group.sizes["variant"],
         "marked": len(known.marked),
-        "dense": known.sampled if np.isfinite(known.sampled) else None,  # price with dense output over heyoka's own
-        "runs": made,
-        "evaluations": evaluated,
+        "dense": known.sampled,  # price with dense output over heyoka's own
+        "runs": sum(float(np.nansum(data[span]["made"].values)) for span in spans),
     }  # fmt: skip
 
 
@@ -90,32 +89,29 @@ def span_facts(data: xr.DataTree, span: str) -> dict[str, float | None]:
 
 
 def winners_facts(data: xr.DataTree) -> dict[str, Any]:
-    """Safe choices and winners in hindsight for any body, the safe choice of each class, and where both agree."""
-    named: dict[str, Any] = {}
-    called = 0
+    """The safe choices for any body and of each class, who takes the fewest evaluations, where both protocols agree."""
+    named: dict[str, Any] = {"safe_called": 0}
     for target in cells.targets(data):
-        one, place = cells.winner(data, Cell("short", "axis", target, NATURAL)), decades(target)
-        called += bool(one["safe"] and one["safe_called"])
-        named |= _safe(f"safe_{place}", one["safe"])
-        best = one["hindsight"]
-        fewest = cells.contest(data, Cell("short", "axis", target, NATURAL), EVALUATIONS).first
-        named |= {f"best_{place}": short_name(best.name) if best else None,
-                  f"best_{place}_share": best.share if best else None,
-                  f"fewest_{place}": short_name(fewest.name) if fewest else None,
-                  f"fewest_{place}_share": fewest.share if fewest else None}  # fmt: skip
+        cell, place = Cell("short", "axis", target, NATURAL), decades(target)
+        one, fewest = cells.winner(data, cell), cells.contest(data, cell, EVALUATIONS).first
+        named["safe_called"] += bool(one["safe"] and one["safe_called"])
+        named |= _safe(f"safe_{place}", data, cell)
+        named |= {
+            f"fewest_{place}": fewest and short_name(fewest.name),
+            f"fewest_{place}_share": fewest and fewest.share,
+        }
     for needs in CLASSES[:-1]:
-        choices, _ = cells.safest(data, Cell("short", "axis", AT, NATURAL, needs))
-        best = choices[0] if choices and np.isfinite(choices[0].seconds) else None
-        key = needs.replace("-", "_")
-        named |= _safe(key, best) if choices else dict.fromkeys((key, f"{key}_seconds"))
+        named |= _safe(needs.replace("-", "_"), data, Cell("short", "axis", AT, NATURAL, needs))
     both = [one for one in cells.winners(data) if one["needs"] != "this-top" and one["safe"] and one["hindsight"]]
     named["cells"] = len(both) or None
     named["same"] = sum(one["safe"].name == one["hindsight"].name for one in both) if both else None
-    return named | {"safe_called": called}
+    return named
 
 
-def _safe(key: str, one: Safe | None) -> dict[str, Any]:
-    return {key: short_name(one.name) if one else NOTHING, f"{key}_seconds": one.seconds if one else None}
+def _safe(key: str, data: xr.DataTree, cell: Cell) -> dict[str, Any]:
+    best = cells.winner(data, cell)["safe"]
+    name = short_name(best.name) if best else NOTHING if cells.costs(data, cell).names else None
+    return {key: name, f"{key}_seconds": best and best.seconds}
 
 
 def silent_facts(data: xr.DataTree) -> dict[str, Any]:
@@ -132,22 +128,19 @@ def silent_facts(data: xr.DataTree) -> dict[str, Any]:
 
 
 def guard_facts(data: xr.DataTree) -> dict[str, int]:
-    """Runs that the guard was asked about and warned of: wrong ones by whether its trial covers them whole, others."""
+    """Runs that the guard was asked about and warned of: wrong ones that are longer than its trial, and right ones."""
     rows = cells.guard_counts(data)
-    kinds = {"piece": [one for one in rows if not one["whole"]], "whole": [one for one in rows if one["whole"]]}
-    wrong = {f"guard_{kind}{end}": sum(one[f"wrong{end}"] for one in part)
-             for kind, part in kinds.items() for end in ("", "_warned")}  # fmt: skip
-    return wrong | {f"guard_{key}{end}": sum(one[f"{key}{end}"] for one in rows)
-                    for key in ("between", "right") for end in ("", "_warned")}  # fmt: skip
+    parts = {"piece": ("wrong", rows[~rows["whole"]]), "right": ("right", rows)}
+    return {f"guard_{name}{end}": int(part[f"{key}{end}"].sum())
+            for name, (key, part) in parts.items() for end in ("", "_warned")}  # fmt: skip
 
 
 def far_facts(data: xr.DataTree) -> dict[str, Any]:
     """The map: who has the most cells, how many were predicted, and what the checks of those say."""
-    names = "axis", "axis_share", "energy", "energy_share", "shape", "shape_share", "variants", "tops"
-    named: dict[str, Any] = dict.fromkeys(
-        (*(f"map_{name}" for name in names), "predicted", "checks", "checks_held", "checks_longest", "checks_low",
-         "checks_middle", "checks_high")
-    )  # fmt: skip
+    names = [f"map_{quantity}{end}" for quantity in far.QUANTITIES for end in ("", "_share")]
+    names += ["map_tops", "predicted", "checks", "checks_held", "checks_longest"]
+    names += ["checks_low", "checks_middle", "checks_high"]  # error of a run, measured over predicted
+    named: dict[str, Any] = dict.fromkeys(names)
     if "far" not in data.children:
         return named
     reached = predicted = 0
@@ -155,50 +148,55 @@ def far_facts(data: xr.DataTree) -> dict[str, Any]:
         panel = far.diagram(data, quantity)
         there = panel.winner >= 0
         reached, predicted = reached + int(there.sum()), predicted + int((panel.predicted & there).sum())
-        area = Counter(panel.names[k] for k in panel.winner[there]).most_common(1)
-        named |= {f"map_{quantity}": short_name(area[0][0]) if area else None,
-                  f"map_{quantity}_share": area[0][1] / int(there.sum()) if area else None}  # fmt: skip
+        for place, count in Counter(panel.winner[there].tolist()).most_common(1):
+            named |= {f"map_{quantity}": short_name(panel.names[place]), f"map_{quantity}_share": count / there.sum()}
+    named |= {"map_tops": data["far"].sizes["member"], "predicted": predicted / reached if reached else None}
     checks = far.checks(data)
-    ratios = np.concatenate([one.ratios[np.isfinite(one.ratios)] for one in checks]) if checks else np.empty(0)
-    low, middle, high = np.quantile(ratios, (0.1, 0.5, 0.9)) if ratios.size else (None,) * 3
-    return named | {
-        "map_variants": len(far.variants_of(data, "axis")),
-        "map_tops": data["far"].sizes["member"],
-        "predicted": predicted / reached if reached else None,
-        "checks": len(checks) or None,
-        "checks_held": sum(one.holds for one in checks) if checks else None,
-        "checks_longest": max((one.horizon for one in checks), default=None),
-        "checks_low": low, "checks_middle": middle, "checks_high": high,  # error, measured over predicted
-    }  # fmt: skip
+    ran = checks.drop_duplicates(["quantity", "target", "horizon"])
+    named |= dict(zip(names[-3:], checks["ratio"].quantile([0.1, 0.5, 0.9]), strict=True))
+    return named | {"checks": len(ran) or None, "checks_held": int(ran["holds"].sum()),
+                    "checks_longest": ran["horizon"].max()}  # fmt: skip
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
 
 
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
-    """What to use; winners in both protocols; by kind of top; other quantities; by tie; prices; silent runs; guard."""
+    """What to use; winners in both protocols; by kind of top; other quantities; prices; silent runs; guard."""
+    kinds = [Cell("short", "axis", target, kind) for kind in KINDS[:-1] for target in cells.targets(data)]
+    others = [cell for quantity in ("attitude", "energy") for cell in cells.cells(data, quantity)]
     return {
-        "use": use(data), "winners": winners(data, cells.winners(data)), "kinds": winners(data, by_kind(data)),
-        "quantities": winners(data, other_quantities(data)), "ties": ties(data), "prices": price_list(data),
-        "silent": silent(data), "guard": pd.DataFrame(cells.guard_counts(data)), "checks": checked(data),
+        "use": use(data), "winners": winners(data, cells.winners(data)),
+        "kinds": winners(data, [cells.winner(data, cell) for cell in kinds]),
+        "quantities": winners(data, [cells.winner(data, cell) for cell in others]),
+        "prices": price_list(data), "silent": silent(data), "guard": cells.guard_counts(data), "checks": checked(data),
     }  # fmt: skip
 
 
 def use(data: xr.DataTree) -> pd.DataFrame:
-    """The safe choice of each class at each error, over the shorter runs."""
+    """The safe choice of each class at each error, over the shorter runs, and what that at `AT` keeps."""
     rows = []
     for needs in CLASSES[:-1]:
-        supplied = f"{needs}: {NEEDS[needs]}" if needs != "this-top" else "this very top's equations, for no other body"
-        line = {"you can supply": supplied}
+        line = {"you can supply": HAVE[needs]}
+        kept = ""
         for target in cells.targets(data):
             one = cells.winner(data, Cell("short", "axis", target, NATURAL, needs))
             best, mark = one["safe"], "" if one["safe_called"] else "~ "
             words = NOTHING if one["asked"] else "not asked"
             if best is not None:
-                words = f"{titled(best.name)}, {setting_words(best.name, best.setting)}, {duration(best.seconds)}"
-            line[f"1e-{decades(target)} rad"] = f"{mark}{words}" if best else words
-        rows.append(line)
+                words = f"{mark}{titled(best.name)}, {setting_words(best.name, best.setting)}, {duration(best.seconds)}"
+                kept = keeps(best.name) if target == AT else kept
+            line[f"1e-{decades(target)} rad"] = words
+        rows.append(line | {f"keeps, at 1e-{decades(AT)} rad": kept})
     return pd.DataFrame(rows)
+
+
+def keeps(name: str) -> str:
+    """Which constants of the motion a method says it keeps, in a table."""
+    words = {claim: declared(integrator(name), claim) for claim in ("energy", "p_phi", "p_psi")}
+    momenta = "momenta" if words["p_phi"] == words["p_psi"] == "kept" else ""
+    energy = {"kept": "energy", "bounded": "energy bounded"}.get(words["energy"], "")
+    return ", ".join(filter(None, (momenta, energy))) or "nothing exactly"
 
 
 def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:
@@ -226,31 +224,6 @@ def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:
 def lead(called: bool, best: Any, marked: list[str]) -> str:
     """Is the lead beyond the intervals?"""
     return "" if best is None else "called" if called else "price too noisy" if best.name in marked else "none"
-
-
-def by_kind(data: xr.DataTree) -> list[dict[str, Any]]:
-    """Cells of any body by kind of top."""
-    return [cells.winner(data, Cell("short", "axis", target, kind))
-            for kind in KINDS[:-1] for target in cells.targets(data)]  # fmt: skip
-
-
-def other_quantities(data: xr.DataTree) -> list[dict[str, Any]]:
-    """Cells of any body for the attitude and the energy."""
-    return [cells.winner(data, cell) for quantity in ("attitude", "energy") for cell in cells.cells(data, quantity)]
-
-
-def ties(data: xr.DataTree) -> pd.DataFrame:
-    """The winner in hindsight if costs within another ratio are level."""
-    rows = []
-    for target in cells.targets(data):
-        taken = cells.costs(data, Cell("short", "axis", target, NATURAL))
-        solved = taken.values[:, np.isfinite(taken.values).any(axis=0)] if taken.values.size else taken.values
-        for tie in TIES:
-            level = solved < tie * (1.0 + 1e-12) * solved.min(axis=0, initial=np.inf)
-            won = (level & (level.sum(axis=0) == 1)).mean(axis=1) if solved.size else np.zeros(1)
-            first = short_name(taken.names[int(won.argmax())]) if won.any() else "none"
-            rows.append([target, tie, first, float(won.max())])
-    return pd.DataFrame(rows, columns=["axis error (rad)", "level within", "first", "share"])
 
 
 def price_list(data: xr.DataTree) -> pd.DataFrame:
@@ -281,13 +254,9 @@ def silent(data: xr.DataTree) -> pd.DataFrame:
 
 
 def checked(data: xr.DataTree) -> pd.DataFrame:
-    """The predicted cells of the map that were run."""
-    rows = []
-    for one in far.checks(data):
-        good = one.ratios[np.isfinite(one.ratios)]
-        spread = np.quantile(good, (0.0, 0.5, 1.0)) if good.size else (np.nan,) * 3
-        rows.append([one.quantity, one.target, one.horizon, short_name(one.winner), short_name(one.next), *spread,
-                     one.holds])  # fmt: skip
-    header = ["quantity", "error", "nutations", "winner", "next", "measured / predicted error, least", "median", "most",
-              "meets the error"]  # fmt: skip
-    return pd.DataFrame(rows, columns=header)
+    """The predicted cells of the map that were run, with the ratio of measured to predicted errors."""
+    runs = far.checks(data)
+    table = runs.groupby(list(runs.columns[:-1]), sort=False)["ratio"].agg(["min", "median", "max"]).reset_index()
+    table[["winner", "next"]] = table[["winner", "next"]].map(short_name)
+    return table.rename(columns={"target": "error", "horizon": "nutations", "holds": "meets the error",
+                                 "min": "measured / predicted error, least", "max": "most"})  # fmt: skip

@@ -22,6 +22,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 from symtop_studies.memoize import of_one_dataset
@@ -315,7 +316,7 @@ def runs_of(data: xr.DataTree, name: str) -> xr.Dataset:
     """What was measured of a variant: without padding, with errors of runs that failed or have no law infinite."""
     one = data["far"].to_dataset().isel(scene=0).sel(variant=name)
     one = one.isel(setting=np.flatnonzero(np.isfinite(one["setting_value"].values)))
-    dead = one["work"].isnull().all("member")  # it failed within ten nutations: there is nothing more to measure
+    dead = np.isnan(one["work"]).all("member")  # it failed within ten nutations: there is nothing more to measure
     return one.assign(error=one["error"].fillna(np.inf), reach=one["reach"].where(~dead, np.inf))
 
 
@@ -413,38 +414,23 @@ def check(asked: Any) -> xr.Dataset:
     )
 
 
-class Check(NamedTuple):
-    """A predicted cell that was run: errors measured over those predicted, by run and top, and who meets the target."""
+def checks(data: xr.DataTree) -> pd.DataFrame:
+    """The predicted cells that were run in full, a line a run and top.
 
-    quantity: str
-    target: float
-    horizon: float
-    winner: str
-    next: str
-    ratios: Array  # of errors, measured over predicted; runs whose error is below 1 alone
-    holds: bool  # the finer setting of the winner meets the target on most tops, and the coarser one does not
-
-
-def checks(data: xr.DataTree) -> list[Check]:
-    """The cells that were run in full."""
-    if "checks" not in data.children:
-        return []
-    group, answers = data["checks"].to_dataset().isel(scene=0), []
-    for name in group["variant"].values:
+    ``ratio`` is the error over the predicted one, of errors below 1 alone; a cell ``holds`` if the finer setting of the
+    winner meets the target on most tops.
+    """
+    names, rows = ["quantity", "target", "horizon", "winner", "next", "holds", "ratio"], []
+    group = data["checks"].to_dataset().isel(scene=0) if "checks" in data.children else None
+    for name in () if group is None else group["variant"].values:
         one = group.sel(variant=name)
         quantity, target, horizon = str(one["quantity"].values), float(one["target"]), float(one["checked_horizon"])
-        measured_errors = one["errors"].transpose("rank", "side", "member").values
-        ratios = []
-        for rank, contender in enumerate(map(str, one["contender"].values)):
-            runs = runs_of(data, contender)
-            for side in range(2):
-                level = int(
-                    np.argmin(np.abs(np.log(runs["setting_value"].values / float(one["setting_value"][rank, side]))))
-                )
-                told = runs["error"].sel(quantity=quantity).isel(setting=level).sel(horizon=horizon, method="nearest")
-                pair = measured_errors[rank, side], told.values[: measured_errors.shape[2]]
-                ratios.append(np.where((pair[0] < 1.0) & (pair[1] < 1.0), pair[0] / pair[1], np.nan))
-        met = measured_errors[0] <= target
-        answers.append(Check(quantity, target, horizon, *map(str, one["contender"].values), np.concatenate(ratios),
-                             bool(met[1].mean() >= 0.5)))  # fmt: skip
-    return answers
+        pair, errors = list(map(str, one["contender"].values)), one["errors"].transpose("rank", "side", "member").values
+        cell = [quantity, target, horizon, *pair, bool((errors[0, 1] <= target).mean() >= 0.5)]
+        for rank, side in np.ndindex(2, 2):
+            runs, setting = runs_of(data, pair[rank]), float(one["setting_value"][rank, side])
+            level = int(np.argmin(np.abs(np.log(runs["setting_value"].values / setting))))
+            told = runs["error"].sel(quantity=quantity).isel(setting=level).sel(horizon=horizon, method="nearest")
+            for error, foretold in zip(errors[rank, side].tolist(), told.values.tolist(), strict=False):
+                rows.append([*cell, error / foretold if max(error, foretold) < 1.0 else math.nan])
+    return pd.DataFrame(rows, columns=names).astype({"ratio": float})

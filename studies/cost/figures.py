@@ -12,7 +12,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from symtop.methods.framework.registry import integrator, split_name
 from symtop.report import style
-from symtop.report.figures import label_lines
+from symtop.report.figures import chosen, label_lines
 from symtop.report.style import LEAST_TEXT, few_ticks, grid, panels
 from symtop.runner.study import Picture
 
@@ -44,8 +44,6 @@ TITLES = {
     "axis": "axis: angle between\nat one time (rad)", "energy": "energy:\nrelative change",
     "shape": "shape: distance\nto the true orbit",
 }  # fmt: skip
-SHADES = {"splitting": style.GREENS, "runge-kutta": style.ORANGES, "taylor": style.BLACKS,
-          "discrete-lagrangian": style.BLUES}  # fmt: skip
 
 
 def pictures(data: xr.DataTree) -> list[Picture]:
@@ -55,33 +53,25 @@ def pictures(data: xr.DataTree) -> list[Picture]:
     return [Picture(name, draw(data)) for name, draw in drawn.items()]
 
 
-def power(target: float) -> str:
-    """A target as a power of ten."""
-    return f"$10^{{{np.log10(target):.0f}}}$"
-
-
 def draw_accuracy(data: xr.DataTree) -> Any:
     """Error against the seconds of a safe run: the fastest for any body at each error, and methods that people know."""
-    lines: dict[str, list[tuple[float, float, float, float]]] = {}
-    names = list(FAMILIAR)
-    for target in cells.targets(data):
-        choices, _ = cells.safest(data, Cell("short", "axis", target, NATURAL))
-        names += [one.name for one in choices[:1] if math.isfinite(one.seconds) and one.name not in names]
-    for target in cells.targets(data):
-        for needs in CLASSES[:-1]:
-            for one in cells.safest(data, Cell("short", "axis", target, NATURAL, needs))[0]:
-                if one.name in names and math.isfinite(one.seconds):
-                    lines.setdefault(one.name, []).append((one.seconds, target, one.low, one.high))
+    asked = [Cell("short", "axis", target, NATURAL) for target in cells.targets(data)]
+    firsts = [one.name for cell in asked for one in cells.safest(data, cell)[0][:1]]
+    each = {cell.target: {one.name: one for needs in CLASSES[:-1]
+                          for one in cells.safest(data, cell._replace(needs=needs))[0] if math.isfinite(one.seconds)}
+            for cell in asked}  # fmt: skip
+    every = list(dict.fromkeys(name for known in each.values() for name in known))
     figure, axes = panels(1, 1, height=4.0)
     axis, ends = axes[0, 0], []
-    for name in (name for name in names if name in lines):
-        x, y, low, high = np.array(lines[name]).T
+    for name in chosen(every, [*FAMILIAR, *firsts], len(FAMILIAR)):
+        points = [(1e6 * known[name].seconds, target, 1e6 * known[name].low, 1e6 * known[name].high)
+                  for target, known in each.items() if name in known]  # fmt: skip
+        x, y, low, high = np.array(points).T
         own = integrator(name).needs == TOP
         style_of = style.line(name) | ({"color": PALEST} if own else {})
-        axis.plot(1e6 * x, y, lw=1.0 if own else 1.6, zorder=2 if own else 3, **style_of)
-        label = f"{short_name(name)} (made for this top)" if own else short_name(name)
-        ends.append((label, style_of["color"], 1e6 * x, y))
-        axis.hlines(y, 1e6 * low, 1e6 * high, color=style_of["color"], lw=3.0, alpha=0.35, zorder=2)
+        axis.plot(x, y, lw=1.0 if own else 1.6, zorder=2 if own else 3, **style_of)
+        axis.hlines(y, low, high, color=style_of["color"], lw=3.0, alpha=0.35, zorder=2)
+        ends.append((f"{short_name(name)}{' (made for this top)' * own}", style_of["color"], x, y))
     axis.set(xscale="log", yscale="log", ylim=(2e-13, 5e-3), ylabel="axis error that 95 % of the tops keep (rad)")
     axis.set_xlabel("time of a safe run: evaluations × price + call (µs)")
     label_lines(axis, ends)
@@ -90,20 +80,18 @@ def draw_accuracy(data: xr.DataTree) -> Any:
 
 def draw_run_lengths(data: xr.DataTree) -> Any:
     """The share of natural tops that each variant has solved within so many force evaluations, one panel a target."""
-    targets = cells.targets(data)
-    each = {target: cells.costs(data, Cell("short", "axis", target, NATURAL), EVALUATIONS) for target in targets}
-    order: list[str] = []
-    for target in targets:
-        contest = cells.contest(data, Cell("short", "axis", target, NATURAL), EVALUATIONS)
-        order += [one.name for one in contest.standings[:2]]
-    rows = list(dict.fromkeys([*order, *BESIDE]))[:NAMED]
+    asked = [Cell("short", "axis", target, NATURAL) for target in cells.targets(data)]
+    each = [cells.costs(data, cell, EVALUATIONS) for cell in asked]
+    firsts = [one.name for cell in asked for one in cells.contest(data, cell, EVALUATIONS).standings[:2]]
+    every = list(dict.fromkeys(name for taken in each for name in taken.names))
+    rows = chosen(every, list(dict.fromkeys([*firsts, *BESIDE]))[:NAMED], NAMED)
     labels = "force evaluations of a run", "share of tops solved"
-    figure, axes = grid(len(targets), 2, labels, height=2.3, sharex=True, sharey=True)
-    named = [taken.values[taken.names.index(name)] for taken in each.values() for name in rows if name in taken.names]
+    figure, axes = grid(len(asked), 2, labels, height=2.3, sharex=True, sharey=True)
+    named = [taken.values[taken.names.index(name)] for taken in each for name in rows if name in taken.names]
     ends = [np.quantile(part[np.isfinite(part)], LATEST) for part in named if np.isfinite(part).any()]
-    cheapest = min((float(taken.values.min()) for taken in each.values() if taken.values.size), default=1.0)
+    cheapest = min((float(taken.values.min()) for taken in each if taken.values.size), default=1.0)
     budgets = np.geomspace(0.9 * cheapest, 1.5 * max(ends, default=10.0 * cheapest), 400)
-    for axis, (target, taken) in zip(axes, each.items(), strict=True):
+    for axis, cell, taken in zip(axes, asked, each, strict=True):
         for name, costs in zip(taken.names, taken.values, strict=True):
             share = run_lengths(costs, budgets)
             if name in rows:
@@ -112,9 +100,10 @@ def draw_run_lengths(data: xr.DataTree) -> Any:
             else:
                 axis.plot(budgets, share, color=style.GREY, lw=0.6, alpha=0.4, zorder=1)
         axis.axhline(HALF, color="black", lw=0.8, ls=(0, (1, 2)), zorder=2)
-        axis.set(xscale="log", ylim=(0.0, 1.03), title=f"axis error below {power(target)} rad")
+        axis.set(xscale="log", ylim=(0.0, 1.03), title=f"axis error below $10^{{{np.log10(cell.target):.0f}}}$ rad")
         axis.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
-    axes[0].plot([], [], color=style.GREY, lw=0.8, label="all other methods for any body")
+    if len(every) > len(rows):
+        axes[0].plot([], [], color=style.GREY, lw=0.8, label="all other methods for any body")
     few_ticks(*axes, most=5)
     style.legend_below(figure, axes)
     return figure
@@ -123,13 +112,10 @@ def draw_run_lengths(data: xr.DataTree) -> Any:
 def draw_map(data: xr.DataTree) -> Any:
     """Three panels: the family of the cheapest variant for every allowed error and run length."""
     each = {quantity: far.diagram(data, quantity) for quantity in far.QUANTITIES}
-    area: Counter[str] = Counter()
-    for panel in each.values():
-        area.update(panel.names[k] for k in panel.winner.ravel() if k >= 0)
-    spoken = {names.most_common(1)[0][0] for panel in each.values()
-              if (names := Counter(panel.names[k] for k in panel.winner.ravel() if k >= 0))}  # fmt: skip
+    won = [Counter(panel.names[k] for k in panel.winner.ravel() if k >= 0) for panel in each.values()]
+    spoken = {names.most_common(1)[0][0] for names in won if names}
     groups: dict[str, list[str]] = {}
-    for name, _ in area.most_common():
+    for name, _ in sum(won, Counter[str]()).most_common():
         groups.setdefault(name if name in spoken else integrator(name).family, []).append(name)
     colors = _colors(groups)
     figure, axes = panels(1, len(far.QUANTITIES), height=3.6, sharex=True, sharey=True)
@@ -149,7 +135,7 @@ def _colors(groups: dict[str, list[str]]) -> dict[str, Any]:
     colors = {}
     for name in sorted(groups, key=lambda name: "[" not in name):
         family = integrator(groups[name][0]).family
-        base, *others = (np.array(to_rgb(shade)) for shade in SHADES[family])
+        base, *others = (np.array(to_rgb(shade)) for shade in style.SHADES[family])
         colors[name] = [base, *sorted(others, key=lambda shade: shade.sum())][used[family] % (1 + len(others))]
         used[family] += 1
     return colors

@@ -90,7 +90,6 @@ class Standing(NamedTuple):
     high: float
     level: float  # share of tops on which it wins or is level
     met: float  # share of all tops on which it meets the error
-    slowdown: float  # median
 
 
 class Contest(NamedTuple):
@@ -133,10 +132,7 @@ def hindsight(names: Sequence[str], costs: Array, errors: Array, marked: Sequenc
     rivals = np.delete(shares, first, axis=1).max(axis=1, initial=0.0)
     called = bool(middle[first] > 0.0 and np.mean(shares[:, first] > rivals) >= SURE and names[first] not in marked)
     met = np.isfinite(costs).mean(axis=1)
-    middles = np.median(np.where(np.isnan(ratio), np.inf, ratio), axis=1)
-    standings = [
-        Standing(names[k], *(float(part[k]) for part in (middle, low, high, half, met, middles))) for k in order
-    ]
+    standings = [Standing(names[k], *(float(part[k]) for part in (middle, low, high, half, met))) for k in order]
     return Contest(standings, called, n, int(solved.sum()))
 
 

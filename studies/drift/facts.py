@@ -7,12 +7,9 @@ import pandas as pd
 import xarray as xr
 
 from symtop.measure.conservation import CONSTANTS, RUN_ROUNDING
-from symtop.methods.framework.registry import split_name
-from symtop.model.charts import CHARTS
-from symtop.run.long_run import PER_NUTATION, SAMPLES
+from symtop.run.long_run import PER_NUTATION
 
 from .measures import (
-    APART,
     BEHAVIOURS,
     FAILED,
     HELD,
@@ -20,12 +17,10 @@ from .measures import (
     HORIZONS,
     ROUNDINGS,
     WINDOWS,
-    apart,
     as_time,
     faster,
     fates,
     losses,
-    pairs,
     phases_by_energy,
     shares,
     shifts,
@@ -39,30 +34,21 @@ MEANING = {
 }  # fmt: skip
 CLOSE = 0.1  # a prediction that is further off, relative, counts as missed
 WHOLE = 0.99  # of the longest run of a scene: a shorter run counts as shortened
-SHOWN = (  # in the figure of the residuals
-    "midpoint[angles]", "stormer-verlet[angles]", "strang[axis]", "gauss-4[axis]", "rk4[angles]", "rk4[axis]",
-    "rk45[angles]", "taylor[axis]",
-)  # fmt: skip
 NAMES = {  # of the facts of each group
-    HISTORIES: "scenes nutations steps tolerance own variants holding ended shown shown_holding shortened shortest "
-    "charts apart chart_worse chart_better chart_change chart_other bounded_runs bounded_as_t lost_runs lost_faster",
-    WINDOWS: "long_steps long_scene long_count moved scattered modified_moved long_momenta",
-    ROUNDINGS: "walk_steps members plain_members walk_least walk_most walks walk_count gain_least gain_most",
-    HORIZONS: "lost_short lost_later lost_hits lost_hit_most lost_count lost_unpredicted",
+    HISTORIES: "scenes nutations steps tolerance own variants holding shortened shortest energy_lost "
+    "energy_lost_most energy_lost_worst bounded_runs bounded_as_t lost_runs lost_faster",
+    WINDOWS: "long_steps long_scene moved scattered long_momenta",
+    ROUNDINGS: "members walk_least walk_most gain_least gain_most",
+    HORIZONS: "lost_short lost_later lost_hits lost_hit_most lost_count",
 }
-OF_CONSTANT = [f"{word}{what}" for word in ("kept", "bounded", "lost") for what in ("", "_most", "_worst")]
 
 
 def facts(data: xr.DataTree) -> dict[str, Any]:
     """What was held fixed, and what became of constants and phase; changes are relative."""
-    names = [*" ".join(NAMES.values()).split(), *(f"{one}_{what}" for one in CONSTANTS for what in OF_CONSTANT)]
-    answers: dict[str, Any] = dict.fromkeys(names) | {
+    answers: dict[str, Any] = dict.fromkeys(" ".join(NAMES.values()).split()) | {
         "rounding": RUN_ROUNDING,  # the largest change that a million steps of rounding explain
-        "apart_times": APART,
         "per_nutation": PER_NUTATION,  # steps of the long runs
-        "samples": SAMPLES,  # of a window of them
         "lost_phase": LOST,  # rad
-        "close": CLOSE,
     }
     measures = {HISTORIES: of_histories, WINDOWS: of_windows, ROUNDINGS: of_walks, HORIZONS: of_losses}
     for group, of_group in measures.items():
@@ -74,14 +60,10 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
 def of_histories(every: xr.Dataset) -> dict[str, Any]:
     """A million steps of every variant."""
     histories = without_repeats(every)
-    fate, phases = fates(histories), phases_by_energy(histories)
-    holding = fate[list(CONSTANTS)].isin(HELD)
-    shown = [name for name in SHOWN if name in fate.index]
+    fate, phases, length = fates(histories), phases_by_energy(histories), shares(histories)
     own = histories["own_tolerance"].max("scene").values > 0.0
     given = histories["tolerance"].max("scene").values[~own]
-    length = shares(histories)
-    differing, known = apart(every), {split_name(one.worse)[0] for one in pairs(every)}
-    worst = max(differing, key=lambda one: one.change if one.constant != "energy" else 0.0, default=None)
+    lost = fate["energy_largest"][fate["energy"].isin(BEHAVIOURS[2:])]
     return {
         "scenes": " and ".join(map(str, histories["scene"].values)),
         "nutations": float(histories["nutations"].max()),
@@ -89,85 +71,60 @@ def of_histories(every: xr.Dataset) -> dict[str, Any]:
         "tolerance": float(np.nanmax(given)) if np.isfinite(given).any() else None,
         "own": int(own.sum()),  # variants that ran at their own tolerance, the rounding of the arithmetic
         "variants": len(fate),
-        "holding": int(holding.all(axis=1).sum()),  # all three constants
-        "ended": int((fate["energy"] == FAILED).sum()),  # early
-        "shown": len(shown),
-        "shown_holding": int(holding["energy"][shown].sum()),
+        "holding": int(fate[list(CONSTANTS)].isin(HELD).all(axis=1).sum()),
         "shortened": int((length < WHOLE).sum()),
         "shortest": float(length.min()),  # share of the run length
-        "charts": len(known) or None,  # methods with more than one
-        "apart": len({split_name(one.worse)[0] for one in differing}) if known else None,
-        "chart_worse": worst and worst.worse, "chart_better": worst and worst.better,  # of a momentum
-        "chart_change": worst and worst.change, "chart_other": worst and worst.other,
-        "bounded_runs": phases["bounded"].size, "bounded_as_t": int(as_time(phases["bounded"]).sum()),
-        "lost_runs": phases["lost"].size, "lost_faster": int(faster(phases["lost"]).sum()),
-        **{f"{one}_{name}": value for one in CONSTANTS for name, value in of_constant(fate, one).items()},
+        "energy_lost": len(lost),
+        "energy_lost_most": float(lost.max()) if len(lost) else None,
+        "energy_lost_worst": str(lost.idxmax()) if len(lost) else None,
+        "bounded_runs": phases["bounded"].size or None, "bounded_as_t": int(as_time(phases["bounded"]).sum()),
+        "lost_runs": phases["lost"].size or None, "lost_faster": int(faster(phases["lost"]).sum()),
     }  # fmt: skip
-
-
-def of_constant(fate: pd.DataFrame, constant: str) -> dict[str, Any]:
-    """How many variants keep a constant, bound its error or lose it, with the largest change of each."""
-    answers: dict[str, Any] = {}
-    for word, chosen in (("kept", BEHAVIOURS[:1]), ("bounded", BEHAVIOURS[1:2]), ("lost", BEHAVIOURS[2:])):
-        largest = fate[f"{constant}_largest"][fate[constant].isin(chosen)]
-        answers |= {word: len(largest), f"{word}_most": float(largest.max()) if len(largest) else None}
-        answers[f"{word}_worst"] = str(largest.idxmax()) if len(largest) else None
-    return answers
 
 
 def of_windows(windows: xr.Dataset) -> dict[str, Any]:
     """The long runs: how far mean energies move, over the width of the oscillation of the energy."""
-    moves, full = np.abs(shifts(windows)), windows.dropna("window", how="all", subset=["energy_mean"])
-    modified = full["modified_energy_mean"]
+    moves = np.abs(shifts(windows))
     parts = [np.abs(windows[f"{name}_{part}"]).max() for name in ("p_phi", "p_psi") for part in ("least", "largest")]
     return {
         "long_steps": float(windows["steps"].max()),
         "long_scene": str(windows["scene"].values[0]),
-        "long_count": windows.sizes["variant"],
         "moved": float(moves.isel(window=-1).max()),
         "scattered": float(moves.max()),
-        "modified_moved": float(np.abs(modified.isel(window=-1) - modified.isel(window=0)).max()),  # of E0 - min V
         "long_momenta": max(map(float, parts)),
     }
 
 
 def of_walks(ensembles: xr.Dataset) -> dict[str, Any]:
     """Drift by rounding: powers of the number of steps with compensated sums, and what those gain over plain ones."""
-    cells = ensembles.isel(scene=0)
-    powers, gains = cells["exponent"].values, cells["gain"].values
+    powers, gains = (ensembles[name].isel(scene=0).values for name in ("exponent", "gain"))
     return {
-        "walk_steps": float(cells["elapsed"].max()),
-        "members": cells.sizes["member"], "plain_members": cells.sizes["plain_member"],
+        "members": ensembles.sizes["member"],
         "walk_least": float(powers.min()), "walk_most": float(powers.max()),
-        "walks": int((np.abs(powers - 0.5) <= cells["exponent_interval"].values).sum()),
-        "walk_count": powers.size,
         "gain_least": float(gains.min()), "gain_most": float(gains.max()),
     }  # fmt: skip
 
 
 def of_losses(horizons: xr.Dataset) -> dict[str, Any]:
     """How well a short run predicts when the phase is lost."""
-    lost = loss_table(horizons)
+    lost, short = loss_table(horizons), float(horizons["short"].max())
     off = np.abs(lost["predicted / measured"] - 1.0)
-    later = lost["measured (nutations)"] / float(horizons["short"].max())
     return {
-        "lost_short": float(horizons["short"].max()),  # nutations
-        "lost_later": float(later.median()),  # times as late as the short run ends
+        "lost_short": short,  # nutations
+        "lost_later": float(lost["measured (nutations)"].median() / short),  # times as late as the short run ends
         "lost_hits": int((off <= CLOSE).sum()),
         "lost_hit_most": float(off[off <= CLOSE].max()),
         "lost_count": len(lost),
-        "lost_unpredicted": horizons.sizes["variant"] - len(lost),
     }
 
 
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
-    """What became of the constants; every variant; where the chart matters; losses of phase."""
+    """What became of the constants; every variant; losses of phase."""
     groups = {name: group.to_dataset() for name, group in data.children.items()}
     made: dict[str, pd.DataFrame] = {}
     if HISTORIES in groups:
         histories = without_repeats(groups[HISTORIES])
         made |= {"behaviours": behaviour_table(histories), "variants": variant_table(histories)}
-        made["charts"] = chart_table(groups[HISTORIES])
     if HORIZONS in groups:
         made["losses"] = loss_table(groups[HORIZONS])
     return made
@@ -193,14 +150,6 @@ def variant_table(histories: xr.Dataset) -> pd.DataFrame:
     powers = histories["phase_exponent"]
     table["grows as t to the, least"], table["most"] = powers.min("scene").values, powers.max("scene").values
     return table.sort_values("change of energy", ascending=False, kind="stable").reset_index(names="variant")
-
-
-def chart_table(histories: xr.Dataset) -> pd.DataFrame:
-    """The largest change of a constant in every chart of the methods for which the chart matters."""
-    losing = dict.fromkeys((one.constant, split_name(one.worse)[0]) for one in apart(histories))
-    largest = {one: histories[f"{one}_largest"].max("scene").to_series() for one in CONSTANTS}
-    rows = [[*place, *(largest[place[0]].get(f"{place[1]}[{chart}]") for chart in CHARTS)] for place in losing]
-    return pd.DataFrame(rows, columns=["constant", "method", *(f"[{chart}]" for chart in CHARTS)])
 
 
 def loss_table(horizons: xr.Dataset) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""Figures of the study: residuals over a million steps, growth of the phase error, rounding of an ensemble."""
+"""Figures of the study: residuals over a million steps, rounding of an ensemble."""
 
 import math
 from typing import Any
@@ -7,26 +7,24 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure.conservation import CONSTANTS, tops
-from symtop.model.charts import Array
+from symtop.report.figures import SMALLEST, chosen
 from symtop.report.formats import number
-from symtop.report.style import BLACK, BLUE, GREY, LEAST_TEXT, few_ticks, legend_below, line, look, panels, slope_guide
+from symtop.report.style import BLACK, GREY, LEAST_TEXT, few_ticks, legend_below, line, look, panels, slope_guide
 from symtop.runner.study import Picture
 
-from .facts import SHOWN
-from .measures import AS_TIME, HISTORIES, ROUNDINGS, by_integrator, phases_by_energy, without_repeats
+from .measures import HISTORIES, ROUNDINGS, by_integrator, without_repeats
 
+SHOWN = (  # in the figure of the residuals
+    "midpoint[angles]", "stormer-verlet[angles]", "strang[axis]", "gauss-4[axis]", "rk4[angles]", "rk4[axis]",
+    "rk45[angles]", "taylor[axis]",
+)  # fmt: skip
 LABELS = {"energy": "energy", "p_phi": r"$p_\varphi$", "p_psi": r"$p_\psi$"}
 NOTE = {"fontsize": LEAST_TEXT, "color": "#444444"}
-SMALLEST = 1e-17  # what is smaller is drawn here
-BIN = 2.0 * AS_TIME  # of an exponent, centred on 1: what grows as t is one column
-ABREAST = 5  # dots beside each other in a column
-LAWS = {0.0: "0\nstays", 0.5: "½", 1.0: "1\nas t", 1.5: "1½", 2.0: "2\nas t²"}
-ENERGIES = {"bounded": "bounded energy error", "lost": "energy drifts or grows", "kept": "energy at rounding"}
 
 
 def pictures(data: xr.DataTree) -> list[Picture]:
     """The figures of every group that was measured."""
-    drawn = {HISTORIES: (_residuals, _exponents), ROUNDINGS: (_rounding,)}
+    drawn = {HISTORIES: (_residuals,), ROUNDINGS: (_rounding,)}
     return [draw(data[group].to_dataset()) for group, draws in drawn.items() if group in data for draw in draws]
 
 
@@ -36,20 +34,19 @@ def envelope(t: np.ndarray, r: np.ndarray) -> tuple[list[float], list[float]]:
 
 
 def _residuals(histories: xr.Dataset) -> Picture:
-    small = without_repeats(histories)
-    names = [name for name in small["variant"].values if name in SHOWN]
-    data = small.sel(variant=names) if names else small
+    data = without_repeats(histories)
+    data = data.sel(variant=chosen(list(map(str, data["variant"].values)), SHOWN))
     figure, axes = panels(len(CONSTANTS), data.sizes["scene"], height=1.9, sharex="col", sharey="row")
     for row, constant in zip(axes, CONSTANTS, strict=True):
         for axis, scene in zip(row, data["scene"].values, strict=True):
-            for name in data["variant"].values:
-                mark, cell = look(str(name)), data.sel(scene=scene, variant=name)
+            for name in map(str, data["variant"].values):
+                cell = data.sel(scene=scene, variant=name)
                 t, r = cell["sample_time"].values, np.abs(cell[f"{constant}_residual"].values)
                 good = np.isfinite(r) & np.isfinite(t) & (t > 0.0)
                 if good.any():
                     t, r = t[good], np.maximum(r[good], SMALLEST)
-                    axis.plot(t, r, ",", color=mark.color, alpha=0.25, zorder=2, rasterized=True)
-                    axis.plot(*envelope(t, r), **line(str(name), 0.8), label=str(name), zorder=3)
+                    axis.plot(t, r, ",", color=look(name).color, alpha=0.25, zorder=2, rasterized=True)
+                    axis.plot(*envelope(t, r), **line(name, 0.8), label=name, zorder=3)
             axis.set(xscale="log", yscale="log")
         row[0].set_ylabel(f"relative change of {LABELS[constant]}")
         row[0].annotate("exact zeros", (0.01, SMALLEST), (0, 3), xycoords=row[0].get_yaxis_transform(),
@@ -66,36 +63,6 @@ def _residuals(histories: xr.Dataset) -> Picture:
     axes[1, 0].text(0.98, 0.45, told, transform=axes[1, 0].transAxes, ha="right", va="center", **NOTE)
     legend_below(figure, axes)
     return Picture("residuals", figure)
-
-
-def _exponents(histories: xr.Dataset) -> Picture:
-    groups = {word: slopes for word, slopes in phases_by_energy(without_repeats(histories)).items() if slopes.size}
-    tall = [max(map(len, _columns(slopes).values())) / ABREAST + 3.0 for slopes in groups.values()]
-    figure, axes = panels(len(groups) or 1, 1, height=1.3, sharex=True, height_ratios=tall or None)
-    for axis, (word, slopes), most in zip(axes[:, 0], groups.items(), tall, strict=False):
-        for place, column in _columns(slopes).items():
-            count = len(column)
-            up, across = np.divmod(np.arange(count), ABREAST)
-            abreast = np.where(up < count // ABREAST, ABREAST, count % ABREAST)  # in the line of a dot
-            x = place + 0.16 * BIN * (across - 0.5 * (abreast - 1))
-            axis.plot(x, up + 0.5, "o", color=BLUE, ms=4.2, mew=0)
-            axis.annotate(str(count), (place, up.max() + 1.1), ha="center", va="bottom", **NOTE)
-        axis.set_title(f"{ENERGIES[word]}: {slopes.size} runs", loc="left")
-        axis.set(ylim=(0.0, most), yticks=())
-        axis.spines["left"].set_visible(False)
-        axis.grid(visible=False)
-        axis.axvspan(1.0 - AS_TIME, 1.0 + AS_TIME, color="#EFEFEF", lw=0, zorder=0)
-    axes[-1, 0].set(xticks=list(LAWS), xticklabels=list(LAWS.values()))
-    axes[-1, 0].set_xlabel("power of time with which the phase error grows")
-    return Picture("exponents", figure)
-
-
-def _columns(slopes: Array) -> dict[float, list[float]]:
-    """Exponents by the middle of their column."""
-    columns: dict[float, list[float]] = {}
-    for slope in sorted(map(float, slopes)):
-        columns.setdefault(1.0 + BIN * round((slope - 1.0) / BIN), []).append(slope)
-    return columns
 
 
 def _rounding(data: xr.Dataset) -> Picture:

@@ -8,17 +8,13 @@ The dataset is a tree of four groups, each over ``scene`` and ``variant``; these
     horizons    loss of phase of the fixed-step methods  `phase_loss.phase_loss`
 """
 
-import itertools
 import math
-from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from symtop.measure.conservation import CONSTANTS, RUN_ROUNDING, behaviour
-from symtop.methods.framework.registry import split_name
+from symtop.measure.conservation import CONSTANTS, behaviour
 from symtop.model.charts import Array
 from symtop.model.scenes import scenes
 
@@ -27,7 +23,6 @@ FAILED = "failed"
 BEHAVIOURS = ("kept", "bounded", "random walk", "growing", "drift")  # each is worse than those before it
 HELD = BEHAVIOURS[:2]
 AS_TIME = 0.1  # of an exponent
-APART = 2.0  # times: two charts of one method differ by more than this, one of them above rounding
 
 
 def by_integrator(data: xr.Dataset) -> dict[str, xr.Dataset]:
@@ -54,12 +49,6 @@ def grain(scene_name: str, name: str) -> float:
     """The rounding of a constant on a scene, in units of the machine's: that of an energy counts from E0 - min V."""
     known = scenes()
     return known[scene_name].energy_grain if name == "energy" and scene_name in known else 1.0
-
-
-def rounding(cell: xr.Dataset, name: str) -> float:
-    """The largest relative change of a constant that a million steps of rounding explain, in a cell of one scene."""
-    constant = "energy" if name == "phase" else name
-    return RUN_ROUNDING * grain(str(cell["scene"].item()) if "scene" in cell.coords else "", constant)
 
 
 def without_repeats(histories: xr.Dataset) -> xr.Dataset:
@@ -106,38 +95,6 @@ def shares(histories: xr.Dataset) -> Array:
     """The length of every variant's run over that of the longest, on the scene where it is least."""
     ends = histories["sample_time"].max("sample")
     return (ends / ends.max("variant")).min("scene").values
-
-
-class Pair(NamedTuple):
-    """One constant in two charts of one method: the largest change over all scenes in each."""
-
-    constant: str
-    worse: str  # name of a variant
-    better: str
-    change: float  # relative, of the worse variant
-    other: float  # of the better one
-
-
-def pairs(histories: xr.Dataset) -> Iterator[Pair]:
-    """Every two charts of a method for every constant; runs that ended early are left out."""
-    whole = histories.sel(variant=(histories["outcome"] == "ok").all("scene"))
-    rows: dict[str, list[str]] = {}
-    for name in map(str, whole["variant"].values):
-        rows.setdefault(split_name(name)[0], []).append(name)
-    for constant in CONSTANTS:
-        largest = whole[f"{constant}_largest"].max("scene", skipna=False).to_series()
-        for two in itertools.chain.from_iterable(itertools.combinations(names, 2) for names in rows.values()):
-            better, worse = sorted(two, key=largest.__getitem__)
-            yield Pair(constant, worse, better, float(largest[worse]), float(largest[better]))
-
-
-def apart(histories: xr.Dataset) -> list[Pair]:
-    """Two charts of a method of which one keeps a constant much better than the other."""
-    explained = {
-        constant: max(rounding(histories.sel(scene=scene), constant) for scene in histories["scene"].values)
-        for constant in CONSTANTS
-    }
-    return [one for one in pairs(histories) if one.change > max(explained[one.constant], APART * one.other)]
 
 
 def shifts(windows: xr.Dataset) -> xr.DataArray:

@@ -11,7 +11,7 @@ import xarray as xr
 from symtop.methods.framework.registry import integrator, split_name
 from symtop.model.scenes import scene
 
-from .measures import FREQUENCIES, HORIZON, SCENES
+from .measures import HORIZON, SCENES
 
 SLOW, FAST = SCENES
 BETWEEN = (400.0, 3000.0)  # steps a nutation that the measured order is taken between
@@ -68,8 +68,6 @@ def _lines(data: xr.DataTree, names: dict[str, None]) -> Iterator[dict[str, Any]
         order, least = slope(count[part], error[part]), int(np.argmin(error)) if error.size else None
         single, term = entry.precision == "single", not split_name(name)[0].startswith("no-gyro")
         off = np.degrees(read(data, "population", "off", scene="population", variant=name))
-        apart = [read(data, "tops", "frame_spherical", scene=SLOW, variant=name, rate=rate, horizon=HORIZON)
-                 for rate in FREQUENCIES]  # fmt: skip
         yield {
             "variant": name, "summary": entry.summary, "engine": entry.family == "engine", "single": single,
             "term": term, "order": order, "group": 0.0 if not term else 1.0 if single else max(1.0, np.round(order)),
@@ -79,16 +77,9 @@ def _lines(data: xr.DataTree, names: dict[str, None]) -> Iterator[dict[str, Any]
             "slow": frame(data, "frame_axis", name), "fast": frame(data, "frame_axis", name, FAST),
             "slow_level": frame(data, "level_axis", name), "fast_level": frame(data, "level_axis", name, FAST),
             "energy": frame(data, "frame_energy", name, long=True), "spin": frame(data, "frame_spin", name, long=True),
-            "precession": frame(data, "frame_precession", name, FAST),
-            "spherical": frame(data, "frame_spherical", name), "spherical_order": slope(np.array(FREQUENCIES), apart),
+            "spherical": frame(data, "frame_spherical", name),
             "share": math.nan if np.isnan(off).any() else np.mean(off <= NEAR),
         }  # fmt: skip
-
-
-def at(values: pd.Series, pick: str) -> tuple[str | None, float | None]:
-    """The variant with the least ("min") or the largest ("max") of some numbers, and the number."""
-    known = values.dropna()
-    return (None, None) if known.empty else (str(getattr(known, f"idx{pick}")()), float(getattr(known, pick)()))
 
 
 def facts(data: xr.DataTree) -> dict[str, Any]:
@@ -96,41 +87,38 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     every = lines(data)
     maps = every[every["engine"] & ~every["single"]]
     turned, without = maps[maps["term"]], maps[~maps["term"]]
-    floors = every[every["single"] & every["term"] & every["best"].notna()]
+    floors = every[every["single"] & every["term"]]["best"]
     beside = every.loc[BESIDE] if BESIDE in every.index else dict.fromkeys(every.columns)
     members = read(data, "population", "steps_a_nutation")
     long = {name: maps[name].abs()[maps["slow"].notna()] for name in ("energy", "spin")}
     answers: dict[str, Any] = {
-        "slow": SLOW, "fast": FAST, "slow_nutation": scene(SLOW).nutation_period,
-        "fast_nutation": scene(FAST).nutation_period,  # s
-        "beside": BESIDE, "near": NEAR, "usual": USUAL,
-        "short": HORIZON, "long": long_time(data),  # s
+        "slow": SLOW, "fast": FAST, "fast_nutation": scene(FAST).nutation_period,  # s
+        "beside": BESIDE, "beside_fast_level": beside["fast_level"], "beside_share": beside["share"],
+        "near": NEAR, "usual": USUAL, "short": HORIZON, "long": long_time(data),  # s
         "maps": len(maps) or None,  # of engines, in double precision
         "members": members.shape[-1] if members.ndim else None,
-        "members_steps": float(np.nanmedian(members)) if np.isfinite(members).any() else None,  # a nutation
-        "wall": at(without["best"], "min")[1],  # without the term, at any step
-        "spherical": at(without["spherical"], "max")[1],  # from the spherical top, which they follow
-        "spherical_order": at(without["spherical_order"], "min")[1],
-        "precession": None if without["precession"].isna().all() else 1.0 + float(without["precession"].mean()),
-        "share_least": at(maps["share"], "min")[1], "share_most": at(maps["share"], "max")[1],
-        "singles": len(floors) or None,
-        "single_best": at(floors["best"], "min")[1],
-        "single_worse": int((floors["last"] > WORSE * floors["best"]).sum()) if len(floors) else None,
+        "wall": without["best"].min(),  # without the term, at any step
+        "spherical": without["spherical"].max(),  # from the spherical top, which they follow
+        "share_least": maps["share"].min(), "share_most": maps["share"].max(),
+        "singles": floors.count() or None, "single_best": floors.min(),
         "lost": int((turned["fast_level"] > LOST).sum()) if turned["fast_level"].notna().any() else None,
         "turned": len(turned) or None,  # maps with the term
         "limit": LOST, "kept": KEPT,
         # a run that ended early has no energy or spin
         **{f"{name}_lost": int((~(sizes <= KEPT)).sum()) if len(sizes) else None for name, sizes in long.items()},
     }  # fmt: skip
-    for name, column, of, pick in (("best", "slow", turned, "min"), ("worst", "slow", turned, "max"),
-                                   ("level_slow", "slow_level", maps, "min"), ("level_fast", "fast_level", maps, "min"),
-                                   ):  # fmt: skip
-        answers[f"{name}_variant"], answers[name] = at(of[column], pick)
-    return answers | {f"beside_{name}": beside[name] for name in ("slow_level", "fast_level", "share")}
+    for name, values, pick in (("best", turned["slow"], "min"), ("worst", turned["slow"], "max"),
+                               ("level_fast", maps["fast_level"], "min")):  # fmt: skip
+        known = values.dropna()
+        answers |= {
+            name: getattr(known, pick)(),
+            f"{name}_variant": getattr(known, f"idx{pick}")() if len(known) else None,
+        }
+    return answers
 
 
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
-    """What the order decides; every map at the usual step; all that was measured at the steps in use."""
+    """What the order decides; every map at the usual step."""
     every = lines(data).sort_values("slow", kind="stable")
     groups = every[every["engine"] & ~every["single"]].groupby("group")
     columns = {"slow": f"error on {SLOW} (rad)", "fast": f"error on {FAST} (rad)", "share": "share of tops followed"}
@@ -142,25 +130,6 @@ def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
         "fast": columns["fast"], "share": columns["share"], "best": "least error (rad)",
         "best_count": "at steps a nutation", "last": "error at the most steps (rad)",
         "energy": f"energy, {long_time(data):g} s", "spin": f"spin, {long_time(data):g} s",
-        "precession": f"precession on {FAST}", "spherical": "off the spherical top (rad)",
-        "spherical_order": "order of that",
+        "spherical": "off the spherical top (rad)",
     }  # fmt: skip
-    return {
-        "orders": orders[["order", "maps", *ranges.columns]],
-        "maps": every[list(names)].rename(columns=names),
-        "steps": steps(data),
-    }
-
-
-def steps(data: xr.DataTree) -> pd.DataFrame:
-    """Every number at the steps that people use, a line a scene, variant, step and time."""
-    names = {
-        "scene": "scene", "variant": "variant", "rate": "steps a second", "horizon": "time (s)",
-        "frame_axis": "axis error (rad)", "level_axis": "at equal cost (rad)", "frame_energy": "energy",
-        "frame_spin": "spin", "frame_precession": "precession", "frame_spherical": "off the spherical top (rad)",
-        "frame_forces": "evaluations of the torque",
-    }  # fmt: skip
-    if "tops" not in data.children:
-        return pd.DataFrame(columns=list(names.values()))
-    table = data["tops"].to_dataset()[[name for name in names if name.startswith(("frame", "level"))]]
-    return table.to_dataframe().dropna(how="all").reset_index()[list(names)].rename(columns=names)
+    return {"orders": orders[["order", "maps", *ranges.columns]], "maps": every[list(names)].rename(columns=names)}

@@ -9,7 +9,7 @@ import xarray as xr
 
 from symtop.model.scenes import scene
 from symtop.report import style
-from symtop.report.figures import name_ends
+from symtop.report.figures import name_ends, rows
 from symtop.runner.study import Picture
 
 from .facts import ROUNDING, SLOW, WORSE, curve, lines, read
@@ -20,7 +20,7 @@ COLORS = {0.0: style.PURPLES[1], 1.0: style.ORANGES[1], 2.0: style.BLUE, 4.0: st
 PAPER = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none"}  # behind letters on a line
 OURS = style.BLACK
 MARKS = ("o", "s", "^")  # of `FREQUENCIES`
-APART = (0.22, 0.0, -0.22)  # of a line, their heights
+APART = (-0.22, 0.0, 0.22)  # of a line, their heights
 DASHES = (0, (4, 2))
 ERROR = f"largest axis error within {HORIZON:g} s (rad)"
 
@@ -85,7 +85,7 @@ def draw_error(data: xr.DataTree, known: pd.DataFrame, colors: dict[str, str]) -
 def draw_cost(data: xr.DataTree, known: pd.DataFrame, colors: dict[str, str]) -> Picture:
     """Axis errors at as many evaluations of the torque a second: a line a variant, a panel a scene."""
     there = [one for one in SCENES if np.isfinite(read(data, "tops", "level_axis", scene=one)).any()]
-    names = list(known.sort_values(["slow_level", "fast_level"], ascending=False, kind="stable").index)
+    names = list(known.sort_values(["slow_level", "fast_level"], kind="stable").index)
     figure, axes = style.panels(1, len(there), height=0.15 * len(names) + 0.9, sharex=True, sharey=True)
     for axis, at in zip(axes[0], there, strict=True):
         for place, name in enumerate(names):
@@ -96,8 +96,7 @@ def draw_cost(data: xr.DataTree, known: pd.DataFrame, colors: dict[str, str]) ->
                 axis.plot(value, height, marker=mark, ms=3.6, color=colors[name], mec="white", mew=0.3, zorder=3)
         axis.axvline(np.pi, color=style.GREY, lw=0.9, ls=(0, (1, 2)), zorder=1)
         axis.set(xscale="log", xlabel=ERROR, title=f"scene {at}")
-        axis.set(yticks=range(len(names)), yticklabels=names, ylim=(-0.7, len(names) - 0.3))
-        axis.tick_params(axis="y", labelsize=style.LEAST_TEXT, length=0)
+        rows(axis, names)
     for rate, mark in zip(FREQUENCIES, MARKS, strict=True):
         axes[0, 0].plot([], [], marker=mark, ms=4, color=OURS, ls="", label=f"{rate:g} evaluations a second")
     axes[0, 0].plot([], [], color=style.GREY, lw=0.9, ls=(0, (1, 2)), label="π: the most, or a run that ended early")

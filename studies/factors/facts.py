@@ -168,34 +168,22 @@ def against_scipy(frame: pd.DataFrame) -> pd.DataFrame:
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """The waterfall, the largest effect of each factor, SciPy, the charts, and what the numbers are worth."""
     every, frame, (loud, count) = timed(data), compared(data), noisy(data)
-    share = every[Column.AXIS] / every["target"] if len(every) else pd.Series(dtype=float)
-    beside, ratios = against_scipy(frame), charts(frame)
+    part, beside, ratios = first_goal(frame), against_scipy(frame), charts(frame)
     answers: dict[str, Any] = {
         "busy": every.shape != frame.shape or None,
-        "times": count or None, "loud": loud, "noisy": NOISY, "usual_spread": float(every["spread"].median()),
-        "samples": SAMPLES, "near": LEAST, "near_share": float((share >= LEAST).mean()) if len(share) else None,
-        "least_share": float(share.min()), "least_variant": every["variant"][share.idxmin()] if len(share) else None,
-        "scenes": ", ".join(map(str, data["scene"].values)),
+        "times": count, "loud": loud, "noisy": NOISY, "usual_spread": every["spread"].median(),
+        "samples": SAMPLES, "near": LEAST, "near_share": (every[Column.AXIS] >= LEAST * every["target"]).mean(),
     }  # fmt: skip
-    part = first_goal(frame)
     for name, call_first in (("late", False), ("first", True)):
         bars = waterfall(part, call_first=call_first)
-        answers |= {f"{name}_{factor}": _most(bars["times faster"][bars["factor"] == factor]) for factor in FACTORS}
+        answers |= {f"{name}_{factor}": bars["times faster"][bars["factor"] == factor].max() for factor in FACTORS}
     answers |= _ends(part, bars)
     for name, column in (("user", "times, as called"), ("author", "times, kernels")):
-        answers |= {f"{name}_least": _least(beside[column]), f"{name}_most": _most(beside[column])}
+        answers |= {f"{name}_least": beside[column].min(), f"{name}_most": beside[column].max()}
     for chart in CHARTS:
-        middles = ratios.groupby("family")[f"{chart} / axis"].median().dropna()
+        middles = ratios.groupby("family")[f"{chart} / axis"].median()
         answers |= {f"{chart}_{family.replace('-', '_').lower()}": middles.get(family) for family in FAMILIES}
     return answers
-
-
-def _least(values: pd.Series) -> float | None:
-    return float(values.min()) if len(values.dropna()) else None
-
-
-def _most(values: pd.Series) -> float | None:
-    return float(values.max()) if len(values.dropna()) else None
 
 
 def _ends(part: pd.DataFrame, bars: pd.DataFrame) -> dict[str, Any]:

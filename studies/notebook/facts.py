@@ -14,14 +14,14 @@ from symtop.model.charts import axis_from_angles
 
 from .derivations import notebook_top
 from .long_energy import better_from, energy_until, notebook_end
-from .measures import ALPHA, MIDPOINT, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION, Column
+from .measures import ALPHA, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION, Column
 
 PARTS = {"spheroid": "first", "goldstein": "second"}  # scenes of the notebook's parts
 MOMENTA = ["p_phi_largest", "p_psi_largest"]
 KEPT = 1e-12  # relative, over 8 s: a momentum that changes by less is kept to rounding
 ORDER_TWO = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "strang[axis]", "cayley[axis]")
 OF_SOLVER = ("followed", "ways", "energies", "solver_momenta", "alpha_at_rest", "alpha_rate", "long")  # facts
-BY_PART = ("end", "energy", "behind", "behind_all", "ahead", "last", "long", "grown", "turned")
+BY_PART = ("end", "energy", "behind", "ahead", "long", "turned")
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
@@ -30,7 +30,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     runs = present(data)
     discrete = data.sel(variant=[name for name in runs if name != SOLVER])
     lost = discrete[MOMENTA].to_dataarray().max(("variable", "scene"), skipna=False)
-    plain, modified = (list(part) for part in zip(*powers(data), strict=True)) if powers(data) else ([], [])
+    changes = powers(data)
     return {
         "tolerance": SOLVER_TOLERANCE,  # of the solver
         "steps": STEPS_A_NUTATION,  # of the others
@@ -42,9 +42,8 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "momenta_kept": int((lost < KEPT).sum()) if lost.size else None,  # variants
         "momenta": float(lost.max()) if lost.size else None,  # largest relative change of a momentum
         **of_the_solver(data, discrete),
-        "power_least": min(plain, default=None), "power_most": max(plain, default=None),
-        "modified_least": min(modified, default=None), "modified_most": max(modified, default=None),
-        "gain": gain(data),  # of the midpoint rule at 40 steps a nutation on the first scene
+        "power_least": changes["energy"].min(), "power_most": changes["energy"].max(),
+        "modified_least": changes["modified"].min(), "modified_most": changes["modified"].max(),
     }  # fmt: skip
 
 
@@ -63,21 +62,17 @@ def of_the_solver(data: xr.Dataset, discrete: xr.Dataset) -> dict[str, Any]:
         "alpha_rate": float(solver[Column.ALPHA_RATE].sel(scene="goldstein")),  # rad/s
         "long": float(data[Column.LONG_TIME].max()),  # s
     }
+    named = [name for name in ORDER_TWO if name in runs]
     for scene, part in PARTS.items():
         limit, largest = float(solver["energy_largest"].sel(scene=scene)), discrete["energy_largest"].sel(scene=scene)
-        named, ends = [name for name in ORDER_TWO if name in runs], (notebook_end(data, scene), answers["long"])
         since = [better_from(data, scene, name) for name in named]
-        until = [[energy_until(data, scene, name, time) for time in ends] for name in named]
         answers |= {
-            f"{part}_end": ends[0],  # s
+            f"{part}_end": notebook_end(data, scene),  # s
             f"{part}_energy": limit,  # the solver's largest relative energy error to the notebook's end
-            # variants with a larger error than the solver to then, of `compared` and of `discrete`
+            # variants with a larger error than the solver to then, of `compared`; with a smaller one in the end
             f"{part}_behind": int((largest.sel(variant=named) > limit).sum()) if named else None,
-            f"{part}_behind_all": int((largest > limit).sum()) if largest.size else None,
-            f"{part}_ahead": sum(map(math.isfinite, since)) if named else None,  # with a smaller one in the end
-            f"{part}_last": max(filter(math.isfinite, since), default=None),  # s: the last of these gets ahead
+            f"{part}_ahead": sum(map(math.isfinite, since)) if named else None,
             f"{part}_long": energy_until(data, scene, SOLVER, answers["long"]),  # the solver's error to then
-            f"{part}_grown": max((late / early for early, late in until), default=None),  # the others', late over early
             f"{part}_turned": turned(data, scene),  # degrees
         }
     return answers
@@ -98,27 +93,15 @@ def turned(data: xr.Dataset, scene: str) -> float:
     return math.degrees(cmath.phase(complex(np.nansum(flat[0] * flat[1].conj()))))
 
 
-def powers(data: xr.Dataset) -> list[tuple[float, float]]:
+def powers(data: xr.Dataset) -> pd.DataFrame:
     """Powers of the step with which energy and modified energy change, of each scene and variant that has both."""
-    runs = [
-        data.sel(scene=scene, variant=name)
-        for scene in data["scene"].values
-        for name in MODIFIED
-        if name in data["variant"].values
-    ]
-
-    def power(run: xr.Dataset, column: str) -> float:
-        return power_law(run[Column.MODIFIED_STEP].values, run[column].values).slope
-
-    return [(power(run, Column.ENERGY_CHANGE), power(run, Column.MODIFIED_CHANGE)) for run in runs]
-
-
-def gain(data: xr.Dataset) -> float | None:
-    """The change of the energy over that of the modified energy, of the midpoint rule on the first scene."""
-    if MIDPOINT not in data["variant"].values:
-        return None
-    run = data.sel(scene="spheroid", variant=MIDPOINT)
-    return float(run[Column.ENERGY_CHANGE][0] / run[Column.MODIFIED_CHANGE][0])
+    runs = [data.sel(scene=scene, variant=name) for scene in data["scene"].values
+            for name in MODIFIED if name in data["variant"].values]  # fmt: skip
+    columns = {"energy": Column.ENERGY_CHANGE, "modified": Column.MODIFIED_CHANGE}
+    return pd.DataFrame({
+        key: [power_law(run[Column.MODIFIED_STEP].values, run[column].values).slope for run in runs]
+        for key, column in columns.items()
+    }, dtype=float)  # fmt: skip
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:

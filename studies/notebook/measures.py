@@ -1,9 +1,9 @@
 """What is computed and stored of one integrator on one of the notebook's two scenes.
 
 Every integrator has its residuals: how far energy and momenta are from their start. The notebook's own solver has also
-its path, the two derivations integrated side by side, and (second scene) the nutation cubic; two discrete methods
+its path, the two derivations side by side, and (second scene) what the printed alpha means; two discrete methods
 have their modified energy (formulas and source: `symtop.run.modified_energy`), from which the energy itself can only
-oscillate by O(h^2); the midpoint rule has the frames of a film.
+oscillate by O(h^2).
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,6 @@ from symtop_studies.grid import grid_variants
 from symtop.measure.conservation import residuals
 from symtop.methods.framework.registry import integrator
 from symtop.methods.library.scipy_ivp import integrated
-from symtop.model import charts
 from symtop.model.scenes import Scene, closed_form
 from symtop.run.modified_energy import modified_energy
 from symtop.run.simulation import integrate
@@ -28,7 +27,6 @@ SOLVER_TOLERANCE = 2.6e-7  # chosen: at it LSODA keeps as many figures as the no
 STEPS_A_NUTATION = 118.02  # of every discrete method; no whole number, so that samples and nutation do not lock
 MIDPOINT = "midpoint[angles]"
 MODIFIED = (MIDPOINT, "stormer-verlet[angles]")  # variants whose modified energy is stored
-FILMED = MIDPOINT
 ALPHA = 1.6  # of the second scene, as the notebook prints it
 SAMPLES = 301
 
@@ -46,17 +44,11 @@ class Column:
     BOTH_TIME, DERIVATIONS_GAP, HARD_GAP, EASY_GAP, ENERGY_GAP = (
         "both_time", "ways_gap", "hard_gap", "easy_gap", "energy_gap",
     )  # fmt: skip
-    # u'^2 (1/s^2) against u = cos theta; cubic_point. Scalars in 1/s^2 and rad/s
-    COSINE, CUBIC_AT_REST, CUBIC_PRINTED = "cosine", "cubic_at_rest", "cubic_printed"
+    # scalars in 1/s^2 and rad/s
     ALPHA_AT_REST, ALPHA_RATE = "alpha_at_rest", "alpha_rate"
-    # theta (rad) of a start at rest and of both starts that the printed alpha allows, over time (s); alpha_sample
-    ALPHA_TIME = "alpha_time"
-    THETA_AT_REST, THETA_FALLING, THETA_RISING = "theta_at_rest", "theta_falling", "theta_rising"
     # largest relative changes at steps (s); shadow_setting. At the first step over time, NAME_history; shadow_sample
     MODIFIED_STEP, MODIFIED_TIME = "shadow_step_size", "shadow_time"
     ENERGY_CHANGE, MODIFIED_CHANGE = "energy_swing", "modified_swing"
-    # attitudes as quaternions; frame, part
-    FRAME_TIME, FRAME_ATTITUDE, TRUE_ATTITUDE = "frame_time", "frame_attitude", "true_attitude"
     # largest relative energy error so far (s, 1) of a run far beyond the notebook's; long
     LONG_TIME, LONG_ENERGY = "long_time", "long_energy"
 
@@ -112,20 +104,10 @@ def both_derivations(scene: Scene, samples: int = SAMPLES) -> xr.Dataset:
     return xr.Dataset({name: ("both", values) for name, values in columns.items()})
 
 
-def alpha_table(scene: Scene, alpha: float, samples: int = 501) -> xr.Dataset:
-    """The cubic and theta(t) for a start at rest and for the printed alpha; ``cubic_point`` and ``alpha_sample``."""
-    cubic, u, times = nutation_cubic(scene), np.linspace(0.2, 0.95, 301), np.linspace(0.0, 20.0, samples)
-    falling, rising = (with_alpha(scene, alpha, sign) for sign in (-1.0, 1.0))
-    columns: dict[str, Any] = {
-        Column.COSINE: ("cubic_point", u),
-        Column.CUBIC_AT_REST: ("cubic_point", cubic(u)),
-        Column.CUBIC_PRINTED: ("cubic_point", cubic._replace(alpha=alpha)(u)),
-        Column.ALPHA_AT_REST: cubic.alpha,
-        Column.ALPHA_RATE: rising.start.theta_dot,
-        Column.ALPHA_TIME: ("alpha_sample", times),
-    }
-    starts = {Column.THETA_AT_REST: scene, Column.THETA_FALLING: falling, Column.THETA_RISING: rising}
-    return xr.Dataset(columns | {k: ("alpha_sample", closed_form(start)(times).theta) for k, start in starts.items()})
+def alpha_table(scene: Scene, alpha: float) -> xr.Dataset:
+    """What a start at rest has for alpha, and the rate of theta that the printed alpha means."""
+    rate = with_alpha(scene, alpha, 1.0).start.theta_dot
+    return xr.Dataset({Column.ALPHA_AT_REST: nutation_cubic(scene).alpha, Column.ALPHA_RATE: rate})
 
 
 def modified_energy_table(scene: Scene, name: str, steps: Sequence[float]) -> xr.Dataset:
@@ -147,12 +129,3 @@ def modified_energy_table(scene: Scene, name: str, steps: Sequence[float]) -> xr
         data[column] = ("shadow_setting", [float(np.max(np.abs(change))) for change in changes])
         data[f"{column}_history"] = ("shadow_sample", changes[0])
     return xr.Dataset(data)
-
-
-def film_table(scene: Scene, name: str, step: float, horizon: float, frames: int) -> xr.Dataset:
-    """The attitude of a run and the true one at every frame of an animation; dimension ``frame``."""
-    run = integrate(scene, name, step_size=step, horizon=horizon, observe="attitude", samples=frames)
-    attitude = charts.quaternion_from_angles(run.theta, run.phi, run.psi)
-    times = run.time
-    data = xr.Dataset({Column.FRAME_TIME: ("frame", times), Column.FRAME_ATTITUDE: (("frame", "part"), attitude)})
-    return data.assign({Column.TRUE_ATTITUDE: (("frame", "part"), closed_form(scene).quaternion(times))})

@@ -14,7 +14,7 @@ from symtop.runner.study import Case, Study
 
 from . import facts, figures, measures
 from .long_energy import long_energy
-from .measures import ALPHA, FILMED, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION
+from .measures import ALPHA, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION
 
 SCENES = ("spheroid", "goldstein")  # of the notebook's first and of its second part
 QUICK = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "strang[axis]", "cayley[axis]")
@@ -23,13 +23,13 @@ LONG = 3000.0  # s: some 2500 nutations of the first scene, 1000 of the second
 
 def cases(quick: bool) -> list[Case]:
     """The notebook's solver and every discrete variant, on both scenes."""
-    settings = {"film": 20 if quick else 80, "shadow_steps": 3 if quick else 6, "long": 0.2 * LONG if quick else LONG}
+    settings = {"shadow_steps": 3 if quick else 6, "long": 0.2 * LONG if quick else LONG}
     methods = [*(QUICK if quick else measures.discrete_methods()), SOLVER]
     return [Case(name, method, settings) for name in SCENES for method in methods]
 
 
 def measure(case: Case) -> xr.Dataset:
-    """Residuals of every method; beside them the solver's derivations, the modified energy, the film."""
+    """Residuals of every method; beside them the solver's derivations, and the modified energy."""
     start, method = scene(case.scene), case.integrator
     period = start.nutation_period
     if method == SOLVER:
@@ -42,8 +42,6 @@ def measure(case: Case) -> xr.Dataset:
     if method in MODIFIED:
         steps = [period / (40.3 * 2.0**k) for k in range(case.settings["shadow_steps"])]
         parts.append(measures.modified_energy_table(start, method, steps))
-    if method == FILMED:
-        parts.append(measures.film_table(start, method, period / 30.0, 2.0 * period, case.settings["film"]))
     return xr.merge(parts)
 
 

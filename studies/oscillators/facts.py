@@ -9,21 +9,9 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from .measures import (
-    AGAINST_RK45,
-    FRICTION,
-    HORIZON,
-    LONG,
-    OSCILLATORS,
-    RK45,
-    RULES,
-    TOP_TOLERANCE,
-    TOPS,
-    Column,
-    order,
-)
+from .measures import AGAINST_RK45, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOPS, Column, order
 from .oscillator import ONE_SIDED
-from .quartic_measures import ERROR, GAPS, MAPS, PERIODS, QUARTICS, STEP, STEPS, oscillator_of, quartic_order
+from .quartic_measures import ERROR, MAPS, PERIODS, QUARTICS, STEP, STEPS, oscillator_of, quartic_order
 
 CRITICAL = "damping-2"  # the scene of critical damping
 COLUMNS = {  # what some variants alone have, and its dimension
@@ -31,7 +19,7 @@ COLUMNS = {  # what some variants alone have, and its dimension
     Column.ENERGY_ERROR: "sample", Column.UPDATE_GAP: "seed_step",
     Column.TOP_STEP: "top_setting", Column.THETA_ERROR: "top_setting",
     Column.BALANCE_PHI: "top_sample", Column.BALANCE_PSI: "top_sample",
-    **dict.fromkeys((ERROR, STEP, *GAPS), "quartic_setting"),
+    **dict.fromkeys((ERROR, STEP), "quartic_setting"),
 }  # fmt: skip
 
 
@@ -57,24 +45,20 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     rates = {name: order(data, CRITICAL, name, Column.EXPONENT_ERROR).slope for name in (*RULES, ONE_SIDED)}
     of_tops = [order(data, *run, Column.THETA_ERROR).slope for run in product(TOPS, RULES)]
     maps = [quartic_order(data, *run).slope for run in product(QUARTICS, MAPS[1:])]
-    limits = [quartic_order(data, name, MAPS[0], gap).slope for name, gap in product(QUARTICS[1:], GAPS)]
     energies = largest(data, Column.ENERGY_ERROR)
     evaluations = data[Column.EVALUATIONS].sel(scene=list(AGAINST_RK45)) if Column.EVALUATIONS in data else None
     return {
         "horizon": HORIZON, "long": LONG,  # in units of sqrt(m/k)
-        "precession": FRICTION.precession, "spin": FRICTION.spin,  # of the bearings, torque over rate
-        "tolerance": TOP_TOLERANCE,  # of RK45 on the damped top
-        "periods": PERIODS, "finest": max(STEPS), "coarsest": min(STEPS),  # of the quartic oscillators, steps a period
+        "periods": PERIODS,  # of the quartic oscillators
         **ends("order", orders), **ends("one_sided", one_sided), **ends("top_order", of_tops),
         **{f"rate_{name.replace('-', '_')}": slope for name, slope in rates.items()},
         "update_gap": float(data[Column.UPDATE_GAP].max()),
         **{f"{word}_{name}": float(energies.sel(scene=scene, variant=name))  # largest relative error of the energy
            for word, scene in zip(("undamped", "damped"), AGAINST_RK45, strict=True) for name in (*RULES, RK45)},
         "rule_evaluations": None if evaluations is None else float(evaluations.sel(variant=list(RULES)).max()),
-        "rk45_evaluations": None if evaluations is None else float(evaluations.sel(variant=RK45).max()),
-        "balance": balance(data, RULES), "balance_rk45": balance(data, (RK45,)),  # relative to the larger momentum
+        "balance": balance(data),  # of the momenta of damped tops, relative to the larger one
         "exact": float(data[ERROR].sel(variant=MAPS[0]).max()),  # largest relative error of the exact map
-        **ends("map_order", maps), **ends("limit", limits),
+        **ends("map_order", maps),
     }  # fmt: skip
 
 
@@ -89,9 +73,9 @@ def largest(data: xr.Dataset, column: str) -> xr.DataArray:
     return np.abs(data[column]).max([dim for dim in data[column].dims if dim not in ("scene", "variant")])
 
 
-def balance(data: xr.Dataset, methods: tuple[str, ...]) -> float:
+def balance(data: xr.Dataset) -> float:
     """The largest relative defect of the momentum balance of the damped tops."""
-    runs = data.sel(scene=list(TOPS), variant=list(methods))
+    runs = data.sel(scene=list(TOPS), variant=list(RULES))
     return max(float(largest(runs, name).max()) for name in (Column.BALANCE_PHI, Column.BALANCE_PSI))
 
 

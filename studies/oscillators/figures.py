@@ -1,14 +1,14 @@
-"""Figures of the study: orders of the damped oscillator, the damped tops, and the exact map."""
+"""Figures of the study: orders of the damped oscillator, and the exact map."""
 
 import numpy as np
 import xarray as xr
 
 from symtop.report import style
-from symtop.report.figures import largest_so_far
+from symtop.report.figures import SMALLEST
 from symtop.runner.study import Picture
 
 from .facts import CRITICAL
-from .measures import OSCILLATORS, RK45, RULES, TOPS, Column, order
+from .measures import OSCILLATORS, Column, order
 from .oscillator import ONE_SIDED
 from .quartic_measures import ERROR, MAPS, QUARTICS, STEP
 
@@ -20,14 +20,13 @@ ORDERS = (  # panels: an oscillator, what is measured of it, and in words
     (CRITICAL, Column.EXPONENT_ERROR, "rate of decay: relative error"),
 )
 LOOKS = {name: style.Look(style.ORANGE, "v") if name == "mcmillan" else style.look(name) for name in MAPS}
-SMALLEST = 1e-17
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
     """Friction first, then the exact map; of what was measured."""
     drawn = []
     for draw, every, names in (
-        (draw_orders, OSCILLATORS, SYMBOLS), (draw_tops, TOPS, (*RULES, RK45)), (draw_maps, QUARTICS, MAPS),
+        (draw_orders, OSCILLATORS, SYMBOLS), (draw_maps, QUARTICS, MAPS),
     ):  # fmt: skip
         scenes, there = [one for one in every if one in data["scene"]], [one for one in names if one in data["variant"]]
         if scenes and there:
@@ -54,32 +53,6 @@ def draw_orders(data: xr.Dataset, _: list[str], names: list[str]) -> Picture:
     axes[0, 0].set_ylabel("error")
     style.few_ticks(*axes.flat, most=6)
     return Picture("orders", figure)
-
-
-def draw_tops(data: xr.Dataset, scenes: list[str], names: list[str]) -> Picture:
-    """Inclination, momenta and momentum balance of the damped tops; the first variant's motion."""
-    figure, axes = style.panels(3, len(scenes), height=1.6, sharex="col")
-    for (theta, momenta, balance), name in zip(axes.T, scenes, strict=True):
-        first = data.sel(scene=name, variant=names[0])
-        time = first[Column.TOP_TIME].values
-        theta.plot(time, np.degrees(first[Column.THETA]), color=style.BLUE, label=rf"$\theta$, {names[0]}")
-        theta.plot(time, np.degrees(first[Column.TRUE_THETA]), ":", color=style.BLACK, label=r"$\theta$, truth")
-        momenta.plot(time, first[Column.P_PHI], color=style.GREEN, label=r"$p_\varphi$")
-        momenta.plot(time, first[Column.P_PSI], "--", color=style.PURPLE, label=r"$p_\psi$")
-        for method in names:
-            run, color = data.sel(scene=name, variant=method), style.look(method).color
-            phi, psi = largest_so_far(run[Column.BALANCE_PHI]), largest_so_far(run[Column.BALANCE_PSI])
-            wide = 2.4 if method == RULES[0] else 1.1  # it lies below the other rule's
-            balance.plot(time[1:], phi[1:], color=color, lw=wide, label=f"balance, {method}")
-            balance.plot(time[1:], psi[1:], "--", color=color, lw=wide)
-        balance.plot([], [], "--", color=style.GREY, label=r"balance of $p_\psi$ (solid: of $p_\varphi$)")
-        theta.set_title(f"scene {name}, damped")
-        balance.set(yscale="log", xlabel="time (s)")
-    labels = (r"$\theta$ (degrees)", "momenta (J s)", "defect of the balance,\nrelative")
-    for axis, label in zip(axes[:, 0], labels, strict=True):
-        axis.set_ylabel(label)
-    style.legend_below(figure, axes)
-    return Picture("damped-top", figure)
 
 
 def draw_maps(data: xr.Dataset, scenes: list[str], names: list[str]) -> Picture:

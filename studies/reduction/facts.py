@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from .tables import CHART_PERIODS, COMMUTES, COMPARED_STEPS, GAPS, SAME_MAP, Column, chart_ratios, commutation_order
+from .tables import CHART_PERIODS, COMMUTES, COMPARED_STEPS, GAPS, Column, chart_ratios, commutation_order
 
 WORST = "largest difference (rad)"
 AS_FAST = 1.1  # times as long: what the noise of a time hides
@@ -35,43 +35,25 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     return {
         "charts_periods": CHART_PERIODS,  # nutations
         "compared_steps": COMPARED_STEPS,
-        "same_map": SAME_MAP,  # rad
         "as_fast": AS_FAST - 1.0,
         "commuting": listed(same["rule"]),
-        "commuting_gap": largest(same[WORST]),
+        "commuting_gap": same[WORST].max(),
         "others": listed(apart["rule"]),
-        "power_least": least(apart["power of h"]),
-        "power_most": largest(apart["power of h"]),
+        "power_least": apart["power of h"].min(), "power_most": apart["power of h"].max(),
         "rules": listed(name for _, name, _ in compared),
-        "twins_gap": largest(float(cell[gap].max()) for *_, cell in compared for gap in GAPS),
-        "twins_drift": largest(
-            float(cell[drift].max()) for *_, cell in compared for drift in (Column.P_PHI_DRIFT, Column.P_PSI_DRIFT)
-        ),
-        **{
-            f"{key}_{name}": pick(kernels[header])
-            for key, header in (("step", "time (ratio)"), ("iterations", "iterations (ratio)"))
-            for name, pick in (("least", least), ("most", largest))
-        },
+        "twins_gap": max((float(cell[gap].max()) for *_, cell in compared for gap in GAPS), default=None),
+        "step_least": kernels["time (ratio)"].min(), "step_most": kernels["time (ratio)"].max(),
+        "iterations_least": kernels["iterations (ratio)"].min(), "iterations_most": kernels["iterations (ratio)"].max(),
         "charts": len(charts) or None,
         "charts_as_fast": int((charts["time (ratio)"] <= AS_FAST).sum()) if len(charts) else None,
         "slowest": slowest.get("variant"),
         "slowest_time": slowest.get("time (ratio)"),
-    }
+    }  # fmt: skip
 
 
 def listed(names: Iterable[str]) -> str | None:
     """Names, each once."""
     return ", ".join(dict.fromkeys(names)) or None
-
-
-def largest(values: Iterable[float]) -> float | None:
-    """The largest number that is there."""
-    return max((float(one) for one in values if np.isfinite(one)), default=None)
-
-
-def least(values: Iterable[float]) -> float | None:
-    """The smallest number that is there."""
-    return min((float(one) for one in values if np.isfinite(one)), default=None)
 
 
 def commutation(data: xr.Dataset) -> pd.DataFrame:

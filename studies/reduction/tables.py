@@ -29,8 +29,6 @@ BATCH = 0.005  # seconds, of runs in several charts
 TIMED_STEPS = 20_000  # of a timed run: a call costs as much as a hundred of them
 COMPARED_STEPS = 10_000  # of a reduced kernel and its unreduced form
 COMMUTES = 1e-13  # rad: two paths of a few thousand steps with compensated sums are that close if they are one method
-# rad, over 10 000 steps without compensation: n^1.5 ulp of theta' h, and phi' is steep near a pole
-SAME_MAP = 1e-11
 CHART_PERIODS = 32.0  # nutations: long enough that the call itself does not count
 
 

@@ -57,7 +57,6 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "scenes": ", ".join(map(str, data["scene"].values)),
         "lengths": " and ".join(f"{length:g}" for length in data["nutations"].values),
         "variants": data.sizes["variant"] - 1,
-        "exact": float(part["seconds"].sel(variant=REFERENCE).min()) if REFERENCE in part["variant"].values else None,
         "bound": float(part["axis_bound"].min()),  # rad, what the truth can judge
     }  # fmt: skip
     for target in TARGETS:

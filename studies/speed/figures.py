@@ -1,13 +1,14 @@
 """Figure 1, error against run time, and the chart of all runs to point at."""
 
 import math
+from itertools import product
 
 import numpy as np
 import xarray as xr
 
 from symtop.methods.framework.registry import split_name
-from symtop.report.figures import error_band, label_lines
-from symtop.report.style import BLACK, BLUE, GREEN, LEAST_TEXT, ORANGE, PURPLE, SKY, VERMILLION, panels
+from symtop.report.figures import MOST_NAMED, error_band, label_lines
+from symtop.report.style import BLACK, BLUE, GREEN, LEAST_TEXT, ORANGE, PURPLE, SKY, VERMILLION, look, panels
 from symtop.runner.study import REFERENCE, Chart, Picture, Series
 
 from .facts import shown
@@ -44,13 +45,15 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     axis.set_xlabel(f"time of a run of {float(part['nutations']):g} nutations, one core (s)")
     axis.set_ylabel("largest error of the axis (rad)")
     level = error_band(axis, part["axis_bound"].values)
+    few = part.sizes["variant"] <= MOST_NAMED
     for name in map(str, part["variant"].values):
         cell = part.sel(variant=name)
         x, y = (cell[key].values for key in ("seconds", "axis"))
         good = np.isfinite(x) & np.isfinite(y) & (y < MOST)
-        if split_name(name)[0] == REFERENCE or not good.any():
+        if name == REFERENCE or not good.any():
             continue
-        label, color, dash = LINES.get(name, (OTHERS.get(name, split_name(name)[0]), PALE, "-"))
+        other = OTHERS.get(name, split_name(name)[0]), look(name).color if few else PALE, "-"
+        label, color, dash = LINES.get(name, other)
         x, y = x[good], np.maximum(y[good], 0.3 * level)
         thick = (1.0, 1.5, 1.5) if color == PALE else (1.7, 2.4, 2.0)
         axis.plot(x, y, color=color, ls=dash, marker="o", **dict(zip(("lw", "ms", "zorder"), thick, strict=True)))
@@ -73,23 +76,16 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 
 def charts(data: xr.Dataset) -> list[Chart]:
     """Every run: two costs and four errors to choose from, a panel a scene and run length."""
-    every = {}
-    for scene in map(str, data["scene"].values):
-        for length in data["nutations"].values:
-            cell = data.sel(scene=scene, nutations=length)
-            every[f"{scene} | {length:g} nutations"] = [
-                Series(str(name), _points(cell.sel(variant=name))) for name in data["variant"].values
-                if split_name(str(name))[0] != REFERENCE
-            ]  # fmt: skip
-    costs, errors = (
-        {name: place + first for place, name in enumerate(one)} for one, first in ((COSTS, 0), (ERRORS, 2))
-    )
-    marks = {}
-    if REFERENCE in data["variant"].values:
-        for name in every:
-            scene, length = name.split(" | ")
-            one = data.sel(scene=scene, variant=REFERENCE, nutations=float(length.split()[0]))
-            marks[name] = (float(one["seconds"].min()), float(one["axis_bound"].min()))
+    names = list(map(str, data["variant"].values))
+    every, marks = {}, {}
+    for scene, length in product(map(str, data["scene"].values), data["nutations"].values):
+        cell, title = data.sel(scene=scene, nutations=length), f"{scene} | {length:g} nutations"
+        every[title] = [Series(name, _points(cell.sel(variant=name))) for name in names if name != REFERENCE]
+        if REFERENCE in names:
+            one = cell.sel(variant=REFERENCE)
+            marks[title] = (float(one["seconds"].min()), float(one["axis_bound"].min()))
+    costs = {name: place for place, name in enumerate(COSTS)}
+    errors = {name: len(COSTS) + place for place, name in enumerate(ERRORS)}
     return [Chart("runs", "Error against cost of every run", costs, errors, every, ("scene", "run length"), marks)]
 
 

@@ -29,7 +29,6 @@ class Failure(NamedTuple):
     """From which setting on a method commonly fails, and how."""
 
     setting: float  # NaN if no `LASTING` settings follow at each of which at least `COMMON` of the rows fail
-    least: float  # the smallest share of failed rows from there on; the largest anywhere if there is no such setting
     kind: str  # what most of the failed runs do from there on (anywhere); empty without a failed run
 
 
@@ -85,9 +84,7 @@ class OutcomeMap(NamedTuple):
         part = slice(first, None) if lasting else slice(None)
         kinds = np.bincount(self.outcome[:, part][failed[:, part]], minlength=len(VERDICTS))
         return Failure(
-            float(self.settings[first]) if lasting else math.nan,
-            float(share[part].min() if lasting else share.max()),
-            VERDICTS[int(kinds.argmax())] if kinds.any() else "",
+            float(self.settings[first]) if lasting else math.nan, VERDICTS[int(kinds.argmax())] if kinds.any() else ""
         )
 
 
@@ -125,18 +122,9 @@ def families(data: xr.Dataset) -> list[str]:
     return [str(name) for name in data["scene"].values if str(name) not in MECHANISMS]
 
 
-class PoleEffect(NamedTuple):
-    """How a pole next to the path changes the reach of a method."""
-
-    near: float  # median reach at gaps of `NEAR` and less
-    halves: bool  # is that less than half of the median reach at gaps of `FAR` and more
-    width: float  # rad, distance of the pole below which the reach is less than half of that away from it
-
-
-def pole_effect(one: OutcomeMap | None) -> PoleEffect | None:
-    """The effect of a pole on a method by its map over the gap; None if it has none, or nothing to set."""
+def halved_by_pole(one: OutcomeMap | None) -> bool | None:
+    """Is the median reach at gaps of `NEAR` and less below half of that at `FAR` and more? None with nothing to set."""
     if one is None or one.control == "none":
         return None
     limits, gaps = one.reach, one.parameter
-    away, near = float(np.median(limits[gaps >= FAR])), float(np.median(limits[gaps <= NEAR]))
-    return PoleEffect(near, near < 0.5 * away, 1.1 * float(gaps[limits < 0.5 * away].max(initial=0.0)))
+    return bool(np.median(limits[gaps <= NEAR]) < 0.5 * np.median(limits[gaps >= FAR]))

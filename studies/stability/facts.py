@@ -1,6 +1,5 @@
 """Facts and tables of the stability study, from its dataset."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -9,38 +8,26 @@ import xarray as xr
 
 from symtop.methods.framework.registry import split_name
 
-from .atlas import COMMON, FAST, NEAR, SLOW, families, map_of, maps, methods_of, pole_effect
+from .atlas import COMMON, FAST, NEAR, SLOW, families, halved_by_pole, map_of, maps, methods_of
 from .failures import LOST
-from .mechanisms import (
-    BARELY,
-    limits,
-    measured,
-    misses,
-    only_windows,
-    outlasting,
-    resonant,
-    sampled,
-    unlimited,
-    unreached,
-)
-from .tables import CURVE_STEPS, PERIODS, SOUGHT_PHASE, Column
+from .mechanisms import BARELY, limits, measured, misses, resonant, sampled
+from .tables import PERIODS, Column
 
 QUOTED = "stormer-verlet[angles]"  # whose numbers are quoted
 NAMES = (  # of all facts that are measured
     "family", "stepped", "fast_variant", "fast_reach", "slow_variant", "slow_reach", "slow_none", "shortest",
     "quoted_fast", "quoted_fails", "silent", "cells", "settled", "checks", "refuted", "angles", "angles_halved",
-    "others", "others_halved", "limited", "limit_least", "limit_variant", "free", "windows", "window_width", "resonant",
-    "turned", "verlet_third", "midpoint_third", "sleep_step", "strang_sleeps", "cayley_sleeps", "sleep_miss", "lawful",
-    "law_middle", "law_most", "law_unreached", "outlasting", "sampled", "hidden", "small", "small_most",
-    "small_variant", "one_iteration", "solved",
+    "others", "others_halved", "limited", "limit_least", "limit_variant", "resonant", "turned", "sleep_step",
+    "strang_sleeps", "cayley_sleeps", "sleep_miss", "law_middle", "sampled", "hidden", "small", "one_iteration",
+    "solved",
 )  # fmt: skip
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """How far methods are accurate and how they fail; what each mechanism does. Steps of maps are in nutations."""
     answers: dict[str, Any] = dict.fromkeys(NAMES)
-    answers |= {"periods": PERIODS, "slow": SLOW, "fast": FAST, "near": NEAR, "barely": BARELY, "sought": SOUGHT_PHASE,
-              "lost": LOST, "common": COMMON, "curve_steps": CURVE_STEPS}  # fmt: skip
+    answers |= {"periods": PERIODS, "slow": SLOW, "fast": FAST, "near": NEAR, "barely": BARELY, "lost": LOST,
+              "common": COMMON}  # fmt: skip
     if family := next(iter(families(data)), None):
         answers |= atlas_facts(data, family)
     for scene, variable, read in READ:
@@ -54,15 +41,12 @@ def atlas_facts(data: xr.Dataset, family: str) -> dict[str, Any]:
     shown, known = maps(data, family), methods_of(data)
     steps = {name: one for name, one in shown.items()
              if one.control == "step_size" and not (name in known and known[name].exact_steps)}  # fmt: skip
-    cells, made = (
-        sum(values) for values in zip(*((one.made.size, one.made.sum()) for one in shown.values()), strict=True)
-    )
-    silent = [one.silent for one in shown.values() if math.isfinite(one.silent)]
+    made = np.concatenate([one.made.ravel() for one in shown.values()])
     answers = {
         "family": family,
-        "silent": float(np.median(silent)) if silent else None,  # share of the inaccurate runs, median variant
-        "cells": cells,
-        "settled": 1.0 - made / cells,  # share that was not run
+        "silent": float(pd.Series([one.silent for one in shown.values()]).median()),  # of the inaccurate runs
+        "cells": made.size,
+        "settled": 1.0 - made.mean(),  # share that was not run
         **{name: int(data[name].sel(scene=family).sum()) for name in (Column.CHECKS, Column.REFUTED)},
     }
     if steps:
@@ -80,23 +64,20 @@ def pole_facts(part: xr.Dataset) -> dict[str, Any]:
     """Of how many variants of fixed step a pole halves the accurate step, in angles and in other charts."""
     halved: dict[bool, list[bool]] = {True: [], False: []}
     for name, method in methods_of(part).items():
-        effect = pole_effect(map_of(part.sel(variant=name)))
-        if effect is not None and method.control == "step_size":
-            halved[method.charts() == ("angles",)].append(effect.halves)
+        halves = halved_by_pole(map_of(part.sel(variant=name)))
+        if halves is not None and method.control == "step_size":
+            halved[method.charts() == ("angles",)].append(halves)
     groups = {"angles": halved[True], "others": halved[False]}
     answers = {name: len(group) for name, group in groups.items() if group}
     return answers | {f"{name}_halved": sum(groups[name]) for name in answers}
 
 
 def resonance_facts(part: xr.Dataset) -> dict[str, Any]:
-    """Where small nutations grow (h omega), and where a third of a turn a step loses a top."""
-    phases, windows, lost, free = limits(part), only_windows(part), resonant(part), unlimited(part)
+    """Where small nutations grow (h omega), and how many variants a third of a turn a step loses a top with."""
+    phases = limits(part)
     least = min(phases, key=lambda name: phases[name], default=None)
-    width = max((end - start for start, end in windows.values()), default=None)
-    return {"limited": len(phases), "limit_least": phases.get(least), "limit_variant": least, "free": len(free),
-            "windows": len(windows), "window_width": width, "resonant": len(lost),
-            "turned": int(np.isfinite(part[Column.THIRD_TURN_PHASE]).sum()),
-            "verlet_third": lost.get(QUOTED), "midpoint_third": lost.get("midpoint[angles]")}  # fmt: skip
+    return {"limited": len(phases), "limit_least": phases.get(least), "limit_variant": least,
+            "resonant": len(resonant(part)), "turned": int(part[Column.THIRD_TURN_PHASE].count())}  # fmt: skip
 
 
 def sleeping_facts(part: xr.Dataset) -> dict[str, Any]:
@@ -115,19 +96,14 @@ def sleeping_facts(part: xr.Dataset) -> dict[str, Any]:
 
 def separatrix_facts(part: xr.Dataset) -> dict[str, Any]:
     """How well an early error predicts the accurate time next to the separatrix, in 1/λ."""
-    gaps = misses(part)
-    middle, most = (float(pick(gaps)) if gaps.size else None for pick in (np.median, np.max))
-    return {"lawful": gaps.size, "law_middle": middle, "law_most": most, "law_unreached": unreached(part),
-            "outlasting": len(outlasting(part))}  # fmt: skip
+    return {"law_middle": float(pd.Series(misses(part)).median())}
 
 
 def sampling_facts(part: xr.Dataset) -> dict[str, Any]:
     """What an energy error sampled once a nutation hides, and the share of the solver in that of the midpoint rule."""
     hidden, ratios = sampled(part)
-    worst = max(ratios, key=lambda name: ratios[name], default=None)
-    answers = {"sampled": len(hidden) + len(ratios), "hidden": len(hidden),
-             "small": sum(ratio > 10.0 for ratio in ratios.values()),
-             "small_most": ratios.get(worst), "small_variant": worst}  # fmt: skip
+    answers: dict[str, Any] = {"sampled": len(hidden) + len(ratios), "hidden": len(hidden),
+                               "small": sum(ratio > 10.0 for ratio in ratios.values())}  # fmt: skip
     if Column.TEXTBOOK_ENERGY in part:
         rule = part.dropna("variant", how="all", subset=[Column.ONE_ITERATION_ENERGY]).isel(variant=0)
         answers |= {"one_iteration": float(rule[Column.ONE_ITERATION_ENERGY]),
@@ -149,26 +125,24 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
 
 def atlas_table(data: xr.Dataset) -> pd.DataFrame:
     """A row for each family and variant; steps are in nutation periods."""
-    rows, past = [], maps(data, "grazing")
+    rows: list[dict[str, Any]] = []
     for family in families(data):
         for name, one in maps(data, family).items():
-            effect, failure, beside = pole_effect(past.get(name)), one.failure, past.get(name)
             limit = data[Column.LINEAR_LIMIT].sel(scene=family, variant=name) if Column.LINEAR_LIMIT in data else None
             rows.append({
                 "variant": name, "scene": family, "set": one.control.replace("step_size", "step"),
                 "accurate (%)": 100.0 * one.accurate,
                 "accurate up to, fast tops": one.usual_reach["fast"],
                 "accurate up to, slow tops": one.usual_reach["slow"],
-                "fails from": failure.setting, "fails mostly by": failure.kind.replace("_", " "),
+                "fails from": one.failure.setting, "fails mostly by": one.failure.kind.replace("_", " "),
                 "ended early (%)": 100.0 * one.early, "wrong without an error (%)": 100.0 * one.silent,
-                "accurate past a pole (%)": None if beside is None else 100.0 * beside.accurate,
-                "a pole halves it within (rad)": effect.width if effect is not None and effect.halves else None,
                 "small nutations grow from": None if limit is None else float(limit.min()),
             })  # fmt: skip
-    table = pd.DataFrame(rows)
     place = {"step": 0, "tolerance": 1, "none": 2}
-    table = table.sort_values("accurate (%)", ascending=False, kind="stable") if rows else table
-    return table.sort_values("set", key=lambda column: column.map(place), kind="stable") if rows else table
+    table = pd.DataFrame(rows)
+    return table if table.empty else table.sort_values(
+        ["set", "accurate (%)"], key=lambda column: column.map(place) if column.name == "set" else -column
+    )  # fmt: skip
 
 
 LIMITS = {  # header: scene, variable

@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from symtop.methods.framework.registry import split_name
 from symtop.methods.splitting.space import cayley_sleeps_from, strang_sleeps_from
 from symtop.report import style
+from symtop.report.figures import chosen
 from symtop.runner.study import Picture
 
 from .atlas import OutcomeMap, families, maps
@@ -57,7 +58,7 @@ def pictures(data: xr.Dataset) -> Iterator[Picture]:
 
 def _chosen(shown: Mapping[str, OutcomeMap]) -> dict[str, OutcomeMap]:
     """The known variants, or all if these are few; those with a step first."""
-    names = list(shown) if len(shown) <= MOST else [name for name in KNOWN if name in shown] or list(shown)[:MOST]
+    names = chosen(list(shown), KNOWN, MOST)
     return {name: shown[name] for name in sorted(names, key=lambda name: list(SETTINGS).index(shown[name].control))}
 
 
@@ -111,7 +112,7 @@ def _ends(values: Any) -> tuple[float, float]:
 def _lines(axis: Any, part: xr.Dataset, x: str, y: str, dots: bool = False) -> None:
     """A line, or dots, a variant; of many those that are not known in grey and without a name."""
     variants = list(map(str, part["variant"].values))
-    named = NAMED if len(variants) > len(NAMED) else variants
+    named = chosen(variants, NAMED, len(NAMED))
     for name in variants:
         across, up = (part[key].sel(variant=name).values for key in (x, y))
         order = np.argsort(across)

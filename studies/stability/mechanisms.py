@@ -33,31 +33,12 @@ def variants_with(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
     return {name: cell for name, cell in cells.items() if np.isfinite(cell[variable].values).any()}
 
 
-def only_windows(part: xr.Dataset) -> dict[str, tuple[float, float]]:
-    """Methods whose nutations grow between the steps of the search only, with the ends of their first window."""
-    return {
-        name: (float(cell[Column.WINDOW_START]), float(cell[Column.WINDOW_END]))
-        for name, cell in variants_with(part, Column.WINDOW_START).items()
-        if math.isnan(float(cell[Column.LIMIT_PHASE]))
-    }
-
-
 def limits(part: xr.Dataset) -> dict[str, float]:
     """The least step, as h omega, at which small nutations grow, of the methods that have a limit."""
     return {
         name: float(np.fmin(cell[Column.LIMIT_PHASE], cell.get(Column.WINDOW_START, math.nan)))
         for name, cell in variants_with(part, Column.LIMIT_PHASE).items()
     }  # a narrow window may come first
-
-
-def unlimited(part: xr.Dataset) -> list[str]:
-    """Methods whose small nutations grow at no step.
-
-    A method whose step reaches a third of a turn was followed on the whole way there; one that shows neither is not
-    symmetric, or has no precession to follow.
-    """
-    known = {**limits(part), **only_windows(part)}
-    return [name for name in variants_with(part, Column.THIRD_TURN_PHASE) if name not in known]
 
 
 def resonant(part: xr.Dataset) -> dict[str, float]:
@@ -91,11 +72,6 @@ def misses(part: xr.Dataset) -> NDArray[np.float64]:
     """By how much the law misses the accurate time of the runs to which it applies, in units of 1/λ."""
     gap = np.abs(part[Column.HORIZON] - part[Column.PREDICTED_HORIZON]).where(lawful(part)).values
     return np.asarray(gap[np.isfinite(gap)])
-
-
-def unreached(part: xr.Dataset) -> int:
-    """How many runs that the law applies to never reach the error of which it speaks."""
-    return int((lawful(part) & part[Column.HORIZON].isnull()).sum())
 
 
 def sampled(part: xr.Dataset) -> tuple[list[str], dict[str, float]]:

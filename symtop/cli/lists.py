@@ -12,7 +12,7 @@ import click
 from symtop import __version__
 from symtop.cli.common import File, as_text, completing, facts, json_option, plugin_option, table, terminal_width
 from symtop.core.errors import SymtopError
-from symtop.report import tables
+from symtop.report import formats
 
 if TYPE_CHECKING:
     from symtop.methods.framework.registry import Integrator
@@ -40,9 +40,9 @@ def _print(
     elif as_json:
         click.echo(as_text(records))
     elif wide:
-        click.echo(table(*tables.columns(records)))
+        click.echo(table(*formats.columns(records)))
     else:
-        click.echo(table(*tables.columns(short), terminal_width()))
+        click.echo(table(*formats.columns(short), terminal_width()))
         click.echo(textwrap.fill(note, terminal_width()))
 
 
@@ -70,7 +70,7 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, eng
     methods = [registry.integrator(name)] if name is not None else list(listed.values())
     records: list[Record] = [method.record() for method in methods]
     if markdown and not as_json:
-        click.echo(tables.table(*tables.columns(records)))
+        click.echo(formats.table(*formats.columns(records)))
         return
     short: list[Record] = [
         {

@@ -12,7 +12,7 @@ from symtop.cli import common
 from symtop.cli.common import File, as_text, completing, json_option, plugin_option, results_option, separated
 from symtop.core.errors import SymtopError, positive
 from symtop.core.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
-from symtop.report.sentences import abridged, counted
+from symtop.report.formats import abridged, counted
 
 if TYPE_CHECKING:
     from symtop.runner.pool import Pool

@@ -307,7 +307,9 @@ class Code:
             constants = [value for value in part.co_consts if not isinstance(value, CodeType)]
             if part is function.__code__ and constants[:1] == [function.__doc__]:
                 del constants[0]
-            self._note(part.co_code.hex(), part.co_exceptiontable.hex(), *map(_constant, constants))
+            # a frozenset prints in another order in every process
+            texts = (f"frozenset({sorted(map(repr, x))})" if isinstance(x, frozenset) else repr(x) for x in constants)
+            self._note(part.co_code.hex(), part.co_exceptiontable.hex(), *texts)
             # every function has `CO_OPTIMIZED`, but numba clears it where a profiler watches
             flags = part.co_flags | (inspect.CO_OPTIMIZED if part.co_flags & inspect.CO_NEWLOCALS else 0)
             counts = part.co_argcount, part.co_kwonlyargcount, flags
@@ -339,11 +341,6 @@ def codes(code: CodeType) -> Iterator[CodeType]:
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from codes(constant)
-
-
-def _constant(value: Any) -> str:
-    """A constant in words that are the same in every process."""
-    return f"frozenset({sorted(map(repr, value))})" if isinstance(value, frozenset) else repr(value)
 
 
 def held(function: FunctionType) -> Iterator[object]:

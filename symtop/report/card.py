@@ -18,7 +18,7 @@ import numpy as np
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home
 from symtop.judging.findings import Finding, StepLedger, claim_name, description
-from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels
+from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels, slope_guide
 
 LEAST = 1e-17  # what is smaller is drawn here
 LETTER = 6.6  # width of a letter of the badge, pixels
@@ -56,13 +56,11 @@ def _order(axis: Any, ledger: StepLedger) -> None:
     axis.set(xscale="log", yscale="log")
     claimed = finding.declared.isdigit()
     slope = float(finding.declared) if claimed else finding.value
-    order = round(slope) if 0.5 < slope < 99.0 else None
-    if order is not None:
-        used = np.flatnonzero(valid & fitted) if (valid & fitted).any() else np.flatnonzero(valid)
-        first, last = used[np.argmin(steps[used])], used[np.argmax(steps[used])]
-        ends = steps[[first, last]]
-        label = f"h^{order}{', as claimed' if claimed else ''}"
-        axis.plot(ends, errors[first] * (ends / ends[0]) ** order, color=GREY, lw=0.9, ls=(0, (5, 3)), label=label)
+    if 0.5 < slope < 99.0:
+        used = valid & fitted if (valid & fitted).any() else valid
+        span, order = (steps[used].min(), steps[used].max()), round(slope)
+        label = f"$h^{{{order}}}${', as claimed' if claimed else ''}"
+        slope_guide(axis, order, span, errors[used][np.argmin(steps[used])], label)
     axis.legend(frameon=False)
 
 

@@ -1,4 +1,4 @@
-"""What drawings of studies share: names at the ends of lines, the grey band of the reference's bound, the front."""
+"""What drawings of studies share: names of lines and rows, the grey band of the bound, which variants are named."""
 
 from collections.abc import Mapping, Sequence
 from itertools import product
@@ -11,6 +11,7 @@ from symtop.report.style import LEAST_TEXT, ink
 SMALLEST = 1e-17  # where an error of exactly zero is drawn
 LOWEST = 1e-40  # below every panel
 BELOW = "below the reference's error bound"
+MOST_NAMED = 9  # variants with a name of their own in a figure
 
 
 def bound_of(bounds: Any, least: float = 1e-16) -> float:
@@ -28,9 +29,17 @@ def error_band(axis: Any, bounds: Any, least: float = 1e-16) -> float:
     return level
 
 
-def largest_so_far(values: Any) -> Any:
-    """The largest size up to each sample; zeros are `SMALLEST`, for a logarithmic axis."""
-    return np.maximum.accumulate(np.maximum(np.abs(np.asarray(values)), SMALLEST))
+def rows(axis: Any, names: Sequence[str], count: int = 0) -> None:
+    """Name the rows of a panel of dots, the first at the top; with room for `count` of them."""
+    axis.set_yticks(range(len(names)), names, fontsize=LEAST_TEXT)
+    axis.set_ylim(max(count, len(names)) - 0.4, -0.6)
+    axis.tick_params(axis="y", length=0)
+    axis.grid(visible=False, axis="y")
+
+
+def chosen(names: Sequence[str], known: Sequence[str], most: int = MOST_NAMED) -> list[str]:
+    """The variants that a figure names: all if they are few, otherwise those that are known, if any of them is."""
+    return list(names) if len(names) <= most else [name for name in names if name in known] or list(names)[:most]
 
 
 def spread(places: Sequence[float], gap: float) -> list[float]:

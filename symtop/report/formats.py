@@ -1,12 +1,14 @@
-"""Numbers as the report prints them, in titles and tables and by the filters of templates."""
+"""Numbers, lists and tables as the report and the command line print them; the filters of templates."""
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 FIRM = "\N{NO-BREAK SPACE}"
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LARGEST_PLAIN = 1e4  # larger numbers are written with a power of ten
 MOST_COUNTED = 1e9  # larger whole numbers are no counts
+FEW = 4  # names that a sentence has; the others are counted, since a long list is a table's
 UNITS = ((1e-9, "ns"), (1e-6, "µs"), (1e-3, "ms"), (1.0, "s"), (60.0, "min"), (3600.0, "h"))  # of times, in seconds
 
 
@@ -68,3 +70,29 @@ def cell(value: Any, digits: int = 3) -> str:
 
 
 FILTERS = (number, count, percent, power, fixed, duration, microseconds, code, cell)
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table as GitHub-flavoured Markdown."""
+    lines = ["| " + " | ".join(_escaped(cell) for cell in row) + " |" for row in [header, *rows]]
+    return "\n".join([lines[0], "|" + "---|" * len(header), *lines[1:]])
+
+
+def _escaped(cell: str) -> str:
+    return cell.replace("|", "\\|").replace("<", "\\<")
+
+
+def columns(records: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[Any]]]:
+    """Header and rows of a table of records, which all have the same keys."""
+    return list(records[0]), [list(record.values()) for record in records]
+
+
+def abridged(names: Sequence[str], most: int = FEW) -> str:
+    """The first names of a list as a sentence has them, and how many more there are."""
+    *first, last = [*names[:most], f"{len(names) - most} more"] if len(names) > most else names or ["none"]
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def counted(count: int, noun: str = "variant") -> str:
+    """So many things: ``1 variant``, ``12 variants``."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"

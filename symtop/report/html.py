@@ -15,7 +15,8 @@ from typing import Any
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
-LONG = 42  # letters of a cell whose line may break
+LONG = 27  # characters of a cell that may be broken into lines
+AT_ONCE = 2  # figures
 MATHML = "http://www.w3.org/1998/Math/MathML"
 PIECES = re.compile(r"^<!-- (?P<kind>chart|table) (?P<name>\S+) -->$|^\$\$(?P<formula>.+?)\$\$$", re.MULTILINE)
 
@@ -49,7 +50,7 @@ class Writer:
         self, images: Mapping[str, Mapping[str, Any]], markers: Callable[[str, str], str], *taken: str
     ) -> None:
         self.images, self.markers, self.anchor = images, markers, Anchors(*taken)
-        self._seen = False  # is there a figure above? The first one is loaded at once
+        self._shown = 0  # figures so far: the first ones, of the front page, are loaded at once
         self._parser = MarkdownIt("commonmark", {"html": False}).enable("table")
 
     def __call__(self, text: str) -> str:
@@ -101,8 +102,8 @@ class Writer:
         address, alt = str(image.attrs["src"]), html.escape(image.content)
         shown = self.images.get(address, {})
         size = f' width="{shown["width"]}" height="{shown["height"]}"' if shown else ""
-        lazy = "" if not self._seen else ' loading="lazy" decoding="async"'
-        self._seen = True
+        lazy = ' loading="lazy" decoding="async"' if self._shown >= AT_ONCE else ""
+        self._shown += 1
         film = ' class="film"' if address.endswith(".gif") else ""
         name = self.anchor(Path(address).stem)
         return (
@@ -119,7 +120,7 @@ class Writer:
     def _table(self, block: Sequence[Token], title: str) -> str:
         name = self.anchor(slug(title) or "table")
         for cell, content in itertools.pairwise(block):
-            if cell.type == "td_open" and len(content.content) > LONG:
+            if cell.type == "td_open" and len(content.content) > LONG and " " in content.content:
                 cell.attrSet("class", "words")
         body = (
             self._rendered(block)

@@ -1,10 +1,11 @@
 """The report: a front page and a page a study, from the findings that the studies left in the results folder.
 
-`report.md` holds all of it in Markdown, beside its figures and tables; `report.html` is made of the same text. The page
-of a study is its template, filled (`symtop.report.template`). How it was measured follows. A chart to point at is data
-for the page's script, each series with the look its integrator has in every figure; a table that is shown in part lies
-in `report.html` in full, to be searched and sorted. Nothing is fetched but figures; with `embed` they are in the page,
-for sending it alone.
+`report.md` holds what a reader decides by, beside its figures and tables; `reference.md` what only checks it: the pages
+of benchmarks from "How to read it" on, or all of one without a figure, the equations and scenes, and the provenance.
+`report.html` is made of both. The page of a study is its template, filled (`symtop.report.template`). A chart to point
+at is data for the page's script, each series with the look its integrator has in every figure; a table that is shown in
+part lies in `report.html` in full, to be searched and sorted. Nothing is fetched but figures; with `embed` they are in
+the page, for sending it alone.
 """
 
 import base64
@@ -16,20 +17,26 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError
+from symtop.core.numbers import EPSILON
 from symtop.methods.framework.registry import integrators, split_name
-from symtop.report import method, tables, template
+from symtop.model.scenes import scenes
+from symtop.model.top import flat
+from symtop.report import formats, template
 from symtop.report.html import Writer, slug
 from symtop.report.sources import report_files, report_hash
 from symtop.report.style import look
 from symtop.run import plugins
+from symtop.run.reference.truth import reference
 from symtop.runner import manifest, run as runner
 
-WORDS = "report.md"
-KINDS = {".png": "image/png", ".gif": "image/gif"}
+WORDS, REFERENCE = "report.md", "reference.md"
 TEMPLATES = Path(__file__).parent / "templates"
-MEASURED = "How it was measured"
+EQUATIONS = "The equations, the scenes and the exact motion"
+READING = "**How to read it.**"  # of the page of a benchmark, where its part for reference begins
 QUICK = "This is a quick pass on coarse grids, for checking that every study works."
 
 
@@ -92,31 +99,54 @@ def gather(results: Path) -> list[dict[str, Any]]:
 
 def _shown(file: Path, *, embed: bool) -> dict[str, Any]:
     """Address, width and height of a PNG or a GIF, so that the page does not move while its figures load."""
-    image = file.read_bytes()
-    if image.startswith(b"\x89PNG"):
-        width, height = (int.from_bytes(image[at : at + 4]) for at in (16, 20))
-    else:
-        width, height = (int.from_bytes(image[at : at + 2], "little") for at in (6, 8))
-    inside = f"data:{KINDS.get(file.suffix, 'image/png')};base64,{base64.b64encode(image).decode()}" if embed else ""
+    from PIL import Image
+
+    with Image.open(file) as image:
+        (width, height), kind = image.size, f"image/{str(image.format).lower()}"
+    inside = f"data:{kind};base64,{base64.b64encode(file.read_bytes()).decode()}" if embed else ""
     return {"source": inside or f"figures/{file.name}", "width": width, "height": height}
 
 
-def texts(results: Path, studies: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """The parts of the report in Markdown, by name: "front", the studies, "measured", "provenance"."""
-    pages = {one["study"]: f"[{one['question']}](#{slug(one['question'])})" for one in studies}
-    links = pages | {"measured": f"[{MEASURED}](#{slug(MEASURED)})"}
-    written = (TEMPLATES / "front.md").read_text(encoding="utf-8")
-    parts = {"front": template.front(written, studies, results, links)}
+def texts(results: Path, studies: Sequence[Mapping[str, Any]]) -> tuple[dict[str, str], dict[str, str]]:
+    """The parts of the report and those for reference, in Markdown, by name: "front", the studies, "measured", ..."""
+    parts, more, pages = dict[str, str](), dict[str, str](), {"measured": _link("How it was measured")}
     for study in studies:
-        parts[study["study"]] = _lower(template.filled(study, results, pages=links))
+        pages[study["study"]] = _link(study["question"], REFERENCE if _checks_only(study) else "")
+    parts["front"] = template.front(_template("front"), studies, results, pages)
+    for study in studies:
+        name, text = study["study"], _lower(template.filled(study, results, pages=pages))
+        if _checks_only(study):
+            more[name] = text
+            continue
+        parts[name], mark, rest = text.partition(READING) if study["measured"] else (text, "", "")
+        if mark:
+            title = f"{study['title']}: tables"
+            parts[name] += f"More: {_link(title, REFERENCE)}.\n"
+            more[f"{name}-tables"] = f"## {title}\n\n{mark}{rest}"
+    known = {"reference": f"{REFERENCE}#{slug(EQUATIONS)}"} | scene_tables()
+    parts["measured"], more["equations"] = (
+        template.rendered(_template(name), name, known) for name in ("measured", "equations")
+    )
     newest = next((study for study in reversed(studies) if not study["measured"]), studies[-1])["provenance"]
     versions = ", ".join(f"{name} {version}" for name, version in json.loads(newest["dependencies"]).items())
     facts = [[key, str(value)] for key, value in {**newest, "dependencies": versions}.items()]
-    parts["measured"] = f"## {MEASURED}\n\n{method.text()}\n"
-    parts["provenance"] = f"## Provenance\n\n{tables.table(['what', 'which'], facts)}\n"
+    more["provenance"] = f"## Provenance\n\n{formats.table(['what', 'which'], facts)}\n"
     if any(study["quick"] for study in studies):
         parts["front"] += f"\n{QUICK}\n"
-    return parts
+    return parts, more
+
+
+def _checks_only(study: Mapping[str, Any]) -> bool:
+    """Is it a benchmark of what ships with symtop, which has no figure?"""
+    return bool(study["measured"]) and not study["pictures"]
+
+
+def _template(name: str) -> str:
+    return (TEMPLATES / f"{name}.md").read_text(encoding="utf-8")
+
+
+def _link(heading: str, file: str = "") -> str:
+    return f"[{heading}]({file}#{slug(heading)})"
 
 
 def _lower(text: str) -> str:
@@ -124,8 +154,25 @@ def _lower(text: str) -> str:
     return re.sub(r"^(#+) ", r"\1# ", text, flags=re.MULTILINE)
 
 
+def scene_tables() -> dict[str, Any]:
+    """Of the scenes of the catalogue: uses, starts to the last bit, units, and the largest bound of the truth (rad)."""
+    uses, starts, bounds = [], [], []
+    for scene in scenes().values():
+        bounds.append(float(reference(scene, np.array([scene.horizon]))["axis_error_bound"].values[0]))
+        period = f"{scene.nutation_period:.9g}" if math.isfinite(scene.nutation_period) else "infinite"
+        uses.append([scene.name, scene.purpose, period, f"{scene.horizon:.6g}", f"{bounds[-1]:.1e}"])
+        starts.append([scene.name, *(repr(number).removesuffix(".0") for number in flat(scene.top, scene.start))])
+    what = ["scene", "what it is for", "nutation period", "horizon", "bound of the truth (rad)"]
+    problem = ["scene", "I1", "I3", "mgl", "theta", "phi", "psi", "theta'", "phi'", "psi'"]
+    return {
+        "uses": formats.table(what, uses), "starts": formats.table(problem, starts),
+        "units": ", ".join(scene.name for scene in scenes().values() if scene.units == "SI"),
+        "bound": max(bounds), "roundings": max(bounds) / EPSILON,
+    }  # fmt: skip
+
+
 def write(results: Path, *, embed: bool = False) -> Path:
-    """Write ``report.html``, and ``report.md`` with the same words, into the results folder; returns the page."""
+    """Write ``report.html``, ``report.md`` and ``reference.md`` into the results folder; returns the page."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -134,35 +181,38 @@ def write(results: Path, *, embed: bool = False) -> Path:
     )  # fmt: skip
     made_of, sources = report_hash(results, embed=embed), report_files(results)
     studies = gather(results)
-    parts = texts(results, studies)
+    parts, more = texts(results, studies)
     images = {
         f"figures/{one['file']}": _shown(results / "figures" / one["file"], embed=embed)
         for study in studies
         for one in study["pictures"]
     }
     charts = {f"{study['study']}-{chart['name']}": chart for study in studies for chart in study["charts"]}
-    records = tables.columns([one.record() for one in integrators().values()])
+    records = formats.columns([one.record() for one in integrators().values()])
 
     def marked(kind: str, name: str) -> str:
         if kind == "table":
             return _whole(name, *_read(results / "tables" / f"{name}.csv"))
         return f'<div class="chart"><script type="application/json">{prepared(charts[name])}</script></div>'
 
-    writer = Writer(images, marked, "content", "scheme", *(f"part-{name}" for name in parts))
+    together = parts | more
+    writer = Writer(images, marked, "content", "scheme", *(f"part-{name}" for name in together))
     text = environment.get_template("report.html").render(
         title=re.sub(r"^# ", "", parts["front"].partition("\n")[0]),
         css="".join((TEMPLATES / name).read_text(encoding="utf-8") for name in ("style.css", "report.css")),
         scripts=[(TEMPLATES / name).read_text(encoding="utf-8") for name in ("page.js", "chart.js")],
-        contents=[(name, _heading(part)) for name, part in parts.items()],
-        parts={name: writer(part) for name, part in parts.items()},
+        contents=[(name, _heading(part)) for name, part in together.items()],
+        parts={name: writer(part.replace(f"]({REFERENCE}#", "](#")) for name, part in together.items()},
         integrators=_whole("integrators", *records),
         provenance=studies[-1]["provenance"],
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
     )
     target = results / manifest.PAGE
     netcdf.write_text(target, text)
-    netcdf.write_text(results / WORDS, "\n".join(part for part in parts.values()))
-    manifest.note(results, manifest.PAGE, "" if plugins.loaded() else made_of, [target, results / WORDS, *sources])
+    netcdf.write_text(results / WORDS, "\n".join(parts.values()))
+    netcdf.write_text(results / REFERENCE, "# For reference\n\n" + "\n".join(more.values()))
+    written = [target, results / WORDS, results / REFERENCE]
+    manifest.note(results, manifest.PAGE, "" if plugins.loaded() else made_of, [*written, *sources])
     return target
 
 

@@ -239,20 +239,13 @@ def _draw_quantiles(axis: Any, times: Any, errors: Any, most: float, color: str)
         axis.fill_between(times, quantiles[low], quantiles[high], color=color, alpha=opaque, lw=0.0)
     marker = "o" if times.size == 1 else None  # a line has two points at least
     axis.plot(times, quantiles[spread.LEVELS.index(0.5)], color=color, lw=1.8, marker=marker)
-    names = [
-        (f"{100.0 * level:g} %" if level != 0.5 else "median") + (": failed" if np.isinf(end) else "")
-        for level, end in zip(spread.LEVELS, errors[:, -1], strict=True)
-    ]
     if np.isinf(errors).any():
         axis.plot(times[[0, -1]], [most, most], color="0.4", lw=0.8, ls=":")
-    ends, place = np.log10(quantiles[:, -1]), -np.inf
-    least = 0.045 * max(np.ptp(np.log10(quantiles)), 1.0)  # labels do not overlap
-    for end, name in zip(ends, names, strict=True):
-        place = max(end, place + least)
-        axis.annotate(
-            name, (times[-1], 10.0**place), xytext=(5, 0), textcoords="offset points", fontsize=LEAST_TEXT, va="center"
-        )
-    axis.set_xlim(0.0, times[-1] * 1.07)
+    names = ["median" if level == 0.5 else f"{100.0 * level:g} %" for level in spread.LEVELS]
+    ends = {f"{name}: failed" if np.isinf(error) else name: (float(times[-1]), float(shown), color)
+            for name, error, shown in zip(names, errors[:, -1], quantiles[:, -1], strict=True)}  # fmt: skip
+    axis.set(xlim=(0.0, times[-1]), yscale="log")
+    name_ends(axis, ends)
 
 
 def draw_compare(data: xr.Dataset, path: str | Path) -> None:

@@ -48,7 +48,7 @@ REDS = (VERMILLION, "#F09A66", "#8A3C00")
 YELLOWS = ("#B8A500", YELLOW, "#7A6F00")
 PURPLES = (PURPLE, "#8C4A73", "#E6B8D2")
 SKIES = (SKY, "#2B7BA8", "#A6D5F2")
-_SHADES = {
+SHADES = {
     "discrete-lagrangian": BLUES,
     "splitting": GREENS,
     "runge-kutta": ORANGES,
@@ -66,49 +66,15 @@ DASHES = {  # of a line, by family; a family that is not here has a solid one
 UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
 _MARKERS = "osv^<>DPXph8dH"
 
-# Looks set by hand; `look` finds one for every other integrator.
-_LOOKS = {
-    "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "simpson-linear": Look(PURPLE, "v"),
-    "midpoint-unreduced": Look(BLUE, "^"), "trapezoidal-unreduced": Look(BLUES[1], "<"),
-    "galerkin-simpson": Look(BLUE, "P"), "exact-discrete": Look(BLUES[2], "D"),
-    "stormer-verlet": Look(GREEN, "^"), "stormer-verlet-yoshida-4": Look(GREEN, "o"),
-    "stormer-verlet-suzuki-4": Look(GREENS[1], "s"), "stormer-verlet-blanes-moan-6": Look(GREENS[2], "v"),
-    "strang": Look(GREEN, "<"), "strang-drift-first": Look(GREENS[2], "<"),
-    "cayley": Look(GREENS[1], ">"), "cayley-tuned": Look(GREENS[2], "D"),
-    "takahashi-imada": Look(GREEN, "P"), "chin-4a": Look(GREENS[1], "X"), "yoshida-4": Look(GREENS[2], "p"),
-    "suzuki-4": Look(GREEN, "h"), "stormer-verlet-reversible": Look(GREENS[2], "*"),
-    "srkn-6-4": Look(GREENS[1], "8"), "srkn-11-6": Look(GREENS[2], "d"), "srkn-14-6": Look(GREEN, "H"),
-    "srkn-19-8": Look(GREENS[1], "*"),
-    "kahan-li-6": Look(GREENS[1], "o"), "suzuki-umeno-8": Look(GREENS[2], "s"), "kahan-li-8": Look(GREEN, "v"),
-    "sofroniou-spaletta-10": Look(GREENS[1], "<"),
-    "aba-8-6-4": Look(GREENS[2], ">"), "aba-10-6-4": Look(GREEN, "D"), "aba-10-4": Look(GREENS[1], "P"),
-    "rk4": Look(ORANGE, "o"), "rk45-compiled": Look(ORANGES[1], "s"),
-    "tsit5": Look(ORANGE, "s"), "tsit5-fixed": Look(ORANGE, "P"), "dop853-compiled": Look(ORANGE, "v"),
-    "dop853-compiled-fixed": Look(ORANGE, "<"), "vern9": Look(ORANGES[2], "o"), "vern9-fixed": Look(ORANGES[2], "s"),
-    "extrapolation": Look(ORANGES[2], "D"), "dprkn8": Look(ORANGES[2], "X"), "adams": Look(ORANGES[1], "D"),
-    "gauss-2": Look(ORANGES[2], "v"), "gauss-4": Look(ORANGE, "^"), "gauss-6": Look(ORANGES[1], "<"),
-    "gauss-8": Look(ORANGES[2], ">"), "gauss-10": Look(ORANGE, "D"), "gauss-12": Look(ORANGES[1], "P"),
-    "kahan": Look(ORANGES[1], "h"),
-    "rkmk-se3-2": Look(YELLOWS[0], "o"), "rkmk-se3-4": Look(YELLOWS[2], "s"),
-    "crouch-grossman-3": Look(YELLOWS[0], "v"), "commutator-free-4": Look(YELLOWS[2], "^"),
-    "simo-wong": Look(YELLOWS[0], "D"), "collective-gauss-2": Look(YELLOWS[2], "<"),
-    "collective-gauss-4": Look(YELLOWS[0], ">"), "collective-gauss-6": Look(YELLOWS[2], "P"),
-    "generalised-alpha": Look(YELLOWS[0], "X"),
-    "lie-variational": Look(BLUES[1], "o"), "lie-variational-suzuki-4": Look(BLUES[2], "X"),
-    "euler-poincare": Look(BLUES[1], "s"),
+_LOOKS = {  # of the methods that people know; `look` finds one for every other integrator
+    "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "stormer-verlet": Look(GREEN, "^"),
+    "strang": Look(GREEN, "<"), "cayley": Look(GREENS[1], ">"), "takahashi-imada": Look(GREEN, "P"),
+    "yoshida-4": Look(GREENS[2], "p"), "srkn-14-6": Look(GREENS[2], "H"), "rk4": Look(ORANGE, "o"),
+    "rk45-compiled": Look(ORANGES[1], "s"), "tsit5-fixed": Look(ORANGES[1], "P"), "vern9-fixed": Look(ORANGES[2], "s"),
+    "dop853-compiled": Look(ORANGE, "v"), "gauss-4": Look(ORANGE, "^"), "gauss-8": Look(ORANGES[2], ">"),
     "rk45": Look(VERMILLION, "D"), "dop853": Look(VERMILLION, "o"), "lsoda": Look(REDS[1], "s"),
-    "radau": Look(REDS[2], "v"),
-    "taylor": Look(BLACK, "*", 6.0), "taylor-longdouble": Look(BLACK, "o"), "taylor-quad": Look(BLACKS[1], "s"),
-    "series": Look(BLACKS[1], "D"), "series-adaptive": Look(BLACKS[1], "^"), "exact": Look(GREY, "x"),
-    "series-general": Look(BLACKS[1], "v"), "series-general-adaptive": Look(BLACKS[1], "o"),
-    "no-gyro": Look(SKY, "o"), "no-gyro-float32": Look(SKIES[2], "o"), "no-gyro-linear": Look(SKIES[1], "o"),
-    "mujoco-euler": Look(SKIES[1], "s"), "mujoco-implicit": Look(SKIES[2], "s"), "bullet": Look(SKY, "v"),
-    "bullet-float32": Look(SKIES[2], "v"), "jolt": Look(SKY, "^"), "jolt-float32": Look(SKIES[2], "^"),
-    "physx": Look(SKY, "<"), "physx-float32": Look(SKIES[2], "<"), "rapier": Look(SKY, ">"),
-    "rapier-float32": Look(SKIES[2], ">"), "ode": Look(SKIES[1], "D"), "lammps-rigid": Look(SKIES[1], "P"),
-    "no-squish": Look(SKY, "P"), "yade": Look(SKIES[1], "X"), "fincham": Look(SKY, "X"),
-    "mujoco3-rk4": Look(SKIES[1], "p"), "rkmk4": Look(SKY, "p"), "jsbsim-default": Look(SKIES[1], "h"),
-    "jsbsim-buss2": Look(SKY, "h"),
+    "radau": Look(REDS[2], "v"), "taylor": Look(BLACK, "*", 6.0), "series": Look(BLACKS[1], "D"),
+    "exact": Look(GREY, "x"),
 }  # fmt: skip
 
 FILLS = {"angles": "none", "axis": "full", "attitude": "left"}  # of a marker, by chart
@@ -117,8 +83,8 @@ FILLS = {"angles": "none", "axis": "full", "attitude": "left"}  # of a marker, b
 def look(name: str) -> Look:
     """Colour and marker of an integrator or a variant: the marker of ``rk4[angles]`` is open, of ``rk4[axis]`` full.
 
-    One that `_LOOKS` does not name gets a shade of its family and a marker that none of these has; which of them
-    depends on its name alone, not on what else is registered.
+    One that `_LOOKS` does not name gets a shade of its family and a marker that no other has, by its place in the
+    registry, to which others are added at the end; of a name that is not registered they follow from the name alone.
     """
     from symtop.methods.framework.registry import integrators, split_name
 
@@ -130,10 +96,11 @@ def look(name: str) -> Look:
     dash = DASHES.get(family, "-")
     if name in _LOOKS:
         return _LOOKS[name]._replace(dash=dash)
-    shades = _SHADES[family]
-    free = [Look(shade, marker) for marker in _MARKERS for shade in shades]
-    free = [one for one in free if all((one.color, one.marker) != shipped[:2] for shipped in _LOOKS.values())]
-    return free[zlib.crc32(name.encode()) % len(free)]._replace(dash=dash)
+    taken = {one[:2] for one in _LOOKS.values()}
+    free = [Look(shade, marker) for marker in _MARKERS for shade in SHADES[family] if (shade, marker) not in taken]
+    alike = [one for one, method in registered.items() if method.family == family and one not in _LOOKS]
+    place = alike.index(name) if name in alike else zlib.crc32(name.encode())
+    return free[place % len(free)]._replace(dash=dash)
 
 
 def line(name: str, scale: float = 1.0) -> dict[str, Any]:
@@ -178,7 +145,7 @@ def compact(picture: "Image.Image") -> "Image.Image":
     from PIL import Image  # matplotlib brings it
     from PIL.ImageColor import getrgb
 
-    shades = [shade for family in _SHADES.values() for shade in family]
+    shades = [shade for family in SHADES.values() for shade in family]
     ours = dict.fromkeys([*shades, *(look.color for look in _LOOKS.values()), "#FFFFFF"])
     fixed = np.array([getrgb(color) for color in ours], np.uint8)
     picture = picture.convert("RGB")

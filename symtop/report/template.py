@@ -11,8 +11,9 @@ the page shows everything that the study has (`templates/plain.md`). In it stand
     The caption: what was found, and how it was drawn.
     {% endcall %}
 
-A fact that was not measured is printed as "not measured"; `has("NAME", ...)` says whether facts were measured, and
-figures and tables made. A figure that was not drawn vanishes with its title and caption, a table without rows too.
+A sentence with a fact that was not measured is left out, and the page says once that there are such; `has("NAME", ...)`
+says whether facts were measured, and figures and tables made. A figure that was not drawn vanishes with its title and
+caption, a table without rows too.
 """
 
 import re
@@ -24,11 +25,13 @@ from typing import Any
 from symtop.core.errors import SymtopError
 from symtop.methods.framework.registry import integrators
 from symtop.report import formats
-from symtop.report.tables import table
+from symtop.report.formats import table
 
 MOST_ROWS = 15  # of a table on a page; the rest is in its CSV
 PLAIN = "plain.md"
 MARKER = "<!-- {kind} {name} -->"  # where the page in HTML has a chart, or a table in full
+GAP = "\N{OBJECT REPLACEMENT CHARACTER}"  # in place of what was not measured, until its sentence is left out
+PARTIAL = "*This run measured a part of the study; sentences about the rest are left out.*"
 
 Findings = Mapping[str, Any]
 
@@ -43,22 +46,25 @@ def filled(findings: Findings, results: Path, *, pages: Mapping[str, str] | None
     given |= {"f": SimpleNamespace(**findings["facts"]), "facts": findings["facts"]}
     given |= {kind: [one["name"] for one in findings[kind]] for kind in ("pictures", "tables")}
     text = rendered(findings["page"], f"page of {name}", given)
-    return (
-        "\n\n".join(filter(None, [text.strip(), *findings["failures"], findings.get("measured"), _ending(findings)]))
-        + "\n"
-    )
+    head, _, body = without_gaps(text).strip().partition("\n\n")
+    parts = [head, PARTIAL if GAP in text else "", body, *findings["failures"], findings.get("measured")]
+    return "\n\n".join(filter(None, [*parts, _ending(findings)])) + "\n"
 
 
 def front(template: str, studies: Sequence[Findings], results: Path, pages: Mapping[str, str]) -> str:
     """A page on all studies: `fact("STUDY.NAME")` is a fact or None, figures and tables are named ``STUDY-NAME``."""
     facts = {f"{study['study']}.{name}": value for study in studies for name, value in study["facts"].items()}
-    given = {"pages": Links(pages), "fact": facts.get, "listed": list(pages.values()), "methods": len(integrators())}
-    return rendered(template, "front page", given | _names(studies, results, whole=True)).strip() + "\n"
+    titles = {study["title"]: pages.get(study["study"], "").partition("](")[2] for study in studies}
+    given = {"pages": Links(pages), "fact": facts.get, "methods": len(integrators())}
+    given["listed"] = [f"[{title}]({address}" for title, address in titles.items() if address]
+    text = rendered(template, "front page", given | _names(studies, results, whole=True))
+    return without_gaps(text).strip() + "\n"
 
 
 def answer(findings: Findings, results: Path) -> str:
     """The answer of a study: the first paragraph or list below its question, as plain text; empty if there is none."""
-    below = re.split(r"\n{2,}", filled(findings, results).partition("\n\n")[2].strip())[0]
+    page = filled(findings, results).replace(f"{PARTIAL}\n\n", "")
+    below = re.split(r"\n{2,}", page.partition("\n\n")[2].strip())[0]
     below = ", ".join(re.findall(r"^- (.*)$", below, re.MULTILINE)) if below.startswith("- ") else below
     return (
         ""
@@ -67,14 +73,11 @@ def answer(findings: Findings, results: Path) -> str:
     )
 
 
-class Links:
+class Links(dict[str, str]):
     """Links to pages by the names of studies; the name alone where there is no page."""
 
-    def __init__(self, pages: Mapping[str, str]) -> None:
-        self._pages = pages
-
-    def __getattr__(self, name: str) -> str:
-        return self._pages.get(name, name)
+    def __missing__(self, name: str) -> str:
+        return name
 
 
 def rendered(template: str | None, name: str, given: Mapping[str, Any]) -> str:
@@ -83,9 +86,10 @@ def rendered(template: str | None, name: str, given: Mapping[str, Any]) -> str:
 
     environment = Environment(  # noqa: S701  (it makes Markdown, and what makes HTML of that escapes it)
         loader=PackageLoader("symtop", "report/templates"), undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True, finalize=lambda value: "not measured" if value is None else value,
+        lstrip_blocks=True, finalize=lambda value: GAP if value is None else value,
     )  # fmt: skip
     environment.filters |= {one.__name__: _passing(one) for one in formats.FILTERS}
+    template = template and template.replace("endraw %}", "endraw +%}")  # which keeps the empty line that follows
     try:
         ready = environment.get_template(PLAIN) if template is None else environment.from_string(template)
         text = ready.render(**given)
@@ -93,6 +97,19 @@ def rendered(template: str | None, name: str, given: Mapping[str, Any]) -> str:
         place = f", line {error.lineno}" if getattr(error, "lineno", None) else ""  # type: ignore[union-attr]
         raise SymtopError(f"{name}{place}: {error}") from error
     return "\n\n".join(map(_unwrapped, re.split(r"\n{2,}", text.strip()))) + "\n"
+
+
+def without_gaps(text: str) -> str:
+    """A text without the sentences and the items of lists in which something is missing."""
+    blocks = [_known(block) if GAP in block else block for block in text.split("\n\n")]
+    return "\n\n".join(filter(None, blocks))
+
+
+def _known(block: str) -> str:
+    listed = re.match(r"[-*] |\d+[.)] ", block)
+    parts = re.split(r"\n(?=[-*] |\d+[.)] )" if listed else r"(?<=[.?]) |(?<=[.?]\*\*) ", block)
+    kept = [part for part in parts if GAP not in part]
+    return "" if all(re.fullmatch(r"\*\*[^*]+\*\*", part) for part in kept) else ("\n" if listed else " ").join(kept)
 
 
 def _passing(filter_: Callable[..., str]) -> Callable[..., str | None]:
@@ -107,8 +124,10 @@ def _passing(filter_: Callable[..., str]) -> Callable[..., str | None]:
 
 
 def _unwrapped(block: str) -> str:
-    """A paragraph as one line, since it is filled with words of any length; other blocks as they are."""
-    return block if re.match(r"[|#>`\s]|[-*+] |\d+[.)] |<!--|\$\$", block) else " ".join(block.split("\n"))
+    """A paragraph or an item as one line, since it is filled with words of any length; other blocks as they are."""
+    if re.match(r"[-*] |\d+[.)] ", block):
+        return re.sub(r"\n +", " ", block)
+    return block if re.match(r"[|#>`\s]|<!--|\$\$", block) else " ".join(block.split("\n"))
 
 
 def _names(studies: Sequence[Findings], results: Path, *, whole: bool = False) -> dict[str, Callable[..., Any]]:
@@ -125,12 +144,11 @@ def _names(studies: Sequence[Findings], results: Path, *, whole: bool = False) -
     def figure(name: str, title: str = "", alt: str = "", chart: str = "", caller: Any = None) -> str:
         if name not in pictures:
             return ""
-        parts = [f"**{title}**" if title else "", f"![{alt}](figures/{pictures[name]['file']})"]
-        parts += [
-            " ".join(caller().split()) if caller else "",
-            MARKER.format(kind="chart", name=chart) if chart else "",
-        ]
-        return "\n\n".join(filter(None, parts)) + "\n"
+        caption = " ".join(caller().split()) if caller else ""
+        if GAP in caption:  # what stands below a figure is its caption: there must be one
+            caption = f"{_known(caption) or f'{title}.'} {GAP}"
+        parts = [f"**{title}**" if title else "", f"![{alt}](figures/{pictures[name]['file']})", caption]
+        return "\n\n".join(filter(None, [*parts, MARKER.format(kind="chart", name=chart) if chart else ""])) + "\n"
 
     def listed(
         name: str, title: str = "", rows: int = MOST_ROWS, columns: Sequence[str] | None = None, digits: int = 3

@@ -105,7 +105,7 @@ def test_what_the_benchmark_leaves_is_what_the_report_shows(tmp_path):
     content = bench.findings(rows, {}, forms, reached, items, one_step, many, together, 1e-9, facts)
     netcdf.write_json(tmp_path / "bench.json", content)
     text = page.write(tmp_path).read_text()
-    markdown = (tmp_path / "report.md").read_text()
+    markdown = (tmp_path / "report.md").read_text() + (tmp_path / "reference.md").read_text()
     counted = ("1 of 2 kernels", "3.0 us at most", "123 times faster", "explicit: 1 of 2 methods")
     for words in (*counted, "gauss: 1 of 1 methods", "4.5 times with rk4[axis]", "2001-02-03", "an abacus"):
         assert words in text

@@ -53,7 +53,7 @@ def test_both_ratios_against_scipy_stand_side_by_side_for_each_chart_and_languag
         "symtop": (1e-3, 2e-5), "scipy[axis] C": (6e-3, 4e-3), "scipy[axis] Python": (7e-3, 5e-3),
         "scipy[angles] Python": (1.2e-2, 1e-2),
     })  # fmt: skip
-    said = {sentence.partition(":")[0]: sentence for sentence in summary.verdict(data)}
+    said = {sentence.partition(":")[0]: sentence for sentence in summary.pairs(data)}
     for name, public, inner in (
         ("scipy[axis], C", "6", "200"), ("scipy[axis], Python", "7", "250"), ("scipy[angles], Python", "12", "500"),
     ):  # fmt: skip
@@ -90,7 +90,7 @@ def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_p
     truth = runner.load("truth")
     runner.run(truth, tmp_path, quick=True, jobs=1, quiet=True, save=style.save)
     page.write(tmp_path)
-    text = (tmp_path / "report.md").read_text()
+    text = (tmp_path / "report.md").read_text() + (tmp_path / "reference.md").read_text()
     sections = re.findall(r"^## (.+)$", text, re.MULTILINE)
     assert study.STUDY.question in sections
     assert truth.question in sections

@@ -9,7 +9,7 @@ import re
 from click.testing import CliRunner
 
 from symtop.cli.main import main
-from symtop.report.tables import columns, table
+from symtop.report.formats import columns, table
 from tests.pages import ROOT, pages
 
 registry = importlib.import_module("symtop.methods.framework.registry")

@@ -17,7 +17,7 @@ def one_step(h, lines):
     form = FORMULATIONS["axis"]
     par, state = form.prepare(SPHEROID.top, SPHEROID.start)
     method = extrapolation.method(form.field)
-    memory = np.zeros((method.rows, 6))
+    memory = np.zeros((extrapolation.LAST + 1, 6))
     memory[0] = form.field(par, state)
     memory[extrapolation.ORDERS, 1] = lines
     sample = method.sample

@@ -89,7 +89,7 @@ def compiled(name, scene, h, **changed):
     par, state = form.prepare(scene.top, scene.start)
     par = par._replace(**changed)
     method = nystrom.Nystrom(DPRKN8)(form.field)
-    memory = np.zeros((method.rows, 4))
+    memory = np.zeros((3, 4))
     memory[0] = form.field(par, state)
     part = getattr(method, name)
 

@@ -89,9 +89,8 @@ def test_a_wrong_estimate_takes_other_steps():
     scene, pair = symtop.scene("spheroid"), PAIRS["dop853-compiled"]
     plan, _ = make_plan(scene, integrator("dop853-compiled"), None, 1e-6, horizon=8.0, samples=2)
     wrong = pair._replace(table=DOP853._replace(third=DOP853.error))
-    right, other = (
-        pairs.solver(FORMULATIONS["axis"], chosen)(scene.top, scene.start, plan) for chosen in (pair, wrong)
-    )
+    solvers = (pairs.solver(FORMULATIONS["axis"], chosen, chosen.rows) for chosen in (pair, wrong))
+    right, other = (solver(scene.top, scene.start, plan) for solver in solvers)
     assert right.steps != other.steps
 
 

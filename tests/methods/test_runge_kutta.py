@@ -206,12 +206,12 @@ def test_rk4_counts_four_evaluations_a_step(chart):
 
 def _walk(scene, tolerance, horizon, pair=pairs.RK45, **limits):
     plan, _ = make_plan(scene, integrator("rk45-compiled"), None, tolerance, horizon=horizon, samples=301)
-    return plan, replace(pairs.solver(FORMULATIONS["angles"], pair), **limits)(scene.top, scene.start, plan)
+    return plan, replace(pairs.solver(FORMULATIONS["angles"], pair, pair.rows), **limits)(scene.top, scene.start, plan)
 
 
 def _step_ends(scene, tolerance, horizon, pair):
     """The ends of the accepted steps: with a budget of one evaluation the loop returns after each."""
-    loop, place, seen, ends = pairs.loop(FORMULATIONS["angles"], pair), np.empty(6 + 7 * 6 + 2), -1, []
+    loop, place, seen, ends = pairs.loop(FORMULATIONS["angles"], pair, pair.rows), np.empty(6 + 7 * 6 + 2), -1, []
     samples = np.array([horizon]), np.empty((1, 4)), np.empty((1, 2))
     while seen < 1:
         budget = 3 if seen < 0 else 1  # two evaluations choose the first step

@@ -66,7 +66,8 @@ def bundled(results):
 def test_it_holds_what_the_report_is_made_of_and_no_more(bundled):
     assert bundled.keys() == {
         "README.md", "SHA256SUMS", "citations.bib", "machine.txt", "versions.txt", "results/small.nc",
-        "results/peers.json", "results/report.html", "results/report.md", "results/figures/small-line.png",
+        "results/peers.json", "results/report.html", "results/report.md", "results/reference.md",
+        "results/figures/small-line.png",
         "results/tables/small-one.csv",
         "scenes/scenes.csv", "scenes/states.csv", "scenes/states.nc",
     }  # fmt: skip

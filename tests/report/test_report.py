@@ -62,7 +62,7 @@ def test_nothing_overflows_and_every_figure_is_there(browser, scheme, width):
     browser.evaluate("[...document.images].forEach(one => { one.loading = 'eager'; })")
     browser.wait_for("[...document.images].every(one => one.complete)")
     assert browser.evaluate("[...document.images].every(one => one.naturalWidth > 100 && one.alt)")
-    assert browser.evaluate("document.images.length") == 5
+    assert browser.evaluate("document.images.length") == 4
     least = "Math.min(...[...document.querySelectorAll('.chart svg text')].map(t => t.getBoundingClientRect().height))"
     assert browser.evaluate(least) >= 10.0  # pixels: legible
     assert browser.problems == []
@@ -106,7 +106,7 @@ def test_headings_figures_and_tables_have_addresses_of_their_own(browser):
 def test_the_contents_follow_the_reader(browser):
     browser.resize(1280, 900)
     here = "document.querySelector('nav a[aria-current]')?.hash"
-    for name in ("part-provenance", "part-measured", "part-convergence"):
+    for name in ("part-provenance", "part-equations", "part-measured", "part-convergence"):
         browser.evaluate(f"location.hash = '{name}'")
         browser.wait_for(f"{here} === '#{name}'")
     browser.evaluate("scrollTo(0, 0)")
@@ -190,7 +190,7 @@ def test_the_page_can_be_sent_alone(results, tmp_path):
     for name in ("convergence", "speed", "pitfalls"):
         shutil.copy(results / f"{name}.json", tmp_path)
     text = page.write(tmp_path, embed=True).read_text(encoding="utf-8")
-    assert text.count("data:image/png;base64,") == 5
+    assert text.count("data:image/png;base64,") == 4
     assert 'src="figures/' not in text
 
 

@@ -1,19 +1,20 @@
-"""All templates together: short, few figures, no sentence twice, links that lead somewhere, titles of figures."""
+"""All templates together: short, few figures, no sentence twice, links that lead somewhere, what is not measured."""
 
 import re
 from collections import Counter
 
 import pytest
 
+from symtop.core.errors import SymtopError
 from symtop.report import template
 from symtop.report.page import TEMPLATES
 from symtop.runner import run as runner
 
-FRONT = TEMPLATES / "front.md"
+OTHERS = {name: TEMPLATES / f"{name}.md" for name in ("front", "measured", "equations")}
 PAGES = {name: page for name in runner.names() if (page := runner.file_beside(name, "page.md")) is not None}
-TEXTS = {name: page.read_text(encoding="utf-8") for name, page in {"front": FRONT, **PAGES}.items()}
+TEXTS = {name: page.read_text(encoding="utf-8") for name, page in {**OTHERS, **PAGES}.items()}
 CALL = re.compile(r"{% call figure\((.*?)\) %}(.*?){% endcall %}", re.DOTALL)
-MOST_LINES, MOST_FIGURES, MOST_WORDS = 120, 3, 1400  # of a template
+MOST_LINES, MOST_FIGURES, MOST_WORDS = 120, 3, 1100  # of a template
 
 
 def sentences(text: str) -> list[str]:
@@ -23,17 +24,14 @@ def sentences(text: str) -> list[str]:
     return [part for part in parts if len(part.split()) >= 6]
 
 
-def test_a_sentence_that_stands_twice_is_found():
-    assert sentences("# Q\n\nOne two three four five {{ f.x }} six. Short one.") == ["One two three four five six."]
-
-
 def test_no_sentence_stands_twice():
+    assert sentences("# Q\n\nOne two three four five {{ f.x }} six. Short one.") == ["One two three four five six."]
     counts = Counter(part for text in TEXTS.values() for part in sentences(text))
     assert [part for part, count in counts.items() if count > 1] == []
     assert sum(counts.values()) > 50
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", ["front", *PAGES])
 def test_a_page_is_short_and_its_figures_have_titles_captions_and_words_for_the_blind(name):
     text = TEXTS[name]
     assert text.startswith("# " if name == "front" else "# {{ question }}\n\n")
@@ -55,9 +53,41 @@ def test_links_to_pages_name_studies_or_benchmarks(name):
 
 def test_the_front_page_renders_without_any_study_and_with_what_there_is(tmp_path):
     text = template.front(TEXTS["front"], [], tmp_path, {})
-    assert "None" not in text
-    assert "not measured" not in text
-    assert "![" not in text
+    assert not re.search("None|not measured|!\\[", text)
+    assert template.GAP not in text
     facts = {"bounds": 4, "bounds_held": 3, "closed_form": 1e-16, "digits": 45}
-    study = {"study": "truth", "facts": facts, "pictures": [], "tables": []}
-    assert "3 of 4 bounds hold" in " ".join(template.front(TEXTS["front"], [study], tmp_path, {}).split())
+    study = {"study": "truth", "title": "Truth", "facts": facts, "pictures": [], "tables": []}
+    said = template.front(TEXTS["front"], [study], tmp_path, {"truth": "[How?](#how)"})
+    assert "3 of 4 error bounds hold" in said
+    assert "[Truth](#how)" in said
+
+
+PAGE = """# {{ question }}
+
+It is {{ f.a }}. It is not {{ f.b }}. So it ends.
+
+**Head.** Only {{ f.b }}.
+
+{% raw %}Raw.{% endraw %}
+
+- one {{ f.a }}
+- two {{ f.b }}
+  and more
+
+{% call figure("drawn", title="A title", alt="For the blind") %}Found {{ f.b }}.{% endcall %}
+"""
+
+
+def test_a_sentence_about_what_was_not_measured_is_left_out_and_the_page_says_so_once(tmp_path):
+    findings = {"study": "mine", "question": "Q?", "page": PAGE, "facts": {"a": 1, "b": None}, "tables": [],
+                "pictures": [{"name": "drawn", "file": "a.png"}], "failures": [], "cases": 1}  # fmt: skip
+    text = template.filled(findings, tmp_path)
+    assert text.split("\n\n") == ["# Q?", template.PARTIAL, "It is 1. So it ends.", "Raw.", "- one 1", "**A title**",
+                                  "![For the blind](figures/a.png)", "A title.\n"]  # fmt: skip
+    assert template.answer(findings, tmp_path) == "It is 1. So it ends."
+    whole = template.filled(findings | {"facts": {"a": 1, "b": 2}}, tmp_path)
+    assert template.PARTIAL not in whole
+    assert "**Head.** Only 2." in whole
+    assert "- two 2 and more" in whole
+    with pytest.raises(SymtopError, match="page of mine"):
+        template.filled(findings | {"facts": {"a": 1}}, tmp_path)

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.stability import atlas, facts, figures, mechanisms, outcome_maps, study
+from symtop_studies.stability import atlas, facts, mechanisms, outcome_maps, study
 from symtop_studies.stability.many_verdicts import JUDGED, VERDICTS
 from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, row_plan, spin_unit, with_spin
 from symtop_studies.stability.tables import Column, family_limits, map_table, sampling_table
@@ -18,7 +18,6 @@ from symtop.measure.verdicts import judgement
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
-from symtop.report import style
 from symtop.runner.study import Case
 from tests.templates import checked
 
@@ -211,7 +210,7 @@ def test_reach_and_failures_are_read_off_the_map():
     data = hand_made([[A, B, L, L, L], [A, B, L, L, L], [A, A, L, L, L], [A, A, B, B, B]], (0.01, 0.1, 1.0, 1.5, 2.0))
     one = atlas.maps(data, "cusp")["midpoint"]
     assert one.usual_reach == {"fast": 0.1, "slow": 0.01}
-    assert (one.failure.setting, one.failure.least, one.failure.kind) == (1.0, 0.75, "left_chart")
+    assert one.failure == (1.0, "left_chart")
     assert (one.accurate, one.early) == (6 / 20, 9 / 20)
     row = facts.tables(data)["atlas"].iloc[0]
     assert (row["accurate up to, fast tops"], row["fails from"], row["fails mostly by"]) == (0.1, 1.0, "left chart")
@@ -219,20 +218,20 @@ def test_reach_and_failures_are_read_off_the_map():
 
 
 def failing(*shares, starts=20, word="drifting"):
-    """From which step on a map fails of which these shares of the starts do, step by step; and the least share."""
+    """From which step on a map fails of which these shares of the starts do, step by step."""
     columns = [[word] * round(share * starts) + [A] * (starts - round(share * starts)) for share in shares]
     data = hand_made(
         np.array(columns).T.tolist(), np.geomspace(0.01, 1.0, len(shares)), np.geomspace(0.1, 30.0, starts)
     )
-    return atlas.maps(data, "cusp")["midpoint"].failure[:2]
+    return atlas.maps(data, "cusp")["midpoint"].failure.setting
 
 
 def test_a_threshold_holds_at_every_larger_step():
     """Five steps from 0.01 to 1: 0.01, 0.032, 0.1, 0.32, 1."""
-    assert failing(0.0, 0.9, 0.6, 0.7, 1.0) == pytest.approx((10.0**-1.5, 0.6))
-    assert failing(0.7, 0.4, 0.6, 0.7, 1.0) == pytest.approx((0.1, 0.6))
+    assert failing(0.0, 0.9, 0.6, 0.7, 1.0) == pytest.approx(10.0**-1.5)
+    assert failing(0.7, 0.4, 0.6, 0.7, 1.0) == pytest.approx(0.1)
     for none in ((0.05, 0.0, 0.0), (0.6, 0.0, 0.2), (0.0, 0.1, 0.2, 0.4, 0.6), (0.0, 0.0, 0.0)):
-        assert math.isnan(failing(*none)[0])
+        assert math.isnan(failing(*none))
 
 
 def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
@@ -261,14 +260,12 @@ def test_a_variant_without_an_inaccurate_run_has_no_share_of_them():
 def test_a_pole_that_halves_the_reach_is_told_from_one_that_does_not():
     gaps = (1e-6, 1e-5, 1e-2, 0.2)
     near = hand_made([[L, L, L], [L, L, L], [A, L, L], [A, A, L]], parameter=gaps, scene_name="grazing")
-    effect = atlas.pole_effect(atlas.maps(near, "grazing")["midpoint"])
-    assert effect.halves
-    assert effect.width == pytest.approx(0.011)
+    assert atlas.halved_by_pole(atlas.maps(near, "grazing")["midpoint"]) is True
     unspoiled = hand_made([[A, A, L]] * 4, parameter=gaps, scene_name="grazing")
-    assert not atlas.pole_effect(atlas.maps(unspoiled, "grazing")["midpoint"]).halves
+    assert atlas.halved_by_pole(atlas.maps(unspoiled, "grazing")["midpoint"]) is False
 
 
-def test_runs_that_outlast_the_law_of_the_separatrix_or_never_get_there_are_not_counted():
+def test_runs_that_outlast_the_law_of_the_separatrix_are_not_counted():
     columns = {
         Column.EARLY_ERROR: (("variant", "setting"), [[1e-6, 1e-8], [1e-6, 1e-8]]),
         Column.PREDICTED_HORIZON: (("variant", "setting"), [[29.0, 38.2], [29.0, 38.2]]),
@@ -277,10 +274,8 @@ def test_runs_that_outlast_the_law_of_the_separatrix_or_never_get_there_are_not_
     part = xr.Dataset(columns, coords={"variant": ["rk4[axis]", "gauss-4[axis]"]})
     assert mechanisms.outlasting(part) == ["gauss-4[axis]"]
     assert mechanisms.misses(part) == pytest.approx([0.5, 0.2])
-    assert mechanisms.unreached(part) == 0
     part[Column.HORIZON][0, 1] = math.nan
     assert mechanisms.misses(part) == pytest.approx([0.5])
-    assert mechanisms.unreached(part) == 1
 
 
 def test_an_energy_error_that_no_sample_sees_is_no_ratio_of_a_floor():
@@ -292,7 +287,6 @@ def test_an_energy_error_that_no_sample_sees_is_no_ratio_of_a_floor():
     assert ratios == pytest.approx({"stormer-verlet": 5e4, "rkmk-se3-2": 1.5})
     found = facts.sampling_facts(part)
     assert (found["sampled"], found["hidden"], found["small"]) == (3, 1, 1)
-    assert (found["small_variant"], found["small_most"]) == ("stormer-verlet", pytest.approx(5e4))
 
 
 def test_the_midpoint_rule_is_known_by_its_nodes_and_not_by_its_name():
@@ -323,9 +317,10 @@ def measured():
 def test_facts_are_those_of_the_mechanisms(measured):
     found = facts.facts(measured)
     assert found.keys() >= set(facts.NAMES)
-    assert {name for name in facts.NAMES if found[name] is None} == {"window_width", "cayley_sleeps"}
-    assert found["verlet_third"] == pytest.approx(math.sqrt(3.0), abs=1e-4)
-    assert found["midpoint_third"] == pytest.approx(2.0 * math.sqrt(3.0), abs=1e-4)
+    assert {name for name in facts.NAMES if found[name] is None} == {"cayley_sleeps"}
+    lost = mechanisms.resonant(measured.sel(scene="steady-fast"))
+    assert lost["stormer-verlet[angles]"] == pytest.approx(math.sqrt(3.0), abs=1e-4)
+    assert lost["midpoint[angles]"] == pytest.approx(2.0 * math.sqrt(3.0), abs=1e-4)
     assert (found["limit_variant"], found["limit_least"]) == ("stormer-verlet[angles]", pytest.approx(2.0, abs=1e-6))
     assert found["sleep_miss"] < 1e-8 < abs(found["strang_sleeps"] - 2.0)
     assert found["one_iteration"] > 10.0 * found["solved"]
@@ -338,27 +333,11 @@ def test_facts_are_those_of_the_mechanisms(measured):
 
 def test_what_was_not_measured_is_none_and_not_a_number():
     found = facts.facts(hand_made([[A, B, L]] * 4))
-    assert (found["settled"], found["cells"], found["verlet_third"], found["others"]) == (0.0, 12, None, None)
+    assert (found["settled"], found["cells"], found["resonant"], found["others"]) == (0.0, 12, None, None)
     assert facts.tables(hand_made([[A, B, L]] * 4))["limits"].empty
 
 
 def test_the_page_says_what_was_measured(measured, tmp_path):
     text = checked("stability", measured, tmp_path)
     found = facts.facts(measured)
-    assert f"measured: {found['verlet_third']:.4f} with stormer-verlet" in text
-    assert f"{found['angles_halved']} of 2 variants" in text
-
-
-def test_a_map_of_few_variants_names_them_all_and_one_of_many_the_known_ones():
-    one = atlas.maps(hand_made([[A, B, L]] * 4), "cusp")["midpoint"]
-    few = {"mine": one._replace(control="tolerance"), "strang[axis]": one}
-    assert list(figures._chosen(few)) == ["strang[axis]", "mine"]
-    part = xr.Dataset(
-        {"x": ("variant", [1.0, 2.0]), "y": ("variant", [1.0, 2.0])},
-        coords={"variant": ["mine[axis]", "gauss-8[axis]"]},
-    ).expand_dims("moment")
-    axis = style.grid(1, 1)[1][0]
-    figures._lines(axis, part, "x", "y")
-    assert axis.get_legend_handles_labels()[1] == ["mine[axis]", "gauss-8[axis]"]
-    many = {**{f"mine-{k}": one for k in range(figures.MOST)}, "strang[axis]": one}
-    assert list(figures._chosen(many)) == ["strang[axis]"]
+    assert f"{found['angles_halved']} of 2 variants in Euler's angles" in text

@@ -157,17 +157,18 @@ def test_facts_are_those_of_the_rules_and_charts(measured):
     assert found["others"] == "trapezoidal, simpson-linear, galerkin-simpson"
     assert (found["power_least"], found["power_most"]) == pytest.approx((2.0, 4.0), abs=0.2)
     assert found["rules"] == "midpoint, trapezoidal"
-    assert 0.0 < found["twins_gap"] < found["same_map"]
+    assert 0.0 < found["twins_gap"] < 1e-11  # rounding over 10 000 steps without compensation
     assert found["charts"] == len(facts.tables(measured)["charts"])
     two = measured.isel(commutation_step=slice(2))  # too few for an order, and no less apart
-    assert (facts.facts(two)["others"], facts.facts(two)["power_least"]) == (found["others"], None)
+    assert facts.facts(two)["others"] == found["others"]
+    assert np.isnan(facts.facts(two)["power_least"])
     assert len(figures.pictures(two)) == 1
 
 
 def test_the_page_says_what_was_measured(measured, tmp_path):
     text = checked("reduction", measured, tmp_path)
-    assert "one and the same method of midpoint." in text
-    assert "matters with trapezoidal, simpson-linear, galerkin-simpson." in text
+    assert "With midpoint it makes no difference" in text
+    assert "With trapezoidal, simpson-linear, galerkin-simpson it does." in text
 
 
 def test_a_kernel_is_known_under_any_name():

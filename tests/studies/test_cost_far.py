@@ -186,9 +186,9 @@ def test_what_is_checked_was_predicted_and_a_prediction_that_fails_is_told(data)
         at = panel.place(one["target"], one["horizon"])
         assert panel.predicted[at]
         assert one["integrators"][0] == panel.names[panel.winner[at]]
-    for one in runs.checks(data):
-        assert one.horizon >= 1e5
-        assert one.ratios.size == 4 * runs.CHECKED_TOPS
+    ran = runs.checks(data)
+    assert (ran["horizon"] >= 1e5).all()
+    assert (ran.groupby(["quantity", "target", "horizon"]).size() == 4 * runs.CHECKED_TOPS).all()
 
 
 def test_a_check_measures_the_error_of_each_run():

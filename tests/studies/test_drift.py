@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.drift import facts, figures, growth, measures, study
+from symtop_studies.drift import facts, figures, measures, study
 from symtop_studies.drift.measures import ROUNDINGS
 from symtop_studies.drift.runs import gauges_of, members, run_history, side_by_side
 from symtop_studies.drift.study import TOLERANCE, cases
@@ -19,7 +19,6 @@ from symtop.methods.framework.lanes import LEAST
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import scene
 from symtop.run.long_run import QUANTITIES, long_run
-from symtop.run.trajectory import Trajectory
 from tests.templates import checked
 
 
@@ -94,35 +93,6 @@ def test_the_shift_of_the_mean_energy_is_relative_to_its_band():
     assert (float(moves.isel(window=-1).max()), float(moves.max())) == pytest.approx((0.01, 0.4))
 
 
-def test_a_change_of_law_is_found_in_a_run_and_an_oscillation_that_switches_on_is_none(monkeypatch):
-    where = symtop.scene("spheroid")
-    time = np.linspace(0.0, 5000.0 * where.nutation_period, 4001)
-    planted = {"energy": 1e-9 + 1e-9 * (time / time[-1] / 0.1) ** 2, "p_phi": np.tanh(time), "p_psi": 1e-9 * time}
-    run = Trajectory(time, theta=time, p_theta=time, steps=1)
-    monkeypatch.setattr(growth, "integrate", lambda *_, **__: run)
-    monkeypatch.setattr(growth, "residuals", lambda *_: planted)
-    found = growth.history(where, symtop.integrator("rk4"))
-    assert float(found["energy_change"]) == pytest.approx(0.1 * time[-1], rel=0.5)
-    assert float(found["energy_after"]) == pytest.approx(2.0, abs=0.3)
-    assert str(found["p_psi_law"].item()) == "linear"
-    assert str(found["p_phi_law"].item()) == "bounded"
-    assert np.isnan(float(found["p_phi_change"]))
-    assert np.isnan(float(found["p_psi_change"]))
-
-
-def test_a_chart_matters_only_where_the_change_is_above_rounding_and_twice_as_large():
-    names = ["rk4[angles]", "rk4[axis]", "strang[axis]", "strang[attitude]"]
-
-    def compared(*changes):
-        columns = {"p_phi_largest": [*changes, 1e-15, 1e-15], "energy_largest": [1e-15] * 4, "p_psi_largest": [0.0] * 4}
-        columns = {key: (("scene", "variant"), [values]) for key, values in (columns | {"outcome": ["ok"] * 4}).items()}
-        return facts.chart_table(xr.Dataset(columns, coords={"scene": ["spheroid"], "variant": names}))
-
-    assert compared(1.5e-4, 0.0).values.tolist() == [["p_phi", "rk4", 1.5e-4, 0.0, None]]
-    assert compared(1.5e-4, 1.2e-4).empty
-    assert compared(1e-14, 0.0).empty
-
-
 NAMES = ["strang[axis]", "gauss-4[axis]", "rk4[axis]", "rk4[angles]", "radau[angles]"]
 SIZES = {"energy": [1e-4, 1e-15, 1e-3, 1e-2, 1e-6], "p_phi": [0.0, 0.0, 0.0, 1e-5, 1e-6], "p_psi": [0.0] * 5}
 SLOPES = {"energy": [0.0, 0.5, 1.0, 1.0, 0.0], "p_phi": [0.0, 0.0, 0.0, 1.0, 1.0], "p_psi": [0.0] * 5}
@@ -155,9 +125,8 @@ def test_a_constant_is_kept_bounded_or_lost_on_the_worst_scene(histories):
     assert fates["energy"].tolist() == ["bounded", "kept", "drift", "drift", "bounded"]
     assert fates["p_phi_largest"].tolist() == SIZES["p_phi"]
     found = facts.of_histories(histories)
-    assert (found["variants"], found["holding"], found["ended"]) == (5, 2, 0)
+    assert (found["variants"], found["holding"]) == (5, 2)
     assert (found["energy_lost"], found["energy_lost_worst"], found["energy_lost_most"]) == (2, "rk4[angles]", 1e-2)
-    assert (found["charts"], found["apart"], found["chart_worse"]) == (1, 1, "rk4[angles]")
     assert (found["bounded_runs"], found["bounded_as_t"], found["lost_faster"]) == (4, 3, 4)
     ended = histories.assign(outcome=histories["outcome"].where(histories["variant"] != "strang[axis]", "left_chart"))
     assert measures.fates(ended)["energy"]["strang[axis]"] == measures.FAILED
@@ -175,12 +144,9 @@ def data():
 def test_the_page_says_what_every_group_shows(data, tmp_path):
     checked("drift", data, tmp_path)
     found = facts.facts(data)
-    assert None not in {value for name, value in found.items() if not name.startswith(("energy", "p_phi", "p_psi"))}
-    assert (found["variants"], found["shown"], found["own"], found["tolerance"]) == (6, 5, 1, TOLERANCE)
-    assert found["energy_kept"] == 2  # gauss-4 and taylor
-    assert found["energy_kept"] + found["energy_bounded"] + found["energy_lost"] == 6
-    assert found["energy_bounded_worst"] == "strang[axis]"
-    assert found["chart_change"] > measures.APART * found["chart_other"]
+    assert None not in set(found.values())
+    assert (found["variants"], found["own"], found["tolerance"]) == (6, 1, TOLERANCE)
+    assert (found["holding"], found["energy_lost"]) == (4, 2)  # so short a run of rk4 in angles does not lose it yet
     assert found["gain_least"] > 3.0
     assert (found["lost_count"], found["lost_hits"]) == (4, 4)
     assert [len(one) for one in facts.tables(data).values()][1] == 6
@@ -193,7 +159,7 @@ def test_a_group_alone_has_the_same_facts_and_none_of_the_others(data, group):
     assert found.keys() == every.keys()
     for other, names in facts.NAMES.items():
         assert all((found[name] is None) is (other != group) for name in names.split()), other
-    assert len(figures.pictures(alone)) == {measures.HISTORIES: 2, measures.ROUNDINGS: 1}.get(group, 0)
+    assert len(figures.pictures(alone)) == (group in (measures.HISTORIES, measures.ROUNDINGS))
 
 
 def test_growth_as_time_is_told_from_faster_growth():
@@ -214,7 +180,7 @@ def test_a_prediction_is_judged_by_what_was_measured():
     horizons = xr.Dataset({name: (("scene", "variant"), [values]) for name, values in cells.items()},
                           coords={"scene": ["spheroid"], "variant": ["a", "b", "c"]})  # fmt: skip
     found = facts.of_losses(horizons)
-    assert (found["lost_count"], found["lost_unpredicted"], found["lost_hits"]) == (2, 1, 1)
+    assert (found["lost_count"], found["lost_hits"]) == (2, 1)
     assert found["lost_later"] == 2.25
     assert facts.loss_table(horizons)["variant"].tolist() == ["b", "a"]
 

@@ -9,6 +9,7 @@ from symtop_studies.engines import facts, measures, study
 
 import symtop
 from symtop.methods.framework.registry import engines, integrator
+from symtop.report.template import PARTIAL
 from tests.templates import checked
 
 GOLDSTEIN = symtop.scene("goldstein")
@@ -81,10 +82,8 @@ def test_facts_are_those_of_the_runs(measured):
     usual = tops.sel(rate=240.0, horizon=10.0)
     assert found["spherical"] == float(usual["frame_spherical"].sel(variant="no-gyro[axis]")) < 0.01
     assert float(usual["frame_spherical"].sel(variant="mujoco-euler[axis]")) > 0.1
-    assert found["spherical_order"] == pytest.approx(1.0, abs=0.05)
     assert found["best"] == found["worst"] == float(usual["frame_axis"].sel(variant="mujoco-euler[axis]"))
-    assert found["level_slow_variant"] == "mujoco-euler[axis]"
-    assert found["beside_slow_level"] < 1e-3 * found["level_slow"]
+    assert found["level_fast_variant"] == "no-gyro[axis]"
     assert (found["maps"], found["turned"], found["singles"], found["members"]) == (2, 1, 1, 20)
     assert found["lost"] == 1  # mujoco-euler flies apart on the fast top
     assert found["single_best"] > 1e-3
@@ -94,7 +93,8 @@ def test_what_was_not_measured_is_none(measured):
     """On the fast top alone there is no error against steps; on the population no scene."""
     fast = xr.DataTree.from_dict({"tops": measured["tops"].to_dataset().sel(scene=["fast"])})
     found = facts.facts(fast)
-    assert found["wall"] is found["share_most"] is found["members"] is found["energy_lost"] is None
+    assert found["members"] is found["energy_lost"] is None
+    assert np.isnan([found["wall"], found["share_most"]]).all()
     assert found["lost"] == 1
     assert [one.name for one in study.STUDY.pictures(fast)] == ["cost"]
     alone = xr.DataTree.from_dict({"tops": measured["tops"].to_dataset().sel(variant=["no-gyro[axis]"])})
@@ -104,7 +104,6 @@ def test_what_was_not_measured_is_none(measured):
     many = xr.DataTree.from_dict({"population": measured["population"].to_dataset()})
     assert facts.facts(many)["share_most"] == facts.facts(measured)["share_most"]
     assert list(study.STUDY.pictures(many)) == []
-    assert facts.tables(many)["steps"].empty
 
 
 @pytest.mark.parametrize("rate", [2.5, -0.7])
@@ -139,12 +138,11 @@ def test_at_the_same_cost_a_method_of_four_evaluations_takes_a_quarter_of_the_st
     assert alone["level_axis"].values.tolist() == alone["frame_axis"].values.tolist()
 
 
-def test_orders_are_tabled_in_double_precision_and_steps_in_full(measured):
+def test_orders_are_tabled_in_double_precision(measured):
     tables = facts.tables(measured)
     assert list(tables["orders"]["order"]) == [0.0, 1.0]
     assert list(tables["orders"]["maps"]) == [1, 1]
     assert tables["maps"]["variant"].iloc[0] == "strang[axis]"
-    assert len(tables["steps"]) == 2 * 4 * 3 * 2
 
 
 def test_shares_count_tops_within_five_degrees(measured):
@@ -155,4 +153,4 @@ def test_shares_count_tops_within_five_degrees(measured):
 
 
 def test_the_page_is_rendered_with_numbers_and_without(measured, tmp_path):
-    assert "not measured" not in checked("engines", measured, tmp_path)
+    assert PARTIAL not in checked("engines", measured, tmp_path)

@@ -113,12 +113,6 @@ def test_every_timed_run_meets_its_target_when_it_is_run_again(rows):
             assert (met.error, met.evaluations) == row
 
 
-def test_the_share_that_is_stated_is_the_least_of_the_timed_runs(measured, rows):
-    share = rows["axis"].min() / SHORT.target
-    assert facts.facts(measured)["least_share"] == pytest.approx(share)
-    assert share >= LEAST  # of these methods; Taylor's error jumps with its order
-
-
 def test_the_search_ends_closer_to_the_target_if_asked():
     horizon = 10.0 * SCENE.nutation_period
     for name in ("rk4[axis]", "rk4[attitude]", "strang[axis]"):
@@ -172,17 +166,19 @@ def test_times_of_a_busy_machine_are_not_compared(quiet, share, busy):
     data = quiet.assign({Column.SPREAD: (quiet[Column.SPREAD].dims, spread)})
     found = facts.facts(data)
     assert (found["loud"], found["times"], found["busy"]) == (loud, known.size, busy)
-    assert (found["whole"] is None) == (found["user_most"] is None) == bool(busy)
+    assert (found["whole"] is None) == np.isnan(found["user_most"]) == bool(busy)
     tables = facts.tables(data)
     assert tables["effects"].empty == tables["charts"].empty == tables["scipy"].empty == bool(busy)
     assert len(tables["times"]) >= known.size
-    assert {one.name for one in figures.pictures(data)} == (set() if busy else {"waterfall", "charts"})
+    assert {one.name for one in figures.pictures(data)} == (set() if busy else {"waterfall"})
 
 
 def test_where_nothing_was_timed_nothing_is_said(quiet):
     nothing = quiet.assign({name: quiet[name] * np.nan for name in (Column.SECONDS, Column.SPREAD)})
     found = facts.facts(nothing)
-    assert found["times"] is found["whole"] is found["near_share"] is found["busy"] is None
+    assert found["whole"] is found["busy"] is None
+    assert found["times"] == 0
+    assert np.isnan(found["near_share"])
     assert list(figures.pictures(nothing)) == []
 
 

@@ -224,7 +224,7 @@ def test_discrete_methods_keep_the_momenta_and_27_or_more_are_in_the_study():
 @pytest.fixture(scope="module")
 def data():
     """The quick grid, with shorter long runs."""
-    asked = [Case(case.scene, case.integrator, case.settings | {"long": 100.0, "film": 2}) for case in cases(True)]
+    asked = [Case(case.scene, case.integrator, case.settings | {"long": 100.0}) for case in cases(True)]
     return datasets.combine([(case, measure(case)) for case in asked])
 
 
@@ -242,7 +242,6 @@ def test_the_page_says_what_the_notebook_and_the_discrete_methods_keep(data, tmp
     assert (found["power_least"], found["modified_most"]) == pytest.approx((2.0, 4.0), abs=0.06)
     assert found["first_behind"] == 5
     assert (found["second_behind"], found["second_ahead"]) == (2, 3)  # the other two get ahead after 100 s
-    assert found["second_last"] < found["second_end"] < found["long"]
 
 
 @pytest.mark.parametrize("name", ["midpoint[angles]", "strang[axis]", SOLVER])

@@ -204,14 +204,13 @@ def test_the_page_says_what_friction_does_and_what_is_exact(data, tmp_path):
     assert (found["rate_midpoint"], found["rate_trapezoidal"]) == pytest.approx((2.0, 1.0), abs=0.1)
     assert found["rate_force_at_one_end"] == pytest.approx(0.5, abs=0.1)
     assert found["balance"] < 1e-11
-    assert found["balance_rk45"] > 1e-8
     assert found["undamped_midpoint"] < 1e-11
     assert found["damped_midpoint"] > 1e-3
     assert max(found["exact"], found["update_gap"]) < 1e-11
     assert (found["top_order_least"], found["map_order_least"]) == pytest.approx((2.0, 2.0), abs=0.05)
 
 
-@pytest.mark.parametrize(("name", "drawn"), [("midpoint", 3), ("rk45", 1), ("exact-discrete", 1)])
+@pytest.mark.parametrize(("name", "drawn"), [("midpoint", 2), ("rk45", 0), ("exact-discrete", 1)])
 def test_one_method_alone_has_the_facts_and_figures_that_are_its_own(data, name, drawn):
     found = facts.facts(data.sel(variant=[name]))
     assert found.keys() == facts.facts(data).keys()

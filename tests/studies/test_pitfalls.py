@@ -30,10 +30,9 @@ def test_the_energy_is_kept_where_the_axis_is_wrong(data):
 
 def test_the_run_in_angles_ends_and_that_on_the_axis_does_not(data):
     found = study.facts(data)
-    assert found["outcome"] == "left_chart"
     assert found["ended"] < 1.0
-    assert found["through"] < 1e-3
     through = study.run_of(data, study.POLE, study.AXIS).isel(setting=0)
+    assert float(through["axis"].max()) < 1e-3
     assert float(through["time"].max()) == pytest.approx(2.0)
     assert (np.isfinite(through["axis"]) == np.isfinite(through["time"])).all()  # the rest is padding
 

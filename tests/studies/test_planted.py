@@ -23,7 +23,7 @@ def data():
 def test_a_liar_is_judged_beside_the_honest_and_registered_nowhere(data):
     said = facts.facts(data)
     assert (said["integrators"], said["refuted"]) == (1, 0)
-    assert (said["planted"], said["caught"], said["escaped"]) == (1, 1, None)
+    assert (said["planted"], said["caught"]) == (1, 1)
     assert not {LIAR, "hidden-kick"} & symtop.integrators().keys()
     row = facts.tables(data)["planted"].iloc[0]
     assert (row["integrator"], row["claim"], row["verdict"]) == (LIAR, "symmetric", "refuted")
@@ -36,7 +36,7 @@ def test_one_that_escapes_is_named_and_one_refuted_for_another_claim_is_not_caug
     verdict = xr.where(liar & (data["claim"] == "symmetric"), "confirmed", data["verdict"])
     fooled = data.assign(verdict=xr.where(liar & (data["claim"] == "order"), "refuted", verdict))
     said = facts.facts(fooled)
-    assert (said["planted"], said["caught"], said["escaped"]) == (1, 0, LIAR)
+    assert (said["planted"], said["caught"]) == (1, 0)
     assert "0 of 1" in {text.get_text() for text in next(figures.pictures(fooled)).figure.axes[0].texts}
 
 

@@ -149,10 +149,10 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
             place = add(place, row_of(memory, i, state), g)
         return add(new, place, back)
 
-    return Method(advance, nothing_more, sample, LAST + 1, 0, -0.5)
+    return Method(advance, nothing_more, sample, 0, -0.5)
 
 
 def built_in() -> list[Integrator]:
     """`adams`."""
     summary = "Adams methods of order 2 to 13 and variable step (Shampine-Gordon), compiled"
-    return [integrator("adams", summary, "shampine-gordon-1975", method)]
+    return [integrator("adams", summary, "shampine-gordon-1975", method, LAST + 1)]

@@ -97,11 +97,11 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
             new, _ = line(par, state, other, j, x * h)
         return new
 
-    return Method(advance, nothing_more, sample, LAST + 1, LAST, -0.2)
+    return Method(advance, nothing_more, sample, LAST, -0.2)
 
 
 def built_in() -> list[Integrator]:
     """The method of Gragg, Bulirsch and Stoer."""
     summary, sources = "Gragg-Bulirsch-Stoer extrapolation of variable order and step, compiled", "bulirsch-stoer-1966"
     sources += " hairer-norsett-wanner-1993"
-    return [integrator("extrapolation", summary, sources, method, symplectic=False, symmetric=False)]
+    return [integrator("extrapolation", summary, sources, method, LAST + 1, symplectic=False, symmetric=False)]

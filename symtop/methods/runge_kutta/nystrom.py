@@ -165,7 +165,7 @@ class Nystrom(NamedTuple):
         def shorter(par, state, new, slopes, h, x):  # type: ignore[no-untyped-def]
             return after(par, state, made_of(par, state, slopes, x * h), x * h)
 
-        return Method(trying(attempt, cost, -1.0 / 7.0), momenta, shorter, 3, 1, -1.0 / 7.0)
+        return Method(trying(attempt, cost, -1.0 / 7.0), momenta, shorter, 1, -1.0 / 7.0)
 
 
 def built_in() -> list[Integrator]:
@@ -173,7 +173,7 @@ def built_in() -> list[Integrator]:
     return [
         Integrator(
             name="dprkn8", family="runge-kutta", control="tolerance", order=8,
-            solvers={"angles": solver(Reduced(), Nystrom(DPRKN8))},
+            solvers={"angles": solver(Reduced(), Nystrom(DPRKN8), 3)},
             summary="Runge-Kutta-Nystrom pair 8(6) of Dormand, El-Mikkawy and Prince on the reduced angles, compiled",
             explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi", "p_psi"}),
             least_tolerance=LEAST_TOLERANCE, reference="dormand-el-mikkawy-prince-1987", needs="kicks", general=False,

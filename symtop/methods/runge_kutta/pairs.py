@@ -52,7 +52,6 @@ class Method(NamedTuple):
     advance: Callable[..., Any]  # (par, state, memory, tolerance, t, step, end) -> state, t, step, evaluations, outcome
     refine: Callable[..., int]  # (par, state, memory, h) -> evaluations: what samples of a step need beyond that
     sample: Callable[..., Any]  # (par, state, new, memory, h, x) -> the state at a fraction x of the step
-    rows: int
     last: int  # the row of f(y+) after a step
     power: float  # of the error in the choice of the first step
 
@@ -119,16 +118,17 @@ def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, toleran
 
 
 @functools.cache
-def loop(form: Any, method: Any) -> AdaptiveLoop:
-    """The loop of ``method(field)`` on a `Formulation`, compiled when it is first used; it counts force evaluations.
+def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
+    """The loop of ``method(field)``, a `Method` whose memory has so many rows, on a `Formulation`, compiled.
 
-    The place is (state, memory, time, step). `observe` sees the memory and the step that a sample lies in.
+    It counts force evaluations. The place is (state, memory, time, step). `observe` sees the memory and the step that a
+    sample lies in.
     """
     field, ended, observe, prepare, size = form.field, form.ended, form.observe, form.prepare.numbers, form.prepare.size
     sample = as_it_steps if form.present is None else form.present.sample
     register_jitable(observe)
     made: Method = method(field)
-    advance, refine, between, rows, last, power = made
+    advance, refine, between, last, power = made
     clock = size + rows * size
 
     def march(  # type: ignore[no-untyped-def]
@@ -175,21 +175,21 @@ def loop(form: Any, method: Any) -> AdaptiveLoop:
     return compiled
 
 
-def solver(form: Any, method: Any) -> Adaptive:
+def solver(form: Any, method: Any, rows: int) -> Adaptive:
     """A solver of the registry on the equations of a `Formulation`."""
     size, shown = form.prepare.size, form.prepare.size if form.present is None else form.present.size
-    clock = size * (1 + method(form.field).rows)
+    clock = size * (1 + rows)
 
     @functools.cache  # once: the hash of a table takes a fifth of the time of a call
     def compiled() -> AdaptiveLoop:
-        return loop(form, method)
+        return loop(form, method, rows)
 
     return Adaptive(lambda _: compiled(), shown, clock + 2, clock, EVALUATIONS, BLOCK, check=form.prepare.check)
 
 
-def integrator(name: str, summary: str, reference: str, method: Any, **claims: Any) -> Integrator:
+def integrator(name: str, summary: str, reference: str, method: Any, rows: int, **claims: Any) -> Integrator:
     """The record of a method with a tolerance that needs f and nothing else, in every chart."""
-    solvers = {chart: solver(form, method) for chart, form in FORMULATIONS.items()}
+    solvers = {chart: solver(form, method, rows) for chart, form in FORMULATIONS.items()}
     return Integrator(
         name=name, family="runge-kutta", summary=summary, solvers=solvers, control="tolerance", explicit=True,
         conserves=frozenset(), least_tolerance=LEAST_TOLERANCE, reference=reference, needs="derivative", general=True,
@@ -238,6 +238,11 @@ class Pair(NamedTuple):
     summary: str
     reference: str
 
+    @property
+    def rows(self) -> int:
+        """Slopes of a step, with the first of the next one and those that only samples need."""
+        return len(self.table.a) + 2 + len(self.table.extra)
+
     def __call__(self, field: Callable[..., Any]) -> Method:
         """What `loop` steps by: attempts, their error, and samples."""
         table, dense = self.table, self.table.dense
@@ -269,13 +274,15 @@ class Pair(NamedTuple):
             return plus(state, total(zero(state), stages(par, state, row_of(slopes, 0, state), slopes, part), part))
 
         sample, power = polynomial if dense else shorter, -1.0 / (self.estimate + 1)
-        parts = Method(trying(attempt, cost, power), nothing_more, sample, cost + 1, cost, power)
+        parts = Method(trying(attempt, cost, power), nothing_more, sample, cost, power)
         return parts if not two else parts._replace(**_order_seven(table, field, cost))
 
     def adaptive(self) -> Integrator:
         """The pair with a tolerance."""
         summary = f"{self.summary} with SciPy's step control, compiled"
-        return integrator(self.name, summary, self.reference, self, order=self.order, symplectic=False, symmetric=False)
+        return integrator(
+            self.name, summary, self.reference, self, self.rows, order=self.order, symplectic=False, symmetric=False
+        )
 
     def fixed(self) -> Integrator:
         """The table of the higher order with a step."""
@@ -323,7 +330,7 @@ def _order_seven(table: Table, field: Callable[..., Any], cost: int) -> dict[str
             at = set_item(at, m, state[m] + ((bent + h * first[m] - moved) * (1.0 - x) + moved) * x)
         return at
 
-    return {"refine": refine, "sample": sample, "rows": stages}
+    return {"refine": refine, "sample": sample}
 
 
 @functools.cache

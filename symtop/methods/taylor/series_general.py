@@ -118,7 +118,7 @@ class Quadratic(NamedTuple):
         def sample(par, state, new, c, h, x):  # type: ignore[no-untyped-def]
             return plus(state, tail(state, c, int(c[0, 0]), x * h))
 
-        return Method(advance, nothing_more, sample, HIGHEST + 2, 0, -0.5)
+        return Method(advance, nothing_more, sample, 0, -0.5)
 
 
 @register_jitable
@@ -165,7 +165,7 @@ def built_in() -> list[Integrator]:
     fixed = {
         chart: FixedStep(loop(chart), (0.0,), FORMULATIONS[chart].prepare, ORDER, implicit=False) for chart in CHARTS
     }
-    adaptive = {chart: solver(FORMULATIONS[chart], equations) for chart, equations in CHARTS.items()}
+    adaptive = {chart: solver(FORMULATIONS[chart], equations, HIGHEST + 2) for chart, equations in CHARTS.items()}
     summary = "Taylor series of the unreduced space-frame equations by recurrence"
     return [
         Integrator("series-general", summary=f"{summary}, order {ORDER}", solvers=fixed, order=ORDER, **same),

@@ -89,7 +89,7 @@
         .filter((one) => one.points.length);
       const first = xAt === 0 && yAt === (typeof chart.y === "string" ? 1 : Object.values(chart.y)[0]);
       const mark = first ? chart.marks?.[panel] : undefined;
-      const width = Math.max(280, frame.clientWidth), height = Math.max(320, Math.min(560, 0.62 * width));
+      const width = Math.max(280, frame.clientWidth), height = Math.max(320, Math.min(390, 0.5 * width));
       const [left, right, top, bottom] = [58, named && width > WIDE ? 170 : 12, 12, 46]; // names stand at the right, if there is room
       const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, tabindex: 0, role: "group",
         "aria-roledescription": "chart", "aria-label": `${chart.title}: ${panel}, ${yName} against ${xName}; arrow keys go from point to point` }, frame);
