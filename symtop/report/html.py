@@ -120,7 +120,7 @@ class Writer:
     def _table(self, block: Sequence[Token], title: str) -> str:
         name = self.anchor(slug(title) or "table")
         for cell, content in itertools.pairwise(block):
-            if cell.type == "td_open" and len(content.content) > LONG:
+            if cell.type == "td_open" and len(content.content) > LONG and " " in content.content:
                 cell.attrSet("class", "words")
         body = (
             self._rendered(block)

@@ -89,6 +89,7 @@ def rendered(template: str | None, name: str, given: Mapping[str, Any]) -> str:
         lstrip_blocks=True, finalize=lambda value: GAP if value is None else value,
     )  # fmt: skip
     environment.filters |= {one.__name__: _passing(one) for one in formats.FILTERS}
+    template = template and template.replace("endraw %}", "endraw +%}")  # which keeps the empty line that follows
     try:
         ready = environment.get_template(PLAIN) if template is None else environment.from_string(template)
         text = ready.render(**given)

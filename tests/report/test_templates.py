@@ -68,6 +68,8 @@ It is {{ f.a }}. It is not {{ f.b }}. So it ends.
 
 **Head.** Only {{ f.b }}.
 
+{% raw %}Raw.{% endraw %}
+
 - one {{ f.a }}
 - two {{ f.b }}
   and more
@@ -80,7 +82,7 @@ def test_a_sentence_about_what_was_not_measured_is_left_out_and_the_page_says_so
     findings = {"study": "mine", "question": "Q?", "page": PAGE, "facts": {"a": 1, "b": None}, "tables": [],
                 "pictures": [{"name": "drawn", "file": "a.png"}], "failures": [], "cases": 1}  # fmt: skip
     text = template.filled(findings, tmp_path)
-    assert text.split("\n\n") == ["# Q?", template.PARTIAL, "It is 1. So it ends.", "- one 1", "**A title**",
+    assert text.split("\n\n") == ["# Q?", template.PARTIAL, "It is 1. So it ends.", "Raw.", "- one 1", "**A title**",
                                   "![For the blind](figures/a.png)", "A title.\n"]  # fmt: skip
     assert template.answer(findings, tmp_path) == "It is 1. So it ends."
     whole = template.filled(findings | {"facts": {"a": 1, "b": 2}}, tmp_path)

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.stability import atlas, facts, figures, mechanisms, outcome_maps, study
+from symtop_studies.stability import atlas, facts, mechanisms, outcome_maps, study
 from symtop_studies.stability.many_verdicts import JUDGED, VERDICTS
 from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, row_plan, spin_unit, with_spin
 from symtop_studies.stability.tables import Column, family_limits, map_table, sampling_table
@@ -18,7 +18,6 @@ from symtop.measure.verdicts import judgement
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
-from symtop.report import style
 from symtop.runner.study import Case
 from tests.templates import checked
 
@@ -342,18 +341,3 @@ def test_the_page_says_what_was_measured(measured, tmp_path):
     text = checked("stability", measured, tmp_path)
     found = facts.facts(measured)
     assert f"{found['angles_halved']} of 2 variants in Euler's angles" in text
-
-
-def test_a_map_of_few_variants_names_them_all_and_one_of_many_the_known_ones():
-    one = atlas.maps(hand_made([[A, B, L]] * 4), "cusp")["midpoint"]
-    few = {"mine": one._replace(control="tolerance"), "strang[axis]": one}
-    assert list(figures._chosen(few)) == ["strang[axis]", "mine"]
-    part = xr.Dataset(
-        {"x": ("variant", [1.0, 2.0]), "y": ("variant", [1.0, 2.0])},
-        coords={"variant": ["mine[axis]", "gauss-8[axis]"]},
-    ).expand_dims("moment")
-    axis = style.grid(1, 1)[1][0]
-    figures._lines(axis, part, "x", "y")
-    assert axis.get_legend_handles_labels()[1] == ["mine[axis]", "gauss-8[axis]"]
-    many = {**{f"mine-{k}": one for k in range(figures.MOST)}, "strang[axis]": one}
-    assert list(figures._chosen(many)) == ["strang[axis]"]

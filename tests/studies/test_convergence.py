@@ -129,12 +129,6 @@ def test_facts_are_those_of_the_data(data):
     assert alone["ratio_most"] == pytest.approx(float(measures.ratios(data)["rk45[angles]"].max()))
 
 
-def test_few_variants_are_all_named(data):
-    few = data.sel(variant=["rk4[axis]", "midpoint[angles]"])
-    assert list(measures.named_variants(few)[1]) == ["rk4[axis]", "midpoint[angles]"]
-    assert "rk4[axis]" not in measures.named_variants(data)[1]
-
-
 def test_the_page_says_what_was_measured(data, tmp_path):
     text = checked("convergence", data, tmp_path)
     assert f"{facts.facts(data)['confirmed']} show the order" in text
