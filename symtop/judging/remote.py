@@ -190,7 +190,7 @@ def table_of(opened: Callable[[], Stepper]) -> Table:
         return *stepper.march(*args), stepper.wrote
 
     def along(f: Any, *args: Any) -> tuple[Any, ...]:
-        return stepper.along(f, *args), sorted(f.times)
+        return stepper.along(f, *args), sorted(getattr(f, "times", ()))
 
     def about() -> dict[str, Any]:
         facts = {name: getattr(stepper, name) for name in FACTS}
@@ -223,7 +223,7 @@ class Remote(Stepper):
     def along(self, f: Any, t: float, y: Array, h: float, marks: Marks) -> Array:
         """The states at the marks for a right-hand side that can be sent, from a time t on."""
         states, times = self.process.call("along", f, t, y, h, marks)
-        f.times.update(map(float, times))
+        getattr(f, "times", set[float]()).update(map(float, times))
         return np.array(states, dtype=float).reshape(marks.size, y.size)
 
 

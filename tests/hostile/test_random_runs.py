@@ -40,11 +40,6 @@ def test_what_is_right_is_not_warned_of(k):
     assert run.warning == ""
 
 
-def test_a_draw_is_its_own():
-    assert repr(drawn(17)) == repr(drawn(17))
-    assert repr(drawn(17)) != repr(drawn(17, 1))
-
-
 @pytest.mark.parametrize("count", [300, pytest.param(1500, marks=pytest.mark.slow)])
 def test_random_runs_are_not_wrong_in_silence(count):
     runs = run_all(count, seed=3, without=NEWER)

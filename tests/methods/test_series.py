@@ -203,17 +203,3 @@ def test_series_axis_and_series_attitude_are_names_of_rows():
             symtop.integrator(wrong)
     with pytest.raises(KeyError):
         symtop.integrators()["serious-axis"]
-
-
-def test_a_user_makes_a_series_of_any_of_its_orders():
-    scene = symtop.scene("spheroid")
-    plan = Plan.steps(scene.nutation_period / 20, [20])
-    errors = []
-    for order in ORDERS:
-        method = symtop.series(f"mine-{order}", order)
-        assert method.order == order
-        done = method.solvers["axis"](scene.top, scene.start, plan)
-        errors.append(charts.axis_distance(done.states[:, :3], closed_form(scene).axis(plan.times))[0])
-    assert errors[0] > 100 * errors[1] > 1e4 * errors[-1]
-    with pytest.raises(symtop.SymtopError, match="order must be one of 8, 12, 16, 20, not 9"):
-        symtop.series("mine", 9)

@@ -15,7 +15,7 @@ ROUNDS = """
 import os
 import xarray as xr
 from symtop.runner.study import Case, Study
-from symtop_studies.stability.atlas import PoleEffect
+from symtop_studies.stability.atlas import Failure
 
 def cases(quick):
     return [Case("spheroid", name) for name in ("midpoint", "strang")]
@@ -23,13 +23,13 @@ def cases(quick):
 def measure(case):
     if not case.timed:
         return xr.Dataset({"steps": float(len(case.integrator))})
-    names, near = case.settings["integrators"], case.settings["effect"].near
-    later = {"later": ("variant", [near] * len(names)), "process": ("variant", [os.getpid()] * len(names))}
+    names, setting = case.settings["integrators"], case.settings["effect"].setting
+    later = {"later": ("variant", [setting] * len(names)), "process": ("variant", [os.getpid()] * len(names))}
     return xr.Dataset(later, coords={"variant": names})
 
 def follow_up(data):
     names = [str(name) for name in data["variant"].values]
-    return [Case("spheroid", "together", {"integrators": names, "effect": PoleEffect(2.0, True, 0.1)}, timed=True)]
+    return [Case("spheroid", "together", {"integrators": names, "effect": Failure(2.0, "left_chart")}, timed=True)]
 
 STUDY = Study("rounds", "Rounds", "Both?", cases, measure,
               follow_up=follow_up)

@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -45,14 +45,9 @@ ENOUGH_STEPS, AT_REST = 50.0, 1e-9  # steps a nutation with a right-hand side of
 ENOUGH = 0.03  # seconds after which the time of a step is known
 
 
-class Rest:
-    """y' = 0, as a right-hand side; it keeps no times."""
-
-    times: ClassVar[set[float]] = set()
-
-    def __call__(self, _: float, y: Any) -> Any:
-        """y'."""
-        return np.zeros(np.shape(y))
+def rest(_: float, y: Any) -> Any:
+    """y' = 0, as a right-hand side."""
+    return np.zeros(np.shape(y))
 
 
 @dataclass(frozen=True)
@@ -81,7 +76,7 @@ class Subject:
         h = self.scene.time_scale() / ENOUGH_STEPS
         y, _ = self.stepper.from_start(self.scene.top, self.scene.start, h)
         try:
-            end = self.stepper.along(Rest(), h, y.copy(), h, np.array([1]))[0]
+            end = self.stepper.along(rest, h, y.copy(), h, np.array([1]))[0]
         except SymtopError:  # it divides by f
             return True
         return not np.max(np.abs(end - y)) <= AT_REST * np.max(np.abs(y))
