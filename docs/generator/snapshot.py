@@ -51,13 +51,23 @@ def answer(report: str, question: str) -> str:
     found = re.search(rf"^## {re.escape(question)}.*\n\n(.+)$", report, flags=re.MULTILINE)
     if found is None:
         sys.exit(f"snapshot: the report has no page with the question {question}")
-    return textwrap.fill(found[1], WIDTH, break_on_hyphens=False, break_long_words=False) + "\n"
+    return wrapped(found[1]) + "\n"
+
+
+def wrapped(paragraph: str) -> str:
+    """Prose in lines of `WIDTH`; figures, rows of tables and lines that are short stay as they are."""
+    return (
+        paragraph
+        if paragraph.startswith(("!", "|"))
+        else textwrap.fill(paragraph, WIDTH, break_on_hyphens=False, break_long_words=False)
+    )
 
 
 def beginning(report: str) -> str:
     """The front page from its first figure to what will go wrong, figures where the README finds them."""
     text = re.split(r"(?:## |\*\*)What will go wrong", report.partition("\n\n")[2].partition("\n\n")[2])[0].strip()
-    return text.replace("](figures/", "](docs/snapshot/figures/") + "\n"
+    text = text.replace("](figures/", "](docs/snapshot/figures/")
+    return "\n\n".join(map(wrapped, text.split("\n\n"))) + "\n"
 
 
 def quote(said: str, page: str) -> str:
