@@ -22,7 +22,7 @@ from .cells import (
     SOLVE_IVP,
     cells,
 )  # fmt: skip
-from .measures import LEAST, NOISY, Column
+from .measures import LEAST, NOISY
 
 NOISY_SHARE = 0.02  # of noisy times, beyond which none is compared
 TIE = 0.1  # times that differ by less are level
@@ -48,9 +48,9 @@ WATERFALL = ["factor", "from", "to", "variant", "call", "time (s)", "times faste
 
 
 def timed(data: xr.Dataset) -> pd.DataFrame:
-    """A line a measured time: its goal, the levels of its four factors, `Column` of it."""
-    names = [Column.SECONDS, Column.SPREAD, Column.AXIS, Column.FORCES]
-    frame = data[names].to_dataframe().dropna(subset=[Column.SECONDS]).reset_index()
+    """A line a measured time: its goal, the levels of its four factors, its numbers."""
+    names = ["seconds", "spread", "axis", "force_evaluations"]
+    frame = data[names].to_dataframe().dropna(subset=["seconds"]).reset_index()
     known = {cell.name: cell.key for cell in cells()}
     levels = [known[name] for name in frame["variant"]]
     return frame.join(pd.DataFrame(levels, index=frame.index, columns=FACTORS[:3]))
@@ -58,7 +58,7 @@ def timed(data: xr.Dataset) -> pd.DataFrame:
 
 def noisy(data: xr.Dataset) -> tuple[int, int]:
     """How many times differ too much from process to process, and how many there are."""
-    spread = data[Column.SPREAD].values
+    spread = data["spread"].values
     return int(np.sum(spread > NOISY)), int(np.isfinite(spread).sum())
 
 
@@ -172,7 +172,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     answers: dict[str, Any] = {
         "busy": every.shape != frame.shape or None,
         "times": count, "loud": loud, "noisy": NOISY, "usual_spread": every["spread"].median(),
-        "samples": SAMPLES, "near": LEAST, "near_share": (every[Column.AXIS] >= LEAST * every["target"]).mean(),
+        "samples": SAMPLES, "near": LEAST, "near_share": (every["axis"] >= LEAST * every["target"]).mean(),
     }  # fmt: skip
     for name, call_first in (("late", False), ("first", True)):
         bars = waterfall(part, call_first=call_first)
@@ -200,7 +200,7 @@ def _ends(part: pd.DataFrame, bars: pd.DataFrame) -> dict[str, Any]:
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     """The effects, SciPy, the charts, and every time; what was not timed with the reason."""
     frame = compared(data)
-    reasons = data[Column.REASON].to_dataframe().reset_index().query(f"{Column.REASON} != ''")
+    reasons = data["reason"].to_dataframe().reset_index().query(f"{'reason'} != ''")
     times = {"axis": "error reached (rad)", "seconds": "time (s)", "force_evaluations": "force evaluations"}
     every = pd.concat([timed(data).drop(columns=FACTORS[:3], errors="ignore"), reasons]).rename(columns=times)
     made = {"effects": effects(frame), "scipy": against_scipy(frame), "charts": charts(frame), "times": every}

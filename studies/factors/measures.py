@@ -33,14 +33,6 @@ START = (
 )
 
 
-class Column:
-    """Variables of the dataset."""
-
-    SETTING, AXIS, AXIS_BOUND, FORCES = "setting", "axis", "axis_bound", "force_evaluations"  # of one run
-    REASON = "reason"  # why a variant has no setting; empty if it has
-    SECONDS, SPREAD, SAMPLES = "seconds", "spread", "seconds_samples"  # median, distance of quartiles over it, all
-
-
 class Goal(NamedTuple):
     """An accuracy over a horizon, and what takes part."""
 
@@ -133,7 +125,7 @@ def factorial(
     grid = cells(schemes)
     horizons, targets = sorted({goal.nutations for goal in goals}), sorted({goal.target for goal in goals})[::-1]
     shape = len(grid), len(horizons), len(targets)
-    names = Column.SETTING, Column.AXIS, Column.AXIS_BOUND, Column.FORCES
+    names = "setting", "axis", "axis_bound", "force_evaluations"
     numbers = {name: np.full(shape, math.nan) for name in names}
     reasons = np.full(shape, "", dtype=object)
     samples = np.full((*shape, len(CALLS), processes), math.nan)
@@ -157,10 +149,10 @@ def factorial(
     dims = ("variant", "horizon", "target")
     table = xr.Dataset(
         {name: (dims, values) for name, values in numbers.items()}
-        | {Column.REASON: (dims, reasons.astype(str)), Column.SAMPLES: ((*dims, "call", "process"), samples)},
+        | {"reason": (dims, reasons.astype(str)), "seconds_samples": ((*dims, "call", "process"), samples)},
         coords={
             "variant": [cell.name for cell in grid], "horizon": horizons, "target": targets, "call": list(CALLS),
         },
     )  # fmt: skip
     dims = (*dims, "call")
-    return table.assign({Column.SECONDS: (dims, np.median(samples, -1)), Column.SPREAD: (dims, spread(samples))})
+    return table.assign({"seconds": (dims, np.median(samples, -1)), "spread": (dims, spread(samples))})

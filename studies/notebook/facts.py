@@ -14,7 +14,7 @@ from symtop.model.charts import axis_from_angles
 
 from .derivations import notebook_top
 from .long_energy import better_from, energy_until, notebook_end
-from .measures import ALPHA, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION, Column
+from .measures import ALPHA, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION
 
 PARTS = {"spheroid": "first", "goldstein": "second"}  # scenes of the notebook's parts
 MOMENTA = ["p_phi_largest", "p_psi_largest"]
@@ -54,13 +54,13 @@ def of_the_solver(data: xr.Dataset, discrete: xr.Dataset) -> dict[str, Any]:
         return dict.fromkeys((*OF_SOLVER, *parts))
     solver, runs = data.sel(variant=SOLVER), discrete["variant"].values
     answers: dict[str, Any] = {
-        "followed": float(np.abs(solver[Column.SOLVER_THETA] - solver[Column.TRUE_THETA]).sel(scene="spheroid").max()),
-        "ways": float(solver[Column.DERIVATIONS_GAP].max()),  # rad
-        "energies": float(solver[Column.ENERGY_GAP].max()),  # relative
+        "followed": float(np.abs(solver["hard_theta"] - solver["true_theta"]).sel(scene="spheroid").max()),
+        "ways": float(solver["ways_gap"].max()),  # rad
+        "energies": float(solver["energy_gap"].max()),  # relative
         "solver_momenta": float(solver[MOMENTA].to_dataarray().max()),
-        "alpha_at_rest": float(solver[Column.ALPHA_AT_REST].sel(scene="goldstein")),  # 1/s^2
-        "alpha_rate": float(solver[Column.ALPHA_RATE].sel(scene="goldstein")),  # rad/s
-        "long": float(data[Column.LONG_TIME].max()),  # s
+        "alpha_at_rest": float(solver["alpha_at_rest"].sel(scene="goldstein")),  # 1/s^2
+        "alpha_rate": float(solver["alpha_rate"].sel(scene="goldstein")),  # rad/s
+        "long": float(data["long_time"].max()),  # s
     }
     named = [name for name in ORDER_TWO if name in runs]
     for scene, part in PARTS.items():
@@ -87,8 +87,8 @@ def present(data: xr.Dataset) -> list[str]:
 def turned(data: xr.Dataset, scene: str) -> float:
     """The angle about the vertical, in degrees, by which the notebook's path is best turned from that of the axis."""
     run = data.sel(scene=scene, variant=SOLVER)
-    drawn = axis_from_angles(run[Column.SOLVER_THETA].values, run[Column.SOLVER_PHI].values + 0.5 * math.pi)
-    true = axis_from_angles(run[Column.TRUE_THETA].values, run[Column.TRUE_PHI].values)
+    drawn = axis_from_angles(run["hard_theta"].values, run["hard_phi"].values + 0.5 * math.pi)
+    true = axis_from_angles(run["true_theta"].values, run["true_phi"].values)
     flat = [path[:, 0] + 1j * path[:, 1] for path in (drawn, true)]
     return math.degrees(cmath.phase(complex(np.nansum(flat[0] * flat[1].conj()))))
 
@@ -97,22 +97,22 @@ def powers(data: xr.Dataset) -> pd.DataFrame:
     """Powers of the step with which energy and modified energy change, of each scene and variant that has both."""
     runs = [data.sel(scene=scene, variant=name) for scene in data["scene"].values
             for name in MODIFIED if name in data["variant"].values]  # fmt: skip
-    columns = {"energy": Column.ENERGY_CHANGE, "modified": Column.MODIFIED_CHANGE}
+    columns = {"energy": "energy_swing", "modified": "modified_swing"}
     return pd.DataFrame({
-        key: [power_law(run[Column.MODIFIED_STEP].values, run[column].values).slope for run in runs]
+        key: [power_law(run["shadow_step_size"].values, run[column].values).slope for run in runs]
         for key, column in columns.items()
     }, dtype=float)  # fmt: skip
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     """What every variant keeps, to the notebook's end and far beyond it."""
-    rows, last = [], float(data[Column.LONG_TIME].max())
+    rows, last = [], float(data["long_time"].max())
     for name in present(data):
         for scene in map(str, data["scene"].values):
             run = data.sel(scene=scene, variant=name)
             since = better_from(data, scene, name) if name != SOLVER and SOLVER in data["variant"].values else math.inf
             errors = [float(run[f"{constant}_largest"]) for constant in CONSTANTS]
-            rows.append([name, scene, str(run[Column.OUTCOME].values), notebook_end(data, scene), *errors,
+            rows.append([name, scene, str(run["outcome"].values), notebook_end(data, scene), *errors,
                          energy_until(data, scene, name, last), since if since < math.inf else math.nan])  # fmt: skip
     header = ["variant", "scene", "outcome", "end of the notebook (s)"]
     header += [*(f"error of {one} to then" for one in CONSTANTS), f"error of energy to {last:g} s"]

@@ -9,7 +9,7 @@ from symtop.runner.study import Picture
 
 from .facts import ORDER_TWO
 from .long_energy import better_from, energy_until, notebook_end
-from .measures import MIDPOINT, MODIFIED, SOLVER, Column
+from .measures import MIDPOINT, MODIFIED, SOLVER
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
@@ -30,7 +30,7 @@ def draw_energy(data: xr.Dataset) -> Picture:
             run = data.sel(scene=scene, variant=name)
             line = style.line(name, 0.8) | {"markevery": 0.12, "label": name}
             wide = line | {"marker": "", "lw": 2.4, "ls": "-"}
-            axis.plot(run[Column.LONG_TIME], run[Column.LONG_ENERGY], **(wide if name == SOLVER else line))
+            axis.plot(run["long_time"], run["long_energy"], **(wide if name == SOLVER else line))
             since = better_from(data, scene, name) if SOLVER in names and name != SOLVER else math.inf
             if 0.0 < since < math.inf:
                 axis.plot(since, energy_until(data, scene, name, since), "o", **ring)
@@ -51,20 +51,20 @@ def draw_modified_energy(data: xr.Dataset) -> Picture:
     names, scenes = [name for name in MODIFIED if name in data["variant"].values], list(map(str, data["scene"].values))
     over_time = MIDPOINT in names
     figure, axes = style.panels(1, over_time + len(scenes), height=2.2)
-    kinds = ((Column.ENERGY_CHANGE, "energy", "-"), (Column.MODIFIED_CHANGE, "modified energy", "--"))
+    kinds = (("energy_swing", "energy", "-"), ("modified_swing", "modified energy", "--"))
     if over_time:
         run, first = data.sel(scene=scenes[0], variant=MIDPOINT), axes[0, 0]
         for (column, kind, _), color in zip(kinds, (style.ORANGE, style.BLACK), strict=True):
-            first.plot(run[Column.MODIFIED_TIME], run[f"{column}_history"], color=color, label=f"{kind} over time")
+            first.plot(run["shadow_time"], run[f"{column}_history"], color=color, label=f"{kind} over time")
         first.set(title=f"{MIDPOINT}, {scenes[0]},\n40 steps a nutation", xlabel="time (s)", ylabel="relative change")
     for axis, scene in zip(axes[0, over_time:], scenes, strict=True):
         for name in names:
             run, look = data.sel(scene=scene, variant=name), style.look(name)
-            h = run[Column.MODIFIED_STEP]
+            h = run["shadow_step_size"]
             for column, kind, line in kinds:
                 axis.plot(h, run[column], look.marker + line, color=look.color, ms=0.8 * look.size,
                           mfc=look.color if line == "-" else "white", label=f"{kind}, {name}")  # fmt: skip
-        for power, column in ((2, Column.ENERGY_CHANGE), (4, Column.MODIFIED_CHANGE)):
+        for power, column in ((2, "energy_swing"), (4, "modified_swing")):
             span = float(h.min()), float(h.max())
             style.slope_guide(axis, power, span, 0.2 * float(run[column].min()), f"$h^{power}$")
         axis.set(xscale="log", yscale="log", xlabel="step size (s)", ylabel="largest relative change")

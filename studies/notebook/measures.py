@@ -31,28 +31,6 @@ ALPHA = 1.6  # of the second scene, as the notebook prints it
 SAMPLES = 301
 
 
-class Column:
-    """Variables of the dataset, with unit and dimension. Beside them, for energy, p_phi and p_psi over ``sample``:
-    NAME, its relative residual NAME_residual, and the largest of these, the scalar NAME_largest.
-    """
-
-    SAMPLE_TIME, OUTCOME = "sample_time", "outcome"  # s; sample. A scalar
-    # theta, phi (rad) and theta' (rad/s) of the notebook's solver and of the closed form over time (s); path
-    PATH_TIME, TRUE_THETA, TRUE_PHI, TRUE_RATE = "path_time", "true_theta", "true_phi", "true_theta_dot"
-    SOLVER_THETA, SOLVER_PHI, SOLVER_RATE = "hard_theta", "hard_phi", "hard_theta_dot"
-    # largest differences of any angle (rad) of derivations and closed form, |E1 + p_psi^2/2 I3 - E| (relative); both
-    BOTH_TIME, DERIVATIONS_GAP, HARD_GAP, EASY_GAP, ENERGY_GAP = (
-        "both_time", "ways_gap", "hard_gap", "easy_gap", "energy_gap",
-    )  # fmt: skip
-    # scalars in 1/s^2 and rad/s
-    ALPHA_AT_REST, ALPHA_RATE = "alpha_at_rest", "alpha_rate"
-    # largest relative changes at steps (s); shadow_setting. At the first step over time, NAME_history; shadow_sample
-    MODIFIED_STEP, MODIFIED_TIME = "shadow_step_size", "shadow_time"
-    ENERGY_CHANGE, MODIFIED_CHANGE = "energy_swing", "modified_swing"
-    # largest relative energy error so far (s, 1) of a run far beyond the notebook's; long
-    LONG_TIME, LONG_ENERGY = "long_time", "long_energy"
-
-
 def discrete_methods() -> list[str]:
     """Variants of the discrete Lagrangians and splittings of the registry, in the angles or the axis chart."""
     return [
@@ -67,7 +45,7 @@ def residual_history(scene: Scene, name: str, setting: float, samples: int = SAM
     """
     control = integrator(name).setting(setting).kwargs()
     run = integrate(scene, name, observe="nutation", samples=samples, **control)
-    columns: dict[str, Any] = {Column.OUTCOME: run.outcome, Column.SAMPLE_TIME: ("sample", run.time)}
+    columns: dict[str, Any] = {"outcome": run.outcome, "sample_time": ("sample", run.time)}
     for constant, values in residuals(scene, run).items():
         columns[constant] = ("sample", getattr(run, constant))
         columns[f"{constant}_residual"] = ("sample", values)
@@ -80,9 +58,9 @@ def notebook_path(scene: Scene, samples: int = 1201) -> xr.Dataset:
     times = np.linspace(0.0, scene.horizon, samples)
     hard = integrated(hard_way(scene), six_variables(scene), times, "LSODA", SOLVER_TOLERANCE)
     truth = closed_form(scene)(times)
-    solver = {Column.SOLVER_THETA: hard[1], Column.SOLVER_PHI: hard[0], Column.SOLVER_RATE: hard[4]}
-    true = {Column.TRUE_THETA: truth.theta, Column.TRUE_PHI: truth.phi, Column.TRUE_RATE: truth.theta_dot}
-    columns = {Column.PATH_TIME: times, **solver, **true}
+    solver = {"hard_theta": hard[1], "hard_phi": hard[0], "hard_theta_dot": hard[4]}
+    true = {"true_theta": truth.theta, "true_phi": truth.phi, "true_theta_dot": truth.theta_dot}
+    columns = {"path_time": times, **solver, **true}
     return xr.Dataset({name: ("path", values) for name, values in columns.items()})
 
 
@@ -95,11 +73,11 @@ def both_derivations(scene: Scene, samples: int = SAMPLES) -> xr.Dataset:
     true = np.array([truth.phi, truth.theta, truth.psi])
     E, E1, spin = energies(scene, hard)
     columns = {
-        Column.BOTH_TIME: times,
-        Column.DERIVATIONS_GAP: np.max(np.abs(hard[:3] - easy[:3]), axis=0),
-        Column.HARD_GAP: np.max(np.abs(hard[:3] - true), axis=0),
-        Column.EASY_GAP: np.max(np.abs(easy[:3] - true), axis=0),
-        Column.ENERGY_GAP: np.abs(E1 + spin - E) / scene.energy_scale,
+        "both_time": times,
+        "ways_gap": np.max(np.abs(hard[:3] - easy[:3]), axis=0),
+        "hard_gap": np.max(np.abs(hard[:3] - true), axis=0),
+        "easy_gap": np.max(np.abs(easy[:3] - true), axis=0),
+        "energy_gap": np.abs(E1 + spin - E) / scene.energy_scale,
     }
     return xr.Dataset({name: ("both", values) for name, values in columns.items()})
 
@@ -107,7 +85,7 @@ def both_derivations(scene: Scene, samples: int = SAMPLES) -> xr.Dataset:
 def alpha_table(scene: Scene, alpha: float) -> xr.Dataset:
     """What a start at rest has for alpha, and the rate of theta that the printed alpha means."""
     rate = with_alpha(scene, alpha, 1.0).start.theta_dot
-    return xr.Dataset({Column.ALPHA_AT_REST: nutation_cubic(scene).alpha, Column.ALPHA_RATE: rate})
+    return xr.Dataset({"alpha_at_rest": nutation_cubic(scene).alpha, "alpha_rate": rate})
 
 
 def modified_energy_table(scene: Scene, name: str, steps: Sequence[float]) -> xr.Dataset:
@@ -123,8 +101,8 @@ def modified_energy_table(scene: Scene, name: str, steps: Sequence[float]) -> xr
     ]
     energy = [run.energy for run in runs]
     time = ("shadow_sample", runs[0].time)
-    data: dict[str, Any] = {Column.MODIFIED_STEP: ("shadow_setting", used), Column.MODIFIED_TIME: time}
-    for column, curves in ((Column.ENERGY_CHANGE, energy), (Column.MODIFIED_CHANGE, modified)):
+    data: dict[str, Any] = {"shadow_step_size": ("shadow_setting", used), "shadow_time": time}
+    for column, curves in (("energy_swing", energy), ("modified_swing", modified)):
         changes = [(values - values[0]) / scene.energy_scale for values in curves]
         data[column] = ("shadow_setting", [float(np.max(np.abs(change))) for change in changes])
         data[f"{column}_history"] = ("shadow_sample", changes[0])

@@ -9,16 +9,16 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from .measures import AGAINST_RK45, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOPS, Column, order
+from .measures import AGAINST_RK45, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOPS, order
 from .oscillator import ONE_SIDED
 from .quartic_measures import ERROR, MAPS, PERIODS, QUARTICS, STEP, STEPS, oscillator_of, quartic_order
 
 CRITICAL = "damping-2"  # the scene of critical damping
 COLUMNS = {  # what some variants alone have, and its dimension
-    Column.STEP: "setting", Column.POSITION_ERROR: "setting", Column.EXPONENT_ERROR: "setting",
-    Column.ENERGY_ERROR: "sample", Column.UPDATE_GAP: "seed_step",
-    Column.TOP_STEP: "top_setting", Column.THETA_ERROR: "top_setting",
-    Column.BALANCE_PHI: "top_sample", Column.BALANCE_PSI: "top_sample",
+    "step_size": "setting", "position_error": "setting", "exponent_error": "setting",
+    "energy_error": "sample", "update_gap": "seed_step",
+    "top_step_size": "top_setting", "theta_error": "top_setting",
+    "balance_phi": "top_sample", "balance_psi": "top_sample",
     **dict.fromkeys((ERROR, STEP), "quartic_setting"),
 }  # fmt: skip
 
@@ -40,19 +40,19 @@ def whole(data: xr.Dataset) -> xr.Dataset:
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """Orders, the notebook's update, energies at equal cost, the balance of momenta, and the exact map."""
     data = whole(data)
-    orders = [order(data, *run, Column.POSITION_ERROR).slope for run in product(OSCILLATORS, RULES)]
-    one_sided = [order(data, name, ONE_SIDED, Column.POSITION_ERROR).slope for name in list(OSCILLATORS)[1:]]
-    rates = {name: order(data, CRITICAL, name, Column.EXPONENT_ERROR).slope for name in (*RULES, ONE_SIDED)}
-    of_tops = [order(data, *run, Column.THETA_ERROR).slope for run in product(TOPS, RULES)]
+    orders = [order(data, *run, "position_error").slope for run in product(OSCILLATORS, RULES)]
+    one_sided = [order(data, name, ONE_SIDED, "position_error").slope for name in list(OSCILLATORS)[1:]]
+    rates = {name: order(data, CRITICAL, name, "exponent_error").slope for name in (*RULES, ONE_SIDED)}
+    of_tops = [order(data, *run, "theta_error").slope for run in product(TOPS, RULES)]
     maps = [quartic_order(data, *run).slope for run in product(QUARTICS, MAPS[1:])]
-    energies = largest(data, Column.ENERGY_ERROR)
-    evaluations = data[Column.EVALUATIONS].sel(scene=list(AGAINST_RK45)) if Column.EVALUATIONS in data else None
+    energies = largest(data, "energy_error")
+    evaluations = data["evaluations"].sel(scene=list(AGAINST_RK45)) if "evaluations" in data else None
     return {
         "horizon": HORIZON, "long": LONG,  # in units of sqrt(m/k)
         "periods": PERIODS,  # of the quartic oscillators
         **ends("order", orders), **ends("one_sided", one_sided), **ends("top_order", of_tops),
         **{f"rate_{name.replace('-', '_')}": slope for name, slope in rates.items()},
-        "update_gap": float(data[Column.UPDATE_GAP].max()),
+        "update_gap": float(data["update_gap"].max()),
         **{f"{word}_{name}": float(energies.sel(scene=scene, variant=name))  # largest relative error of the energy
            for word, scene in zip(("undamped", "damped"), AGAINST_RK45, strict=True) for name in (*RULES, RK45)},
         "rule_evaluations": None if evaluations is None else float(evaluations.sel(variant=list(RULES)).max()),
@@ -76,15 +76,15 @@ def largest(data: xr.Dataset, column: str) -> xr.DataArray:
 def balance(data: xr.Dataset) -> float:
     """The largest relative defect of the momentum balance of the damped tops."""
     runs = data.sel(scene=list(TOPS), variant=list(RULES))
-    return max(float(largest(runs, name).max()) for name in (Column.BALANCE_PHI, Column.BALANCE_PSI))
+    return max(float(largest(runs, name).max()) for name in ("balance_phi", "balance_psi"))
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     """Orders and energies of the damped oscillator, the lowest order of the rate first; errors of every exact map."""
     data = whole(data)
-    energies, rows = largest(data, Column.ENERGY_ERROR), []
+    energies, rows = largest(data, "energy_error"), []
     for (name, oscillator), rule in product(OSCILLATORS.items(), (*RULES, ONE_SIDED, RK45)):
-        slopes = [order(data, name, rule, error).slope for error in (Column.POSITION_ERROR, Column.EXPONENT_ERROR)]
+        slopes = [order(data, name, rule, error).slope for error in ("position_error", "exponent_error")]
         energy = float(energies.sel(scene=name, variant=rule))
         if math.isfinite(energy):
             rows.append([oscillator.damping, oscillator.regime, rule, *slopes, energy])

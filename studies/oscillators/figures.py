@@ -8,16 +8,16 @@ from symtop.report.figures import SMALLEST
 from symtop.runner.study import Picture
 
 from .facts import CRITICAL
-from .measures import OSCILLATORS, Column, order
+from .measures import OSCILLATORS, order
 from .oscillator import ONE_SIDED
 from .quartic_measures import ERROR, MAPS, QUARTICS, STEP
 
 SYMBOLS = {"midpoint": "o", "trapezoidal": "s", ONE_SIDED: "v"}
 PLAIN = {ONE_SIDED: "force at one end"}
 ORDERS = (  # panels: an oscillator, what is measured of it, and in words
-    (CRITICAL, Column.POSITION_ERROR, "position x: largest error"),
-    ("damping-3", Column.EXPONENT_ERROR, "rate of decay: relative error"),
-    (CRITICAL, Column.EXPONENT_ERROR, "rate of decay: relative error"),
+    (CRITICAL, "position_error", "position x: largest error"),
+    ("damping-3", "exponent_error", "rate of decay: relative error"),
+    (CRITICAL, "exponent_error", "rate of decay: relative error"),
 )
 LOOKS = {name: style.Look(style.ORANGE, "v") if name == "mcmillan" else style.look(name) for name in MAPS}
 
@@ -43,7 +43,7 @@ def draw_orders(data: xr.Dataset, _: list[str], names: list[str]) -> Picture:
             color = style.PURPLE if method == ONE_SIDED else style.look(method).color
             marks = {"mfc": "none", "ms": 3.4} if method == "trapezoidal" else {"mfc": color, "ms": 4.6}
             errors = run[error].where(run[error] > 1e-13)  # above rounding
-            axis.plot(run[Column.STEP], errors, marker + "-", color=color, lw=1.1, **marks)
+            axis.plot(run["step_size"], errors, marker + "-", color=color, lw=1.1, **marks)
             slope = order(data, name, method, error).slope
             axis.text(0.98, 0.23 - 0.085 * line, f"{PLAIN.get(method, method)}: order {slope:.1f}", ha="right",
                       transform=axis.transAxes, color=style.ink(color), fontsize=7.5, weight="bold")  # fmt: skip

@@ -31,26 +31,9 @@ LEAST_JUDGED = 1e-9  # errors below do not enter the fit of an order
 ASYMPTOTIC = {"step_size": 0.11, "top_step_size": 0.011}  # largest step that enters the fit
 
 
-class Column:
-    """Variables of the dataset, with unit and dimension. Times of the oscillator are in units of sqrt(m/k)."""
-
-    # oscillator, several steps; setting. Absolute (start: 1), relative
-    STEP, POSITION_ERROR, EXPONENT_ERROR = "step_size", "position_error", "exponent_error"
-    # over a long horizon, relative; sample. And force evaluations, a scalar
-    TIME, ENERGY_ERROR, EVALUATIONS = "sample_time", "energy_error", "evaluations"
-    # positions in the notebook's experiment; seed_step
-    NOTEBOOK_TIME, ANALYTIC, UPDATE, GUESS = "seed_time", "analytic", "seed_update", "seed_guess"
-    UPDATE_GAP = "update_gap"  # from the midpoint rule
-    # damped top, errors of theta (rad) at several steps (s); top_setting. And the error of the truth, rad, a scalar
-    TOP_STEP, THETA_ERROR, TOP_BOUND = "top_step_size", "theta_error", "top_bound"
-    # over time (s) at the finest step: rad, momenta, and their balance relative to the larger momentum; top_sample
-    TOP_TIME, THETA, TRUE_THETA = "top_time", "theta", "true_theta"
-    P_PHI, P_PSI, BALANCE_PHI, BALANCE_PSI = "p_phi", "p_psi", "balance_phi", "balance_psi"
-
-
 def order(data: xr.Dataset, scene: str, method: str, error: str) -> Fit:
     """Slope of an error against the step, over the steps that are small enough and the errors above rounding."""
-    step = Column.TOP_STEP if error == Column.THETA_ERROR else Column.STEP
+    step = "top_step_size" if error == "theta_error" else "step_size"
     cell = data.sel(scene=scene, variant=method)
     steps, errors = cell[step].values, cell[error].values
     return power_law(steps, errors, (steps < ASYMPTOTIC[step]) & (errors > LEAST_JUDGED))
@@ -63,9 +46,9 @@ def convergence(oscillator: Oscillator, method: str, steps: Sequence[float], hor
         times, position, _ = discrete_path(oscillator, rule, *RELEASED, horizon, count)
         errors, h = position - oscillator.exact(times, *RELEASED)[0], horizon / count
         rows.append({
-            Column.STEP: h,
-            Column.POSITION_ERROR: float(np.max(np.abs(errors))),
-            Column.EXPONENT_ERROR: abs(discrete_exponents(oscillator, rule, h)[0] - slow) / abs(slow),
+            "step_size": h,
+            "position_error": float(np.max(np.abs(errors))),
+            "exponent_error": abs(discrete_exponents(oscillator, rule, h)[0] - slow) / abs(slow),
         })  # fmt: skip
     return as_table(rows)
 
@@ -84,8 +67,8 @@ def decay(oscillator: Oscillator, method: str, step: float, horizon: float) -> x
         times, position, momentum = motion
     x, v = oscillator.exact(times, *RELEASED)
     error = oscillator.energy(position, momentum) / oscillator.energy(x, oscillator.mass * v) - 1.0
-    histories = {Column.TIME: ("sample", times), Column.ENERGY_ERROR: ("sample", error)}
-    return xr.Dataset({**histories, Column.EVALUATIONS: float(evaluations)})
+    histories = {"sample_time": ("sample", times), "energy_error": ("sample", error)}
+    return xr.Dataset({**histories, "evaluations": float(evaluations)})
 
 
 def _rk45_at_cost(oscillator: Oscillator, evaluations: int, times: Array) -> tuple[Array, Array, int]:
@@ -121,8 +104,8 @@ def notebook_history(oscillator: Oscillator, h: float, horizon: float) -> xr.Dat
     momentum = float(legendre(oscillator, rule, (first, 0.0), (second - first, 0.0), h)[0])
     ours = discrete_path(oscillator, rule, first, momentum, count * h, count, count + 1)[1]
     update, guess = notebook_positions(oscillator.damping, h, first, second, count)
-    columns = {Column.NOTEBOOK_TIME: times, Column.ANALYTIC: true, Column.UPDATE: update, Column.GUESS: guess}
-    columns[Column.UPDATE_GAP] = np.abs(update - ours)
+    columns = {"seed_time": times, "analytic": true, "seed_update": update, "seed_guess": guess}
+    columns["update_gap"] = np.abs(update - ours)
     return xr.Dataset({name: ("seed_step", values) for name, values in columns.items()})
 
 
@@ -136,7 +119,7 @@ def damped_top_table(scene: Scene, method: str, counts: Sequence[int], horizon: 
     top, share = scene.top, np.unique(np.rint(np.linspace(0.0, counts[0], min(SAMPLES, counts[0] + 1))).astype(int))
     times = share.astype(np.float64) * (horizon / counts[0])
     truth, bound = damped_truth(scene, FRICTION, times)
-    columns: dict[str, Any] = {Column.TOP_BOUND: bound}
+    columns: dict[str, Any] = {"top_bound": bound}
     if method == RK45:
         theta, phi, psi, _, phi_dot, psi_dot = six_variables(scene, FRICTION, times, "RK45", TOP_TOLERANCE)
         p_psi = top.I3 * (psi_dot + phi_dot * np.cos(theta))
@@ -147,16 +130,16 @@ def damped_top_table(scene: Scene, method: str, counts: Sequence[int], horizon: 
             damped_run(scene, FRICTION, method, h, share * (count // counts[0])).states.T
             for h, count in zip(steps, counts, strict=True)
         ]
-        columns[Column.TOP_STEP] = ("top_setting", steps)
-        columns[Column.THETA_ERROR] = ("top_setting", [float(np.max(np.abs(run[0] - truth[0]))) for run in runs])
+        columns["top_step_size"] = ("top_setting", steps)
+        columns["theta_error"] = ("top_setting", [float(np.max(np.abs(run[0] - truth[0]))) for run in runs])
         theta, phi, psi, _, p_phi, p_psi = runs[-1]
     history = {
-        Column.TOP_TIME: times,
-        Column.THETA: theta,
-        Column.TRUE_THETA: truth[0],
-        Column.P_PHI: p_phi,
-        Column.P_PSI: p_psi,
-        Column.BALANCE_PHI: (p_phi - p_phi[0] + FRICTION.precession * (phi - phi[0])) / scene.momentum_scale,
-        Column.BALANCE_PSI: (p_psi - p_psi[0] + FRICTION.spin * (psi - psi[0])) / scene.momentum_scale,
+        "top_time": times,
+        "theta": theta,
+        "true_theta": truth[0],
+        "p_phi": p_phi,
+        "p_psi": p_psi,
+        "balance_phi": (p_phi - p_phi[0] + FRICTION.precession * (phi - phi[0])) / scene.momentum_scale,
+        "balance_psi": (p_psi - p_psi[0] + FRICTION.spin * (psi - psi[0])) / scene.momentum_scale,
     }
     return xr.Dataset(columns | {name: ("top_sample", values) for name, values in history.items()})

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from .tables import CHART_PERIODS, COMMUTES, COMPARED_STEPS, GAPS, Column, chart_ratios, commutation_order
+from .tables import CHART_PERIODS, COMMUTES, COMPARED_STEPS, GAPS, chart_ratios, commutation_order
 
 WORST = "largest difference (rad)"
 AS_FAST = 1.1  # times as long: what the noise of a time hides
@@ -29,7 +29,7 @@ def cells(data: xr.Dataset, variable: str) -> list[tuple[str, str, xr.Dataset]]:
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """Which rules commute with the reduction (rad), how far an unreduced form is from its kernel, what charts cost."""
     gaps, kernels, charts = tables(data).values()
-    compared = cells(data, Column.THETA_GAP)
+    compared = cells(data, "theta_gap")
     same, apart = (gaps[(gaps[WORST] < COMMUTES) == wanted] for wanted in (True, False))
     slowest = charts.loc[charts["time (ratio)"].idxmax()] if len(charts) else {}
     return {
@@ -59,10 +59,10 @@ def listed(names: Iterable[str]) -> str | None:
 def commutation(data: xr.Dataset) -> pd.DataFrame:
     """The difference of reducing first and last by scene and rule; no power of h where it is rounding."""
     rows = []
-    for scene, rule, cell in cells(data, Column.GAP):
-        gap, worst = cell[Column.GAP].dropna("commutation_step").values, float(cell[Column.GAP].max())
+    for scene, rule, cell in cells(data, "commutation_gap"):
+        gap, worst = cell["commutation_gap"].dropna("commutation_step").values, float(cell["commutation_gap"].max())
         power = None if worst < COMMUTES else commutation_order(cell)
-        rows.append([scene, rule, power, worst, gap[-1], float(cell[Column.STEP].max())])
+        rows.append([scene, rule, power, worst, gap[-1], float(cell["commutation_step_size"].max())])
     header = ["scene", "rule", "power of h", WORST, "at the finest step (rad)", "coarsest step (s)"]
     return pd.DataFrame(rows, columns=header).astype({"power of h": float})
 
@@ -70,14 +70,14 @@ def commutation(data: xr.Dataset) -> pd.DataFrame:
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     """Reducing first or last; kernels and their unreduced forms at each step; every chart against the smallest."""
     kernels, charts = [], []
-    for scene, rule, cell in cells(data, Column.SECONDS_A_STEP):
+    for scene, rule, cell in cells(data, "seconds_per_step"):
         for step in range(cell.sizes["twin_step"]):
             at = cell.isel(twin_step=step)
             seconds, done = (at[name].sel(kernel=["reduced", "unreduced"]).values
-                             for name in (Column.SECONDS_A_STEP, Column.ITERATIONS_A_STEP))  # fmt: skip
+                             for name in ("seconds_per_step", "iterations_per_step"))  # fmt: skip
             time, more = seconds[1] / seconds[0], done[1] / done[0]
-            kernels.append([scene, rule, float(at[Column.COMPARED_STEP]), time, more, time / more, *seconds, *done])
-    for scene, method, cell in cells(data, Column.SECONDS):
+            kernels.append([scene, rule, float(at["twin_step_size"]), time, more, time / more, *seconds, *done])
+    for scene, method, cell in cells(data, "seconds"):
         for one in chart_ratios(cell):
             name = f"{method}[{one.chart}]"
             charts.append([scene, name, one.base, one.time, one.error])

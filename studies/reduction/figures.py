@@ -9,12 +9,12 @@ from symtop.report.figures import SMALLEST
 from symtop.runner.study import Picture
 
 from .facts import cells
-from .tables import COMMUTES, Column, commutation_order
+from .tables import COMMUTES, commutation_order
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
     """Reducing first against reducing last, against the step, a panel a scene."""
-    measured = cells(data, Column.GAP)
+    measured = cells(data, "commutation_gap")
     names = list(dict.fromkeys(scene for scene, *_ in measured))
     if not names:
         return []
@@ -23,13 +23,13 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     places = dict(zip(names, axes, strict=True))
     lowest: dict[tuple[str, int], float] = {}  # of the lines of each power, where its guide goes
     for scene, rule, cell in measured:
-        gap = cell[Column.GAP].values
-        places[scene].plot(cell[Column.STEP], np.maximum(gap, SMALLEST), **style.line(rule), label=rule)
+        gap = cell["commutation_gap"].values
+        places[scene].plot(cell["commutation_step_size"], np.maximum(gap, SMALLEST), **style.line(rule), label=rule)
         if np.nanmax(gap) > COMMUTES and np.isfinite(order := commutation_order(cell)):
             power = scene, round(order)
             lowest[power] = min(float(np.nanmin(gap)), lowest.get(power, np.inf))
     for (scene, power), low in lowest.items():
-        steps = data[Column.STEP].sel(scene=scene)
+        steps = data["commutation_step_size"].sel(scene=scene)
         style.slope_guide(places[scene], power, (float(steps.min()), float(steps.max())), 0.3 * low, f"$h^{power}$")
     for scene, axis in places.items():
         axis.set(xscale="log", yscale="log", title=f"scene {scene}")

@@ -16,7 +16,7 @@ from symtop.methods.framework.registry import Integrator, integrator, integrator
 
 from .many_verdicts import BOUNDED_BUT_WRONG, JUDGED, VERDICTS
 from .outcome_maps import NOT_RUN, SETTLED
-from .tables import MECHANISMS, Column
+from .tables import MECHANISMS
 
 SLOW, FAST = 1.0, 3.0  # relative spin
 LOWER_SHARE = 0.1  # of the rows may reach less far than what is quoted
@@ -90,23 +90,23 @@ class OutcomeMap(NamedTuple):
 
 def map_of(cell: xr.Dataset) -> OutcomeMap | None:
     """The map in the dataset of one scene and one integrator, or None if there is none."""
-    if Column.OUTCOME not in cell:
+    if "outcome" not in cell:
         return None
-    outcome = cell[Column.OUTCOME].values
+    outcome = cell["outcome"].values
     rows, columns = (outcome != NOT_RUN).any(axis=1), (outcome != NOT_RUN).any(axis=0)
     if not rows.any():
         return None
-    parameter, settings = cell[Column.PARAMETER].values[rows], cell[Column.SETTING].values[columns]
+    parameter, settings = cell["parameter_value"].values[rows], cell["control"].values[columns]
     outcome = outcome[rows][:, columns]
     made = outcome != SETTLED
-    return OutcomeMap(np.where(made, outcome, np.uint8(0)), parameter, settings, str(cell[Column.CONTROL].values), made)
+    return OutcomeMap(np.where(made, outcome, np.uint8(0)), parameter, settings, str(cell["knob_name"].values), made)
 
 
 def maps(data: xr.Dataset, scene: str) -> dict[str, OutcomeMap]:
     """The maps over a family of scenes by the names of their integrators."""
-    if scene not in data["scene"].values or Column.OUTCOME not in data:
+    if scene not in data["scene"].values or "outcome" not in data:
         return {}
-    part = data[[Column.OUTCOME, Column.PARAMETER, Column.SETTING, Column.CONTROL]].sel(scene=scene)
+    part = data[["outcome", "parameter_value", "control", "knob_name"]].sel(scene=scene)
     read = {str(name): map_of(part.sel(variant=name)) for name in data["variant"].values}
     return {name: one for name, one in read.items() if one is not None}
 

@@ -11,7 +11,7 @@ from symtop.methods.framework.registry import split_name
 from .atlas import COMMON, FAST, NEAR, SLOW, families, halved_by_pole, map_of, maps, methods_of
 from .failures import LOST
 from .mechanisms import BARELY, limits, measured, misses, resonant, sampled
-from .tables import PERIODS, Column
+from .tables import PERIODS
 
 QUOTED = "stormer-verlet[angles]"  # whose numbers are quoted
 NAMES = (  # of all facts that are measured
@@ -47,7 +47,7 @@ def atlas_facts(data: xr.Dataset, family: str) -> dict[str, Any]:
         "silent": float(pd.Series([one.silent for one in shown.values()]).median()),  # of the inaccurate runs
         "cells": made.size,
         "settled": 1.0 - made.mean(),  # share that was not run
-        **{name: int(data[name].sel(scene=family).sum()) for name in (Column.CHECKS, Column.REFUTED)},
+        **{name: int(data[name].sel(scene=family).sum()) for name in ("checks", "refuted")},
     }
     if steps:
         for kind in ("fast", "slow"):
@@ -77,17 +77,17 @@ def resonance_facts(part: xr.Dataset) -> dict[str, Any]:
     phases = limits(part)
     least = min(phases, key=lambda name: phases[name], default=None)
     return {"limited": len(phases), "limit_least": phases.get(least), "limit_variant": least,
-            "resonant": len(resonant(part)), "turned": int(part[Column.THIRD_TURN_PHASE].count())}  # fmt: skip
+            "resonant": len(resonant(part)), "turned": int(part["third_turn_phase"].count())}  # fmt: skip
 
 
 def sleeping_facts(part: xr.Dataset) -> dict[str, Any]:
     """The spin from which a top sleeps at the longest step, and how far all of them are from theory."""
-    answers: dict[str, Any] = {"sleep_step": float(part[Column.SLEEPING_STEP].max())}
+    answers: dict[str, Any] = {"sleep_step": float(part["sleeping_step"].max())}
     misses_ = []
     for name, method in methods_of(part).items():
-        cell = part.sel(variant=name).dropna("rung", subset=[Column.SLEEPING_THRESHOLD])
+        cell = part.sel(variant=name).dropna("rung", subset=["sleeping_threshold"])
         if method.sleeps_from is not None and cell.sizes["rung"]:
-            steps, spins = (cell[key].values for key in (Column.SLEEPING_STEP, Column.SLEEPING_THRESHOLD))
+            steps, spins = (cell[key].values for key in ("sleeping_step", "sleeping_threshold"))
             misses_ += [abs(one - method.sleeps_from(float(h))) for h, one in zip(steps, spins, strict=True)]
             if split_name(name)[0] in ("strang", "cayley"):
                 answers[f"{split_name(name)[0]}_sleeps"] = float(spins[-1])
@@ -104,17 +104,17 @@ def sampling_facts(part: xr.Dataset) -> dict[str, Any]:
     hidden, ratios = sampled(part)
     answers: dict[str, Any] = {"sampled": len(hidden) + len(ratios), "hidden": len(hidden),
                                "small": sum(ratio > 10.0 for ratio in ratios.values())}  # fmt: skip
-    if Column.TEXTBOOK_ENERGY in part:
-        rule = part.dropna("variant", how="all", subset=[Column.ONE_ITERATION_ENERGY]).isel(variant=0)
-        answers |= {"one_iteration": float(rule[Column.ONE_ITERATION_ENERGY]),
-                  "solved": float(rule[Column.TEXTBOOK_ENERGY][-1])}  # fmt: skip
+    if "plain_energy" in part:
+        rule = part.dropna("variant", how="all", subset=["one_iteration_energy"]).isel(variant=0)
+        answers |= {"one_iteration": float(rule["one_iteration_energy"]),
+                  "solved": float(rule["plain_energy"][-1])}  # fmt: skip
     return answers
 
 
 READ = (
-    ("grazing", Column.OUTCOME, pole_facts), ("steady-fast", Column.THIRD_TURN_PHASE, resonance_facts),
-    ("sleeping", Column.SLEEPING_THRESHOLD, sleeping_facts), ("separatrix", Column.HORIZON, separatrix_facts),
-    ("goldstein", Column.ENERGY_ONCE, sampling_facts),
+    ("grazing", "outcome", pole_facts), ("steady-fast", "third_turn_phase", resonance_facts),
+    ("sleeping", "sleeping_threshold", sleeping_facts), ("separatrix", "horizon", separatrix_facts),
+    ("goldstein", "energy_once", sampling_facts),
 )  # fmt: skip
 
 
@@ -128,7 +128,7 @@ def atlas_table(data: xr.Dataset) -> pd.DataFrame:
     rows: list[dict[str, Any]] = []
     for family in families(data):
         for name, one in maps(data, family).items():
-            limit = data[Column.LINEAR_LIMIT].sel(scene=family, variant=name) if Column.LINEAR_LIMIT in data else None
+            limit = data["linear_limit"].sel(scene=family, variant=name) if "linear_limit" in data else None
             rows.append({
                 "variant": name, "scene": family, "set": one.control.replace("step_size", "step"),
                 "accurate (%)": 100.0 * one.accurate,
@@ -146,13 +146,13 @@ def atlas_table(data: xr.Dataset) -> pd.DataFrame:
 
 
 LIMITS = {  # header: scene, variable
-    "nutations grow at h omega": ("steady-fast", Column.LIMIT_PHASE),
-    "first window of growth from": ("steady-fast", Column.WINDOW_START),
-    "a third of a turn at": ("steady-fast", Column.THIRD_TURN_PHASE),
-    "survives there (rad)": ("steady-fast", Column.SURVIVING_AT_THIRD_TURN),
-    "sleeps from a spin of": ("sleeping", Column.SLEEPING_THRESHOLD),
-    "energy error, every step": ("goldstein", Column.ENERGY_EVERY),
-    "energy error, once a nutation": ("goldstein", Column.ENERGY_ONCE),
+    "nutations grow at h omega": ("steady-fast", "limit_phase"),
+    "first window of growth from": ("steady-fast", "window_start"),
+    "a third of a turn at": ("steady-fast", "third_turn_phase"),
+    "survives there (rad)": ("steady-fast", "surviving_at_third_turn"),
+    "sleeps from a spin of": ("sleeping", "sleeping_threshold"),
+    "energy error, every step": ("goldstein", "energy_every"),
+    "energy error, once a nutation": ("goldstein", "energy_once"),
 }
 
 

@@ -20,7 +20,6 @@ from .atlas import OutcomeMap, families, maps
 from .failures import LOST, SEEN
 from .many_verdicts import JUDGED
 from .mechanisms import measured
-from .tables import Column
 
 KNOWN = (  # the variants whose maps are drawn, if they are there
     "stormer-verlet[angles]", "midpoint[angles]", "rk4[angles]", "rk4[axis]", "strang[axis]", "takahashi-imada[axis]",
@@ -32,8 +31,8 @@ OUTCOMES = {  # as the key names them; what ends early for any reason is one of 
     "crosses a turning point of the true motion": style.PURPLE, "ended early": style.BLACK,
     "accurate, not run": "#9FDAC8",
 }  # fmt: skip
-LINES = {Column.LINEAR_LIMIT: ("small nutations grow beyond", "-"),
-         Column.THIRD_TURN: ("a step turns the nutation by a third", (0, (4, 2)))}  # fmt: skip
+LINES = {"linear_limit": ("small nutations grow beyond", "-"),
+         "third_turn": ("a step turns the nutation by a third", (0, (4, 2)))}  # fmt: skip
 SETTINGS = {"step_size": "step (nutations)", "tolerance": "tolerance"}
 NAMED = ("stormer-verlet[angles]", "midpoint[angles]", "strang[axis]", "cayley[axis]", "gauss-4[axis]", "rk4[axis]")
 THEORY = {"color": style.BLACK, "lw": 0.9, "ls": (0, (1, 1.5)), "zorder": 4, "label": "theory"}
@@ -81,7 +80,7 @@ def _atlas(part: xr.Dataset, shown: Mapping[str, OutcomeMap]) -> Any:
         for variable, (_, dash) in LINES.items():
             if variable in part:
                 cell = part.sel(variant=name)
-                x, y = np.log10(cell[variable].values), np.log10(cell[Column.LIMIT_PARAMETER].values)
+                x, y = np.log10(cell[variable].values), np.log10(cell["limit_parameter"].values)
                 axis.plot(x, y, color="white", lw=2.2)
                 axis.plot(x, y, color="black", lw=0.9, ls=dash)
         axis.axis(limits)
@@ -125,18 +124,18 @@ def _lines(axis: Any, part: xr.Dataset, x: str, y: str, dots: bool = False) -> N
 
 
 def _pole(axis: Any, data: xr.Dataset) -> None:
-    _lines(axis, data.sel(scene="grazing"), Column.PARAMETER, Column.GRAZING_ERROR)
+    _lines(axis, data.sel(scene="grazing"), "parameter_value", "grazing_error")
     axis.set(xscale="log", yscale="log", title="a pole next to the path")
     axis.set(xlabel=r"gap $\delta$ to the pole (rad)", ylabel="largest axis error (rad)")
 
 
 def _resonance(axis: Any, data: xr.Dataset) -> None:
-    part, resonance = data.sel(scene="steady-fast"), (Column.THIRD_TURN_PHASE, Column.SURVIVING_AT_THIRD_TURN)
-    names = dict(zip(resonance, (Column.PHASE, Column.SURVIVING), strict=True))  # it lies between two of the grid
+    part, resonance = data.sel(scene="steady-fast"), ("third_turn_phase", "surviving_at_third_turn")
+    names = dict(zip(resonance, ("phase_value", "surviving"), strict=True))  # it lies between two of the grid
     part = xr.concat([part[list(names.values())], part[list(resonance)].rename(names)], "phase")
     for theory in (np.sqrt(3.0), 2.0 * np.sqrt(3.0)):
         axis.axvline(theory, **THEORY)
-    _lines(axis, part, Column.PHASE, Column.SURVIVING)
+    _lines(axis, part, "phase_value", "surviving")
     axis.set(
         xlabel=r"step $h\omega$ ($\omega$: frequency of the nutation)",
         ylabel="survives a displacement of (rad)",
@@ -145,7 +144,7 @@ def _resonance(axis: Any, data: xr.Dataset) -> None:
 
 
 def _separatrix(axis: Any, data: xr.Dataset) -> None:
-    _lines(axis, data.sel(scene="separatrix"), Column.EARLY_ERROR, Column.HORIZON, dots=True)
+    _lines(axis, data.sel(scene="separatrix"), "early_error", "horizon", dots=True)
     error = np.geomspace(1e-16, 0.1, 50)
     axis.plot(error, SEEN + 2.0 * np.log(LOST / error), **THEORY)
     axis.set(xscale="log", xlabel=rf"axis error at ${SEEN:g}/\lambda$ (rad)", title="next to the separatrix")
@@ -153,7 +152,7 @@ def _separatrix(axis: Any, data: xr.Dataset) -> None:
 
 
 def _sleep(axis: Any, data: xr.Dataset) -> None:
-    _lines(axis, data.sel(scene="sleeping"), Column.SLEEPING_STEP, Column.SLEEPING_THRESHOLD, dots=True)
+    _lines(axis, data.sel(scene="sleeping"), "sleeping_step", "sleeping_threshold", dots=True)
     steps = np.linspace(0.02, 1.0, 60)
     for law in (cayley_sleeps_from, strang_sleeps_from):
         axis.plot(steps, [law(float(h)) for h in steps], **THEORY)
@@ -161,6 +160,6 @@ def _sleep(axis: Any, data: xr.Dataset) -> None:
 
 
 MECHANISMS = (  # scene, variable that it needs, drawing
-    ("grazing", Column.GRAZING_ERROR, _pole), ("steady-fast", Column.SURVIVING, _resonance),
-    ("separatrix", Column.HORIZON, _separatrix), ("sleeping", Column.SLEEPING_THRESHOLD, _sleep),
+    ("grazing", "grazing_error", _pole), ("steady-fast", "surviving", _resonance),
+    ("separatrix", "horizon", _separatrix), ("sleeping", "sleeping_threshold", _sleep),
 )  # fmt: skip

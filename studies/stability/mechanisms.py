@@ -7,7 +7,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from .atlas import methods_of
-from .tables import Column
 
 BARELY = 0.02  # rad: a top that is lost at a smaller displacement is lost to a resonance
 NEXT = 1.05  # times the largest displacement up to which all stay, at most: the first that was lost
@@ -36,31 +35,31 @@ def variants_with(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
 def limits(part: xr.Dataset) -> dict[str, float]:
     """The least step, as h omega, at which small nutations grow, of the methods that have a limit."""
     return {
-        name: float(np.fmin(cell[Column.LIMIT_PHASE], cell.get(Column.WINDOW_START, math.nan)))
-        for name, cell in variants_with(part, Column.LIMIT_PHASE).items()
+        name: float(np.fmin(cell["limit_phase"], cell.get("window_start", math.nan)))
+        for name, cell in variants_with(part, "limit_phase").items()
     }  # a narrow window may come first
 
 
 def resonant(part: xr.Dataset) -> dict[str, float]:
     """By variant the linearly stable steps (h omega) where some small displacement is lost, and none just past."""
     phases = {}
-    for name, cell in variants_with(part, Column.THIRD_TURN_PHASE).items():
-        at, past = float(cell[Column.SURVIVING_AT_THIRD_TURN]), float(cell[Column.SURVIVING_PAST_THIRD_TURN])
+    for name, cell in variants_with(part, "third_turn_phase").items():
+        at, past = float(cell["surviving_at_third_turn"]), float(cell["surviving_past_third_turn"])
         if past > REVIVAL * at and NEXT * at < BARELY:
-            phases[name] = float(cell[Column.THIRD_TURN_PHASE])
+            phases[name] = float(cell["third_turn_phase"])
     return phases
 
 
 def outlasting(part: xr.Dataset) -> list[str]:
     """Variants with a run that stays accurate next to the separatrix longer than predicted, by over `OUTLASTS`."""
-    longer = (part[Column.HORIZON] - part[Column.PREDICTED_HORIZON]).transpose("variant", ...).values
+    longer = (part["horizon"] - part["predicted_horizon"]).transpose("variant", ...).values
     variants = zip(map(str, part["variant"].values), longer, strict=True)
     return [name for name, values in variants if np.max(values[np.isfinite(values)], initial=0.0) > OUTLASTS]
 
 
 def lawful(part: xr.Dataset) -> xr.DataArray:
     """To which runs next to the separatrix does the law of their early error apply?"""
-    early, methods, apart = part[Column.EARLY_ERROR], methods_of(part), outlasting(part)
+    early, methods, apart = part["early_error"], methods_of(part), outlasting(part)
     conserving = [
         name in apart or (name in methods and "energy" in (methods[name].conserves or ()))
         for name in map(str, part["variant"].values)
@@ -70,7 +69,7 @@ def lawful(part: xr.Dataset) -> xr.DataArray:
 
 def misses(part: xr.Dataset) -> NDArray[np.float64]:
     """By how much the law misses the accurate time of the runs to which it applies, in units of 1/λ."""
-    gap = np.abs(part[Column.HORIZON] - part[Column.PREDICTED_HORIZON]).where(lawful(part)).values
+    gap = np.abs(part["horizon"] - part["predicted_horizon"]).where(lawful(part)).values
     return np.asarray(gap[np.isfinite(gap)])
 
 
@@ -79,8 +78,8 @@ def sampled(part: xr.Dataset) -> tuple[list[str], dict[str, float]]:
 
     No ratio is formed with a number at rounding.
     """
-    pairs = {name: (float(cell[Column.ENERGY_ONCE]), float(cell[Column.ENERGY_EVERY]))
-             for name, cell in variants_with(part, Column.ENERGY_ONCE).items()}  # fmt: skip
+    pairs = {name: (float(cell["energy_once"]), float(cell["energy_every"]))
+             for name, cell in variants_with(part, "energy_once").items()}  # fmt: skip
     asked = {name: pair for name, pair in pairs.items() if pair[1] > LEAST_ASKED}
     hidden = [name for name, (once, _) in asked.items() if once <= LEAST_SAMPLED]
     return hidden, {name: every / once for name, (once, every) in asked.items() if name not in hidden}

@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.optimize import root
 from symtop_studies.reduction import commutation, facts, figures, study
 from symtop_studies.reduction.commutation import gap, kernel_path, path, reduced_first
-from symtop_studies.reduction.tables import Column, commutation_table, unreduced_forms
+from symtop_studies.reduction.tables import commutation_table, unreduced_forms
 
 import symtop
 from symtop.measure import datasets
@@ -31,7 +31,7 @@ def slope(scene_name, name):
     """The power of h with which the two orders approach each other over two nutations."""
     scene = symtop.scene(scene_name)
     table = commutation_table(scene, symtop.integrator(name), 2.0 * scene.nutation_period, COUNTS)
-    return power_law(table[Column.STEP], table[Column.GAP]).slope
+    return power_law(table["commutation_step_size"], table["commutation_gap"]).slope
 
 
 @pytest.mark.parametrize("scene_name", SCENES)
@@ -125,9 +125,9 @@ def test_a_method_that_has_no_reduced_twin_is_refused_in_one_sentence():
 def test_what_a_reduced_kernel_saves_is_split_into_iterations_and_the_time_of_one():
     dims = ("scene", "variant", "kernel", "twin_step")
     data = xr.Dataset(
-        {Column.SECONDS_A_STEP: (dims, [[[[1e-7, 1e-7], [2e-7, 3e-7]]]]),
-         Column.ITERATIONS_A_STEP: (dims, [[[[2.0, 1.5], [3.0, 4.5]]]]),
-         Column.COMPARED_STEP: (("scene", "variant", "twin_step"), [[[0.1, 0.01]]])},
+        {"seconds_per_step": (dims, [[[[1e-7, 1e-7], [2e-7, 3e-7]]]]),
+         "iterations_per_step": (dims, [[[[2.0, 1.5], [3.0, 4.5]]]]),
+         "twin_step_size": (("scene", "variant", "twin_step"), [[[0.1, 0.01]]])},
         coords={"scene": ["spheroid"], "variant": ["midpoint"], "kernel": ["reduced", "unreduced"]},
     )  # fmt: skip
     found, table = facts.facts(data), facts.tables(data)["kernels"]

@@ -23,7 +23,7 @@ from symtop_studies.factors.cells import (
     taylor_in_angles,
 )  # fmt: skip
 from symtop_studies.factors.facts import FACTORS, GOAL, charts, effects, fastest, first_goal, pairs, timed, waterfall
-from symtop_studies.factors.measures import LEAST, Column, Goal, factorial, settle
+from symtop_studies.factors.measures import LEAST, Goal, factorial, settle
 
 import symtop
 from symtop.measure import settings
@@ -47,8 +47,8 @@ def measured():
 @pytest.fixture(scope="module")
 def quiet(measured):
     """The same with times that agree from process to process."""
-    known = np.isfinite(measured[Column.SPREAD])
-    return measured.assign({Column.SPREAD: measured[Column.SPREAD].where(~known, 0.01)})
+    known = np.isfinite(measured["spread"])
+    return measured.assign({"spread": measured["spread"].where(~known, 0.01)})
 
 
 @pytest.fixture(scope="module")
@@ -124,9 +124,9 @@ def test_languages_of_one_method_have_the_same_setting_and_the_same_work(measure
     part = measured.isel(scene=0, horizon=0, target=0)
     for chart in ("angles", "axis", "attitude"):
         trio = [part.sel(variant=f"{name}[{chart}]") for name in ("rk45-compiled", "rk45", "rk45-numba")]
-        assert len({float(one[Column.SETTING]) for one in trio}) == 1
-        assert len({float(one[Column.FORCES]) for one in trio}) == 1
-        np.testing.assert_allclose([float(one[Column.AXIS]) for one in trio], float(trio[0][Column.AXIS]), rtol=1e-3)
+        assert len({float(one["setting"]) for one in trio}) == 1
+        assert len({float(one["force_evaluations"]) for one in trio}) == 1
+        np.testing.assert_allclose([float(one["axis"]) for one in trio], float(trio[0]["axis"]), rtol=1e-3)
 
 
 def test_what_is_not_within_the_budget_has_a_reason_and_no_time():
@@ -137,21 +137,21 @@ def test_what_is_not_within_the_budget_has_a_reason_and_no_time():
     assert list(settled.values())[1] == settings.BUDGET
     data = factorial(SCENE, ["Strang"], [goal._replace(languages=(COMPILED, NUMPY))], 1, 0.001, 1)
     slow, fast = (data.sel(variant=name, call=KERNEL).squeeze() for name in ("strang-numpy[axis]", "strang[axis]"))
-    assert (str(slow[Column.REASON].values), bool(np.isnan(slow[Column.SECONDS]))) == (settings.BUDGET, True)
-    assert (str(fast[Column.REASON].values), bool(np.isnan(fast[Column.SECONDS]))) == ("", False)
+    assert (str(slow["reason"].values), bool(np.isnan(slow["seconds"]))) == (settings.BUDGET, True)
+    assert (str(fast["reason"].values), bool(np.isnan(fast["seconds"]))) == ("", False)
 
 
 # ---- measured times --------------------------------------------------------------------------------------------------
 
 
 def test_every_time_is_the_median_of_its_processes(measured, rows):
-    samples, seconds = measured[Column.SAMPLES], measured[Column.SECONDS]
+    samples, seconds = measured["seconds_samples"], measured["seconds"]
     assert samples.sizes["process"] == 2
     assert np.array_equal(np.isfinite(seconds), np.isfinite(samples).all("process"))
     np.testing.assert_array_equal(seconds, np.median(samples, axis=samples.get_axis_num("process")))
     taken = samples.values[np.isfinite(seconds.values)]
     assert (np.ptp(taken, axis=-1) > 0.0).all()  # each process measures for itself
-    gap = measured[Column.SPREAD].values[np.isfinite(seconds.values)]
+    gap = measured["spread"].values[np.isfinite(seconds.values)]
     np.testing.assert_allclose(gap, 0.5 * np.ptp(taken, axis=-1) / np.median(taken, axis=-1))
     assert set(rows["call"]) == set(CALLS)
     assert set(rows["language"][rows["call"] == SOLVE_IVP]) == {SCIPY_PYTHON}
@@ -159,11 +159,11 @@ def test_every_time_is_the_median_of_its_processes(measured, rows):
 
 @pytest.mark.parametrize(("share", "busy"), [(0.0, None), (facts.NOISY_SHARE, None), (0.2, True)])
 def test_times_of_a_busy_machine_are_not_compared(quiet, share, busy):
-    spread = quiet[Column.SPREAD].values.copy()
+    spread = quiet["spread"].values.copy()
     known = np.flatnonzero(np.isfinite(spread))
     loud = int(share * known.size)
     spread.flat[known[:loud]] = 1.01 * facts.NOISY
-    data = quiet.assign({Column.SPREAD: (quiet[Column.SPREAD].dims, spread)})
+    data = quiet.assign({"spread": (quiet["spread"].dims, spread)})
     found = facts.facts(data)
     assert (found["loud"], found["times"], found["busy"]) == (loud, known.size, busy)
     assert (found["whole"] is None) == np.isnan(found["user_most"]) == bool(busy)
@@ -174,7 +174,7 @@ def test_times_of_a_busy_machine_are_not_compared(quiet, share, busy):
 
 
 def test_where_nothing_was_timed_nothing_is_said(quiet):
-    nothing = quiet.assign({name: quiet[name] * np.nan for name in (Column.SECONDS, Column.SPREAD)})
+    nothing = quiet.assign({name: quiet[name] * np.nan for name in ("seconds", "spread")})
     found = facts.facts(nothing)
     assert found["whole"] is found["busy"] is None
     assert found["times"] == 0

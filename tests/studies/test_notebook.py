@@ -12,7 +12,6 @@ from symtop_studies.notebook.long_energy import better_from
 from symtop_studies.notebook.measures import (
     SOLVER,
     SOLVER_TOLERANCE,
-    Column,
     both_derivations,
     discrete_methods,
     modified_energy_table,
@@ -168,8 +167,8 @@ def test_the_hard_way_and_the_easy_way_agree(name):
         kernel = accelerations(top.I1, top.I3, top.mgl, theta, theta_dot, phi_dot, psi_dot)
         assert hard[[4, 3, 5]] == pytest.approx(kernel, rel=1e-11, abs=1e-10)
     both = both_derivations(scene)
-    assert float(both[Column.DERIVATIONS_GAP].max()) < 1e-10
-    assert float(both[Column.HARD_GAP].max()) < 1e-10
+    assert float(both["ways_gap"].max()) < 1e-10
+    assert float(both["hard_gap"].max()) < 1e-10
 
 
 def test_the_two_energies_are_reconciled():
@@ -200,8 +199,8 @@ def test_alpha_contradicts_a_release_at_rest():
 def test_the_modified_energy_is_kept_to_fourth_order(method):
     scene = symtop.scene("spheroid")
     table = modified_energy_table(scene, method, [scene.nutation_period / (60.3 * 2.0**k) for k in range(5)])
-    assert power_law(table[Column.MODIFIED_STEP], table[Column.ENERGY_CHANGE]).slope == pytest.approx(2.0, abs=0.03)
-    assert power_law(table[Column.MODIFIED_STEP], table[Column.MODIFIED_CHANGE]).slope == pytest.approx(4.0, abs=0.06)
+    assert power_law(table["shadow_step_size"], table["energy_swing"]).slope == pytest.approx(2.0, abs=0.03)
+    assert power_law(table["shadow_step_size"], table["modified_swing"]).slope == pytest.approx(4.0, abs=0.06)
 
 
 def test_the_modified_energy_of_another_method_is_not_conserved():
@@ -259,10 +258,10 @@ def long_runs(level, slope):
     time = np.geomspace(1.0, 1000.0, 301)
     coords = {"scene": ["spheroid"], "variant": ["midpoint[angles]", SOLVER]}
     return xr.Dataset({
-        Column.LONG_TIME: (("scene", "variant", "long"), [[time, time]]),
-        Column.LONG_ENERGY: (("scene", "variant", "long"), [[np.full(301, level), slope * time]]),
+        "long_time": (("scene", "variant", "long"), [[time, time]]),
+        "long_energy": (("scene", "variant", "long"), [[np.full(301, level), slope * time]]),
         "energy_largest": (("scene", "variant"), [[level, slope * 8.0]]),
-        Column.SAMPLE_TIME: (("scene", "variant", "sample"), np.full((1, 2, 1), 8.0)),
+        "sample_time": (("scene", "variant", "sample"), np.full((1, 2, 1), 8.0)),
     }, coords=coords)  # fmt: skip
 
 
@@ -276,8 +275,8 @@ def test_the_notebooks_question_is_answered_and_the_time_from_which_its_hope_is_
 
 def test_the_notebooks_path_is_turned_by_a_quarter_about_the_vertical():
     phi = np.linspace(0.1, 1.0, 5)
-    angles = {Column.SOLVER_THETA: 0.5 + phi, Column.SOLVER_PHI: phi, Column.TRUE_THETA: 0.5 + phi,
-              Column.TRUE_PHI: phi}  # fmt: skip
+    angles = {"hard_theta": 0.5 + phi, "hard_phi": phi, "true_theta": 0.5 + phi,
+              "true_phi": phi}  # fmt: skip
     data = xr.Dataset(
         {name: (("scene", "variant", "path"), values[None, None]) for name, values in angles.items()},
         coords={"scene": ["spheroid"], "variant": [SOLVER]},
