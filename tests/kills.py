@@ -1,6 +1,6 @@
 """kill -9 at random moments of `symtop study`, and the same command again until it is through.
 
-python -m tests.kills --all --quick        30 kills over one pass of every study: eight minutes on two quiet cores
+python -m tests.kills --all --quick        30 kills over one pass of every study; some four times as long as a pass
 """
 
 import contextlib
