@@ -104,10 +104,9 @@ class Writer:
         size = f' width="{shown["width"]}" height="{shown["height"]}"' if shown else ""
         lazy = ' loading="lazy" decoding="async"' if self._shown >= AT_ONCE else ""
         self._shown += 1
-        film = ' class="film"' if address.endswith(".gif") else ""
         name = self.anchor(Path(address).stem)
         return (
-            f'<figure id="{name}"><div class="scroll" tabindex="0" role="region" aria-label="Figure {name}"><img{film} '
+            f'<figure id="{name}"><div class="scroll" tabindex="0" role="region" aria-label="Figure {name}"><img '
             f'src="{shown.get("source", address)}"{size}{lazy} alt="{alt}"></div>'
             "<figcaption></figcaption></figure>"
         )

@@ -8,7 +8,7 @@ of print, 6.5 inches, and its text is at least 7 points high there.
 import textwrap
 import zlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -16,13 +16,9 @@ import numpy as np
 
 from symtop.core import netcdf
 
-if TYPE_CHECKING:
-    from PIL import Image
-
 WIDTH = 6.5  # inches, of a figure: the text block of a page
 LEAST_TEXT = 7.0  # points, of any text at that width
 DPI, SKETCHED = 200, 100
-LEVEL = 7  # of the compression of a picture: a sixth of the time of 9, for 7 % more bytes
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
@@ -137,37 +133,8 @@ def use() -> None:
     plt.rcParams.update(PAPER)
 
 
-def compact(picture: "Image.Image") -> "Image.Image":
-    """A picture with 256 colours, a third of the bytes: ours exactly as they are, the rest as the picture needs.
-
-    A palette made from the picture alone would merge the colour of a few small markers with a neighbour's.
-    """
-    from PIL import Image  # matplotlib brings it
-    from PIL.ImageColor import getrgb
-
-    shades = [shade for family in SHADES.values() for shade in family]
-    ours = dict.fromkeys([*shades, *(look.color for look in _LOOKS.values()), "#FFFFFF"])
-    fixed = np.array([getrgb(color) for color in ours], np.uint8)
-    picture = picture.convert("RGB")
-    free = picture.quantize(256 - len(ours)).getpalette() or []
-    palette = Image.new("P", (1, 1))
-    palette.putpalette([*fixed.ravel().tolist(), *free][:768])
-    drawn = picture.quantize(palette=palette, dither=Image.Dither.NONE)
-    colors, known = (  # every colour as one number
-        np.asarray(image.convert("RGBA")).view(np.uint32)[..., 0]
-        for image in (picture, Image.fromarray(fixed[np.newaxis]))
-    )
-    known = known.ravel()
-    order = np.argsort(known)
-    nearest = order[np.minimum(np.searchsorted(known, colors, sorter=order), len(known) - 1)]
-    # The library's search for the nearest is a little coarse.
-    places = np.where(known[nearest] == colors, nearest, np.asarray(drawn))
-    drawn.frombytes(places.astype(np.uint8).tobytes())
-    return drawn
-
-
 def save(figure: Any, target: Path) -> None:
-    """Write a figure as a compact PNG, an SVG or a PDF, or a film as it is, whole or not at all, and close it."""
+    """Write a figure as a PNG, an SVG or a PDF, whole or not at all, and close it."""
     _write(figure, target)
     plt.close(figure)
 
@@ -179,7 +146,7 @@ def sketch(figure: Any, target: Path) -> None:
 
 
 def publish(figure: Any, target: Path) -> None:
-    """Write a figure as a PNG and, for print, as a PDF beside it, laid out once; a film has no PDF."""
+    """Write a figure as a PNG and, for print, as a PDF beside it, laid out once."""
     _write(figure, target)
     if target.suffix == ".png":
         figure.set_layout_engine("none")
@@ -191,7 +158,6 @@ def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
     """A figure in a file of its kind; ``savefig`` would draw a PNG or a PDF twice, once to lay it out."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
-    from PIL import Image
 
     metadata = {UNDATED.get(target.suffix, "Software"): None}
     netcdf.sweep(target)
@@ -202,10 +168,6 @@ def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
         figure.set_dpi(dpi)
         if target.suffix == ".pdf":
             FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
-        elif dpi == DPI:
-            canvas = FigureCanvasAgg(figure)
-            canvas.draw()
-            compact(Image.fromarray(np.asarray(canvas.buffer_rgba()))).save(path, compress_level=LEVEL)
         else:
             FigureCanvasAgg(figure).print_png(path, metadata=metadata)
 

@@ -88,6 +88,7 @@ class StudyCases:
         """Have cases computed, with a progress bar where somebody is watching."""
         script = str(file_of(self.study.name))
         tasks = [Task(script, case, path, plugins.loaded(), limit, fresh) for path, case in missing.items()]
+        before = self.computed + len(self.failures)
         with beating(progress_bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case")) as bar:
 
             def on_result(task: Task, result: Result) -> None:
@@ -97,7 +98,8 @@ class StudyCases:
                     self.failures.append(result.message)
                     bar.set_postfix_str(f"{len(self.failures)} failed", refresh=False)
                 self.computed += result.state == "computed"
-                post(f"{self.study.name}: {self.computed + len(self.failures)} of {len(tasks)} cases")
+                done = self.computed + len(self.failures) - before
+                post(f"{self.study.name}: {done} of {len(tasks)} cases")
                 bar.update()
 
             pool.run(self.study, tasks, on_result)
