@@ -23,11 +23,14 @@ LINES = {  # label, colour and line; what is not here is pale
     "dop853-compiled[axis]": ("DOP853, compiled", "#8C510A", "-"),
     "gauss-8[axis]": ("Gauss 8", PURPLE, "-"),
     "strang[axis]": ("Strang splitting", "#66A61E", "-"),
-    "takahashi-imada[axis]": ("Takahashi-Imada", "#00573F", "-"),
+    "takahashi-imada[axis]": ("Takahashi-Imada (symmetric)", "#00573F", "-"),
     "taylor[axis]": ("Taylor (heyoka)", BLACK, "-"),
     "rk45[axis]": ("RK45 through SciPy", VERMILLION, SCIPY),
 }
-OTHERS = {"series[axis]": "Taylor for this top", "dop853[axis]": "DOP853 through SciPy"}  # names of pale ones
+OTHERS = {  # pale ones
+    "series[axis]": ("Taylor for this top", PALE, "-"), "dop853[axis]": ("DOP853 through SciPy", PALE, SCIPY),
+    "tsit5-fixed[axis]": ("Tsit5", PALE, "-"), "vern9-fixed[axis]": ("Vern9", PALE, "-"),
+}  # fmt: skip
 LEAST, MOST = 1e-16, 3.0  # rad, of the panel
 COSTS = {"time of a run, one core (s)": "seconds", "force evaluations": "force_evaluations"}
 ERRORS = {
@@ -52,8 +55,8 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         good = np.isfinite(x) & np.isfinite(y) & (y < MOST)
         if name == REFERENCE or not good.any():
             continue
-        other = OTHERS.get(name, split_name(name)[0]), look(name).color if few else PALE, "-"
-        label, color, dash = LINES.get(name, other)
+        other = split_name(name)[0], look(name).color if few else PALE, "-"
+        label, color, dash = (LINES | OTHERS).get(name, other)
         x, y = x[good], np.maximum(y[good], 0.3 * level)
         thick = (1.0, 1.5, 1.5) if color == PALE else (1.7, 2.4, 2.0)
         axis.plot(x, y, color=color, ls=dash, marker="o", **dict(zip(("lw", "ms", "zorder"), thick, strict=True)))
