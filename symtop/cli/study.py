@@ -240,20 +240,12 @@ def check_all(
 def report(results: str, embed: bool) -> None:
     """Gather the findings of all studies into one page beside its figures.
 
-    If the folder holds no findings and its folder ``quick`` does, the page is made of those of ``quick``. A page that
-    is up to date is not written again.
+    If the folder holds no findings and its folder ``quick`` does, the page is made of those of ``quick``.
     """
-    from symtop.report.sources import report_hash
-    from symtop.runner import manifest
-
     folder = Path(results)
     if not any(folder.glob("*.json")) and any((folder / "quick").glob("*.json")):
         common.warn(f"{folder} holds no findings; the report is made of those in {folder / 'quick'}")
         folder /= "quick"
-    made_of = report_hash(folder, embed=embed)
-    if not click.get_current_context().meta.get(common.PLUGINS) and manifest.is_current(folder, manifest.PAGE, made_of):
-        click.echo(f"report: {folder / manifest.PAGE} (up to date)")
-        return
     from symtop.report import page
 
     click.echo(f"report: {page.write(folder, embed=embed)}")

@@ -105,15 +105,13 @@ def card(ledger: StepLedger, path: str | Path) -> Path:
         described=description(ledger.findings),
         badge=badge(ledger),
         drawings=[_as_svg(figure) for figure in figures(ledger)],
-        rows=[_row(one) for one in ledger.findings if one.declared or one.verdict != "inapplicable"],
+        rows=[
+            one.plain() | {"verdict": f"{SIGNS[one.verdict]} {one.verdict}", "claim": claim_name(one.claim)}
+            for one in ledger.findings
+            if one.declared or one.verdict != "inapplicable"
+        ],
     )
     return _written(text, path)
-
-
-def _row(finding: Finding) -> dict[str, str]:
-    verdict = f"{SIGNS[finding.verdict]} {finding.verdict}"
-    cells = finding.plain() | {"verdict": verdict, "claim": claim_name(finding.claim)}
-    return {name: str(value) for name, value in cells.items()}
 
 
 def badge(ledger: StepLedger) -> str:

@@ -14,16 +14,11 @@ BELOW = "below the reference's error bound"
 MOST_NAMED = 9  # variants with a name of their own in a figure
 
 
-def bound_of(bounds: Any, least: float = 1e-16) -> float:
-    """The median error bound of the reference, or `least` without one."""
-    return float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else least
-
-
 def error_band(axis: Any, bounds: Any, least: float = 1e-16) -> float:
     """Shade all that lies below the median error bound of the reference; returns that bound, or `least` without one."""
     from matplotlib.patches import Rectangle
 
-    level = bound_of(bounds, least)
+    level = float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else least  # of the reference
     shape = {"color": "#BBBBBB", "alpha": 0.45, "lw": 0, "label": BELOW, "transform": axis.get_yaxis_transform()}
     axis.add_artist(Rectangle((0.0, LOWEST), 1.0, level - LOWEST, **shape))  # to the frame, which it does not move
     return level

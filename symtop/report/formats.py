@@ -74,12 +74,9 @@ FILTERS = (number, count, percent, power, fixed, duration, microseconds, code, c
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table as GitHub-flavoured Markdown."""
-    lines = ["| " + " | ".join(_escaped(cell) for cell in row) + " |" for row in [header, *rows]]
+    escaped = [[cell.replace("|", "\\|").replace("<", "\\<") for cell in row] for row in [header, *rows]]
+    lines = [f"| {' | '.join(row)} |" for row in escaped]
     return "\n".join([lines[0], "|" + "---|" * len(header), *lines[1:]])
-
-
-def _escaped(cell: str) -> str:
-    return cell.replace("|", "\\|").replace("<", "\\<")
 
 
 def columns(records: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[Any]]]:

@@ -121,11 +121,8 @@ class Writer:
         for cell, content in itertools.pairwise(block):
             if cell.type == "td_open" and len(content.content) > LONG and " " in content.content:
                 cell.attrSet("class", "words")
-        body = (
-            self._rendered(block)
-            .replace("<table>", f'<table data-name="{name}">', 1)
-            .replace("<th>", '<th scope="col">')
-        )
+        body = self._rendered(block).replace("<th>", '<th scope="col">')
+        body = body.replace("<table>", f'<table data-name="{name}">', 1)
         return (
             f'<div class="scroll" tabindex="0" role="region" aria-label="{html.escape(title) or "Table"}">{body}</div>'
         )

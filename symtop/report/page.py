@@ -27,13 +27,11 @@ from symtop.model.scenes import scenes
 from symtop.model.top import flat
 from symtop.report import formats, template
 from symtop.report.html import Writer, slug
-from symtop.report.sources import report_files, report_hash
 from symtop.report.style import look
-from symtop.run import plugins
 from symtop.run.reference.truth import reference
-from symtop.runner import manifest, run as runner
+from symtop.runner import run as runner
 
-WORDS, REFERENCE = "report.md", "reference.md"
+PAGE, WORDS, REFERENCE = "report.html", "report.md", "reference.md"
 TEMPLATES = Path(__file__).parent / "templates"
 EQUATIONS = "The equations, the scenes and the exact motion"
 READING = "**How to read it.**"  # of the page of a benchmark, where its part for reference begins
@@ -55,12 +53,12 @@ def _series(name: str, points: Sequence[tuple[float | None, float | None, str]])
         "color": style.color,
         "marker": style.marker,
         "dashed": method is not None and method.implementation == "python",
-        "points": [list(point) for point in points if len(point) > 3 or all(map(_drawn, point[:2]))],
+        "points": [
+            list(point)
+            for point in points
+            if len(point) > 3 or all(0.0 < (value or 0.0) < math.inf for value in point[:2])
+        ],
     }
-
-
-def _drawn(value: float | None) -> bool:
-    return value is not None and 0.0 < value < math.inf
 
 
 def gather(results: Path) -> list[dict[str, Any]]:
@@ -179,7 +177,6 @@ def write(results: Path, *, embed: bool = False) -> Path:
         loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    made_of, sources = report_hash(results, embed=embed), report_files(results)
     studies = gather(results)
     parts, more = texts(results, studies)
     images = {
@@ -207,12 +204,10 @@ def write(results: Path, *, embed: bool = False) -> Path:
         provenance=studies[-1]["provenance"],
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
     )
-    target = results / manifest.PAGE
+    target = results / PAGE
     netcdf.write_text(target, text)
     netcdf.write_text(results / WORDS, "\n".join(parts.values()))
     netcdf.write_text(results / REFERENCE, "# For reference\n\n" + "\n".join(more.values()))
-    written = [target, results / WORDS, results / REFERENCE]
-    manifest.note(results, manifest.PAGE, "" if plugins.loaded() else made_of, [*written, *sources])
     return target
 
 
