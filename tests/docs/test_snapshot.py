@@ -136,6 +136,7 @@ def test_what_a_run_of_the_studies_writes_is_not_tracked():
         "live-engines.json",
         "peers.json",
         "horizon.json",
+        "repeat.json",
         "peers.nc",
         "figures/peers-fronts.png",
     )
