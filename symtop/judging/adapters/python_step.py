@@ -230,7 +230,7 @@ def _matrix_of(top: SymmetricTop, at: Angles) -> tuple[Body, tuple[float, ...]]:
 
 
 def _with_quaternions(states: Array) -> Array:
-    """States (q, w) of states (R, w): q of the nearest rotation, |q|^2 the length of R's third column; NaN without one."""
+    """States (q, w) of states (R, w): q of the nearest rotation, |q|^2 the length of R's third column; NaN if none."""
     shown = np.full((len(states), 7), np.nan)
     for k, state in enumerate(states):
         if np.isfinite(state).all() and np.linalg.det(state[:9].reshape(3, 3)) > 0.0:
