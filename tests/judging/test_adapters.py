@@ -526,6 +526,13 @@ def test_a_matrix_that_is_no_rotation_any_more_is_seen():
     assert 1e-13 < abs(lengths[-1] - 1.0) < 1e-3
 
 
+def test_a_matrix_that_is_left_handed_ends_the_run():
+    """As a step that blows up may return it; SciPy raises an error of its own."""
+    run = of_rotation(lambda R, w, h, inertia, torque: (R @ np.diag([1.0, 1.0, -1.0]), w), 0.01, 0.1)
+    assert run.attrs["outcome"] == "not_finite"
+    assert run.attrs["reached_time"] == 0.0
+
+
 def test_the_order_of_a_quaternion_is_said_where_a_step_is_refused():
     def of_a_rotation(q, w, h, inertia, torque):
         return q

@@ -230,10 +230,10 @@ def _matrix_of(top: SymmetricTop, at: Angles) -> tuple[Body, tuple[float, ...]]:
 
 
 def _with_quaternions(states: Array) -> Array:
-    """States (q, w) of states (R, w): q of the nearest rotation, and the length of R's third column is |q|^2."""
+    """States (q, w) of states (R, w): q of the nearest rotation, |q|^2 the length of R's third column; NaN if none."""
     shown = np.full((len(states), 7), np.nan)
     for k, state in enumerate(states):
-        if np.isfinite(state).all():
+        if np.isfinite(state).all() and np.linalg.det(state[:9].reshape(3, 3)) > 0.0:
             matrix = state[:9].reshape(3, 3)
             x, y, z, w = Rotation.from_matrix(matrix).as_quat()
             shown[k] = *(np.sqrt(np.linalg.norm(matrix[:, 2])) * np.array([w, x, y, z])), *state[9:]
