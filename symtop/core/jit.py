@@ -46,6 +46,7 @@ set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new
 MOST_BYTES = 200_000_000  # of kernels that are kept, about 2000 of them
 OPTIONS = {"error_model": "numpy", "nogil": True}  # division by zero gives infinity, as in C; threads run at once
 HASH = hashlib.sha256().digest_size  # bytes before the code in its file
+NAMES = "by content"  # of kernels: those that were stored before may share one
 WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # kernels alone call it: 14 % less to compile
 INLINED = {"forceinline": True, **WITHIN}
 
@@ -226,17 +227,26 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     a NamedTuple has none either, but follows from the fields, which are part of what the kernel is made of.
     """
     _register_parts()
-    kernel = njit(**OPTIONS)(function)
-    kernel.compile = _once(kernel, kernel.compile)
     parts = code_of(function)
+    made_of = digest(by_file(parts) | {"names": NAMES})
+    kernel = njit(**OPTIONS)(_named(function, made_of))
+    kernel.compile = _once(kernel, kernel.compile)
     functions = (part.thing for part in parts if isinstance(part.thing, FunctionType))
     written = [part for part in functions if not part.__module__.startswith("namedtuple_")]
     if all(Path(part.__code__.co_filename).is_file() for part in written):
-        folder = cache_root() / "kernels" / digest(by_file(parts))
+        folder = cache_root() / "kernels" / made_of
         if all(map(is_trusted, (cache_root(), folder.parent, folder))):
             touch(folder)
             kernel._cache = _Cache(function, folder)
     return kernel
+
+
+def _named(function: Any, made_of: str) -> FunctionType:
+    """The function under a name of its own: LLVM finds machine code by name, and numba counts names by process."""
+    own = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__,
+                       function.__closure__)  # fmt: skip
+    own.__qualname__, own.__module__ = f"{function.__qualname__}_{made_of[:16]}", function.__module__
+    return own
 
 
 def is_cached(kernel: Any, signature: Any) -> bool:

@@ -97,3 +97,18 @@ def test_a_full_disk_costs_time_and_no_run(monkeypatch, tmp_path):
     assert not list(tmp_path.rglob("*.nbc"))
     assert compile_kernel(_doubled)(2.0) == 4.0
     assert list(tmp_path.rglob("*.nbc"))
+
+
+def test_kernels_of_one_factory_have_names_of_their_own():
+    """Machine code is found by name: two stored kernels of one name, loaded into one process, would be one."""
+
+    def adding(number):
+        def added(x):
+            return x + number
+
+        return compile_kernel(added)
+
+    one, same, other = adding(1.0), adding(1.0), adding(2.0)
+    assert (one(1.0), same(1.0), other(1.0)) == (2.0, 2.0, 3.0)
+    names = [kernel.py_func.__qualname__ for kernel in (one, same, other)]
+    assert names[0] == names[1] != names[2]
