@@ -31,6 +31,8 @@ def main() -> None:
     parser.add_argument("--nutations", type=float, default=1e8)
     parser.add_argument("--results", type=Path, default=Path("results"))
     options = parser.parse_args()
+    if options.nutations < 10.0 * FITTED:
+        parser.error(f"--nutations must be at least {10.0 * FITTED:g}, not {options.nutations:g}")
     facts, tops = measured.circumstances(), far.tops_of(TOPS, SEED)
     ends = far.horizons()[far.horizons() <= 1.0001 * options.nutations]
     ((errors, work),) = far.measured(integrator(NAME), tops, [far.Asked(STEPS, ends, np.inf)])

@@ -34,13 +34,13 @@ class Shown(NamedTuple):
 
 def sections(report: str) -> dict[str, tuple[str, list[Shown]]]:
     """Of each section of the report that has figures: its text, and its figures in order."""
-    found: dict[str, tuple[str, list[Shown]]] = {}
+    with_figures: dict[str, tuple[str, list[Shown]]] = {}
     first, *others = re.split(r"^## ", report, flags=re.MULTILINE)
     for title, _, text in [(FRONT, "", first), *(part.partition("\n") for part in others)]:
         shown = SHOWN.finditer(text)
         if figures := [Shown(one["file"], one["title"] or "", one["alt"], one["caption"]) for one in shown]:
-            found[title.strip()] = (text, figures)
-    return found
+            with_figures[title.strip()] = (text, figures)
+    return with_figures
 
 
 def maker(file: str, root: Path = ROOT) -> tuple[str, str]:

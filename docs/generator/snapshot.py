@@ -41,17 +41,17 @@ def take(results: Path, snapshot: Path) -> list[str]:
     for name in names:
         shutil.copyfile(results / "figures" / name, snapshot / "figures" / name)
     for file in (results / name for name in ("report.md", "reference.md") if (results / name).is_file()):
-        text = STORED.sub(lambda found: found[1] or "", file.read_text(encoding="utf-8"))
+        text = STORED.sub(lambda link: link[1] or "", file.read_text(encoding="utf-8"))
         (snapshot / file.name).write_text(text, encoding="utf-8")
     return names
 
 
 def answer(report: str, question: str) -> str:
     """The paragraph below the heading that begins with a question. SystemExit if there is none."""
-    found = re.search(rf"^## {re.escape(question)}.*\n\n(.+)$", report, flags=re.MULTILINE)
-    if found is None:
+    page = re.search(rf"^## {re.escape(question)}.*\n\n(.+)$", report, flags=re.MULTILINE)
+    if page is None:
         sys.exit(f"snapshot: the report has no page with the question {question}")
-    return wrapped(found[1]) + "\n"
+    return wrapped(page[1]) + "\n"
 
 
 def wrapped(paragraph: str) -> str:

@@ -181,8 +181,8 @@ def named_variants(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
 
 def ratios(data: xr.Dataset) -> dict[str, np.ndarray]:
     """Axis errors over tolerances of every adaptive variant on all scenes, where the tolerance rules."""
-    found: dict[str, list[np.ndarray]] = {}
+    by_name: dict[str, list[np.ndarray]] = {}
     for (on, name), fit in tolerance_fits(data).items():
         cell = data.sel(scene=on, variant=name)
-        found.setdefault(name, []).append((cell[MAIN] / cell["tolerance"]).values[fit.used])
-    return {name: np.concatenate(parts) for name, parts in found.items()}
+        by_name.setdefault(name, []).append((cell[MAIN] / cell["tolerance"]).values[fit.used])
+    return {name: np.concatenate(parts) for name, parts in by_name.items()}

@@ -38,7 +38,7 @@ import numpy as np
 import xarray as xr
 from symtop_studies.memoize import of_one_dataset
 
-from symtop.measure.timing import timings
+from symtop.measure.timing import quartile_spread, timings
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.charts import Array
@@ -180,8 +180,7 @@ class Prices(NamedTuple):
 
 def spread_of(values: Array) -> Array:
     """The distance of the quartiles over the median, along the first axis; infinite where too few are left."""
-    low, middle, high = np.nanquantile(values, (0.25, 0.5, 0.75), axis=0)
-    return np.where(np.isfinite(values).sum(axis=0) >= ENOUGH, (high - low) / middle, np.inf)
+    return np.where(np.isfinite(values).sum(axis=0) >= ENOUGH, quartile_spread(values, axis=0), np.inf)
 
 
 def combined(price: Array, call: Array) -> tuple[Array, Array, Array, Array]:

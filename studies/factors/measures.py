@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.measure import settings
-from symtop.measure.timing import first_call, timings
+from symtop.measure.timing import first_call, quartile_spread, timings
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 
@@ -99,21 +99,15 @@ def timed(asked: Runs, processes: int) -> Array:
     return np.array(answers).T
 
 
-def spread(samples: Array) -> Array:
-    """The distance of the quartiles over the median, of samples (..., processes)."""
-    low, middle, high = np.quantile(samples, (0.25, 0.5, 0.75), axis=-1)
-    return (high - low) / middle
-
-
 def settled_times(asked: Runs, processes: int) -> Array:
     """As `timed`, with those that are noisy taken again."""
     taken = timed(asked, processes)
     for _ in range(TRIES - 1):
-        loud = np.flatnonzero(spread(taken) > NOISY)
+        loud = np.flatnonzero(quartile_spread(taken) > NOISY)
         if not loud.size:
             break
         again = timed(asked._replace(runs=[asked.runs[i] for i in loud]), processes)
-        closer = spread(again) < spread(taken[loud])
+        closer = quartile_spread(again) < quartile_spread(taken[loud])
         taken[loud[closer]] = again[closer]
     return taken
 
@@ -129,6 +123,7 @@ def factorial(
     numbers = {name: np.full(shape, math.nan) for name in names}
     reasons = np.full(shape, "", dtype=object)
     samples = np.full((*shape, len(CALLS), processes), math.nan)
+    spread = np.full((*shape, len(CALLS)), math.nan)
     places, runs = [], []
     for goal in goals:
         part = [cell for cell in grid if cell.language in goal.languages]
@@ -144,8 +139,9 @@ def factorial(
                 if caller(scene, cell, call, met.setting, met.horizon) is not None:
                     places.append((grid.index(cell), *at, CALLS.index(call)))
                     runs.append((cell.name, call, met.setting, met.horizon))
-    for place, taken in zip(places, settled_times(Runs(scene, runs, rounds, batch), processes), strict=True):
-        samples[place] = taken
+    times = settled_times(Runs(scene, runs, rounds, batch), processes)
+    for place, taken, wide in zip(places, times, quartile_spread(times), strict=True):
+        samples[place], spread[place] = taken, wide
     dims = ("variant", "horizon", "target")
     table = xr.Dataset(
         {name: (dims, values) for name, values in numbers.items()}
@@ -155,4 +151,4 @@ def factorial(
         },
     )  # fmt: skip
     dims = (*dims, "call")
-    return table.assign({"seconds": (dims, np.median(samples, -1)), "spread": (dims, spread(samples))})
+    return table.assign({"seconds": (dims, np.median(samples, -1)), "spread": (dims, spread)})

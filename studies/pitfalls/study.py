@@ -91,19 +91,19 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
 
 def lines(data: xr.Dataset) -> list[list[tuple[str, str, Any, Any]]]:
     """Name, colour, x and y of the lines of each panel."""
-    found: list[list[tuple[str, str, Any, Any]]] = [[], [], []]
+    curves: list[list[tuple[str, str, Any, Any]]] = [[], [], []]
     for name, color in ((WITHOUT, VERMILLION), (WITH, BLUE), (RIGHT, GREEN)):
         if (one := run_of(data, TERM, name)) is not None:
-            found[0].append((LABELS[name], color, one["steps"].values, one["axis"].max("sample").values))
+            curves[0].append((LABELS[name], color, one["steps"].values, one["axis"].max("sample").values))
     if (one := run_of(data, FALLING, ANGLES)) is not None:
         late = one.isel(setting=0, sample=slice(1, None))
         for key, color, label in (("axis", VERMILLION, "axis (rad)"), ("energy", BLUE, "energy (relative)")):
-            found[1].append((label, color, late["time"].values, late[key].values))
+            curves[1].append((label, color, late["time"].values, late[key].values))
     for name, color, label in ((ANGLES, VERMILLION, ENDED), (AXIS, GREEN, "in the axis")):
         if (one := run_of(data, POLE, name)) is not None:
             late = one.isel(setting=0, sample=slice(1, None))
-            found[2].append((label, color, late["time"].values, late["axis"].values))
-    return [[(label, color, x[y > 0.0], y[y > 0.0]) for label, color, x, y in each] for each in found]
+            curves[2].append((label, color, late["time"].values, late["axis"].values))
+    return [[(label, color, x[y > 0.0], y[y > 0.0]) for label, color, x, y in each] for each in curves]
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:

@@ -182,8 +182,8 @@ def cite(files: tuple[Path, ...]) -> None:
         sources[name] = []
         with contextlib.suppress(SymtopError):  # not registered here
             sources[name] = citation_keys(integrator(name))
-    keys = dict.fromkeys(key for found in sources.values() for key in found)
+    keys = dict.fromkeys(key for entries in sources.values() for key in entries)
     for text in [PACKAGE, *(bibliography()[key] for key in keys)]:
         click.echo(text + "\n")
-    if unknown := [name for name, found in sources.items() if not found]:
+    if unknown := [name for name, entries in sources.items() if not entries]:
         click.echo(f"symtop: no source is known of {', '.join(unknown)}", err=True)

@@ -15,7 +15,8 @@ from symtop.cli.common import File, as_text, check_outputs, completing, say, say
 from symtop.core.errors import SymtopError, whole
 from symtop.core.progress import ticking
 
-FEW, MANY = 100_000, 20  # steps that are timed before a run of many times as many
+FEWEST, FEW, MANY = 1000, 100_000, 20  # steps that are timed before a run of many times as many
+LONG_ENOUGH = 0.1  # seconds of steps that are timed
 SAME = 0.01  # relative difference of the step used from --step-size that is printed
 COMPARED = 100_000  # tops whose errors are shown, the first of the population: those of a million take 1 GB
 
@@ -56,7 +57,7 @@ def run(
     symtop run goldstein rk45 --tolerance 1e-9 --horizon 200 --output run.nc --figure run.png
     """
     check_outputs(output=output, figure=figure)
-    with ticking("running"):  # the packages are loaded under the clock, too
+    with ticking("loading"):
         from symtop.core import netcdf
         from symtop.measure.errors import QUANTITIES, errors
         from symtop.measure.verdicts import judgement
@@ -65,10 +66,11 @@ def run(
         from symtop.run.simulation import simulate
 
         settings["step_size"] = h = common.step_of(scene, settings)
-        if h is not None and h > 0.0:
-            few_steps = partial(simulate, scene, integrator, step_size=h, samples=2, guard=False)
-            horizon = settings["horizon"] or scenes.scene(scene).horizon
-            estimate(horizon / h, lambda few: few_steps(horizon=min(few * h, horizon)))
+    if h is not None and h > 0.0:
+        few_steps = partial(simulate, scene, integrator, step_size=h, samples=2, guard=False)
+        horizon = settings["horizon"] or scenes.scene(scene).horizon
+        estimate(horizon / h, lambda few: few_steps(horizon=few * h))
+    with ticking("running"):
         data = simulate(scene, integrator, guard=warn if guard else False, **settings)
         if output is not None:
             netcdf.write(data, output)
@@ -110,11 +112,14 @@ def estimate(steps: float, run: Callable[[int], object]) -> None:
     if not MANY * FEW < steps <= MOST_STEPS:  # more are refused
         return
     with ticking("timing some steps"):
-        took = 0.0
-        for few in (1000, FEW):  # the first of them compiles
+        run(FEWEST)  # which compiles
+        for few in (FEWEST, FEW):
             began = time.monotonic()
             run(few)
-            took = (time.monotonic() - began) * steps / FEW
+            spent = time.monotonic() - began
+            took = spent * steps / few
+            if spent > LONG_ENOUGH:
+                break
     if took > 10.0:
         warn(f"{steps:.3g} steps take about {f'{took:.2g} s' if took < 100.0 else f'{took / 60.0:.2g} min'}")
 

@@ -1,6 +1,6 @@
 """compare(): what methods cost on one scene for the error that they make, as one dataset.
 
-The setting of each method is searched for at each target (`symtop.measure.settings.seek`), from loose targets to tight
+The setting of each method is results for at each target (`symtop.measure.settings.seek`), from loose targets to tight
 ones, until one is not met; then steps are doubled until a run fails or has a few steps. Every run is kept. Runs that
 ended well are timed afterwards, against each other (`symtop.measure.timing`): a slow spell of the machine hits all
 methods alike.
@@ -82,26 +82,26 @@ def compare(
 
     exact = find_integrator("exact")
     with beating(tqdm(total=len(names), desc="compare", disable=boolean("quiet", quiet) or None, leave=False)) as bar:
-        found = []
+        results = []
         for one in in_threads(tried, variants, min(cores(), len(variants))):
-            found.append(one)
+            results.append(one)
             bar.update()
         bar.set_description("timing")
         rows: list[dict[str, Any]] = [{"setting_value": math.nan, "outcome": "ok"}]
-        pairs = zip([exact, *variants], [rows, *(runs for runs, _ in found)], strict=True)
+        pairs = zip([exact, *variants], [rows, *(runs for runs, _ in results)], strict=True)
         timed_rows([(chosen, method, end, runs) for method, runs in pairs] if cost == "time" else [])
-    size = max(len(runs) for runs, _ in found)
+    size = max(len(runs) for runs, _ in results)
     blank: dict[str, Any] = {**SPENT, "message": "", "setting_value": math.nan}
     tables = [
         as_table([blank | run for run in runs] + [blank_row(method) | blank] * (size - len(runs)))
-        for method, (runs, _) in zip(variants, found, strict=True)
+        for method, (runs, _) in zip(variants, results, strict=True)
     ]
     data = xr.concat(tables, "variant").drop_vars("setting_value")
     mean = data["reached_time"] / data["steps"].where(data["steps"] > 0.0)
     data = data.assign(
         error=data[quantity], error_bound=data[f"{quantity}_bound"], exact_seconds=rows[0].get("seconds", math.nan),
         steps_per_nutation=chosen.time_scale(end) / data["step_size"].where(data["step_size"] > 0.0, mean),
-        reached=(("variant", "target"), [reached for _, reached in found]),
+        reached=(("variant", "target"), [reached for _, reached in results]),
     )  # fmt: skip
     data = data.assign_coords(variant=names, target=list(settings.TARGETS), scene=chosen.name)
     entries = {

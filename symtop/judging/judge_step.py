@@ -107,12 +107,12 @@ def judge(
     if form is None and (file or isinstance(target, (xr.Dataset, Mapping))):
         if set(structure.values()) != {None}:
             raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
-        found = tuple(of_trajectory(target, chosen, kept, energy))
+        constants = tuple(of_trajectory(target, chosen, kept, energy))
         about = About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory", "", "", 0.0)
         listen(about)
-        for finding in found:
+        for finding in constants:
             listen(finding)
-        return StepLedger(about.name, chosen.name, found, {}, about)
+        return StepLedger(about.name, chosen.name, constants, {}, about)
     implied = {"time": not autonomous, "energy": energy is None and "energy" not in kept}
     heartbeat.reset(quick=quick)
     began, findings = time.monotonic(), list[Finding]()

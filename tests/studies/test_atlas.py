@@ -285,8 +285,8 @@ def test_an_energy_error_that_no_sample_sees_is_no_ratio_of_a_floor():
     hidden, ratios = mechanisms.sampled(part)
     assert hidden == ["yoshida-4"]
     assert ratios == pytest.approx({"stormer-verlet": 5e4, "rkmk-se3-2": 1.5})
-    found = facts.sampling_facts(part)
-    assert (found["sampled"], found["hidden"], found["small"]) == (3, 1, 1)
+    answers = facts.sampling_facts(part)
+    assert (answers["sampled"], answers["hidden"], answers["small"]) == (3, 1, 1)
 
 
 def test_the_midpoint_rule_is_known_by_its_nodes_and_not_by_its_name():
@@ -315,16 +315,19 @@ def measured():
 
 
 def test_facts_are_those_of_the_mechanisms(measured):
-    found = facts.facts(measured)
-    assert found.keys() >= set(facts.NAMES)
-    assert {name for name in facts.NAMES if found[name] is None} == {"cayley_sleeps"}
+    answers = facts.facts(measured)
+    assert answers.keys() >= set(facts.NAMES)
+    assert {name for name in facts.NAMES if answers[name] is None} == {"cayley_sleeps"}
     lost = mechanisms.resonant(measured.sel(scene="steady-fast"))
     assert lost["stormer-verlet[angles]"] == pytest.approx(math.sqrt(3.0), abs=1e-4)
     assert lost["midpoint[angles]"] == pytest.approx(2.0 * math.sqrt(3.0), abs=1e-4)
-    assert (found["limit_variant"], found["limit_least"]) == ("stormer-verlet[angles]", pytest.approx(2.0, abs=1e-6))
-    assert found["sleep_miss"] < 1e-8 < abs(found["strang_sleeps"] - 2.0)
-    assert found["one_iteration"] > 10.0 * found["solved"]
-    assert (found["angles"], found["others"], found["others_halved"]) == (2, 1, 0)
+    assert (answers["limit_variant"], answers["limit_least"]) == (
+        "stormer-verlet[angles]",
+        pytest.approx(2.0, abs=1e-6),
+    )
+    assert answers["sleep_miss"] < 1e-8 < abs(answers["strang_sleeps"] - 2.0)
+    assert answers["one_iteration"] > 10.0 * answers["solved"]
+    assert (answers["angles"], answers["others"], answers["others_halved"]) == (2, 1, 0)
     shares = {name: one.accurate for name, one in atlas.maps(measured, study.FAMILY).items()}
     table = facts.tables(measured)["atlas"]
     assert dict(zip(table["variant"], table["accurate (%)"] / 100.0, strict=True)) == pytest.approx(shares)
@@ -332,12 +335,12 @@ def test_facts_are_those_of_the_mechanisms(measured):
 
 
 def test_what_was_not_measured_is_none_and_not_a_number():
-    found = facts.facts(hand_made([[A, B, L]] * 4))
-    assert (found["settled"], found["cells"], found["resonant"], found["others"]) == (0.0, 12, None, None)
+    answers = facts.facts(hand_made([[A, B, L]] * 4))
+    assert (answers["settled"], answers["cells"], answers["resonant"], answers["others"]) == (0.0, 12, None, None)
     assert facts.tables(hand_made([[A, B, L]] * 4))["limits"].empty
 
 
 def test_the_page_says_what_was_measured(measured, tmp_path):
     text = checked("stability", measured, tmp_path)
-    found = facts.facts(measured)
-    assert f"{found['angles_halved']} of 2 variants in Euler's angles" in text
+    answers = facts.facts(measured)
+    assert f"{answers['angles_halved']} of 2 variants in Euler's angles" in text

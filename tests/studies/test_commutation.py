@@ -130,12 +130,12 @@ def test_what_a_reduced_kernel_saves_is_split_into_iterations_and_the_time_of_on
          "twin_step_size": (("scene", "variant", "twin_step"), [[[0.1, 0.01]]])},
         coords={"scene": ["spheroid"], "variant": ["midpoint"], "kernel": ["reduced", "unreduced"]},
     )  # fmt: skip
-    found, table = facts.facts(data), facts.tables(data)["kernels"]
+    answers, table = facts.facts(data), facts.tables(data)["kernels"]
     assert list(table["time (ratio)"]) == pytest.approx([2.0, 3.0])
     assert list(table["iterations (ratio)"]) == pytest.approx([1.5, 3.0])
     assert list(table["time of an iteration (ratio)"]) == pytest.approx([4.0 / 3.0, 1.0])
-    assert (found["step_least"], found["step_most"]) == pytest.approx((2.0, 3.0))
-    assert (found["commuting"], found["charts"], found["twins_gap"]) == (None, None, None)
+    assert (answers["step_least"], answers["step_most"]) == pytest.approx((2.0, 3.0))
+    assert (answers["commuting"], answers["charts"], answers["twins_gap"]) == (None, None, None)
 
 
 @pytest.fixture(scope="module")
@@ -151,16 +151,16 @@ def measured():
 
 
 def test_facts_are_those_of_the_rules_and_charts(measured):
-    found = facts.facts(measured)
-    assert found["commuting"] == "midpoint"
-    assert found["commuting_gap"] < 1e-13
-    assert found["others"] == "trapezoidal, simpson-linear, galerkin-simpson"
-    assert (found["power_least"], found["power_most"]) == pytest.approx((2.0, 4.0), abs=0.2)
-    assert found["rules"] == "midpoint, trapezoidal"
-    assert 0.0 < found["twins_gap"] < 1e-11  # rounding over 10 000 steps without compensation
-    assert found["charts"] == len(facts.tables(measured)["charts"])
+    answers = facts.facts(measured)
+    assert answers["commuting"] == "midpoint"
+    assert answers["commuting_gap"] < 1e-13
+    assert answers["others"] == "trapezoidal, simpson-linear, galerkin-simpson"
+    assert (answers["power_least"], answers["power_most"]) == pytest.approx((2.0, 4.0), abs=0.2)
+    assert answers["rules"] == "midpoint, trapezoidal"
+    assert 0.0 < answers["twins_gap"] < 1e-11  # rounding over 10 000 steps without compensation
+    assert answers["charts"] == len(facts.tables(measured)["charts"])
     two = measured.isel(commutation_step=slice(2))  # too few for an order, and no less apart
-    assert facts.facts(two)["others"] == found["others"]
+    assert facts.facts(two)["others"] == answers["others"]
     assert np.isnan(facts.facts(two)["power_least"])
     assert len(figures.pictures(two)) == 1
 

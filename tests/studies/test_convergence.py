@@ -88,11 +88,11 @@ def test_the_work_of_an_error_constant_is_the_work_of_a_run_with_that_error(data
     fit = measures.fits(data, "axis")["goldstein", "stormer-verlet[angles]"]
     k = np.flatnonzero(fit.used)[-1]
     error, work = float(cell["axis"][k]), float(measures.evaluations_a_nutation(cell, "goldstein")[k])
-    found = measures.efficiencies(data, error)["goldstein", "stormer-verlet[angles]"]
-    assert found.work == pytest.approx(work, rel=0.1)
-    assert not found.foreseen
+    answers = measures.efficiencies(data, error)["goldstein", "stormer-verlet[angles]"]
+    assert answers.work == pytest.approx(work, rel=0.1)
+    assert not answers.foreseen
     beyond = measures.efficiencies(data, error / 4.0)["goldstein", "stormer-verlet[angles]"]
-    assert beyond.work == pytest.approx(2.0 * found.work, rel=1e-6)
+    assert beyond.work == pytest.approx(2.0 * answers.work, rel=1e-6)
     assert measures.efficiencies(data, 1e-14)["goldstein", "stormer-verlet[angles]"].foreseen
     assert ("goldstein", "rk45[angles]") not in measures.efficiencies(data, error)  # it has no step to choose
 
@@ -121,9 +121,9 @@ def test_errors_of_adaptive_methods_follow_their_tolerance(data):
 
 
 def test_facts_are_those_of_the_data(data):
-    found = facts.facts(data)
-    assert found["pairs"] == found["confirmed"] + found["refuted"] + found["undecided"]
-    assert found["ratio_most"] == max(float(values.max()) for values in measures.ratios(data).values() if values.size)
+    answers = facts.facts(data)
+    assert answers["pairs"] == answers["confirmed"] + answers["refuted"] + answers["undecided"]
+    assert answers["ratio_most"] == max(float(values.max()) for values in measures.ratios(data).values() if values.size)
     alone = facts.facts(data.sel(variant=["rk45[angles]"]))
     assert alone["pairs"] is alone["best_work"] is None
     assert alone["ratio_most"] == pytest.approx(float(measures.ratios(data)["rk45[angles]"].max()))

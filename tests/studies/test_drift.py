@@ -124,10 +124,14 @@ def test_a_constant_is_kept_bounded_or_lost_on_the_worst_scene(histories):
     fates = measures.fates(histories)
     assert fates["energy"].tolist() == ["bounded", "kept", "drift", "drift", "bounded"]
     assert fates["p_phi_largest"].tolist() == SIZES["p_phi"]
-    found = facts.of_histories(histories)
-    assert (found["variants"], found["holding"]) == (5, 2)
-    assert (found["energy_lost"], found["energy_lost_worst"], found["energy_lost_most"]) == (2, "rk4[angles]", 1e-2)
-    assert (found["bounded_runs"], found["bounded_as_t"], found["lost_faster"]) == (4, 3, 4)
+    answers = facts.of_histories(histories)
+    assert (answers["variants"], answers["holding"]) == (5, 2)
+    assert (answers["energy_lost"], answers["energy_lost_worst"], answers["energy_lost_most"]) == (
+        2,
+        "rk4[angles]",
+        1e-2,
+    )
+    assert (answers["bounded_runs"], answers["bounded_as_t"], answers["lost_faster"]) == (4, 3, 4)
     ended = histories.assign(outcome=histories["outcome"].where(histories["variant"] != "strang[axis]", "left_chart"))
     assert measures.fates(ended)["energy"]["strang[axis]"] == measures.FAILED
     assert facts.of_histories(ended)["holding"] == 1
@@ -143,22 +147,25 @@ def data():
 
 def test_the_page_says_what_every_group_shows(data, tmp_path):
     checked("drift", data, tmp_path)
-    found = facts.facts(data)
-    assert None not in set(found.values())
-    assert (found["variants"], found["own"], found["tolerance"]) == (6, 1, TOLERANCE)
-    assert (found["holding"], found["energy_lost"]) == (4, 2)  # so short a run of rk4 in angles does not lose it yet
-    assert found["gain_least"] > 3.0
-    assert (found["lost_count"], found["lost_hits"]) == (4, 4)
+    answers = facts.facts(data)
+    assert None not in set(answers.values())
+    assert (answers["variants"], answers["own"], answers["tolerance"]) == (6, 1, TOLERANCE)
+    assert (answers["holding"], answers["energy_lost"]) == (
+        4,
+        2,
+    )  # so short a run of rk4 in angles does not lose it yet
+    assert answers["gain_least"] > 3.0
+    assert (answers["lost_count"], answers["lost_hits"]) == (4, 4)
     assert [len(one) for one in facts.tables(data).values()][1] == 6
 
 
 @pytest.mark.parametrize("group", list(facts.NAMES))
 def test_a_group_alone_has_the_same_facts_and_none_of_the_others(data, group):
     alone = xr.DataTree.from_dict({group: data[group].to_dataset()})
-    found, every = facts.facts(alone), facts.facts(data)
-    assert found.keys() == every.keys()
+    answers, every = facts.facts(alone), facts.facts(data)
+    assert answers.keys() == every.keys()
     for other, names in facts.NAMES.items():
-        assert all((found[name] is None) is (other != group) for name in names.split()), other
+        assert all((answers[name] is None) is (other != group) for name in names.split()), other
     assert len(figures.pictures(alone)) == (group in (measures.HISTORIES, measures.ROUNDINGS))
 
 
@@ -179,9 +186,9 @@ def test_a_prediction_is_judged_by_what_was_measured():
              "predicted": [2500.0, 2500.0, np.inf], "measured": [2500.0, 2000.0, np.nan]}  # fmt: skip
     horizons = xr.Dataset({name: (("scene", "variant"), [values]) for name, values in cells.items()},
                           coords={"scene": ["spheroid"], "variant": ["a", "b", "c"]})  # fmt: skip
-    found = facts.of_losses(horizons)
-    assert (found["lost_count"], found["lost_hits"]) == (2, 1)
-    assert found["lost_later"] == 2.25
+    answers = facts.of_losses(horizons)
+    assert (answers["lost_count"], answers["lost_hits"]) == (2, 1)
+    assert answers["lost_later"] == 2.25
     assert facts.loss_table(horizons)["variant"].tolist() == ["b", "a"]
 
 

@@ -76,26 +76,26 @@ def test_orders_walls_and_floors_are_read_off(measured):
 
 def test_facts_are_those_of_the_runs(measured):
     """The wall of a map without the term, its distance from the spherical top, and the ends of the field."""
-    found = facts.facts(measured)
+    answers = facts.facts(measured)
     tops = measured["tops"].to_dataset().sel(scene="goldstein")
-    assert found["wall"] == float(tops["axis"].sel(variant="no-gyro[axis]").min()) > 1.5
+    assert answers["wall"] == float(tops["axis"].sel(variant="no-gyro[axis]").min()) > 1.5
     usual = tops.sel(rate=240.0, horizon=10.0)
-    assert found["spherical"] == float(usual["frame_spherical"].sel(variant="no-gyro[axis]")) < 0.01
+    assert answers["spherical"] == float(usual["frame_spherical"].sel(variant="no-gyro[axis]")) < 0.01
     assert float(usual["frame_spherical"].sel(variant="mujoco-euler[axis]")) > 0.1
-    assert found["best"] == found["worst"] == float(usual["frame_axis"].sel(variant="mujoco-euler[axis]"))
-    assert found["level_fast_variant"] == "no-gyro[axis]"
-    assert (found["maps"], found["turned"], found["singles"], found["members"]) == (2, 1, 1, 20)
-    assert found["lost"] == 1  # mujoco-euler flies apart on the fast top
-    assert found["single_best"] > 1e-3
+    assert answers["best"] == answers["worst"] == float(usual["frame_axis"].sel(variant="mujoco-euler[axis]"))
+    assert answers["level_fast_variant"] == "no-gyro[axis]"
+    assert (answers["maps"], answers["turned"], answers["singles"], answers["members"]) == (2, 1, 1, 20)
+    assert answers["lost"] == 1  # mujoco-euler flies apart on the fast top
+    assert answers["single_best"] > 1e-3
 
 
 def test_what_was_not_measured_is_none(measured):
     """On the fast top alone there is no error against steps; on the population no scene."""
     fast = xr.DataTree.from_dict({"tops": measured["tops"].to_dataset().sel(scene=["fast"])})
-    found = facts.facts(fast)
-    assert found["members"] is found["energy_lost"] is None
-    assert np.isnan([found["wall"], found["share_most"]]).all()
-    assert found["lost"] == 1
+    answers = facts.facts(fast)
+    assert answers["members"] is answers["energy_lost"] is None
+    assert np.isnan([answers["wall"], answers["share_most"]]).all()
+    assert answers["lost"] == 1
     assert [one.name for one in study.STUDY.pictures(fast)] == ["cost"]
     alone = xr.DataTree.from_dict({"tops": measured["tops"].to_dataset().sel(variant=["no-gyro[axis]"])})
     for one, most in ((measured, 5), (alone, 1)):  # entries of the key: what is drawn, and no more

@@ -116,8 +116,8 @@ def test_every_timed_run_meets_its_target_when_it_is_run_again(rows):
 def test_the_search_ends_closer_to_the_target_if_asked():
     horizon = 10.0 * SCENE.nutation_period
     for name in ("rk4[axis]", "rk4[attitude]", "strang[axis]"):
-        found = settings.search(SCENE, symtop.integrator(name), 1e-5, "axis", horizon, least=LEAST)
-        assert LEAST * 1e-5 <= found.error <= 1e-5
+        answers = settings.search(SCENE, symtop.integrator(name), 1e-5, "axis", horizon, least=LEAST)
+        assert LEAST * 1e-5 <= answers.error <= 1e-5
 
 
 def test_languages_of_one_method_have_the_same_setting_and_the_same_work(measured):
@@ -164,9 +164,9 @@ def test_times_of_a_busy_machine_are_not_compared(quiet, share, busy):
     loud = int(share * known.size)
     spread.flat[known[:loud]] = 1.01 * facts.NOISY
     data = quiet.assign({"spread": (quiet["spread"].dims, spread)})
-    found = facts.facts(data)
-    assert (found["loud"], found["times"], found["busy"]) == (loud, known.size, busy)
-    assert (found["whole"] is None) == np.isnan(found["user_most"]) == bool(busy)
+    answers = facts.facts(data)
+    assert (answers["loud"], answers["times"], answers["busy"]) == (loud, known.size, busy)
+    assert (answers["whole"] is None) == np.isnan(answers["user_most"]) == bool(busy)
     tables = facts.tables(data)
     assert tables["effects"].empty == tables["charts"].empty == tables["scipy"].empty == bool(busy)
     assert len(tables["times"]) >= known.size
@@ -175,10 +175,10 @@ def test_times_of_a_busy_machine_are_not_compared(quiet, share, busy):
 
 def test_where_nothing_was_timed_nothing_is_said(quiet):
     nothing = quiet.assign({name: quiet[name] * np.nan for name in ("seconds", "spread")})
-    found = facts.facts(nothing)
-    assert found["whole"] is found["busy"] is None
-    assert found["times"] == 0
-    assert np.isnan(found["near_share"])
+    answers = facts.facts(nothing)
+    assert answers["whole"] is answers["busy"] is None
+    assert answers["times"] == 0
+    assert np.isnan(answers["near_share"])
     assert list(figures.pictures(nothing)) == []
 
 
@@ -244,9 +244,11 @@ def synthetic(interaction=1.0):
 def test_the_effect_of_a_factor_is_found_where_effects_multiply_and_spread_where_they_do_not():
     for pair in pairs(synthetic()).to_dict("records"):
         assert pair["ratio"] == pytest.approx(EFFECT[pair["before"]] / EFFECT[pair["after"]], rel=1e-12)
-    found = effects(synthetic(interaction=4.0)).set_index(["factor", "before", "after"]).loc["chart", "angles", "axis"]
-    assert (found["min"], found["max"]) == (pytest.approx(3.0), pytest.approx(12.0))
-    assert found["count"] == 3 * len(LANGUAGES) * len(CALLS)
+    answers = (
+        effects(synthetic(interaction=4.0)).set_index(["factor", "before", "after"]).loc["chart", "angles", "axis"]
+    )
+    assert (answers["min"], answers["max"]) == (pytest.approx(3.0), pytest.approx(12.0))
+    assert answers["count"] == 3 * len(LANGUAGES) * len(CALLS)
 
 
 def test_scipy_is_compared_in_its_fastest_chart_with_the_fastest_compiled_variant():

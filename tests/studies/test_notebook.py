@@ -228,27 +228,27 @@ def data():
 
 
 def test_the_page_says_what_the_notebook_and_the_discrete_methods_keep(data, tmp_path):
-    found = facts.facts(data)
+    answers = facts.facts(data)
     text = checked("notebook", data, tmp_path)
     assert "mgl = 26.8658" in text
-    assert (found["compared"], found["discrete"], found["momenta_kept"]) == (5, 5, 5)
-    assert found["momenta"] < 1e-14
-    assert found["solver_momenta"] > 1e-7  # the control
-    assert max(found["ways"], found["energies"]) < 1e-10
-    assert found["followed"] > 1e-6
-    assert (found["first_turned"], found["second_turned"]) == pytest.approx((90.0, 90.0), abs=0.1)
-    assert (found["alpha_at_rest"], found["alpha_rate"]) == pytest.approx((1.4981443962885, 0.31914824723237937))
-    assert (found["power_least"], found["modified_most"]) == pytest.approx((2.0, 4.0), abs=0.06)
-    assert found["first_behind"] == 5
-    assert (found["second_behind"], found["second_ahead"]) == (2, 3)  # the other two get ahead after 100 s
+    assert (answers["compared"], answers["discrete"], answers["momenta_kept"]) == (5, 5, 5)
+    assert answers["momenta"] < 1e-14
+    assert answers["solver_momenta"] > 1e-7  # the control
+    assert max(answers["ways"], answers["energies"]) < 1e-10
+    assert answers["followed"] > 1e-6
+    assert (answers["first_turned"], answers["second_turned"]) == pytest.approx((90.0, 90.0), abs=0.1)
+    assert (answers["alpha_at_rest"], answers["alpha_rate"]) == pytest.approx((1.4981443962885, 0.31914824723237937))
+    assert (answers["power_least"], answers["modified_most"]) == pytest.approx((2.0, 4.0), abs=0.06)
+    assert answers["first_behind"] == 5
+    assert (answers["second_behind"], answers["second_ahead"]) == (2, 3)  # the other two get ahead after 100 s
 
 
 @pytest.mark.parametrize("name", ["midpoint[angles]", "strang[axis]", SOLVER])
 def test_one_method_alone_has_the_facts_and_figures_that_are_its_own(data, name, tmp_path):
     alone = data.sel(variant=[name])
-    found = facts.facts(alone)
-    assert found.keys() == facts.facts(data).keys()
-    assert (found["momenta"] is None) is (found["ways"] is not None) is (name == SOLVER)
+    answers = facts.facts(alone)
+    assert answers.keys() == facts.facts(data).keys()
+    assert (answers["momenta"] is None) is (answers["ways"] is not None) is (name == SOLVER)
     assert [one.name for one in STUDY.pictures(alone)] == ["energy", "modified-energy"][: 1 + (name[0] == "m")]
     assert len(facts.tables(alone)["kept"]) == 2
 

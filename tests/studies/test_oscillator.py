@@ -197,21 +197,21 @@ def data():
 
 def test_the_page_says_what_friction_does_and_what_is_exact(data, tmp_path):
     checked("oscillators", data, tmp_path)
-    found = facts.facts(data)
-    assert None not in found.values()
-    assert (found["order_least"], found["order_most"]) == pytest.approx((2.0, 2.0), abs=0.05)
-    assert found["one_sided_least"] == pytest.approx(1.0, abs=0.1)
-    assert (found["rate_midpoint"], found["rate_trapezoidal"]) == pytest.approx((2.0, 1.0), abs=0.1)
-    assert found["rate_force_at_one_end"] == pytest.approx(0.5, abs=0.1)
-    assert found["balance"] < 1e-11
-    assert found["undamped_midpoint"] < 1e-11
-    assert found["damped_midpoint"] > 1e-3
-    assert max(found["exact"], found["update_gap"]) < 1e-11
-    assert (found["top_order_least"], found["map_order_least"]) == pytest.approx((2.0, 2.0), abs=0.05)
+    answers = facts.facts(data)
+    assert None not in answers.values()
+    assert (answers["order_least"], answers["order_most"]) == pytest.approx((2.0, 2.0), abs=0.05)
+    assert answers["one_sided_least"] == pytest.approx(1.0, abs=0.1)
+    assert (answers["rate_midpoint"], answers["rate_trapezoidal"]) == pytest.approx((2.0, 1.0), abs=0.1)
+    assert answers["rate_force_at_one_end"] == pytest.approx(0.5, abs=0.1)
+    assert answers["balance"] < 1e-11
+    assert answers["undamped_midpoint"] < 1e-11
+    assert answers["damped_midpoint"] > 1e-3
+    assert max(answers["exact"], answers["update_gap"]) < 1e-11
+    assert (answers["top_order_least"], answers["map_order_least"]) == pytest.approx((2.0, 2.0), abs=0.05)
 
 
 @pytest.mark.parametrize(("name", "drawn"), [("midpoint", 2), ("rk45", 0), ("exact-discrete", 1)])
 def test_one_method_alone_has_the_facts_and_figures_that_are_its_own(data, name, drawn):
-    found = facts.facts(data.sel(variant=[name]))
-    assert found.keys() == facts.facts(data).keys()
+    answers = facts.facts(data.sel(variant=[name]))
+    assert answers.keys() == facts.facts(data).keys()
     assert len(figures.pictures(data.sel(variant=[name]))) == drawn

@@ -23,14 +23,14 @@ def test_no_step_is_short_enough_without_the_gyroscopic_term_and_with_it_one_is(
 
 
 def test_the_energy_is_kept_where_the_axis_is_wrong(data):
-    found = study.facts(data)
-    assert found["falling_energy"] < 0.01
-    assert found["falling"] > 0.5
+    answers = study.facts(data)
+    assert answers["falling_energy"] < 0.01
+    assert answers["falling"] > 0.5
 
 
 def test_the_run_in_angles_ends_and_that_on_the_axis_does_not(data):
-    found = study.facts(data)
-    assert found["ended"] < 1.0
+    answers = study.facts(data)
+    assert answers["ended"] < 1.0
     through = study.run_of(data, study.POLE, study.AXIS).isel(setting=0)
     assert float(through["axis"].max()) < 1e-3
     assert float(through["time"].max()) == pytest.approx(2.0)

@@ -62,9 +62,9 @@ def test_the_chart_holds_every_run_and_the_marks_of_the_truth(data):
 def test_the_page_says_what_was_measured(data, tmp_path):
     text = checked("speed", data, tmp_path, elsewhere={"error-against-time"})
     assert "`takahashi" not in text
-    found = facts.facts(data)
-    assert found["fastest_6"] in text
-    assert found["scipy"] is None
+    answers = facts.facts(data)
+    assert answers["fastest_6"] in text
+    assert answers["scipy"] is None
 
 
 def test_a_method_for_symmetric_bodies_is_not_called_one_for_any_body():

@@ -18,11 +18,11 @@ def data():
 
 
 def test_facts_follow_from_the_errors_and_a_bound_that_is_broken_is_counted(data):
-    found = facts.facts(data)
-    assert found["closed_form"] == float(data[ERROR].sel(variant="closed form").max()) < 1e-14
-    assert found["integrated"] > found["closed_form"]
-    assert (found["bounds"], found["bounds_held"]) == (4, 4)
-    assert found["quadruple"] is None
+    answers = facts.facts(data)
+    assert answers["closed_form"] == float(data[ERROR].sel(variant="closed form").max()) < 1e-14
+    assert answers["integrated"] > answers["closed_form"]
+    assert (answers["bounds"], answers["bounds_held"]) == (4, 4)
+    assert answers["quadruple"] is None
     worse = data.assign({ERROR: data[ERROR].where(data["horizon"] < 10.0, 2.0 * data[BOUND])})
     assert facts.facts(worse)["bounds_held"] == 2
 

@@ -52,7 +52,7 @@ class Stepper:
 
     def march(self, top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state after marks[0], marks[1], ... steps of h from y."""
-        raise NotImplementedError
+        raise NotImplementedError  # each kind of foreign code has its own
 
     def from_start(self, top: SymmetricTop, start: Angles, h: float) -> tuple[Array, Callable[..., Array]]:
         """The state of a start, and a function (state, *marks) -> the states after so many steps of h."""

@@ -139,11 +139,11 @@ def _elsewhere(subject: Subject, step: maps.StepMap, answers: list[Answer]) -> l
         with contextlib.suppress(SymtopError):
             other = maps.moved(step, scene)
             gap = maps.restart_gap(other, scene.start)
-            found = (
+            pair = (
                 _bracket(step.chart, maps.symplectic_defect(other, scene.start), gap),
                 _returned(maps.return_miss(other, scene.start), gap),
             )
-            for i, (yes, value, resolution, why) in enumerate(found):
+            for i, (yes, value, resolution, why) in enumerate(pair):
                 if yes is False and answers[i][0]:
                     answers[i] = yes, value, resolution, f"{why} ({name})"
     return answers

@@ -87,7 +87,7 @@ class _Form:
     precession_rate = _constant(at.PHI_LINE, "Mean of phi' over a nutation, radians per unit time.")
 
     def _view(self, times: ArrayLike, view: int) -> Array:
-        raise NotImplementedError
+        raise NotImplementedError  # one motion and many have their own
 
     def quaternion(self, times: ArrayLike) -> Array:
         """Attitude (w, x, y, z), body to space, shape (..., 4); continuous in time, through poles as well."""
