@@ -4,6 +4,8 @@
     axis      e (3), L (3), space frame                                   singular nowhere
     attitude  q (4), L (3), space frame                                   singular nowhere
 
+and `body`, q (4) and M (3) in body axes, of a body without symmetry (`symtop.model.body`).
+
 ``q = (w, x, y, z)`` turns body vectors into space vectors, ``q = exp(phi k/2) exp(theta i/2) exp(psi k/2)``:
 
     q = (cos x cos s, sin x cos d, sin x sin d, cos x sin s),   x = theta/2, s = (phi+psi)/2, d = (phi-psi)/2
@@ -29,13 +31,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from symtop.model.body import RigidBody, rotated, vertical
 from symtop.model.lazy_kernel import LazyKernel
 from symtop.model.top import Angles, Momenta, SymmetricTop
 
 Array = NDArray[np.float64]
 
-DIMENSIONS = {"angles": 4, "axis": 6, "attitude": 7}  # of a state
-CHARTS = tuple(DIMENSIONS)
+BODY = "body"  # the chart of a body without symmetry
+DIMENSIONS = {"angles": 4, "axis": 6, "attitude": 7, BODY: 7}  # of a state
+CHARTS = ("angles", "axis", "attitude")  # of the top
 
 
 def axis_from_angles(theta: Any, phi: Any) -> Array:
@@ -180,11 +184,22 @@ def space_energy(top: SymmetricTop, axis: Any, momentum: Any, p_psi: Any) -> Any
     return turning + 0.5 * p_psi**2 * (1.0 / top.I3 - 1.0 / top.I1) + top.mgl * axis[..., 2]
 
 
+def body_energy(body: RigidBody, states: Any) -> Any:
+    """Energy M.omega/2 + c.Gamma of states (..., 7) of the chart `body`."""
+    kinetic = 0.5 * (states[..., 4:] ** 2 / np.array(body.moments)).sum(axis=-1)
+    return kinetic + sum(c * g for c, g in zip(body.torque, vertical(*_parts(states)), strict=True))
+
+
 def axis_of(chart: str, states: Any) -> Any:
     """Unit vectors (..., 3) along the top's axis, of states (..., dimension) in any precision."""
     if chart == "angles":
         return axis_from_angles(states[..., 0], states[..., 2])
     return states[..., :3] if chart == "axis" else axis_from_quaternion(states[..., :4])
+
+
+def lifted(states: Any) -> Any:
+    """L in the space frame, (..., 3), of states (..., 7) of the chart `body`."""
+    return rotated(states[..., :4], states[..., 4:])
 
 
 def space_momenta(chart: str, states: Any) -> tuple[Any, Any]:
@@ -217,12 +232,12 @@ class View:
         """Unit quaternion from body to space; None on the axis, which does not show the spin angle."""
         if self.chart == "angles":
             return quaternion_from_angles(self.theta, self.phi, self.psi)
-        return self.states[..., :4] if self.chart == "attitude" else None
+        return self.states[..., :4] if self.chart in ("attitude", BODY) else None
 
-    @property
+    @cached_property
     def momentum(self) -> Any:
-        """Angular momentum in the space frame; only the charts `axis` and `attitude` have it."""
-        return self.states[..., -3:]
+        """Angular momentum in the space frame; angles do not have it."""
+        return lifted(self.states) if self.chart == BODY else self.states[..., -3:]
 
     @cached_property
     def _angles(self) -> tuple[Any, Any, Any]:
@@ -261,6 +276,8 @@ class View:
         """Total energy, with the momenta that the run showed."""
         if self.chart == "angles":
             return self.top.reduced_energy(self.theta, self.p_theta, self.p_phi, self.p_psi)
+        if self.chart == BODY:
+            return body_energy(self.top, self.states)
         return space_energy(self.top, self.axis, self.momentum, self.p_psi)
 
     def nutation_energy(self, momenta: Momenta) -> Any:

@@ -7,20 +7,21 @@ import functools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from symtop.core.code_hash import by_name
 from symtop.core.errors import SymtopError, finite, label, one_of, positive, shown
 from symtop.core.numbers import EPSILON, TINY
-from symtop.model.charts import Array
+from symtop.model.body import Attitude, RigidBody
+from symtop.model.charts import BODY, Array
 from symtop.model.top import BISECTIONS, Angles, SymmetricTop, effective_force, effective_potential, effective_stiffness
 
 if TYPE_CHECKING:
     from symtop.model.exact.closed_form import ClosedForm
 
-OBSERVABLES = ("nutation", "axis", "attitude")
+OBSERVABLES = ("nutation", "axis", "attitude")  # of a top
 UNITS = ("", "SI")
 TAGS = {  # by which studies choose; a scene without any is in every study
     "ordinary": "an ordinary nutation, such as spheroid and goldstein show",
@@ -53,12 +54,13 @@ class Scene:
     """A top, its start and a horizon; `observes` names the smallest thing the scene is watched for.
 
     ``nutation`` is theta alone, ``axis`` the direction of the axis, ``attitude`` the whole orientation. `units` decides
-    the units in datasets. Studies leave out scenes by their `tags`, any of `TAGS`.
+    the units in datasets. Studies leave out scenes by their `tags`, any of `TAGS`. A `RigidBody` with an `Attitude` is
+    the scene of a body without symmetry: it observes ``body``, and what takes such a scene says so.
     """
 
     name: str
-    top: SymmetricTop
-    start: Angles
+    top: Any  # SymmetricTop, or RigidBody
+    start: Any  # Angles, or Attitude
     horizon: float
     purpose: str = field(default="", metadata={"words": True})
     observes: str = "attitude"
@@ -67,20 +69,29 @@ class Scene:
 
     def __post_init__(self) -> None:
         label("name", self.name)
-        if not isinstance(self.top, SymmetricTop):
-            raise SymtopError(f"top must be a SymmetricTop, not {shown(self.top)}")
-        if not isinstance(self.start, Angles):
-            raise SymtopError(f"start must be Angles, not {shown(self.start)}")
+        if not isinstance(self.top, SymmetricTop | RigidBody):
+            raise SymtopError(f"top must be a SymmetricTop or a RigidBody, not {shown(self.top)}")
+        kind = Attitude if self.of_body else Angles
+        if not isinstance(self.start, kind):
+            words = f"of a {type(self.top).__name__} must be {kind.__name__}"
+            raise SymtopError(f"start {words}, not {shown(self.start)}")
         object.__setattr__(self, "horizon", horizon_of(self.horizon))
-        one_of("observes", self.observes, OBSERVABLES)
+        if self.of_body:
+            object.__setattr__(self, "observes", BODY)
+        one_of("observes", self.observes, (BODY,) if self.of_body else OBSERVABLES)
         one_of("units", self.units, UNITS)
         if isinstance(self.tags, str) or not isinstance(self.tags, Iterable):
             raise SymtopError(f"tags must be a list of names, not {shown(self.tags)}")
         object.__setattr__(self, "tags", tuple(sorted({one_of("tags", tag, TAGS) for tag in self.tags})))
 
     @property
+    def of_body(self) -> bool:
+        """Is it of a body without symmetry?"""
+        return isinstance(self.top, RigidBody)
+
+    @property
     def nutation_period(self) -> float:
-        """Time of one full nutation; infinite on a separatrix."""
+        """Time of one full nutation, infinite on a separatrix; of a body its natural period."""
         return _nutation_period(self.top, self.start)
 
     def time_scale(self, horizon: float | None = None) -> float:
@@ -94,8 +105,11 @@ class Scene:
 
         This height of the reduced motion above its steady precession bounds how far a wrong energy moves the turning
         points. A steady precession has none. There it is I1 omega^2/2, the energy of a small nutation with an amplitude
-        of one radian: a relative error is then the square of the amplitude (rad) that it could pay for.
+        of one radian: a relative error is then the square of the amplitude (rad) that it could pay for. Of a body it is
+        the kinetic energy of the start and |mgl|.
         """
+        if self.of_body:
+            return max(float(self.top.energy_scale(self.start)), TINY)
         return _energy_scale(self.top, self.start)
 
     @property
@@ -105,7 +119,9 @@ class Scene:
 
     @property
     def momentum_scale(self) -> float:
-        """The larger of p_phi and p_psi in size, what the errors of both are divided by."""
+        """The larger of p_phi and p_psi in size, what the errors of both are divided by; of a body, |L| of the start."""
+        if self.of_body:
+            return max(math.hypot(*self.top.momentum(self.start)), TINY)
         momenta = self.top.momenta(self.start)
         return max(abs(momenta.p_phi), abs(momenta.p_psi), TINY)
 
@@ -116,7 +132,9 @@ class Scene:
         return {"name": self.name, **times, "observes": self.observes, "purpose": self.purpose}
 
 
-_nutation_period = functools.lru_cache(maxsize=256)(SymmetricTop.nutation_period)
+@functools.lru_cache(maxsize=256)
+def _nutation_period(top: Any, start: Any) -> float:
+    return float(top.nutation_period(start))
 
 
 @functools.lru_cache(maxsize=256)
@@ -273,6 +291,29 @@ def _catalogue() -> dict[str, Scene]:
     return {scene.name: scene for scene in catalogue}
 
 
+@functools.lru_cache(maxsize=1)
+def _bodies() -> dict[str, Scene]:
+    def free(name: str, moments: tuple[float, ...], rates: tuple[float, ...], horizon: float, purpose: str) -> Scene:
+        return Scene(name, RigidBody(*moments), Attitude(omega_body=rates), horizon, purpose)
+
+    brick = RigidBody(0.00189422, 0.006211019, 0.007194665)  # kg m^2
+    rates = tuple(math.radians(rate) for rate in (10.0, 20.0, 30.0))
+    swinging = Attitude((0.8, 0.6, 0.0, 0.0), (0.2, 0.3, 3.0))
+    catalogue = [
+        Scene("check-case-2", brick, Attitude(omega_body=rates), 30.0,
+              "a free brick: check case 2 of NASA's simulations in six degrees of freedom, space axes at the start north,"
+              " east, down", units="SI"),
+        free("tennis-racket", (1.0, 2.0, 3.0), (1e-3, 1.0, 1e-3), 100.0,
+             "free, turning about its middle axis: it flips over again and again"),
+        free("free-wobble", (1.0, 1.01, 1.6), (0.3, 0.0, 1.0), 60.0, "free and nearly symmetric: a slow wobble"),
+        Scene("heavy-brick", RigidBody(1.0, 1.2, 0.6, 1.0, (0.1, 0.0, 1.0)), swinging, 20.0,
+              "a heavy body near a symmetric top: regular"),
+        Scene("heavy-chaotic", RigidBody(1.0, 1.6, 0.8, 2.0, (0.5, 0.2, 1.0)),
+              Attitude((0.8, 0.6, 0.0, 0.0), (0.4, 0.5, 0.9)), 20.0, "a heavy body far from symmetry: chaotic"),
+    ]  # fmt: skip
+    return {entry.name: entry for entry in catalogue}
+
+
 _added: dict[str, Scene] = {}
 
 
@@ -280,7 +321,7 @@ def register_scene(entry: Scene) -> Scene:
     """Add a scene to the catalogue, so that studies and commands know it by name."""
     if not isinstance(entry, Scene):
         raise SymtopError(f"register_scene needs a Scene, not {shown(entry)}")
-    if entry.name in _catalogue() or _added.get(entry.name, entry) != entry:
+    if entry.name in _catalogue() | _bodies() or _added.get(entry.name, entry) != entry:
         raise SymtopError(f"scene {entry.name!r} is already known; choose another name")
     _added[entry.name] = entry
     return entry
@@ -304,17 +345,26 @@ class _Scenes(dict[str, Scene]):
 
 @by_name
 def scenes() -> dict[str, Scene]:
-    """All known scenes, by name."""
-    return _Scenes({**_catalogue(), **_added})
+    """All known scenes of tops, by name."""
+    return _Scenes({**_catalogue(), **{name: entry for name, entry in _added.items() if not entry.of_body}})
 
 
 @by_name
-def scene(name: "str | Scene") -> Scene:
-    """The scene of that name; a Scene is returned as it is."""
-    if isinstance(name, Scene):
-        return name
-    catalogue = scenes()
-    return catalogue[one_of("scene", name, catalogue)]
+def body_scenes() -> dict[str, Scene]:
+    """All known scenes of bodies without symmetry, by name."""
+    return _Scenes({**_bodies(), **{name: entry for name, entry in _added.items() if entry.of_body}})
+
+
+@by_name
+def scene(name: "str | Scene", *, bodies: bool = False) -> Scene:
+    """The scene of that name; a Scene is returned as it is. One of a body is refused unless `bodies` is true."""
+    chosen = name
+    if not isinstance(chosen, Scene):
+        catalogue = scenes() | body_scenes()
+        chosen = catalogue[one_of("scene", name, catalogue)]
+    if chosen.of_body and not bodies:
+        raise SymtopError(f"scene must be one of a SymmetricTop here, not {chosen.name}, a body without symmetry")
+    return chosen
 
 
 # energies and scales of many tops, of rows of numbers as `symtop.model.top.flat` has them

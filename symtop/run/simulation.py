@@ -19,9 +19,9 @@ from symtop.core.errors import SymtopError, SymtopWarning, boolean, one_of, posi
 from symtop.core.numbers import GOLDEN
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan, sentence
-from symtop.methods.framework.registry import Integrator, integrator as find_integrator
+from symtop.methods.framework.registry import Integrator, integrator as find_integrator, methods
+from symtop.model.charts import BODY
 from symtop.model.scenes import OBSERVABLES, Scene, horizon_of, scene as find_scene
-from symtop.model.top import Angles, SymmetricTop
 from symtop.run.guard import MOST_STEPS, warning
 from symtop.run.trajectory import Trajectory, dataset
 
@@ -79,9 +79,20 @@ def chart_of(method: Integrator, watched: str, observe: str | None = None) -> st
 
     Where nothing is asked, it is what the scenes are `watched` for, or the axis if the method does not show that.
     """
+    if watched == BODY:
+        return _body_chart(method, observe)
     if observe is not None:
         return method.chart_for(one_of("observe", observe, OBSERVABLES))
     return method.chart_for(watched if watched != "attitude" or {"angles", "attitude"} & {*method.charts()} else "axis")
+
+
+def _body_chart(method: Integrator, observe: str | None) -> str:
+    """The chart of a body without symmetry, if the method has it."""
+    one_of("observe", observe or "attitude", ("axis", "attitude"))
+    if BODY not in method.solvers:
+        able = ", ".join(name for name, entry in methods().items() if BODY in entry.solvers)
+        raise SymtopError(f"integrator must have a chart for bodies without symmetry, not {method.name}: {able}")
+    return BODY
 
 
 def likely_step(scene: Scene, method: Integrator, horizon: float, accuracy: float) -> float:
@@ -188,7 +199,7 @@ def _prepared(
     horizon: object = None, samples: int = 501, observe: str | None = None, budget: object = None,
 ) -> tuple[Scene, Integrator, str, Plan, bool]:  # fmt: skip
     """Check the arguments of `simulate`, choose the chart, and lay out steps and samples, which may be dithered."""
-    chosen, method = find_scene(scene), find_integrator(integrator)
+    chosen, method = find_scene(scene, bodies=True), find_integrator(integrator)
     end = chosen.horizon if horizon is None else horizon_of(horizon)
     count = whole("samples", samples, 2, MOST_SAMPLES)
     chart = chart_of(method, chosen.observes, observe)
@@ -201,6 +212,8 @@ def _guarded(
     scene: Scene, method: Integrator, chart: str, plan: Plan, guard: Callable[[str], object] | None
 ) -> tuple[Trajectory, str]:
     """Make a run, after the guard's sentence if there is one; "off" is the sentence of no guard."""
+    if chart == BODY:  # nothing forecasts a run of a body
+        guard = None
     caution = "off" if guard is None else warning(scene, method, chart, plan)
     if caution and guard is not None:
         guard(caution)
@@ -213,6 +226,7 @@ def _warn(sentence: str) -> None:
 
 
 @functools.lru_cache(maxsize=256)
-def _json(record: SymmetricTop | Angles) -> str:
+def _json(record: Any) -> str:
     """Its numbers as the JSON of an attribute; `json.dumps` takes three times as long."""
-    return "{" + ", ".join(f'"{name}": {getattr(record, name)!r}' for name in sorted(record.__slots__)) + "}"
+    numbers = ((name, getattr(record, name)) for name in sorted(record.__slots__))
+    return "{" + ", ".join(f'"{name}": {list(v) if isinstance(v, tuple) else v!r}' for name, v in numbers) + "}"

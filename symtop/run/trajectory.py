@@ -13,7 +13,7 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.methods.framework.plan import Plan, Run
-from symtop.model.charts import Array, View, continuous, readings
+from symtop.model.charts import BODY, Array, View, continuous, readings
 from symtop.model.scenes import Scene, closed_form
 
 LABELS = {"component": ("x", "y", "z"), "part": ("w", "x", "y", "z")}  # of the second dimension of vectors
@@ -33,6 +33,7 @@ class Trajectory(NamedTuple):
     p_theta: Any = None  # (n,)
     p_phi: Any = None  # (n,)
     p_psi: Any = None  # (n,)
+    momentum: Any = None  # (n, 3) L of a body, space frame
     chart: str = ""
     step_size: float = np.nan  # of a fixed-step method
     tolerance: float = np.nan  # of an adaptive method
@@ -50,6 +51,8 @@ class Trajectory(NamedTuple):
         """
         with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up, and that is a result
             view = View(chart, scene.top, run.states, run.p_phi, run.p_psi)
+            if chart == BODY:
+                return cls._of_body(view, plan, run)
             phi, psi = view.phi, view.psi
             if chart != "angles":
                 angles = [phi] if psi is None else [phi, psi]
@@ -66,6 +69,19 @@ class Trajectory(NamedTuple):
             )  # fmt: skip
 
     @classmethod
+    def _of_body(cls, view: View, plan: Plan, run: Run) -> Self:
+        """What the chart `body` shows: no angles but theta, and the momentum in space."""
+        outcome, reached = run.outcome, run.reached
+        if outcome == "ok" and not (whole := np.isfinite(view.energy)).all():
+            outcome, reached = "not_finite", plan.last_of(whole)
+        return cls(
+            plan.times, view.theta, axis=view.axis, quaternion=view.quaternion, energy=view.energy, p_phi=run.p_phi,
+            momentum=view.momentum, chart=BODY, step_size=plan.step_size, tolerance=plan.tolerance, steps=run.steps,
+            force_evaluations=run.force_evaluations, newton_iterations=run.newton_iterations, outcome=outcome,
+            reached_time=reached,
+        )  # fmt: skip
+
+    @classmethod
     def of_data(cls, data: xr.Dataset | Mapping[str, Any]) -> Self:
         """The trajectory in a dataset of `simulate`, or in any dataset or mapping with some of its variables."""
         attributes = getattr(data, "attrs", {})
@@ -78,7 +94,7 @@ class Trajectory(NamedTuple):
         return {name: values for name in COLUMNS if (values := getattr(self, name)) is not None}
 
 
-COLUMNS, FACTS = Trajectory._fields[1:10], Trajectory._fields[10:]
+COLUMNS, FACTS = Trajectory._fields[1:11], Trajectory._fields[11:]
 
 
 def dataset(time: Array, columns: Mapping[str, Array], units: str = "") -> xr.Dataset:

@@ -15,37 +15,38 @@ from symtop.core.signals import at_most
 from symtop.methods.framework.plan import OUTCOMES, Array, Plan, Run, off_length
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import DIMENSIONS
-from symtop.model.top import Angles, SymmetricTop, flat
 
 PATIENCE = 10.0  # seconds of processor time for the few steps backwards that probes of reversibility ask for
 OWN = "symtop.methods."  # solvers of these modules spoil nothing, and are given no copies
 COUNTS = ("steps", "force_evaluations", "newton_iterations", "reached")
 
 
-def solve(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan: Plan, context: str = "") -> Run:
+def solve(method: Integrator, chart: str, top: Any, start: Any, plan: Plan, context: str = "") -> Run:
     """Run a method in one of its charts, `context` such as " on spheroid".
 
     A run that blows up is data: NumPy says nothing of overflow or NaN. Raises SymtopError if the solver raises, changes
     the top or the start, or returns anything but a Run that fits.
     """
-    solver, before = method.solvers[chart], flat(top, start)
+    solver, records = method.solvers[chart], (top, start)
     with foreign_code(f"integrator {method.name}{context}"):
         own = getattr(solver, "__module__", "").startswith(OWN)
+        fields = (
+            [] if own else [(record, name, getattr(record, name)) for record in records for name in record.__slots__]
+        )
         given = plan if own else plan._replace(times=plan.times.copy(), marks=plan.marks.copy())
         backwards = not own and plan.step_size < 0.0  # a loop that counts on a step forwards never ends
         with np.errstate(all="ignore"), at_most(PATIENCE) if backwards else contextlib.nullcontext():
             run = solver(top, start, given)
         if not own:
-            _restore(method, top, start, before)
+            _restore(method, fields)
         checked = _checked(method, (plan.times.size, DIMENSIONS[chart]), plan, run, copy=not own)
         return _of_length_one(plan, checked, chart)
 
 
-def _restore(method: Integrator, top: SymmetricTop, start: Angles, before: tuple[float, ...]) -> None:
+def _restore(method: Integrator, fields: list[tuple[Any, str, Any]]) -> None:
     """Refuse a solver that has changed the top or the start, which others use, too."""
-    if flat(top, start) != before:
-        names = [(top, name) for name in top.__slots__] + [(start, name) for name in start.__slots__]
-        for (record, name), value in zip(names, before, strict=True):
+    if any(getattr(record, name) != value for record, name, value in fields):
+        for record, name, value in fields:
             object.__setattr__(record, name, value)
         raise SymtopError(f"integrator {method.name} must not change the top or the start that it is given")
 

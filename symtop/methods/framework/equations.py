@@ -20,11 +20,12 @@ import numpy as np
 from symtop.core.errors import SymtopError, one_of
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.numbers import real_numbers
-from symtop.methods.framework import angles, space
+from symtop.methods.framework import angles, body, space
 from symtop.methods.framework.angles import BareTop, field_angles
 from symtop.methods.framework.plan import OUTCOMES, Array, Run
 from symtop.methods.framework.space import SpaceTop, field_attitude, field_axis
-from symtop.model.charts import CHARTS, space_momenta
+from symtop.model import charts
+from symtop.model.charts import BODY, CHARTS, space_momenta
 from symtop.model.top import Angles, SymmetricTop
 
 
@@ -53,6 +54,15 @@ FORMULATIONS = {
         lambda _, states: space_momenta("attitude", states),
     ),
 }  # fmt: skip
+
+
+def _body_momenta(_: Any, states: Array) -> tuple[Array, Array]:
+    return charts.lifted(states)[..., 2], states[..., 6].copy()
+
+
+FORMS = FORMULATIONS | {
+    BODY: Formulation(body.field_body, body.ended_body, body.observe_body, body.on_body, None, _body_momenta)
+}  # with the body that has no symmetry
 
 
 def as_run(

@@ -35,7 +35,7 @@ from symtop.core.parallel import heed
 from symtop.methods.framework import lanes as many, preparation
 from symtop.methods.framework.lanes import Blocks, Lanes, Many, Whole
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan, Run
-from symtop.methods.framework.preparation import Body, Preparation, Shown, Start, as_it_steps, conserved
+from symtop.methods.framework.preparation import Preparation, Shown, as_it_steps, momenta_at, opened
 from symtop.methods.framework.registry import Solver
 from symtop.methods.vectors import accumulate, accumulate_plainly, zero
 from symtop.model import charts
@@ -171,18 +171,18 @@ def kernel_loop(  # noqa: C901  (one loop, read in one piece)
 
     @functools.cache
     def whole(
-        kind: Callable[..., Any], numbers: Callable[..., Any], scale: Callable[..., Any], sample: Callable[..., Any]
-    ) -> Callable[..., tuple[int, int, int]]:
+        kind: Callable[..., Any], numbers: Callable[..., Any], scale: Callable[..., Any], sample: Callable[..., Any],
+        opened: Callable[..., Any] = opened, momenta_at: Callable[..., Any] = momenta_at,
+    ) -> Callable[..., tuple[int, int, int]]:  # fmt: skip
         march = register_jitable(marching(sample))
 
         def run(plain, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
-            top, at = Body(*plain[:3]), Start(*plain[3:])
+            top, at = opened(plain)
             par, state = numbers(top, at)
             rule = scale(kind(coefficients), top, at, h)
             state = enter(par, rule, state, h)
             if marks[0] == 0:
-                constants = conserved(top, at)
-                momenta[0, 0], momenta[1, 0] = constants.p_phi, constants.p_psi
+                momenta[0, 0], momenta[1, 0] = momenta_at(top, at)
             carry, stop = begin(par, rule, state, h), marks[-1]
             _, _, _, k, j, work, outcome = march(
                 par, rule, state, zero(state), carry, h, 0, 0, stop, marks, states, momenta
@@ -350,7 +350,8 @@ class FixedStep:
         lanes = loop.lanes(rule)
         blocks = None if lanes is None else partial(loop.blocks, lanes, lanes.pack(rule)[0], *parts[1:])
         costs = self.evaluations, self.each_step, int(self.implicit)
-        alone = loop.whole(*parts), numbers, prepare.check, size, *costs
+        whole = loop.whole(*parts, prepare.opened, prepare.momenta)
+        alone = whole, numbers, prepare.check, size, *costs
         return _Whole(numbers, size, alone, blocks, rule)
 
 

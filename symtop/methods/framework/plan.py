@@ -92,7 +92,7 @@ def off_length(chart: str, states: Array) -> NDArray[np.bool_]:
 
     A state that is not finite says nothing.
     """
-    if chart != "attitude":
+    if chart not in ("attitude", "body"):
         return np.zeros(states.shape[:-1], dtype=bool)
     length = np.sqrt((states[..., :4] ** 2).sum(axis=-1))
     return np.logical_or.accumulate(np.isfinite(length) & (np.abs(length - 1.0) > LENGTH), axis=-1)

@@ -47,18 +47,36 @@ class Start(NamedTuple):
     psi_dot: float
 
 
+@register_jitable
+def opened(plain: Any) -> Any:
+    """A top and a start, of their nine numbers."""
+    return Body(*plain[:3]), Start(*plain[3:])
+
+
+@register_jitable
+def momenta_at(top: Any, at: Any) -> Any:
+    """p_phi and p_psi of a start."""
+    constants = conserved(top, at)
+    return constants.p_phi, constants.p_psi
+
+
 @dataclass(frozen=True)
 class Preparation:
-    """What a kernel steps: `numbers(top, at)` compiles, `check` refuses a start that the kernel cannot step."""
+    """What a kernel steps: `numbers(top, at)` compiles, `check` refuses a start that the kernel cannot step.
+
+    `opened` makes the records that `numbers` takes of the plain numbers of a run, and `momenta` is what these conserve.
+    """
 
     numbers: Callable[..., tuple[Any, Numbers]]
     size: int  # of the state
     check: Callable[[Any], None] | None = None  # raises SymtopError
+    opened: Callable[..., Any] = opened
+    momenta: Callable[..., Any] = momenta_at
 
     def __post_init__(self) -> None:
         register_jitable(self.numbers)  # at once: what a kernel is made of must not hang on what has run
 
-    def __call__(self, top: SymmetricTop, at: Angles) -> tuple[Any, Numbers]:
+    def __call__(self, top: Any, at: Any) -> tuple[Any, Numbers]:
         """Kernel parameters and state of a start."""
         if self.check is not None:
             self.check(at)

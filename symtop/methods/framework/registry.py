@@ -29,7 +29,7 @@ from symtop.core.code_hash import by_name
 from symtop.core.errors import SymtopError, SymtopWarning, one_of, shown, words_of
 from symtop.core.signals import is_of_user
 from symtop.methods.framework.plan import Plan, Run
-from symtop.model.charts import DIMENSIONS, View
+from symtop.model.charts import BODY, DIMENSIONS, View
 from symtop.model.top import Angles, Momenta, SymmetricTop
 
 Array = NDArray[np.float64]
@@ -195,8 +195,8 @@ class Integrator:
         return Setting(self.control, value)
 
     def charts(self) -> tuple[str, ...]:
-        """The charts this integrator works in."""
-        return tuple(self.solvers)
+        """The charts of the top that this integrator works in; a solver of `body` is for bodies without symmetry."""
+        return tuple(chart for chart in self.solvers if chart != BODY)
 
     def chart_for(self, observe: str, among: Collection[str] | None = None) -> str:
         """The smallest chart that shows the "nutation", the "axis" or the "attitude", one without poles if two tie.
@@ -228,7 +228,7 @@ class Integrator:
             "conserves": "unknown" if self.conserves is None else ", ".join(sorted(self.conserves)) or "nothing",
             "needs": self.needs or "unknown",
             "general": _CLAIM[self.general],
-            "charts": ", ".join(self.charts()),
+            "charts": ", ".join(self.solvers),
             "control": self.control or "none",
             "implementation": self.implementation,
             "inner loop": self.inner_loop or "unknown",

@@ -25,7 +25,7 @@ import numpy as np
 from symtop.core.errors import SymtopError, one_of
 from symtop.core.jit import compile_kernel
 from symtop.methods.framework.angles import LEAST_TOLERANCE, BareTop
-from symtop.methods.framework.equations import FORMULATIONS, as_run
+from symtop.methods.framework.equations import FORMS, FORMULATIONS, as_run
 from symtop.methods.framework.plan import NOT_FINITE, OK, OUT_OF_BUDGET, STEP_TOO_SMALL, Array, Plan, Run
 from symtop.methods.framework.registry import Integrator, Solver
 from symtop.methods.framework.space import SpaceTop
@@ -52,8 +52,8 @@ class RightHandSide:
 
 @functools.cache
 def compiled_field(chart: str) -> Any:
-    """f(a, b, c, y) -> y' of a chart, compiled; a, b, c are the three parameters of its equations."""
-    field = FORMULATIONS[chart].field
+    """f(a, b, c, y) -> y' of a chart of the top, compiled; a, b, c are the three parameters of its equations."""
+    field = FORMS[chart].field
     parameters: type = BareTop if chart == "angles" else SpaceTop
 
     def compiled(a, b, c, y):  # type: ignore[no-untyped-def]
@@ -68,7 +68,7 @@ def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solve
     It is the loop of ``solve_ivp`` with ``t_eval``, to the same bits, kept open: a run that fails returns what it had,
     and one that would never end is stopped.
     """
-    form = FORMULATIONS[chart]
+    form = FORMS[chart]
     most = EVALUATIONS.get(method if isinstance(method, str) else "", EVALUATIONS["Radau"])
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
@@ -136,7 +136,7 @@ def scipy_method(name: str, *, compiled: bool = False) -> Integrator:
         name=f"{name.lower()}-numba" if compiled else name.lower(),
         family="library",
         summary=f"SciPy's {name} ({summary}), the right-hand side in {'numba' if compiled else 'Python'}",
-        solvers={chart: solver(name, chart, compiled=compiled) for chart in FORMULATIONS},
+        solvers={chart: solver(name, chart, compiled=compiled) for chart in (FORMULATIONS if compiled else FORMS)},
         control="tolerance",
         implementation="python",
         order=order,

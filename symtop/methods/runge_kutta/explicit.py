@@ -28,7 +28,8 @@ from numpy.typing import NDArray
 from symtop.core.errors import SymtopError, row
 from symtop.core.jit import combined, register_jitable, set_item
 from symtop.methods.framework.angles import BareTop
-from symtop.methods.framework.equations import FORMULATIONS, Formulation
+from symtop.methods.framework.body import General
+from symtop.methods.framework.equations import FORMS, Formulation
 from symtop.methods.framework.lanes import Lanes, W, column, put, reading
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import OK
@@ -36,6 +37,7 @@ from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate, zero
+from symtop.model.charts import BODY
 
 
 def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
@@ -201,8 +203,8 @@ def _loop(form: Formulation, top: Any, dimension: int) -> Loop:
     return kernel_loop(begin, increment, form.observe, lanes=lanes)
 
 
-_STEPPED = {"angles": (BareTop, 6), "axis": (SpaceTop, 6), "attitude": (SpaceTop, 7)}
-LOOPS = {chart: _loop(form, *_STEPPED[chart]) for chart, form in FORMULATIONS.items()}
+_STEPPED = {"angles": (BareTop, 6), "axis": (SpaceTop, 6), "attitude": (SpaceTop, 7), BODY: (General, 7)}
+LOOPS = {chart: _loop(form, *_STEPPED[chart]) for chart, form in FORMS.items()}
 
 
 def _explicit(a: Rows, b: Row) -> tuple[list[list[float]], list[float]]:
@@ -254,7 +256,7 @@ def runge_kutta(
         summary=summary or f"explicit Runge-Kutta method with {len(weights)} stages",
         solvers={
             chart: FixedStep(LOOPS[chart], rule, form.prepare, 1, implicit=False, present=form.present)
-            for chart, form in FORMULATIONS.items()
+            for chart, form in FORMS.items()
         },
         order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
         reference=reference, needs="derivative", general=True,

@@ -31,10 +31,10 @@ import numpy as np
 from symtop.core.jit import combined, compile_kernel, register_jitable, set_item
 from symtop.methods.framework.adaptive import Adaptive, Loop as AdaptiveLoop
 from symtop.methods.framework.angles import LEAST_TOLERANCE
-from symtop.methods.framework.equations import FORMULATIONS
+from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
-from symtop.methods.framework.preparation import Body, Start, as_it_steps
+from symtop.methods.framework.preparation import as_it_steps
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import Tableau, add, plus, row_of, store, weighted, written_out
 from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5, VERN9, Row, Table
@@ -125,6 +125,7 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
     sample lies in.
     """
     field, ended, observe, prepare, size = form.field, form.ended, form.observe, form.prepare.numbers, form.prepare.size
+    opened = form.prepare.opened
     sample = as_it_steps if form.present is None else form.present.sample
     register_jitable(observe)
     made: Method = method(field)
@@ -134,7 +135,7 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
     def march(  # type: ignore[no-untyped-def]
         numbers, tolerance, times, budget, seen, place, states, momenta
     ):
-        par, state = prepare(Body(*numbers[:3]), Start(*numbers[3:]))
+        par, state = prepare(*opened(numbers))
         memory, nothing, end = np.zeros((rows, size)), zero(state), times[-1]
         steps = effort = outcome = 0
         if seen < 0:
@@ -189,7 +190,7 @@ def solver(form: Any, method: Any, rows: int) -> Adaptive:
 
 def integrator(name: str, summary: str, reference: str, method: Any, rows: int, **claims: Any) -> Integrator:
     """The record of a method with a tolerance that needs f and nothing else, in every chart."""
-    solvers = {chart: solver(form, method, rows) for chart, form in FORMULATIONS.items()}
+    solvers = {chart: solver(form, method, rows) for chart, form in FORMS.items()}
     return Integrator(
         name=name, family="runge-kutta", summary=summary, solvers=solvers, control="tolerance", explicit=True,
         conserves=frozenset(), least_tolerance=LEAST_TOLERANCE, reference=reference, needs="derivative", general=True,
@@ -292,7 +293,7 @@ class Pair(NamedTuple):
         rule = Tableau(*arrays)
         solvers = {
             chart: FixedStep(fixed_loop(chart, self), rule, form.prepare, 1, implicit=False, present=form.present)
-            for chart, form in FORMULATIONS.items()
+            for chart, form in FORMS.items()
         }
         return replace(
             self.adaptive(), name=f"{self.name}-fixed", summary=f"{self.summary} with fixed steps, compiled",
@@ -336,7 +337,7 @@ def _order_seven(table: Table, field: Callable[..., Any], cost: int) -> dict[str
 @functools.cache
 def fixed_loop(chart: str, pair: Pair) -> Loop:
     """The loop with fixed steps in one chart; the rule is the table as a `Tableau`, for whoever wants to see it."""
-    form = FORMULATIONS[chart]
+    form = FORMS[chart]
     field, ended_at, rows = form.field, form.ended, pair.table.a[: len(pair.table.b) - 1]
     stages, total, cost = _stages(field, rows, _forget), summed(pair.table.b), len(pair.table.b)
 

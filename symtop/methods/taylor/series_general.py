@@ -28,12 +28,14 @@ import numpy as np
 
 from symtop.core.jit import fused, register_jitable, set_item
 from symtop.core.numbers import EPSILON
-from symtop.methods.framework.equations import FORMULATIONS
+from symtop.methods.framework.body import torque
+from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import plus, row_of, store
 from symtop.methods.runge_kutta.pairs import Method, nothing_more, solver
+from symtop.model.charts import BODY
 
 ORDER = 16  # with a fixed step
 HIGHEST = 24  # of a tolerance: N = 21 at the least one
@@ -133,16 +135,46 @@ def tail(state: Any, c: Any, order: int, h: float) -> Any:
     return total
 
 
+@register_jitable
+def _body_products(total: Any, a: Any, b: Any) -> Any:
+    """Add half of q M by components, two q's for Gamma, and M x M less its signs; q and M of `a` and `b`.
+
+    The moments are in `_body_slope`: nine products q_i M_j, six of q for Gamma, three of M.
+    """
+    p, q, r, s, t, u, v, w, x, y1, z, o, g1, g2, g3, m1, m2, m3 = total
+    p, q, r = fused(a[1], b[4], p), fused(a[2], b[5], q), fused(a[3], b[6], r)
+    s, t, u = fused(a[0], b[4], s), fused(a[2], b[6], t), fused(a[3], b[5], u)
+    v, w, x = fused(a[0], b[5], v), fused(a[1], b[6], w), fused(a[3], b[4], x)
+    y1, z, o = fused(a[0], b[6], y1), fused(a[1], b[5], z), fused(a[2], b[4], o)
+    g1 = fused(-a[0], b[2], fused(a[1], b[3], g1))
+    g2 = fused(a[0], b[1], fused(a[2], b[3], g2))
+    g3 = fused(-a[1], b[1], fused(-a[2], b[2], fused(a[3], b[3], fused(a[0], b[0], g3))))
+    m1, m2, m3 = fused(a[5], b[6], m1), fused(a[6], b[4], m2), fused(a[4], b[5], m3)
+    return p, q, r, s, t, u, v, w, x, y1, z, o, g1, g2, g3, m1, m2, m3
+
+
+@register_jitable
+def _body_slope(par: Any, total: Any, y: Any) -> Any:
+    p, q, r, s, t, u, v, w, x, y1, z, o, g1, g2, g3, m1, m2, m3 = total
+    a, b, c = 0.5 * par.a1, 0.5 * par.a2, 0.5 * par.a3
+    t1, t2, t3 = torque(par, 2.0 * g1, 2.0 * g2, g3)
+    return (
+        -(a * p + b * q + c * r), a * s + c * t - b * u, b * v - c * w + a * x, c * y1 + b * z - a * o,
+        (par.a3 - par.a2) * m1 + t1, (par.a1 - par.a3) * m2 + t2, (par.a2 - par.a1) * m3 + t3,
+    )  # fmt: skip
+
+
 CHARTS = {
     "axis": Quadratic(_axis_products, _axis_slope, (0.0,) * 3),
     "attitude": Quadratic(_attitude_products, _attitude_slope, (0.0,) * 6),
+    BODY: Quadratic(_body_products, _body_slope, (0.0,) * 18),
 }
 
 
 @functools.cache
 def loop(chart: str) -> Loop:
     """The loop with fixed steps in one chart."""
-    form, fill = FORMULATIONS[chart], CHARTS[chart].series()
+    form, fill = FORMS[chart], CHARTS[chart].series()
     ended_at = form.ended
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
@@ -162,10 +194,8 @@ def built_in() -> list[Integrator]:
         "family": "taylor", "explicit": True, "symplectic": False, "symmetric": False,
         "conserves": frozenset({"p_phi"}), "reference": "jorba-zou-2005", "needs": "expression", "general": True,
     }  # fmt: skip
-    fixed = {
-        chart: FixedStep(loop(chart), (0.0,), FORMULATIONS[chart].prepare, ORDER, implicit=False) for chart in CHARTS
-    }
-    adaptive = {chart: solver(FORMULATIONS[chart], equations, HIGHEST + 2) for chart, equations in CHARTS.items()}
+    fixed = {chart: FixedStep(loop(chart), (0.0,), FORMS[chart].prepare, ORDER, implicit=False) for chart in CHARTS}
+    adaptive = {chart: solver(FORMS[chart], equations, HIGHEST + 2) for chart, equations in CHARTS.items()}
     summary = "Taylor series of the unreduced space-frame equations by recurrence"
     return [
         Integrator("series-general", summary=f"{summary}, order {ORDER}", solvers=fixed, order=ORDER, **same),

@@ -1,0 +1,217 @@
+"""A heavy rigid body with a fixed point and three moments of inertia: its parameters, starts, energy and momenta.
+
+Principal axes of the body; q turns body vectors into space vectors, M is the angular momentum and omega the angular
+velocity in body axes, chi the unit vector from the fixed point to the centre of mass, c = mgl chi, and Gamma the
+upward vertical in body axes:
+
+    M = (I1 w1, I2 w2, I3 w3),     M' = M x omega + Gamma x c,     q' = q omega/2,     Gamma = q* k q
+    E = M.omega/2 + c.Gamma,       p_phi = L_z = M.Gamma,          L = q M q*
+
+Energy and p_phi are conserved, and all of L without a weight. With I1 = I2 and the centre on the third axis it is the
+top of `symtop.model.top`, and M3 = p_psi is conserved, too. A start of a body is an `Attitude`; the natural period is
+
+    T = 2 pi / sqrt((|L|/I2)^2 + |mgl|/I2),     I2 the middle moment.
+
+Units are any consistent set. Source: Goldstein, Classical Mechanics, chapter 5.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.core.errors import SymtopError, finite, positive
+from symtop.core.jit_functions import inlined
+from symtop.model.top import LARGEST, bounded, unit, vector
+
+SLACK = 1e-12  # of the triangle inequality: moments come rounded
+SYMMETRIC = 1e-9  # of the largest entry: how far a matrix may be from a symmetric one
+
+
+class Placed(NamedTuple):
+    """The conserved momentum of a body, and one that a symmetric body conserves."""
+
+    p_phi: float
+    p_psi: float
+
+
+@inlined
+def vertical(w: Any, x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
+    """Gamma, the upward vertical in body axes."""
+    return 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z
+
+
+@dataclass(frozen=True, slots=True)
+class Attitude:
+    """An attitude and the angular velocity at one instant: the start of a `RigidBody`.
+
+    `quaternion` (w, x, y, z) turns body vectors into space vectors; `omega_body` (3,) is in rad per unit time, along
+    the principal axes of the body.
+    """
+
+    quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    omega_body: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "quaternion", tuple(unit("quaternion", self.quaternion, 4)))
+        rates = (bounded("omega_body", rate) for rate in vector("omega_body", self.omega_body, 3))
+        object.__setattr__(self, "omega_body", tuple(rates))
+
+
+@dataclass(frozen=True, slots=True)
+class RigidBody:
+    """A rigid body with a fixed point, by its principal moments of inertia about that point, in any order.
+
+    `mgl` is mass x gravity x distance of the centre of mass, 0 for a free body; `centre` its direction in principal
+    axes, of any length but zero. `axes` is the turn from principal axes to those that the matrix of `from_inertia`
+    was given in, a quaternion; states and starts are in principal axes.
+    """
+
+    I1: float
+    I2: float
+    I3: float
+    mgl: float = 0.0
+    centre: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    axes: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name in ("I1", "I2", "I3"):
+            moment = bounded(name, positive(name, getattr(self, name)), 1.0 / LARGEST)
+            object.__setattr__(self, name, moment)
+        least, middle, most = sorted(self.moments)
+        if most > (least + middle) * (1.0 + SLACK):
+            name = ("I1", "I2", "I3")[self.moments.index(most)]
+            words = f"{least + middle!r}: no rigid body exceeds it, not {most!r}"
+            raise SymtopError(f"{name} must be at most the sum of the other moments, {words}", name)
+        object.__setattr__(self, "mgl", bounded("mgl", self.mgl))
+        centre = vector("centre", self.centre, 3)
+        length = math.hypot(*centre)
+        if not 1.0 / LARGEST <= length <= LARGEST:
+            raise SymtopError(f"centre must be a direction and of a length above zero, not {self.centre!r}", "centre")
+        object.__setattr__(self, "centre", tuple(part / length for part in centre))
+        object.__setattr__(self, "axes", tuple(unit("axes", self.axes, 4)))
+
+    @classmethod
+    def from_inertia(
+        cls, matrix: Sequence[Sequence[float]], mgl: float = 0.0, centre: Sequence[float] = (0.0, 0.0, 1.0)
+    ) -> "RigidBody":
+        """A body by its inertia matrix (3, 3) about the fixed point and the direction of its centre, in any axes.
+
+        The matrix is diagonalised, moments in increasing order, and the turn kept in `axes`. `in_principal` takes an
+        attitude in the axes of the matrix to one of this body.
+        """
+        rows = [vector("a row of matrix", row, 3) for row in matrix]
+        if len(rows) != 3:
+            raise SymtopError(f"matrix must have 3 rows, not {len(rows)}", "matrix")
+        inertia = np.array(rows)
+        if np.abs(inertia - inertia.T).max() > SYMMETRIC * np.abs(inertia).max():
+            raise SymtopError("matrix must be symmetric", "matrix")
+        moments, turn = np.linalg.eigh(inertia)
+        if np.linalg.det(turn) < 0.0:
+            turn[:, 2] = -turn[:, 2]
+        along = turn.T @ np.array(vector("centre", centre, 3))
+        I1, I2, I3 = moments.tolist()
+        return cls(I1, I2, I3, mgl, tuple(along.tolist()), _quaternion_of(turn))
+
+    @classmethod
+    def from_brick(cls, mass: float, sides: Sequence[float]) -> "RigidBody":
+        """A free homogeneous brick by its sides (3,) along the principal axes, turning about its centre."""
+        mass = positive("mass", mass)
+        a, b, c = (positive("sides", side) ** 2 for side in vector("sides", sides, 3))
+        return cls(mass * (b + c) / 12.0, mass * (c + a) / 12.0, mass * (a + b) / 12.0)
+
+    @classmethod
+    def from_points(
+        cls, masses: Sequence[float], places: Sequence[Sequence[float]], gravity: float = 0.0
+    ) -> "RigidBody":
+        """Points of `masses` (n,) at `places` (n, 3) from the fixed point, in any body axes; free without `gravity`."""
+        weights = np.array([positive("masses", mass) for mass in masses])
+        points = np.array([vector("a place of places", place, 3) for place in places]).reshape(-1, 3)
+        if len(weights) != len(points):
+            raise SymtopError(f"places must be as many as masses, {len(weights)}, not {len(points)}", "places")
+        squares = (points * points).sum(axis=1)
+        inertia = np.diag([(weights * squares).sum()] * 3) - (weights[:, None] * points).T @ points
+        moment = weights @ points
+        arm = float(np.linalg.norm(moment))
+        pull = finite("gravity", gravity) * arm
+        return cls.from_inertia(inertia.tolist(), pull, (moment if arm > 0.0 else np.array([0.0, 0.0, 1.0])).tolist())
+
+    @property
+    def moments(self) -> tuple[float, float, float]:
+        """I1, I2 and I3."""
+        return self.I1, self.I2, self.I3
+
+    @property
+    def torque(self) -> tuple[float, float, float]:
+        """c = mgl chi, in principal axes."""
+        x, y, z = self.centre
+        return self.mgl * x, self.mgl * y, self.mgl * z
+
+    @property
+    def free(self) -> bool:
+        """Has it no weight?"""
+        return self.mgl == 0.0
+
+    def in_principal(self, at: Attitude) -> Attitude:
+        """An attitude, with its angular velocity, in the axes of the matrix as one in principal axes."""
+        w, x, y, z = self.axes
+        return Attitude(product(at.quaternion, self.axes), rotated((w, -x, -y, -z), at.omega_body))
+
+    def momentum(self, at: Attitude) -> tuple[float, float, float]:
+        """M of a start, in body axes."""
+        w1, w2, w3 = at.omega_body
+        return self.I1 * w1, self.I2 * w2, self.I3 * w3
+
+    def energy(self, at: Attitude) -> float:
+        """Total energy of a start."""
+        kinetic = 0.5 * math.fsum(m * w for m, w in zip(self.momentum(at), at.omega_body, strict=True))
+        return kinetic + math.fsum(c * g for c, g in zip(self.torque, vertical(*at.quaternion), strict=True))
+
+    def momenta(self, at: Attitude) -> Placed:
+        """p_phi, conserved, and M3, which is p_psi of a symmetric body."""
+        M = self.momentum(at)
+        return Placed(math.fsum(m * g for m, g in zip(M, vertical(*at.quaternion), strict=True)), M[2])
+
+    def nutation_period(self, at: Attitude) -> float:
+        """The natural period, see above; infinite for a free body at rest."""
+        middle = sorted(self.moments)[1]
+        rate = math.hypot(math.hypot(*self.momentum(at)) / middle, math.sqrt(abs(self.mgl) / middle))
+        return 2.0 * math.pi / rate if rate > 0.0 else math.inf
+
+    def energy_scale(self, at: Attitude) -> float:
+        """What energy errors are divided by: the kinetic energy of the start, and |mgl|."""
+        kinetic = 0.5 * math.fsum(m * w for m, w in zip(self.momentum(at), at.omega_body, strict=True))
+        return kinetic + abs(self.mgl)
+
+    def flat(self, at: Attitude) -> tuple[float, ...]:
+        """The body and a start as 13 plain numbers: moments, c, q, M."""
+        return (*self.moments, *self.torque, *at.quaternion, *self.momentum(at))
+
+
+def product(first: Sequence[float], second: Sequence[float]) -> tuple[float, float, float, float]:
+    """The product of two quaternions: the second turn first."""
+    a, b, c, d = first
+    w, x, y, z = second
+    return (
+        a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y,
+        a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w,
+    )  # fmt: skip
+
+
+def rotated(quaternion: Any, vectors: Any) -> Any:
+    """q v q*, of a vector (3,) or of rows (n, 4) and (n, 3)."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternion), -1, 0)
+    a, b, c = np.moveaxis(np.asarray(vectors), -1, 0)
+    p, q, s = y * c - z * b + w * a, z * a - x * c + w * b, x * b - y * a + w * c
+    turned = np.stack([a + 2.0 * (y * s - z * q), b + 2.0 * (z * p - x * s), c + 2.0 * (x * q - y * p)], axis=-1)
+    return turned if turned.ndim > 1 else tuple(turned.tolist())
+
+
+def _quaternion_of(matrix: Any) -> tuple[float, float, float, float]:
+    """The quaternion of a rotation matrix."""
+    from scipy.spatial.transform import Rotation  # 0.1 s
+
+    x, y, z, w = Rotation.from_matrix(matrix).as_quat().tolist()
+    return w, x, y, z
