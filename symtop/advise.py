@@ -203,6 +203,8 @@ def recommend(
     if accuracy < limit:
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(question, [], (), source)
+    if {*allowed} == {"solution"} and question.allows(integrator("exact")):
+        return _the_motion(question, limit)
     guesses, source = _candidates(question, near)
     source += f" ({Path(results) / STORED})" if results is not None else ""
     trials: list[_Trial] = []
@@ -260,6 +262,8 @@ def _candidates(question: _Question, near: Near | None) -> tuple[dict[str, float
     scene, usable = question.scene, _usable(question.quantity, question.needs)
     usable = [name for name in usable if question.allows(integrator(name))]
     everyone: dict[str, float | None] = dict.fromkeys(usable)
+    if not everyone:
+        return everyone, "no compiled method is within these limits"
     if question.step is not None:
         return everyone, f"tried all {len(everyone)} compiled methods of fixed step that you can use"
     if near is None:
@@ -373,7 +377,21 @@ def _advice(
         f"{best.words()} meets {goal}: {worth}; {source}. {_carries(best.met.integrator)}", runner_up="".join(runners),
         beside=_beside(beside, best.seconds),
         closed_form=_without_steps(question, best.seconds), nearest=near.words(served) if near and served else "",
-        fails=fails, **_lines(question, best.met),
+        fails=fails, **_lines(question, best.met.integrator, best.met.setting),
+    )  # fmt: skip
+
+
+def _the_motion(question: _Question, limit: float) -> Advice:
+    """The answer to whoever has the motion itself, whose error is below a limit."""
+    scene, accuracy, quantity, horizon = question[:4]
+    exact, seconds = integrator("exact"), _exact_seconds(question)
+    reason = (
+        f"exact, the closed form, meets {quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}: error below "
+        f"{limit:.2g} in {seconds:.2g} s, without steps; it needs {NEEDS['solution']} (solution). {_carries(exact)}"
+    )
+    return Advice(
+        scene.name, quantity, accuracy, horizon, exact.name, expected_error=limit, seconds=seconds,
+        confidence="at the reference's limit", reason=reason, **_lines(question, exact, None),
     )  # fmt: skip
 
 
@@ -391,25 +409,33 @@ def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
     return "".join(f"Made for this top: {one.words()}{time}." for one, time in zip(trials, times, strict=True))
 
 
-def _lines(question: _Question, met: settings.Met) -> dict[str, str]:
+def _lines(question: _Question, method: Integrator, setting: float | None) -> dict[str, str]:
     """The command and the Python line that make the recommended run; no command for a scene that has no name here."""
     scene, _, _, horizon = question[:4]
-    value, name, whole = float(met.setting), met.integrator.name, horizon == scene.horizon
+    name, whole = method.name, horizon == scene.horizon
     known = scenes.scenes().get(scene.name) == scene
-    shown, control = f'"{name}"' if "[" in name else name, str(met.integrator.control)
+    shown, control = f'"{name}"' if "[" in name else name, str(method.control)
+    option = "" if setting is None else f" --{control.replace('_', '-')} {float(setting)!r}"
     until = "" if whole else f" --horizon {horizon!r}"
-    command = f"symtop run {scene.name} {shown} --{control.replace('_', '-')} {value!r}{until}"
+    command = f"symtop run {scene.name} {shown}{option}{until}"
     of, until = f'"{scene.name}"' if known else "scene", "" if whole else f", horizon={horizon!r}"
-    python = f'symtop.simulate({of}, "{name}", {control}={value!r}{until})'
+    option = "" if setting is None else f", {control}={float(setting)!r}"
+    python = f'symtop.simulate({of}, "{name}"{option}{until})'
     return {"command": command if known else "", "python": python}
+
+
+def _exact_seconds(question: _Question) -> float:
+    """Seconds of the exact motion at the horizon."""
+    scene, _, quantity, horizon = question[:4]
+    exact = integrator("exact")
+    call = bare_run(scene, exact, exact.chart_for(settings.observed(quantity)), math.nan, horizon)
+    return timings([call], batches=5, batch=0.002)[0].best
 
 
 def _without_steps(question: _Question, best: float) -> str:
     """What the closed form costs beside a run of `best` seconds (nan if there is none), and why it is not advised."""
     scene, _, quantity, horizon = question[:4]
-    exact = integrator("exact")
-    call = bare_run(scene, exact, exact.chart_for(settings.observed(quantity)), math.nan, horizon)
-    taken = timings([call], batches=5, batch=0.002)[0].best
+    taken = _exact_seconds(question)
     limit = settings.judgeable(scene, quantity, horizon)
     error = f", with an error below {limit:.1g}" if math.isfinite(limit) else ""
     if not best > taken:
