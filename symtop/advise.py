@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from symtop.core.errors import SymtopError, boolean, one_of, positive
+from symtop.core.progress import post
 from symtop.judging.claims.subject import declared
 from symtop.measure import settings
 from symtop.measure.errors import QUANTITIES, errors
@@ -211,7 +212,8 @@ def recommend(
     ranked: list[_Trial] = []
     fails: dict[str, list[str]] = {}
     # those of high order first: they are the cheapest at most accuracies, and their cost ends the other searches
-    for method in sorted(map(integrator, guesses), key=lambda method: -(method.order or 0)):
+    for number, method in enumerate(sorted(map(integrator, guesses), key=lambda method: -(method.order or 0)), 1):
+        post(f"trying method {number} of {len(guesses)}; the first time each is compiled")
         rivals = (one.met.evaluations for one in trials if one.met.integrator.needs not in THIS_TOP)
         patience = TOO_DEAR * min(rivals, default=math.inf)
         trial = _try(question, method, guesses[method.name], patience)

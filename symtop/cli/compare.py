@@ -17,7 +17,7 @@ from symtop.cli.common import (
     table,
     warn,
 )  # fmt: skip
-from symtop.core.progress import post, ticking
+from symtop.core.progress import ticking
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +61,6 @@ def compare(
         from symtop.measure.sweep import failed_setting
         from symtop.measure.timing import NOISY
 
-    post("running methods, and timing them")
     data = comparison.compare(scene, methods, **options)
     if output is not None:
         netcdf.write(data, output)
