@@ -24,6 +24,7 @@ stands it is mostly the fastest way, and the advice says so with its time.
 """
 
 import math
+import shlex
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,6 +50,7 @@ from symtop.methods.framework.registry import (
 from symtop.model import scenes
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run.guard import MOST_STEPS
+from symtop.run.plugins import loaded
 from symtop.run.simulation import simulate
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
@@ -419,7 +421,8 @@ def _lines(question: _Question, method: Integrator, setting: float | None) -> di
     shown, control = f'"{name}"' if "[" in name else name, str(method.control)
     option = "" if setting is None else f" --{control.replace('_', '-')} {float(setting)!r}"
     until = "" if whole else f" --horizon {horizon!r}"
-    command = f"symtop run {scene.name} {shown}{option}{until}"
+    files = "".join(f" --plugin {shlex.quote(file)}" for file in loaded())
+    command = f"symtop run {scene.name} {shown}{option}{until}{files}"
     of, until = f'"{scene.name}"' if known else "scene", "" if whole else f", horizon={horizon!r}"
     option = "" if setting is None else f", {control}={float(setting)!r}"
     python = f'symtop.simulate({of}, "{name}"{option}{until})'
@@ -467,7 +470,7 @@ class EngineAdvice:
     advice: Advice | None
 
     def __str__(self) -> str:
-        default, maps = next(iter(self.errors)), SETTINGS.get(self.engine, {self.engine: self.engine})
+        default, maps = next(iter(self.errors)), _settings()[self.engine]
         lines = [
             f"{self.engine} on {self.scene}, step {self.step_size:g}, to t = {self.horizon:g}: the axis is off by",
             *(f"    {value:.2e} rad  {name} ({maps[name]})" for name, value in self.errors.items()),
@@ -484,6 +487,11 @@ class EngineAdvice:
         return "\n".join(lines)
 
 
+def _settings() -> dict[str, dict[str, str]]:
+    """The maps by the settings of each engine, and each map by itself where no engine has its name."""
+    return {name: {name: name} for name in engines()} | SETTINGS
+
+
 def i_use(
     engine: str, scene: "str | Scene", *, step_size: float | None = None, horizon: float | None = None,
     accuracy: float | None = None, **limits: Any,
@@ -495,7 +503,7 @@ def i_use(
     `horizon` its own by default. Raises SymtopError for an engine that is
     not known and for numbers that are out of range. It takes some seconds.
     """
-    maps = SETTINGS | {name: {name: name} for name in engines()}
+    maps = _settings()
     one_of("engine", engine, maps)
     start, h = scenes.scene(scene), STEP if step_size is None else positive("step_size", step_size)
     end = start.horizon if horizon is None else horizon_of(horizon)

@@ -287,6 +287,12 @@ def test_limits_leave_out_what_a_user_cannot_use():
     assert any(words.startswith("A step takes over 1e-12 s") for words in slow.fails)
 
 
+def test_the_command_of_a_plug_in_loads_it(tmp_path, monkeypatch):
+    file = tmp_path / "my scene.py"
+    monkeypatch.setattr(advise, "loaded", lambda: (str(file),))
+    assert symtop.recommend("spheroid", accuracy=1e-6, needs="solution").command.endswith(f" --plugin '{file}'")
+
+
 def test_who_has_the_solution_is_given_the_exact_motion_with_its_price():
     """Negative controls: with a step there is none, and beside the derivative it is a line and not the answer."""
     advice = symtop.recommend("spheroid", accuracy=1e-6, needs="solution", horizon=20.0)
