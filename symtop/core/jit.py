@@ -25,6 +25,7 @@ from typing import Any
 import numba
 from numba import njit, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.typing.templates import builtin_registry
 from numba.cpython.unsafe.tuple import tuple_setitem
@@ -45,6 +46,7 @@ MOST_BYTES = 200_000_000  # of kernels that are kept, about 2000 of them
 OPTIONS = {"error_model": "numpy", "nogil": True}  # division by zero gives infinity, as in C; threads run at once
 HASH = hashlib.sha256().digest_size  # bytes before the code in its file
 WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # kernels alone call it: 14 % less to compile
+WRAPPERS = ("_ZN7cpython", "cfunc.")  # names of functions that Python and C can call
 INLINED = {"forceinline": True, **WITHIN}
 
 _stands_for: dict[int, list[object]] = {}  # id of a function: what numba compiles in its place
@@ -184,6 +186,40 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             super().save_overload(signature, data)
 
 
+@contextlib.contextmanager
+def _no_code_of_inner_functions() -> Iterator[None]:
+    """While a kernel is compiled, what it calls is optimised and linked into it as ever, but gets no machine code.
+
+    numba makes that of each inner function, and nobody runs it: Python calls a function through a wrapper, which inner
+    ones lack. Their environments get an address with the kernel. The caller holds numba's lock; a version of numba
+    that lacks what is replaced here compiles as it does.
+    """
+    try:
+        finish, set_env = JITCodeLibrary._finalize_final_module, JITCPUCodegen.set_env
+    except AttributeError:
+        yield
+        return
+
+    def link_only(library: Any) -> None:
+        names = [function.name for function in library._final_module.functions if not function.is_declaration]
+        if any(name.startswith(WRAPPERS) for name in names) or not any(name.startswith("_ZN") for name in names):
+            return finish(library)  # type: ignore[no-any-return]
+        library._finalize_dynamic_globals()
+        library._verify_declare_only_symbols()
+        library._finalized = True
+        return None
+
+    def set_where_defined(codegen: Any, name: str, environment: Any) -> None:
+        if codegen._engine.is_symbol_defined(name):
+            set_env(codegen, name, environment)
+
+    JITCodeLibrary._finalize_final_module, JITCPUCodegen.set_env = link_only, set_where_defined
+    try:
+        yield
+    finally:
+        JITCodeLibrary._finalize_final_module, JITCPUCodegen.set_env = finish, set_env
+
+
 def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
     """numba's compilation, of a kernel that is not on disk by one process at a time: the next ones load it.
 
@@ -201,7 +237,12 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
             if isinstance(kernel._cache, _Cache) and not is_cached(kernel, signature):
                 with contextlib.suppress(SymtopError):  # a cache that cannot be written costs time and no run
                     stack.enter_context(locked(Path(kernel._cache._cache_path) / "code", wait=True))
-            return compiling(signature)
+            with _no_code_of_inner_functions():
+                entry = compiling(signature)
+            compiled = kernel.overloads[signature]
+            for environment in compiled._find_referenced_environments():
+                compiled.library.codegen.set_env(environment.env_name, environment)
+            return entry
 
     return compile_now
 
