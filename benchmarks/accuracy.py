@@ -17,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.families import REGIMES, tops
-from symtop.core.multiprecision import context
-from symtop.core.numbers import EPSILON
+from symtop.core.numbers import EPSILON, context
 from symtop.model.charts import Array
 from symtop.model.exact import closed_form, constants, layout as at
 from symtop.model.exact.closed_form import ClosedForm

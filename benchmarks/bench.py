@@ -9,9 +9,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks import ensemble, kernels, lanes, measured, startup, targets, truth, twin, whole_run
+from benchmarks import ensemble, kernels, lanes, measured, pages, startup, targets, truth, twin, whole_run
+from benchmarks.pages import Table
 from symtop.core import netcdf
-from symtop.runner.study import Table
 
 
 def findings(
@@ -83,31 +83,19 @@ def findings(
         ),
         Table("Starting", ["what", "ms"], [[name, f"{seconds * 1e3:.2f}"] for name, seconds in started.items()]),
     ]
-    return {
-        "study": "bench",
-        "title": "Kernels beside C",
-        "question": "Are the kernels as fast as the same loop in C, and what does a call add to them?",
-        "how_to_read": (
-            f"One process, all kernels and their C twins (gcc) interleaved in random order; {kernels.SCENE}, a step of "
-            f"1/{kernels.PER_NUTATION:g} of a nutation. The spread is what five fifths of the batches would have said."
-        ),
-        "verdict": [
-            *said,
-            *lanes.verdict(together),
-            *ensemble.verdict(many),
-            run,
-            f"A run of one step takes {one_step[slowest] * 1e6:.1f} us at most, with {slowest}.",
-        ],
-        "tables": [table._asdict() for table in tables],
-        "charts": [],
-        "opening": None,
-        "pictures": [],
-        "failures": [],
-        "cases": len(rows),
-        "quick": False,
-        "provenance": {key: facts[key] for key in facts if key not in ("measured", "cores", "load_before")},
-        "measured": measured.sentence(facts, "make bench"),
-    }
+    sentences = [
+        *said, *lanes.verdict(together), *ensemble.verdict(many), run,
+        f"A run of one step takes {one_step[slowest] * 1e6:.1f} us at most, with {slowest}.",
+    ]  # fmt: skip
+    how_to_read = (
+        f"One process, all kernels and their C twins (gcc) interleaved in random order; {kernels.SCENE}, a step of "
+        f"1/{kernels.PER_NUTATION:g} of a nutation. The spread is what five fifths of the batches would have said."
+    )
+    return pages.findings(
+        "bench", "Kernels beside C", "Are the kernels as fast as the same loop in C, and what does a call add to them?",
+        sentences, how_to_read, tables, cases=len(rows), measured=measured.sentence(facts, "make bench"),
+        provenance={key: facts[key] for key in facts if key not in ("measured", "cores", "load_before")},
+    )  # fmt: skip
 
 
 def main() -> None:

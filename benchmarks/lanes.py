@@ -23,6 +23,7 @@ import numpy as np
 
 import symtop
 from benchmarks import kernels, twin
+from benchmarks.pages import Table
 from symtop.core.parallel import in_threads
 from symtop.measure.timing import timings
 from symtop.methods.framework.lanes import W, members_of
@@ -31,7 +32,6 @@ from symtop.methods.taylor import heyoka
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import flat
-from symtop.runner.study import Table
 
 MEMBERS = 4 * W
 SPREAD = 0.001  # of theta, from one neighbour to the next

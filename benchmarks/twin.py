@@ -22,10 +22,11 @@ from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian import discrete_lagrangian, exact_discrete, galerkin, unreduced
 from symtop.methods.lie_group import energy_momentum, generalised_alpha, runge_kutta, variational
-from symtop.methods.runge_kutta import collective_gauss, explicit, gauss, kahan
+from symtop.methods.runge_kutta import collective_gauss, explicit, gauss, kahan, pairs
 from symtop.methods.splitting import angles, space
-from symtop.methods.taylor import series
+from symtop.methods.taylor import series, series_general
 from symtop.methods.taylor.series import DEFAULT_ORDER
+from symtop.model.charts import CHARTS
 from symtop.model.scenes import Scene
 
 SOURCES = Path(__file__).resolve().parent / "twins"
@@ -70,10 +71,12 @@ FAMILIES: dict[Callable[..., Any], tuple[str, str]] = {
     space.march_axis: ("splitting_space", ""),
     space.march_attitude: ("splitting_space", "ATTITUDE"),
     **{loop: ("runge_kutta", chart.upper()) for chart, loop in explicit.LOOPS.items()},
+    **{pairs.fixed_loop(chart, pair): ("runge_kutta", chart.upper()) for pair in pairs.PAIRS for chart in CHARTS},
     exact_discrete.march_axis: ("exact_discrete", ""),
     exact_discrete.march_attitude: ("exact_discrete", ""),
     series.march_axis(DEFAULT_ORDER): ("series", ""),
     series.march_attitude(DEFAULT_ORDER): ("series", "ATTITUDE"),
+    **{series_general.loop(chart): ("series_general", chart.upper()) for chart in series_general.CHARTS},
     gauss.march_axis: ("gauss", "AXIS"),
     gauss.march_frame: ("gauss", "FRAME"),
     kahan.march_axis: ("kahan", ""),

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import symtop
 from symtop.core import netcdf
-from symtop.core.lazy_kernel import LAZY
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import methods
+from symtop.model.lazy_kernel import LAZY
 from symtop.model.scenes import closed_form
 from symtop.run.guard import warning
 from symtop.run.simulation import make_plan

@@ -2,6 +2,7 @@
 
 # of the report; others follow
 ORDER = (
-    "population", "truth", "convergence", "work_precision", "factors", "drift", "stability", "claims", "reduction",
-    "phase_diagram", "oscillators", "notebook",
+    "speed", "cost", "truth", "convergence", "factors", "drift", "stability", "claims", "reduction", "oscillators",
+    "notebook",
 )  # fmt: skip
+FORMER = dict.fromkeys(("population", "work_precision", "phase_diagram"), "cost")  # names that studies had

@@ -14,6 +14,7 @@ from symtop.core import old_paths as old_paths
 if TYPE_CHECKING:
     from symtop.advise import Advice as Advice, recommend as recommend
     from symtop.core.errors import SymtopError as SymtopError, SymtopWarning as SymtopWarning
+    from symtop.judging.comparison import compare as compare
     from symtop.judging.judge_step import judge as judge
     from symtop.measure.errors import errors as errors
     from symtop.measure.sweep import sweep as sweep
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
     from symtop.run.long_run import long_run as long_run
     from symtop.run.reference.truth import reference as reference
     from symtop.run.simulation import simulate as simulate
-    from symtop.runner.study import Case as Case, Picture as Picture, Study as Study, Table as Table
+    from symtop.runner.study import Case as Case, Picture as Picture, Study as Study
 
 __version__ = "0.3.0"
 
@@ -70,9 +71,10 @@ _NAMES = {  # by the module that holds them
     "run.ensemble.population": "population",
     "run.reference.truth": "reference",
     "run.simulation": "simulate",
+    "judging.comparison": "compare",
     "report.card": "card",
     "report.plot": "plot",
-    "runner.study": "Case Picture Study Table",
+    "runner.study": "Case Picture Study",
     "measure.sweep": "sweep",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}

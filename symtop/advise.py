@@ -1,8 +1,7 @@
 """`recommend`: the cheapest integrator, with its step or tolerance, that meets an accuracy on a scene.
 
-    1. Candidates. A stored population study counts on how many of the random tops nearest to this one a method was
-       the cheapest or nearly so (`symtop.measure.ranking`); a stored work-precision study lists the methods that were
-       cheapest on the nearest scene. Without a stored study every compiled method is a candidate.
+    1. Candidates. A stored study of cost counts on how many of the random tops nearest to this one a method was the
+       cheapest or nearly so (`symtop.measure.ranking`). Without a stored study every compiled method is a candidate.
     2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
        (`symtop.measure.settings`), against the closed form and a target lowered by the law of growth; one run is timed.
     3. Confirmation. The three fastest candidates are run to the whole horizon, if a budget of force evaluations allows
@@ -15,36 +14,46 @@ The confidence of the advice is one of:
     extrapolated               it was not run to the end
     none                       no method meets the accuracy; the integrator is None
 
+The answer is the best method that neither is made for this very top (`Integrator.needs`) nor evaluates its solution;
+the best of those is named beside it. At a step that the user has there is nothing to search for: all methods run with
+it.
+
 An accuracy below the bound of the reference is answered with ``none`` before any run. The closed form is no candidate:
 it is what errors are measured by, and a top with friction, drive or another body attached has none. For the top as it
 stands it is mostly the fastest way, and the advice says so with its time.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-import xarray as xr
-
-from symtop.core import netcdf
-from symtop.core.errors import SymtopError, one_of, positive
-from symtop.measure import ranking, settings
+from symtop.core.errors import SymtopError, boolean, one_of, positive
+from symtop.judging.claims.subject import declared
+from symtop.measure import settings
 from symtop.measure.errors import QUANTITIES, errors
 from symtop.measure.phase import FREQUENCIES
-from symtop.measure.ranking import STORED, Near, distances, nearest, regime
+from symtop.measure.ranking import STORED, Near, nearest
 from symtop.measure.timing import bare_run, timings
-from symtop.methods.framework.registry import Integrator, integrator, integrators, is_built_in, split_name
+from symtop.methods.framework.registry import (
+    NEEDS,
+    Integrator,
+    engines,
+    integrator,
+    integrators,
+    is_built_in,
+    split_name,
+)
 from symtop.model import scenes
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run.guard import MOST_STEPS
 from symtop.run.simulation import simulate
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
-STORED_STUDY = "work_precision.nc"
-CANDIDATES = 8  # methods of the stored studies that are tried
+THIS_TOP = ("this-top", "solution")  # needs of what is named beside the answer, unless it is asked for
+KEPT = {"energy": ("energy",), "momenta": ("p_phi", "p_psi")}  # claims, by what a user wants kept
+CANDIDATES = 8  # methods of the stored study that are tried
 FINALISTS = 3  # methods that are run to the whole horizon
 TOO_DEAR = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
 CONFIDENCE = {
@@ -71,6 +80,7 @@ SETTINGS = {  # the maps of an engine by its settings, the default first
     "jsbsim": {"default": "jsbsim-default", "Buss2 and AB2": "jsbsim-buss2"},
     "exudyn": {"RK44": "rkmk4"},
 }  # fmt: skip
+MISSES_AT_STEP, FAILS_AT_STEP = "Not accurate enough at this step", "No run ends well at this step"
 STEP = 1.0 / 240.0  # s
 WORST = 0.5  # rad: an axis that is further off needs no method to match it
 MARGIN = 0.8  # fraction of the accuracy that a run must meet at its samples; between them its error may be larger
@@ -97,6 +107,7 @@ class Advice:
     confidence: str = "none"
     reason: str = ""
     runner_up: str = ""
+    beside: str = ""
     closed_form: str = ""
     nearest: str = ""
     fails: tuple[str, ...] = ()
@@ -105,8 +116,8 @@ class Advice:
 
     def __str__(self) -> str:
         lines = [
-            self.reason, self.runner_up and f"Runner-up: {self.runner_up}", self.nearest, self.closed_form, *self.fails,
-            self.command and f"Run it: {self.command}", self.python and f"In Python: {self.python}",
+            self.reason, self.runner_up and f"Runner-up: {self.runner_up}", self.beside, self.nearest, self.closed_form,
+            *self.fails, self.command and f"Run it: {self.command}", self.python and f"In Python: {self.python}",
         ]  # fmt: skip
         return "\n".join(filter(None, lines))
 
@@ -118,6 +129,18 @@ class _Question(NamedTuple):
     accuracy: float
     quantity: str
     horizon: float
+    needs: tuple[str, ...]  # of the methods that may be recommended; empty: of any
+    step: float | None = None  # that they must have
+    max_step: float = math.inf
+    general: bool = False
+    keeps: str | None = None
+    pace: float = math.inf  # most seconds of a step
+
+    def allows(self, method: Integrator) -> bool:
+        """Is a method what the user can use, before its error is known?"""
+        kept = all(declared(method, claim) in ("kept", "bounded") for claim in KEPT.get(self.keeps or "", ()))
+        fixed = self.step is None and self.max_step == self.pace == math.inf
+        return kept and (fixed or method.fixed_step) and (method.general is True or not self.general)
 
 
 class _Trial(NamedTuple):
@@ -127,6 +150,12 @@ class _Trial(NamedTuple):
     error: float
     seconds: float
     confidence: str  # a key of CONFIDENCE
+    horizon: float
+
+    @property
+    def a_step(self) -> float:
+        """Seconds of a step; infinite for a method that has none."""
+        return self.seconds * self.met.setting / self.horizon if self.met.integrator.fixed_step else math.inf
 
     def words(self) -> str:
         return f"{self.met.integrator.name} with {self.met.integrator.setting(self.met.setting).label}"
@@ -134,49 +163,72 @@ class _Trial(NamedTuple):
 
 def recommend(
     scene: "str | Scene", *, accuracy: float, quantity: str = "axis", horizon: float | None = None,
-    results: str | Path | None = None,
+    results: str | Path | None = None, needs: Collection[str] = (), step_size: float | None = None,
+    max_step: float | None = None, general: bool = False, keeps: str | None = None, time_a_step: float | None = None,
 ) -> Advice:  # fmt: skip
     """The cheapest integrator, with its step or tolerance, that keeps the error of `quantity` below `accuracy`.
 
     `accuracy` is the largest error of `quantity` over the run: radians for ``axis``, ``attitude`` and ``theta``, and
     relative for others, energy and momenta by the scales of `symtop.errors`. `horizon` is the scene's own by default.
-    `results` is a folder with a stored ``work_precision.nc``, and ``population.nc`` if it is there; without it every
-    compiled method is tried. Raises SymtopError for arguments that are out of range. It runs what it recommends, which
-    takes from 0.1 s to half a minute.
+    `results` is a folder with a stored ``cost.nc``; without it every compiled method is tried. `needs` leaves out
+    methods that need something else (`Integrator.needs`), for example ``("derivative", "kicks")`` where there is no
+    formula; without them, what is made for this very top is not the answer but named beside it (`Advice.beside`).
+
+    `step_size` is the step that you have: every method of fixed step runs with it, and the fastest that is good enough
+    is the answer. `max_step` is the longest step, `time_a_step` the most seconds of one on this machine. `general`
+    leaves out what does not exist for a body without symmetry, `keeps` ("energy", "momenta") what lets them drift.
+
+    Raises SymtopError for arguments that are out of range. It runs what it recommends, which takes from 0.1 s to half
+    a minute.
     """
     scene = scenes.scene(scene)
+    allowed = tuple(one_of("needs", need, NEEDS) for need in ([needs] if isinstance(needs, str) else needs))
     accuracy = positive("accuracy", accuracy)
     one_of("quantity", quantity, KNOWN_QUANTITIES)
     if quantity in settings.ANGLES and accuracy >= math.pi:
         raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}", "accuracy")
     horizon = scene.horizon if horizon is None else horizon_of(horizon)
-    data = None if results is None else _stored(Path(results) / STORED_STUDY)
+    comparable = allowed or [need for need in NEEDS if need not in THIS_TOP]
+    near = None if results is None else nearest(Path(results) / STORED, scene, quantity, accuracy, horizon, comparable)
     limit = settings.judgeable(scene, quantity, horizon)
-    question = _Question(scene, accuracy, quantity, horizon)
+    step = None if step_size is None else positive("step_size", step_size)
+    if step is not None and not horizon / MOST_STEPS <= step < horizon:
+        words = f"below the horizon {horizon:g}, of which at most {MOST_STEPS:g} steps are run, not {step:g}"
+        raise SymtopError(f"step_size must be {words}", "step_size")
+    longest = math.inf if max_step is None else positive("max_step", max_step)
+    pace = math.inf if time_a_step is None else positive("time_a_step", time_a_step)
+    kept = None if keeps is None else one_of("keeps", keeps, KEPT)
+    limits = step, longest, boolean("general", general), kept, pace
+    question = _Question(scene, accuracy, quantity, horizon, allowed, *limits)
     if accuracy < limit:
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(question, [], (), source)
-    near = None if results is None else nearest(Path(results) / STORED, scene, quantity, accuracy, horizon)
-    guesses, source = _candidates(question, data, near)
-    source += f" ({Path(results) / STORED_STUDY})" if results is not None else ""
+    guesses, source = _candidates(question, near)
+    source += f" ({Path(results) / STORED})" if results is not None else ""
     trials: list[_Trial] = []
     ranked: list[_Trial] = []
     fails: dict[str, list[str]] = {}
     # those of high order first: they are the cheapest at most accuracies, and their cost ends the other searches
     for method in sorted(map(integrator, guesses), key=lambda method: -(method.order or 0)):
-        patience = TOO_DEAR * min((one.met.evaluations for one in trials), default=math.inf)
+        rivals = (one.met.evaluations for one in trials if one.met.integrator.needs not in THIS_TOP)
+        patience = TOO_DEAR * min(rivals, default=math.inf)
         trial = _try(question, method, guesses[method.name], patience)
         _sort_in(trial, trials, fails, method.name)
-    for number, tried in enumerate(sorted(trials, key=lambda trial: trial.seconds)):
+    trials = _timed(question, trials, fails)
+    own_of_top = [] if allowed else [one for one in trials if one.met.integrator.needs in THIS_TOP]
+    for number, tried in enumerate([one for one in trials if one not in own_of_top]):
         if number < FINALISTS or not ranked:
             _sort_in(_confirm(question, tried), ranked, fails, tried.met.integrator.name)
-    ranked.sort(key=lambda trial: trial.seconds)
+    beside: list[_Trial] = []
+    for tried in own_of_top[:1]:
+        _sort_in(_confirm(question, tried), beside, fails, tried.met.integrator.name)
+    ranked, beside = _timed(question, ranked, fails), _timed(question, beside, fails)
     # Times of the user's own methods in plain Python say nothing beside those of compiled ones.
     own = [one.name for one in integrators().values() if one.implementation == "python" and not is_built_in(one.name)]
     if own:
         fails["Not tried, as only compiled methods are timed"] = own
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
-    return _advice(question, ranked, sentences, source, near)
+    return _advice(question, ranked, sentences, source, near, beside)
 
 
 def _sort_in(trial: "_Trial | str", trials: list[_Trial], fails: dict[str, list[str]], name: str) -> None:
@@ -187,26 +239,13 @@ def _sort_in(trial: "_Trial | str", trials: list[_Trial], fails: dict[str, list[
         fails.setdefault(trial, []).append(name)
 
 
-def _stored(file: Path) -> xr.Dataset:
-    """The dataset of the work-precision study; refused with a sentence if it is not there or cannot be read."""
-    if not file.is_file():
-        raise SymtopError(f"results holds no {file.name}: {str(file.parent)!r}; run symtop study work_precision first")
-    remedy = "run symtop study work_precision --fresh"
-    try:
-        data = netcdf.read(file)
-    except SymtopError as error:
-        raise SymtopError(f"{file} cannot be read ({error.__cause__}); {remedy}") from error
-    if missing := [name for name in ("variant", *ranking.NEEDS) if name not in data]:
-        raise SymtopError(f"{file} is of an older version, without {', '.join(missing)}; {remedy}")
-    return data
-
-
-def _usable(quantity: str) -> list[str]:
+def _usable(quantity: str, needs: tuple[str, ...] = ()) -> list[str]:
     """Compiled methods with a step or a tolerance, each in the charts that show the quantity, which it then names."""
     return [
         variant.name if len(integrator(variant.method).charts()) > 1 else variant.method
         for variant in settings.compared(settings.observed(quantity))
         if variant.control is not None and variant.implementation == "compiled"
+        if not needs or variant.needs in needs
     ]
 
 
@@ -216,101 +255,145 @@ def _same(variant: str, usable: Sequence[str]) -> str | None:
     return next((name for name in (variant, *usable) if name in usable and split_name(name)[0] == method), None)
 
 
-def _candidates(
-    question: _Question, data: xr.Dataset | None, near: Near | None = None
-) -> tuple[dict[str, float | None], str]:
+def _candidates(question: _Question, near: Near | None) -> tuple[dict[str, float | None], str]:
     """Names of methods to try, each with a first guess of its setting, and a phrase on their origin."""
-    scene, accuracy, quantity, horizon = question
-    usable = _usable(quantity)
+    scene, usable = question.scene, _usable(question.quantity, question.needs)
+    usable = [name for name in usable if question.allows(integrator(name))]
     everyone: dict[str, float | None] = dict.fromkeys(usable)
-    if data is None or quantity not in data:
+    if question.step is not None:
+        return everyone, f"tried all {len(everyone)} compiled methods of fixed step that you can use"
+    if near is None:
         return everyone, f"tried all {len(everyone)} compiled methods (without a stored study)"
-    catalogue = scenes.scenes()
-    stored = {name: catalogue[name] for name in map(str, data["scene"].values) if name in catalogue}
-    if not stored:
-        return everyone, f"tried all {len(everyone)} compiled methods (the stored study holds no known scene)"
-    numbers = regime(scene)
-    closest = min(stored, key=lambda name: float(distances(regime(stored[name])[np.newaxis], numbers)[0]))
-    column = int(np.argmin(np.abs(np.log(data["horizon"].values / max(horizon / scene.nutation_period, 1e-3)))))
-    cell = data.sel(scene=closest).isel(horizon=column)
-    served = [_same(name, usable) for name, count in near.served.items() if count] if near is not None else []
-    often = dict.fromkeys(filter(None, served))  # the methods that served most of the nearest tops first
-    scale = scene.nutation_period / stored[closest].nutation_period
-    cheapest: dict[str, float | None] = {}
-    stored_as = "axis" if quantity == "attitude" else quantity  # the study runs what shows the axis
-    for place in ranking.cheapest(cell, accuracy, stored_as):
-        name = _same(place.integrator, usable)
-        if name is not None and name not in cheapest:
-            run = cell.sel(variant=place.integrator).isel(setting=place.setting)
-            step, fixed = float(run["step_size"]), bool(np.isfinite(run["step_size"]))
-            scaled = step * scale if math.isfinite(scale) and scale > 0.0 else step
-            cheapest[name] = scaled if fixed else float(run["tolerance"])
-    chosen = {name: cheapest.get(name) for name in [*often, *cheapest][:CANDIDATES]}
+    chosen: dict[str, float | None] = {}
+    for variant, count in near.served.items():
+        name = _same(variant, usable)
+        if name is not None and name not in chosen and count and len(chosen) < CANDIDATES:
+            setting = near.settings[variant]
+            chosen[name] = scene.nutation_period / setting if integrator(name).fixed_step else setting
     if not chosen:
-        return everyone, f"tried all {len(everyone)} compiled methods (none met it on {closest}, the nearest scene)"
-    count = sum(name in often for name in chosen)
-    words = [f"{count} methods that served the {near.tops} nearest random tops most often"] if near and count else []
-    if len(chosen) > count:
-        words.append(f"{len(chosen) - count} methods that are cheapest on {closest}, the nearest stored scene")
-    return chosen, f"tried the {' and '.join(words)}"
+        return everyone, f"tried all {len(everyone)} compiled methods (none served the nearest random tops)"
+    served = f"tried the {len(chosen)} methods that served the {near.tops} nearest random tops most often"
+    return chosen | dict.fromkeys(name for name in usable if integrator(name).needs in THIS_TOP), served
 
 
 def _try(question: _Question, method: Integrator, guess: float | None, patience: float) -> "_Trial | str":
     """A candidate's setting and cost from short runs, or the reason why it has none."""
-    scene, accuracy, quantity, horizon = question
+    scene, accuracy, quantity, horizon = question[:4]
+    if question.step is not None:
+        return _at_step(question, method, question.step)
     period = scene.nutation_period
     short = min(horizon, settings.SHORT * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** settings.growth(method, quantity)
-    met = settings.search(scene, method, accuracy * law, quantity, short, guess, patience)
+    met = settings.search(
+        scene, method, accuracy * law, quantity, short, guess, patience, longest=question.max_step
+    )  # fmt: skip
     if isinstance(met, str):
         dear = met == settings.BUDGET and patience < settings.MOST_EVALUATIONS[method.implementation]
         return f"Not within {TOO_DEAR:g} times the work of the best" if dear else met
     if method.fixed_step and horizon / met.setting > MOST_STEPS:
         return f"Would need more than {MOST_STEPS:.0e} steps"
-    return _Trial(met, met.error / law, settings.seconds(scene, met, quantity, horizon), "extrapolated")
+    return _Trial(met, met.error / law, math.nan, "extrapolated", horizon)
+
+
+def _at_step(question: _Question, method: Integrator, step: float) -> "_Trial | str":
+    """A run to the horizon with the step that the user has."""
+    scene, accuracy, quantity, horizon = question[:4]
+    try:
+        met = settings.attempt(scene, method, step, horizon, quantity)
+    except SymtopError as error:  # a start at a pole, for a method in the angles chart
+        return f"Not run, as {error}"
+    if not met.error <= accuracy:
+        return FAILS_AT_STEP if math.isinf(met.error) else MISSES_AT_STEP
+    confidence = "checked" if met.error + met.bound <= accuracy else "at the reference's limit"
+    return _Trial(met, met.error, math.nan, confidence, horizon)
+
+
+def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]]) -> list[_Trial]:
+    """The trials by their times, measured against each other; steps that take too long fail."""
+    times = settings.seconds(question.scene, [one.met for one in trials], question.quantity, question.horizon)
+    pairs = zip(trials, times, strict=True)
+    timed = sorted((one._replace(seconds=time) for one, time in pairs), key=lambda one: one.seconds)
+    slow = [one.met.integrator.name for one in timed if one.a_step > question.pace]
+    if slow:
+        fails[f"A step takes over {question.pace:g} s"] = slow
+    return [one for one in timed if one.a_step <= question.pace]
 
 
 def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
     """The trial run to the whole horizon, if not too much, with its setting corrected; or the reason why it fails."""
-    scene, accuracy, quantity, horizon = question
+    scene, accuracy, quantity, horizon = question[:4]
+    if question.step is not None:
+        return trial
     short = trial.met
     if short.evaluations * horizon / short.horizon > settings.MOST_EVALUATIONS[short.integrator.implementation]:
         met = settings.rounded(scene, short, accuracy * short.error / (trial.error or 1.0), quantity)
         return trial._replace(met=met, error=trial.error * met.error / (short.error or 1.0))
-    best = settings.search(scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting)
+    best = settings.search(
+        scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting, longest=question.max_step
+    )
     if isinstance(best, str):
         return f"Good enough over a short run but not to the end ({best[0].lower()}{best[1:]})"
     met = settings.rounded(scene, best, MARGIN * accuracy, quantity)
     confidence = "checked" if met.error + met.bound <= accuracy else "at the reference's limit"
-    return _Trial(met, met.error, settings.seconds(scene, met, quantity, horizon), confidence)
+    return _Trial(met, met.error, math.nan, confidence, horizon)
 
 
 def _advice(
-    question: _Question, ranked: Sequence[_Trial], fails: tuple[str, ...], source: str, near: Near | None = None
-) -> Advice:
-    scene, accuracy, quantity, horizon = question
+    question: _Question, ranked: Sequence[_Trial], fails: tuple[str, ...], source: str, near: Near | None = None,
+    beside: Sequence[_Trial] = (),
+) -> Advice:  # fmt: skip
+    scene, accuracy, quantity, horizon = question[:4]
     goal = f"{quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}"
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}."
         without = _without_steps(question, math.nan)
-        return Advice(scene.name, quantity, accuracy, horizon, reason=reason, closed_form=without, fails=fails)
+        return Advice(
+            scene.name,
+            quantity,
+            accuracy,
+            horizon,
+            reason=reason,
+            beside=_beside(beside),
+            closed_form=without,
+            fails=fails,
+        )
     best = ranked[0]
     name, fixed = best.met.integrator.name, best.met.integrator.fixed_step
     worth = f"error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
+    if need := best.met.integrator.needs:
+        worth += f"; it needs {NEEDS[need]} ({need})"
+    if fixed:
+        a_step = f"{scene.time_scale(horizon) / best.met.setting:.3g} a nutation, {1e6 * best.a_step:.2g} us each"
+        worth += f"; steps are {a_step}"
     runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
     served = _same(name, list(near.served)) if near is not None else None  # None: the study has no chart of it
     return Advice(
         scene.name, quantity, accuracy, horizon, name, best.met.setting if fixed else None,
         None if fixed else best.met.setting, best.error, best.seconds, best.confidence,
-        f"{best.words()} meets {goal}: {worth}; {source}.", runner_up="".join(runners),
+        f"{best.words()} meets {goal}: {worth}; {source}. {_carries(best.met.integrator)}", runner_up="".join(runners),
+        beside=_beside(beside, best.seconds),
         closed_form=_without_steps(question, best.seconds), nearest=near.words(served) if near and served else "",
         fails=fails, **_lines(question, best.met),
     )  # fmt: skip
 
 
+def _carries(method: Integrator) -> str:
+    """Does a method carry over to a body without symmetry?"""
+    if method.general is not True:
+        return "It does not carry over to a body without symmetry."
+    chart = ", in another chart: [axis] is that of a symmetric top" if method.charts() == ("axis",) else ""
+    return f"It carries over to a body without symmetry{chart}."
+
+
+def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
+    """The best of what is made for this top."""
+    times = [f", {one.seconds / best:.2g} times the time" if math.isfinite(best) else "" for one in trials]
+    return "".join(f"Made for this top: {one.words()}{time}." for one, time in zip(trials, times, strict=True))
+
+
 def _lines(question: _Question, met: settings.Met) -> dict[str, str]:
     """The command and the Python line that make the recommended run; no command for a scene that has no name here."""
-    scene, _, _, horizon = question
+    scene, _, _, horizon = question[:4]
     value, name, whole = float(met.setting), met.integrator.name, horizon == scene.horizon
     known = scenes.scenes().get(scene.name) == scene
     shown, control = f'"{name}"' if "[" in name else name, str(met.integrator.control)
@@ -323,7 +406,7 @@ def _lines(question: _Question, met: settings.Met) -> dict[str, str]:
 
 def _without_steps(question: _Question, best: float) -> str:
     """What the closed form costs beside a run of `best` seconds (nan if there is none), and why it is not advised."""
-    scene, _, quantity, horizon = question
+    scene, _, quantity, horizon = question[:4]
     exact = integrator("exact")
     call = bare_run(scene, exact, exact.chart_for(settings.observed(quantity)), math.nan, horizon)
     taken = timings([call], batches=5, batch=0.002)[0].best
@@ -356,7 +439,7 @@ class EngineAdvice:
     advice: Advice | None
 
     def __str__(self) -> str:
-        default, maps = next(iter(self.errors)), SETTINGS[self.engine]
+        default, maps = next(iter(self.errors)), SETTINGS.get(self.engine, {self.engine: self.engine})
         lines = [
             f"{self.engine} on {self.scene}, step {self.step_size:g}, to t = {self.horizon:g}: the axis is off by",
             *(f"    {value:.2e} rad  {name} ({maps[name]})" for name, value in self.errors.items()),
@@ -366,28 +449,42 @@ class EngineAdvice:
             lines.append(f"Its best setting is {self.best}, {times:.3g} times nearer than {default}.")
         if self.advice is None:
             return "\n".join([*lines, f"No setting is within {WORST:g} rad, so that there is nothing to match."])
+        if self.advice.accuracy != self.errors[self.best]:
+            return "\n".join([*lines, str(self.advice)])
         much = f"{self.gain:.3g} times fewer" if self.gain >= 1.0 else f"{1.0 / self.gain:.3g} times more"
         lines.append(f"As near as {self.best} with {much} force evaluations: {self.advice.reason}")
         return "\n".join(lines)
 
 
-def i_use(engine: str, scene: "str | Scene", *, step_size: float = STEP, horizon: float | None = None) -> EngineAdvice:
+def i_use(
+    engine: str, scene: "str | Scene", *, step_size: float | None = None, horizon: float | None = None,
+    accuracy: float | None = None, **limits: Any,
+) -> EngineAdvice:  # fmt: skip
     """What the settings of an engine make of a scene at a step, and which method does as well for how much less.
 
-    `step_size` is in the units of the scene, `horizon` its own by default. Raises SymtopError for an engine that is
+    An engine is one of `SETTINGS` or a map, such as "mujoco-euler". With an `accuracy`, the advice is for that and
+    for the step; `limits` are what else `recommend` takes. `step_size` is in the units of the scene, 1/240 by default,
+    `horizon` its own by default. Raises SymtopError for an engine that is
     not known and for numbers that are out of range. It takes some seconds.
     """
-    one_of("engine", engine, SETTINGS)
-    start, h = scenes.scene(scene), positive("step_size", step_size)
+    maps = SETTINGS | {name: {name: name} for name in engines()}
+    one_of("engine", engine, maps)
+    start, h = scenes.scene(scene), STEP if step_size is None else positive("step_size", step_size)
     end = start.horizon if horizon is None else horizon_of(horizon)
     if h >= end:
         raise SymtopError(f"step_size must be below the horizon {end:g}, not {h:g}", "step_size")
-    measured = {name: _error_and_forces(start, method, h, end) for name, method in SETTINGS[engine].items()}
+    measured = {name: _error_and_forces(start, method, h, end) for name, method in maps[engine].items()}
     best = min(measured, key=lambda name: measured[name][0])
     (error, forces), off = measured[best], {name: value for name, (value, _) in measured.items()}
-    advice = recommend(start, accuracy=error, horizon=end) if error <= WORST else None
+    if accuracy is not None:
+        limits["step_size"] = step_size
+    elif limits.get("quantity", "axis") != "axis":
+        raise SymtopError(f"quantity must be axis where there is no accuracy, not {limits['quantity']!r}", "quantity")
+    target = error if accuracy is None else accuracy
+    sought = accuracy is not None or error <= WORST
+    advice = recommend(start, accuracy=target, horizon=end, **limits) if sought else None
     if advice is None or advice.integrator is None:
-        return EngineAdvice(start.name, engine, h, end, off, best, math.nan, None)
+        return EngineAdvice(start.name, engine, h, end, off, best, math.nan, None if accuracy is None else advice)
     setting: dict[str, Any] = {"step_size": advice.step_size, "tolerance": advice.tolerance}
     needed = simulate(start, advice.integrator, **setting, horizon=end, guard=False, observe="axis")
     gain = forces / float(needed.attrs["force_evaluations"])

@@ -76,6 +76,14 @@ def contents(results: Path, *, provenance: bool = False) -> dict[str, xr.Dataset
     return found
 
 
+def same(one: Path, other: Path) -> int:
+    """How many datasets two results folders hold, whose datasets must be the same to the bit."""
+    first, second = contents(one), contents(other)
+    assert first.keys() == second.keys()
+    assert all(first[name].identical(second[name]) for name in first)
+    return len(first)
+
+
 def leftovers(results: Path) -> list[str]:
     """Partial files, locks and traces."""
     return [str(path.relative_to(results)) for path in results.rglob(".*") if path.is_file()]

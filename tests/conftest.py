@@ -39,9 +39,9 @@ scripts.install()  # tests import `symtop_studies`
 
 
 LONGEST = (  # files whose tests take longest, begun first: one that begins last keeps a process busy alone
-    "test_faults", "test_without_heyoka", "test_wheel", "test_advise", "test_plugin_in_studies", "test_study",
-    "test_archive", "test_report", "test_reference", "test_command_lines", "test_cold", "test_figures", "test_blind",
-    "test_long_runs", "test_typing",
+    "test_hidden", "test_blind", "test_faults", "test_explore", "test_random_runs", "test_adapters", "test_advise",
+    "test_without_heyoka", "test_study", "test_report", "test_adaptive", "test_runge_kutta", "test_reference",
+    "test_other_systems", "test_long_runs",
 )  # fmt: skip
 STORED = Path(__file__).resolve().parent.parent / "results" / "quick"
 
@@ -78,6 +78,13 @@ def _registered_for_a_while():
 @pytest.fixture(scope="module", autouse=True)
 def _registered_for_one_file():
     """Forget the integrators, scenes and plug-ins that a file of tests registered, so that files run in any order."""
+    with _registered_for_a_while():
+        yield
+
+
+@pytest.fixture
+def clean_registry():
+    """Forget what one test registers."""
     with _registered_for_a_while():
         yield
 

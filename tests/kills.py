@@ -1,6 +1,6 @@
 """kill -9 at random moments of `symtop study`, and the same command again until it is through.
 
-python -m tests.kills --all [--quick]        the studies of `make studies`; about three times as long as they take
+python -m tests.kills --all --quick        30 kills over one pass of every study; some four times as long as a pass
 """
 
 import contextlib
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import xarray as xr
+from tqdm import tqdm
 
 from symtop.core import netcdf
 from symtop.measure.datasets import differences
@@ -23,7 +24,7 @@ from symtop.runner import store
 from tests.commands import ended, leftovers, symtop
 
 PATIENCE = 2400.0  # seconds for an undisturbed run
-CHOSEN_BY_TIMES = "phase_diagram/spheroid--check-"  # cells that are run in full follow from measured prices
+CHOSEN_BY_TIMES = "cost/natural--check-"  # cells that are run in full follow from measured prices
 
 
 class Survived(NamedTuple):
@@ -44,8 +45,9 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
     """
     draw, results, calm = random.Random(seed), folder / "r", folder / "calm"
     command = ["study", *words, "--jobs", 2, "--results"]
-    assert ended(symtop(*command, calm), PATIENCE)[0] == 0
+    _through(command, calm)
     count = lost = most = rounds = 0
+    bar = tqdm(total=kills, desc="kills", disable=None)  # on a terminal
     done: dict[Path, tuple[int, int]] = {}  # finished cases: the identity of their file and when it was written
     while count < kills:
         before, start = _begun(results), time.time()
@@ -59,6 +61,7 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
             alone = draw.random() < 0.5
             (os.kill if alone else os.killpg)(process.pid, signal.SIGKILL)
             count += 1
+            bar.update()
         _, said = process.communicate()
         assert process.returncode in (0, -signal.SIGKILL), said
         time.sleep(1.5)  # workers whose parent was killed have ended by then
@@ -73,10 +76,17 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
             rounds += 1
             shutil.rmtree(results)
             done = {}
-    assert ended(symtop(*command, results), PATIENCE)[0] == 0
+    bar.close()
+    _through(command, results)
     assert_same(results, calm)
     assert not leftovers(results)
     return Survived(count, lost, most, rounds + 1)
+
+
+def _through(command: list[object], results: Path) -> None:
+    """Run the command undisturbed."""
+    code, _, err = ended(symtop(*command, results), PATIENCE)
+    assert code == 0, err
 
 
 def _begun(results: Path) -> set[Path]:
@@ -105,4 +115,4 @@ def _read(path: Path) -> xr.Dataset | xr.DataTree:
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as place:
-        print(survive(list(sys.argv[1:]), Path(place), 25.0))
+        print(survive(list(sys.argv[1:]), Path(place), 10.0))

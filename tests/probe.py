@@ -42,7 +42,11 @@ def measure(case: Case) -> xr.Dataset:
 def pictures(data: xr.Dataset) -> list[Picture]:
     figure, axis = plt.subplots(figsize=(2, 2), layout="constrained")
     axis.plot(data["energy"].values.reshape(-1))
-    return [Picture("energy", figure, "Energy.", "A line.")]
+    return [Picture("energy", figure)]
 
 
-STUDY = Study("probe", "Probe", "Is it whole?", "", cases, measure, pictures, lambda data: ["It ran."])
+def facts(data: xr.Dataset) -> dict[str, float]:
+    return {"largest": float(abs(data["energy"]).max())}
+
+
+STUDY = Study("probe", "Probe", "Is it whole?", cases, measure, facts, pictures)

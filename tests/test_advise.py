@@ -1,18 +1,18 @@
 """recommend: what it recommends meets the accuracy, and it says when it does not know."""
 
+import functools
 import math
 import random
 
 import numpy as np
 import pytest
-import xarray as xr
 from click.testing import CliRunner
 
 import symtop
 from symtop import advise
-from symtop.advise import regime
 from symtop.cli.main import main
 from symtop.measure import settings
+from symtop.measure.ranking import regime
 from symtop.methods.framework.registry import methods
 
 
@@ -122,16 +122,6 @@ def test_the_advised_lines_are_the_run_that_was_checked(horizon, monkeypatch):
     assert error[advice.step_size] == advice.expected_error
 
 
-def test_a_rounded_setting_that_misses_the_accuracy_is_not_advised(monkeypatch):
-    scene, method = symtop.scene("spheroid"), symtop.integrator("strang")
-    met = settings.attempt(scene, method, 0.0123456789, 8.0, "axis")
-    assert settings.rounded(scene, met, 1.0, "axis").setting == 0.012345
-    assert settings.rounded(scene, met, 1e-12, "axis") is met
-    short = settings.attempt(scene, method, 0.01, 8.0, "axis")
-    monkeypatch.setattr(settings, "attempt", lambda *_: pytest.fail("it runs what it knows"))
-    assert settings.rounded(scene, short, 1.0, "axis") is short
-
-
 def few(monkeypatch, count):
     """Only the first of some cheap methods are candidates."""
     names = ("strang", "takahashi-imada", "srkn-6-4", "kahan-li-6", "gauss-6")[:count]
@@ -153,19 +143,13 @@ def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_wi
     assert run.attrs["integrator"] == advice.integrator
 
 
-def test_an_older_study_is_refused_with_a_remedy(tmp_path):
-    xr.Dataset({"seconds": ("setting", [1.0])}).to_netcdf(tmp_path / "work_precision.nc")
-    with pytest.raises(symtop.SymtopError, match=r"older version, without .*control.*--fresh"):
-        symtop.recommend("spheroid", accuracy=1e-3, results=tmp_path)
-
-
 def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch):
     few(monkeypatch, 5)
     real, ended = settings.search, []
 
-    def search(scene, method, accuracy, quantity, horizon, *rest):
+    def search(scene, method, accuracy, quantity, horizon, *rest, **limits):
         if horizon < 60.0 or len(ended) >= 3:
-            return real(scene, method, accuracy, quantity, horizon, *rest)
+            return real(scene, method, accuracy, quantity, horizon, *rest, **limits)
         ended.append(method.name)
         return settings.STOPPED
 
@@ -176,11 +160,6 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
     assert advice.integrator not in ended
     assert all(name in " ".join(advice.fails) for name in ended)
     assert "not to the end (stopped by rounding" in " ".join(advice.fails)
-
-
-def test_a_folder_without_a_study_is_refused():
-    with pytest.raises(symtop.SymtopError, match="work_precision"):
-        symtop.recommend("spheroid", accuracy=1e-6, results="/nowhere")
 
 
 def test_the_command_prints_and_refuses(tmp_path, monkeypatch):
@@ -195,12 +174,12 @@ def test_the_command_prints_and_refuses(tmp_path, monkeypatch):
 def test_the_answer_does_not_depend_on_the_working_directory(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "results").mkdir()
-    (tmp_path / "results" / "work_precision.nc").write_text("no dataset")
+    (tmp_path / "results" / "cost.nc").write_text("no dataset")
     few(monkeypatch, 1)
     assert symtop.recommend("spheroid", accuracy=1e-3).integrator == "strang"
     command = CliRunner().invoke(main, ["recommend", "spheroid", "--accuracy", "1e-3"])  # it says what it reads
     assert command.exit_code == 2
-    assert "work_precision.nc cannot be read" in command.output
+    assert "cost.nc cannot be read" in command.output
 
 
 def test_a_regime_does_not_depend_on_units():
@@ -244,7 +223,65 @@ def test_thirty_random_tops():
                 rivals = [one for one in methods().values() if one.implementation == "compiled" and one.control]
                 tried = [settings.search(scene, one, accuracy, "axis", scene.horizon, patience=2e6) for one in rivals]
                 met_by = [one for one in tried if isinstance(one, settings.Met)]
-                best = min(settings.seconds(scene, one, "axis", scene.horizon) for one in met_by)
+                best = min(settings.seconds(scene, met_by, "axis", scene.horizon))
                 ratios.append(advice.seconds / best)
     assert np.mean(met) >= 0.97
     assert np.median(ratios) <= 2.0
+
+
+def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
+    usable = advise._usable("axis", ("derivative", "kicks"))
+    assert {symtop.integrator(name).needs for name in usable} == {"derivative", "kicks"}
+    assert set(usable) < set(advise._usable("axis"))
+    advice = symtop.recommend("spheroid", accuracy=1e-6, horizon=4.0, needs="expression")
+    assert symtop.integrator(advice.integrator).needs == "expression"
+    assert "it needs f as a formula (expression)" in advice.reason
+    with pytest.raises(symtop.SymtopError, match="needs 'luck' is unknown"):
+        symtop.recommend("spheroid", accuracy=1e-6, needs=["luck"])
+
+
+def test_what_is_made_for_this_top_is_named_beside_the_answer():
+    advice = symtop.recommend("spheroid", accuracy=1e-6, horizon=8.0)
+    assert symtop.integrator(advice.integrator).needs not in ("this-top", "solution")
+    assert advice.beside.startswith("Made for this top: series")
+    assert advice.beside in str(advice)
+    asked = symtop.recommend("spheroid", accuracy=1e-6, horizon=8.0, needs="this-top")
+    assert symtop.integrator(asked.integrator).needs == "this-top"
+    assert asked.beside == ""
+    assert "It does not carry over to a body without symmetry" in asked.reason
+
+
+def test_at_the_step_that_a_user_has_it_says_what_is_good_enough():
+    scene, step = symtop.scene("spheroid"), 0.004
+    advice = symtop.recommend(scene, accuracy=1e-4, step_size=step)
+    assert advice.step_size == step
+    assert measured(scene, advice) <= 1e-4
+    assert f"steps are {scene.nutation_period / step:.3g} a nutation" in advice.reason
+    missed = next(words for words in advice.fails if words.startswith("Not accurate enough at this step"))
+    names = missed.partition(": ")[2].rstrip(".").split(", ")
+    assert "midpoint" in names
+    for name in names[:4]:
+        assert settings.attempt(scene, symtop.integrator(name), step, scene.horizon, "axis").error > 1e-4
+    nobody = symtop.recommend(scene, accuracy=1e-9, step_size=0.2)
+    assert nobody.integrator is None or measured(scene, nobody) <= 1e-9
+    with pytest.raises(symtop.SymtopError, match="step_size must be below the horizon"):
+        symtop.recommend(scene, accuracy=1e-4, step_size=10.0)
+
+
+def test_limits_leave_out_what_a_user_cannot_use():
+    scene = symtop.scene("spheroid")
+    ask = functools.partial(symtop.recommend, scene, horizon=2.0)
+    free = ask(accuracy=1e-4, needs=("derivative", "kicks"))
+    short = ask(accuracy=1e-4, needs=("derivative", "kicks"), max_step=0.002)
+    assert short.step_size <= 0.002
+    assert free.step_size is None or free.step_size > 0.002
+    body = ask(accuracy=1e-4, needs="kicks", general=True)
+    assert symtop.integrator(body.integrator).general is True
+    assert "It carries over to a body without symmetry" in body.reason
+    kept = ask(accuracy=1e-3, keeps="energy", step_size=0.002)
+    run = symtop.simulate(scene, kept.integrator, step_size=0.002, horizon=800.0, guard=False)
+    early, late = (symtop.errors(run)["energy"].values[part].max() for part in (slice(1, 50), slice(-50, None)))
+    assert late < 3.0 * early
+    slow = ask(accuracy=1e-3, step_size=0.002, time_a_step=1e-12)
+    assert slow.integrator is None
+    assert any(words.startswith("A step takes over 1e-12 s") for words in slow.fails)

@@ -24,13 +24,6 @@ def test_no_function_has_the_name_of_a_package_beside_it():
             assert isinstance(importlib.import_module(f"symtop.{package}.{entry.name}"), types.ModuleType)
 
 
-def test_a_module_imported_by_its_path_is_a_module():
-    import symtop.model.scenes as s
-
-    assert isinstance(s, types.ModuleType)
-    assert symtop.scenes()["spheroid"] is s.scene("spheroid")
-
-
 def test_one_thing_has_one_name_in_every_public_function():
     for function in (symtop.simulate, symtop.reference, symtop.recommend, symtop.long_run, symtop.errors):
         names = list(inspect.signature(function).parameters)

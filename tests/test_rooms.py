@@ -41,7 +41,7 @@ class Arrow(NamedTuple):
     target: str
     names: tuple[str, ...]
     line: int
-    kind: str  # top, lazy (inside a function) or type (under TYPE_CHECKING)
+    typing: bool  # under TYPE_CHECKING
 
 
 @dataclass(frozen=True)
@@ -70,28 +70,23 @@ def read(root: Path) -> dict[str, Module]:
     for name, path in files.items():
         tree = ast.parse(path.read_bytes())
         package = name if path.name == "__init__.py" else name.rpartition(".")[0]
-        modules[name] = Module(name, path, tree, tuple(_arrows(tree, package, "top", set(files))))
+        modules[name] = Module(name, path, tree, tuple(_arrows(tree, package, known=set(files))))
     return modules
 
 
-def _arrows(node: ast.AST, package: str, kind: str, known: set[str]) -> Iterator[Arrow]:
+def _arrows(node: ast.AST, package: str, known: set[str], *, typing: bool = False) -> Iterator[Arrow]:
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.Import):
-            yield from (Arrow(alias.name, (), child.lineno, kind) for alias in child.names)
+            yield from (Arrow(alias.name, (), child.lineno, typing) for alias in child.names)
         elif isinstance(child, ast.ImportFrom):
             above = package.split(".")[: package.count(".") + 2 - child.level] if child.level else []
             source = ".".join([*above, *([child.module] if child.module else [])])
             for alias in child.names:
                 inner = f"{source}.{alias.name}"
-                yield Arrow(inner if inner in known else source, (alias.name,), child.lineno, kind)
-        elif isinstance(child, ast.If) and ast.unparse(child.test).rpartition(".")[2] == "TYPE_CHECKING":
-            for part in child.body:
-                yield from _arrows(ast.Module([part], []), package, "type", known)
-            for part in child.orelse:
-                yield from _arrows(ast.Module([part], []), package, kind, known)
+                yield Arrow(inner if inner in known else source, (alias.name,), child.lineno, typing)
         else:
-            inside = isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda) and kind == "top"
-            yield from _arrows(child, package, "lazy" if inside else kind, known)
+            checked = isinstance(child, ast.If) and ast.unparse(child.test).rpartition(".")[2] == "TYPE_CHECKING"
+            yield from _arrows(child, package, known, typing=typing or checked)
 
 
 def upward(modules: dict[str, Module]) -> list[str]:
@@ -106,14 +101,14 @@ def upward(modules: dict[str, Module]) -> list[str]:
             if target is None or target.room == module.room or arrow.names == ("__version__",):
                 continue
             if FLOOR.get(target.room, len(ORDER)) >= FLOOR[module.room]:
-                complaints.append(f"{module.name}:{arrow.line} imports {target.name} ({arrow.kind})")
+                complaints.append(f"{module.name}:{arrow.line} imports {target.name}")
     return sorted(set(complaints))
 
 
 def circles(modules: dict[str, Module]) -> list[str]:
     """Sets of files that import each other, directly or through others; TYPE_CHECKING imports aside."""
     graph = {
-        name: {arrow.target for arrow in module.arrows if arrow.kind != "type" and arrow.names != ("__version__",)}
+        name: {arrow.target for arrow in module.arrows if not arrow.typing and arrow.names != ("__version__",)}
         & modules.keys() - {name}
         for name, module in modules.items()
     }
@@ -167,8 +162,7 @@ def test_three_modules_lie_in_the_root():
 def test_every_file_is_read():
     assert house().keys() >= {"symtop", "symtop.advise", "symtop.model.top", "symtop_studies.convergence.study"}
     assert {module.room for module in house().values()} == set(FLOOR)
-    kinds = {(arrow.kind, arrow.target) for arrow in house()["symtop"].arrows}
-    assert ("type", "symtop.run.simulation") in kinds
+    assert "symtop.run.simulation" in {arrow.target for arrow in house()["symtop"].arrows if arrow.typing}
 
 
 @pytest.fixture
@@ -181,7 +175,7 @@ def small(tmp_path):
         "symtop/core/__init__.py": "",
         "symtop/core/plain.py": "from symtop import __version__\n",
         "symtop/core/up.py": "from symtop.model import good\n",
-        "symtop/core/lazy_kernel.py": "def look():\n    import symtop.model.good\n",
+        "symtop/core/progress.py": "def look():\n    import symtop.model.good\n",
         "symtop/core/typed.py": "from typing import TYPE_CHECKING\n"
         "if TYPE_CHECKING:\n    from ..model.good import value\n",
         "symtop/model/__init__.py": "",
@@ -204,12 +198,12 @@ def small(tmp_path):
 
 def test_imports_that_run_upward_are_reported(small):
     assert upward(small) == [
-        "symtop.core.lazy_kernel:2 imports symtop.model.good (lazy)",
-        "symtop.core.typed:3 imports symtop.model.good (type)",
-        "symtop.core.up:1 imports symtop.model.good (top)",
+        "symtop.core.progress:2 imports symtop.model.good",
+        "symtop.core.typed:3 imports symtop.model.good",
+        "symtop.core.up:1 imports symtop.model.good",
         "symtop.extra lies in no room of ORDER",
-        "symtop.report.page:1 imports symtop_studies.drift.study (top)",
-        "symtop.runner.beside:1 imports symtop.judging (top)",
+        "symtop.report.page:1 imports symtop_studies.drift.study",
+        "symtop.runner.beside:1 imports symtop.judging",
     ]
 
 

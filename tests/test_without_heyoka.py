@@ -4,6 +4,7 @@ A `sitecustomize` hides the package from a whole tree of processes, the workers 
 """
 
 import json
+import re
 import subprocess
 import sys
 
@@ -37,8 +38,8 @@ def test_the_registry_has_everything_but_taylor(hidden):
 def test_taylor_is_refused_in_a_sentence(hidden):
     done = hidden("run", "spheroid", "taylor")
     assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "taylor needs the package heyoka" in done.stderr
+    (said,) = (line for line in done.stderr.splitlines() if not re.fullmatch(r"symtop: running, \d+ s", line))
+    assert "taylor needs the package heyoka" in said
 
 
 def test_a_run_its_error_and_a_certificate_in_40_digits(hidden):
@@ -69,5 +70,5 @@ def test_every_study_runs(hidden, tmp_path):
     done = hidden("study", "--all", "--quick", "--results", "here")
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     names = {path.stem for path in (tmp_path / "here" / "quick").glob("*.nc")}
-    assert {"truth", "convergence", "work_precision", "drift", "stability", "reduction", "claims"} <= names
+    assert {"truth", "convergence", "cost", "drift", "stability", "reduction", "claims"} <= names
     assert hidden("report", "--results", "here/quick").returncode == 0

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from benchmarks.engines import ADAPTERS, load
 from benchmarks.engines.measure import row
-from benchmarks.engines.study import NAME, findings
+from benchmarks.engines.study import NAME, findings, verdict
 from benchmarks.measured import circumstances, sentence
 from symtop.core import netcdf
 
@@ -34,7 +34,7 @@ def main() -> None:
     measured = sentence(facts, "make engines", {engine: " and ".join(known) for engine, known in versions.items()})
     said = findings(rows, missing, measured)
     netcdf.write_json(file, said)
-    for line in (*said["verdict"], *said["failures"]):
+    for line in (*verdict(rows), *said["failures"]):
         print(line)
 
 

@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 from typing import Any
 
+from benchmarks import pages
 from benchmarks.engines.measure import COMPARED, COUNT, LEVEL, STEPS, agrees
+from benchmarks.pages import Table
 from symtop.core import netcdf
 from symtop.methods.framework.registry import integrator
-from symtop.report.sentences import counted, few
+from symtop.report.formats import FEW, counted
 
 NAME = "live-engines"  # of the findings; `engines` is the study of the maps
 UNRUN = "YADE is not run: its map is held by its formula and a reference value alone."
@@ -42,6 +44,11 @@ def _largest(rows: Sequence[dict[str, Any]], what: str) -> str:
     return f"{max((made[f'{name}_{what}'] for made in rows for name in STEPS), default=0.0):.0e}"
 
 
+def few(names: Sequence[str], noun: str) -> str:
+    """The names, if they are few; otherwise how many there are."""
+    return ", ".join(names) if len(names) <= FEW else counted(len(names), noun)
+
+
 def verdict(rows: Sequence[dict[str, Any]]) -> list[str]:
     """How many settings have the map of the catalogue, to what, and which have not."""
     said, compared = [], [made for made in rows if made["method"]]
@@ -70,12 +77,9 @@ def verdict(rows: Sequence[dict[str, Any]]) -> list[str]:
 def findings(rows: Sequence[dict[str, Any]], missing: Sequence[str], measured: str) -> dict[str, Any]:
     """What the report wants, and the numbers themselves."""
     failed = [f"{made['engine']} ({made['name']}): {made['failed']}" for made in rows if "failed" in made]
-    table = {"title": "Engines against their maps", "header": list(HEADER), "rows": [cells(made) for made in rows]}
-    return {
-        "study": NAME, "title": "Engines against their maps",
-        "question": "Are the maps of the catalogue those that the engines take?",
-        "how_to_read": HOW_TO_READ, "verdict": verdict(rows), "tables": [table], "charts": [], "opening": None,
-        "pictures": [], "failures": [*missing, *failed], "cases": len(rows), "quick": False,
-        "provenance": netcdf.provenance(changes=True), "measured": measured, "rows": list(rows),
-        "missing": list(missing),
-    }  # fmt: skip
+    table = Table("Engines against their maps", HEADER, [cells(made) for made in rows])
+    return pages.findings(
+        NAME, "Engines against their maps", "Are the maps of the catalogue those that the engines take?", verdict(rows),
+        HOW_TO_READ, [table], failures=[*missing, *failed], cases=len(rows), measured=measured,
+        provenance=netcdf.provenance(changes=True), rows=list(rows), missing=list(missing),
+    )  # fmt: skip

@@ -9,11 +9,10 @@ from pathlib import Path
 from benchmarks.peers import ADAPTERS, load, together
 from benchmarks.peers.adapters.diffrax import PACKAGE as DIFFRAX, SOLVERS
 from benchmarks.peers.measure import SCENES, measure
-from benchmarks.peers.study import STUDY, measured
+from benchmarks.peers.study import STUDY, findings
 from benchmarks.peers.summary import lines
 from symtop.core import netcdf
-from symtop.report import style
-from symtop.runner import run as runner
+from symtop.measure import columns
 
 
 def main() -> None:
@@ -33,16 +32,12 @@ def main() -> None:
         peers, missing = load(tuple(options.only))
         for sentence in missing:
             print(sentence)
-        data = netcdf.describe(measure(peers, options.scenes), STUDY.title, question=STUDY.question)
+        own = netcdf.read_columns(Path(__file__).parent / "columns.tsv")
+        data = columns.described(measure(peers, options.scenes), own=own)
+        data = netcdf.describe(data, STUDY.title, question=STUDY.question)
         netcdf.write(data, file)
         many = together.measure(SOLVERS if any(peer.package == DIFFRAX for peer in peers) else ())
-    findings = runner.findings_of(
-        STUDY, data, options.results, style.publish, failures=missing, cases=data["seconds"].count().item()
-    )
-    if many:
-        findings["tables"].append(together.table(many)._asdict())
-        findings["verdict"] = [*findings["verdict"], *together.verdict(many)]
-    netcdf.write_json(told, findings | {"measured": measured(data), "together": [row._asdict() for row in many]})
+    netcdf.write_json(told, findings(data, many, options.results, missing))
     print("\n".join([*lines(data), "", *together.lines(many)]))
 
 

@@ -1,12 +1,18 @@
 """The peers as a study of the report: its question, its figure, its words, and where and when it was measured."""
 
+from pathlib import Path
+from typing import Any
+
 import xarray as xr
 
+from benchmarks import pages
 from benchmarks.measured import sentence
-from benchmarks.peers import distributions, summary
+from benchmarks.peers import distributions, summary, together
 from benchmarks.peers.measure import HEYOKA, OURS, PERIODS
 from benchmarks.peers.summary import ENGINES, JUDGED, NAMES
 from symtop.report import style
+from symtop.report.formats import number
+from symtop.runner import run as runner
 from symtop.runner.study import Picture, Study
 
 SOLVE_IVP = "scipy["  # how the groups of SciPy's solve_ivp begin: a chart and a language each
@@ -43,22 +49,27 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         text.set_color(SPOKEN if name.startswith(SOLVE_IVP) else "black")
     style.few_ticks(*axes.flat, most=5)
     scenes = " and ".join(data["scene"].values.astype(str))
-    errors = " and ".join(style.number(target) for target in JUDGED)
+    errors = " and ".join(number(target) for target in JUDGED)
     figure.supxlabel(
         f"A dot: the library's fastest run with an error of at most {errors} rad over {PERIODS:g} nutations of "
         f"{scenes},\nover symtop's fastest. Public call: what a user types. Inner loop: without set-up and samples.",
         fontsize=7.5, ha="left", x=0.01,
     )  # fmt: skip
-    style.headline(figure, _message(data, known) or "Time of other libraries over that of symtop at the same error")
-    caption = (
-        f"{_gain(data, known)}A line is a library, with the chart and the language of its right-hand side where it was "
+    return [Picture("fronts", figure)]
+
+
+def caption(data: xr.Dataset) -> tuple[str, str]:
+    """Caption of the figure, and its text for those who cannot see it."""
+    gains = _gains(data, summary.groups(data))
+    first = f"SciPy's solve_ivp takes {gains[0]} as long at the left, {gains[1]} at the right. " if gains else ""
+    words = (
+        f"{first}A line is a library, with the chart and the language of its right-hand side where it was "
         "given several; a dot is one scene and one accuracy, at which its fastest method and setting is divided by "
         "the fastest of symtop's own kernels. Left, the call that a user types; right, the inner loop alone; the same "
         f"runs at the same settings in both. All on (e, L), but arkode-sprk and the variants [angles] in Euler angles. "
         "symtop with heyoka is taylor, heyoka's stepper called by symtop."
     )
-    alt = "Dot plots of the time of each library over that of symtop, a panel for each call, a line a library."
-    return [Picture("fronts", figure, caption, alt)]
+    return words, "Dot plots of the time of each library over that of symtop, a panel for each call, a line a library."
 
 
 def _spans(data: xr.Dataset, known: dict[str, list[str]], name: str) -> list[list[float]]:
@@ -83,23 +94,6 @@ def _gains(data: xr.Dataset, known: dict[str, list[str]]) -> list[str]:
     return [f"{summary.printed(min(each))} to {summary.printed(max(each))} times" for each in calls]
 
 
-def _message(data: xr.Dataset, known: dict[str, list[str]]) -> str:
-    """The message of the figure; empty without SciPy."""
-    gains = _gains(data, known)
-    if not gains:
-        return ""
-    return (
-        f"SciPy's solve_ivp takes {gains[0]} as long as symtop's own methods in a public call, {gains[1]} as long in "
-        "an inner loop"
-    )
-
-
-def _gain(data: xr.Dataset, known: dict[str, list[str]]) -> str:
-    """The same as a sentence of the caption."""
-    gains = _gains(data, known)
-    return f"SciPy's solve_ivp takes {gains[0]} as long at the left, {gains[1]} at the right. " if gains else ""
-
-
 def measured(data: xr.Dataset) -> str:
     """When, where and with which versions, in a sentence."""
     pairs = zip(data["package"].values.astype(str), data["version"].values.astype(str), strict=True)
@@ -112,11 +106,22 @@ STUDY = Study(
     name="peers",
     title="Beside other libraries",
     question="What would I gain or lose by using another library for this, as its user and as its author?",
-    how_to_read=summary.HOW_TO_READ,
     cases=lambda _: [],
     measure=lambda _: xr.Dataset(),
     pictures=pictures,
-    tables=summary.tables,
-    verdict=summary.verdict,
     timed=True,
 )
+
+
+def findings(data: xr.Dataset, many: list[together.Row], results: Path, missing: list[str]) -> dict[str, Any]:
+    """Draw, and say what was measured, with the runs of many tops at once."""
+    drawn = runner.findings_of(
+        STUDY, data, results, style.publish, failures=missing, cases=data["seconds"].count().item()
+    )
+    tables = [*summary.tables(data), *([together.table(many)] if many else [])]
+    said = pages.findings(
+        STUDY.name, STUDY.title, STUDY.question, [*summary.verdict(data), *together.verdict(many)],
+        summary.HOW_TO_READ, tables, further=summary.pairs(data), captions={"fronts": caption(data)},
+    )  # fmt: skip
+    stored = {"measured": measured(data), "together": [row._asdict() for row in many]}
+    return drawn | {"page": said["page"]} | stored

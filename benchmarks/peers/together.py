@@ -17,6 +17,7 @@ import numpy as np
 
 import symtop
 from benchmarks import lanes
+from benchmarks.pages import Table
 from benchmarks.peers.adapters import diffrax as adapter
 from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import Array
@@ -24,7 +25,6 @@ from symtop.methods.framework.space import on_axis
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import flat
-from symtop.runner.study import Table
 
 MEMBERS = (1000, 10_000)
 WIDTH = 0.128  # rad

@@ -1,6 +1,6 @@
 """The gallery: every figure in docs/snapshot with its caption, the study that makes it and the command to type.
 
-Captions, questions and notes on reading are those of docs/snapshot/report.md, in its order. A figure is of the study
+Titles, captions and notes on reading are those of docs/snapshot/report.md, in its order. A figure is of the study
 whose folder its name begins with; those of benchmarks are named in `OTHERS`. A figure that the report does not show,
 and one that nothing makes, is an error: the site does not build.
 """
@@ -16,25 +16,31 @@ ROOT = Path(__file__).resolve().parents[2]
 SNAPSHOT = ROOT / "docs" / "snapshot"
 PAGE, MARK = "reference/gallery", "<!-- gallery -->"
 OTHERS = {"peers": ("make peers", "benchmarks/peers/figures.py")}  # a command and the code, by the name's beginning
-SHOWN = re.compile(r"^!\[(?P<alt>.*)\]\(figures/(?P<file>[^)]+)\)\n\n(?P<caption>\S(?:.|\n(?!\n))*)", re.MULTILINE)
+FRONT = "Front page"
+SHOWN = re.compile(
+    r"^(?:\*\*(?P<title>[^*\n]+)\*\*\n\n)?!\[(?P<alt>.*)\]\(figures/(?P<file>[^)]+)\)\n\n(?P<caption>\S(?:.|\n(?!\n))*)",
+    re.MULTILINE,
+)
 
 
 class Shown(NamedTuple):
     """A figure as the report shows it."""
 
     file: str
+    title: str
     alt: str
     caption: str
 
 
 def sections(report: str) -> dict[str, tuple[str, list[Shown]]]:
     """Of each section of the report that has figures: its text, and its figures in order."""
-    found: dict[str, tuple[str, list[Shown]]] = {}
-    for part in re.split(r"^## ", report, flags=re.MULTILINE)[1:]:
-        title, _, text = part.partition("\n")
-        if figures := [Shown(one["file"], one["alt"], one["caption"]) for one in SHOWN.finditer(text)]:
-            found[title.strip()] = (text, figures)
-    return found
+    with_figures: dict[str, tuple[str, list[Shown]]] = {}
+    first, *others = re.split(r"^## ", report, flags=re.MULTILINE)
+    for title, _, text in [(FRONT, "", first), *(part.partition("\n") for part in others)]:
+        shown = SHOWN.finditer(text)
+        if figures := [Shown(one["file"], one["title"] or "", one["alt"], one["caption"]) for one in shown]:
+            with_figures[title.strip()] = (text, figures)
+    return with_figures
 
 
 def maker(file: str, root: Path = ROOT) -> tuple[str, str]:
@@ -57,12 +63,11 @@ def markdown(report: str, tracked: set[str], root: Path = ROOT) -> str:
     for title, (text, figures) in parts.items():
         command, code = maker(figures[0].file, root)
         lines += [f"## {title}", ""]
-        if question := re.search(r"^\*[^*\n]+\*$", text, re.MULTILINE):
-            lines += [question.group(), ""]
         lines += [f"Made by `{command}`; the code that draws is in `{code}`.", ""]
         if reading := re.search(r"^\*\*How to read it\.\*\*.*", text, re.MULTILINE):
             lines += [reading.group(), ""]
         for one in figures:
+            lines += [f"**{one.title}**", ""] if one.title else []
             lines += [f"```{{figure}} ../snapshot/figures/{one.file}", f":name: {Path(one.file).stem}"]
             lines += [
                 f":alt: {one.alt}",

@@ -8,7 +8,7 @@ from symtop.methods.framework.registry import integrator, integrators
 from symtop.model.scenes import scene
 from symtop.runner.study import Case, Study
 
-from . import figures, words
+from . import facts, figures, planted
 
 LEFT_OUT = {  # tags of scenes, with the reason; all claims of all integrators take minutes on each scene
     "mild": "a defect shows less",
@@ -20,13 +20,16 @@ LEFT_OUT = {  # tags of scenes, with the reason; all claims of all integrators t
 
 
 def cases(quick: bool) -> list[Case]:
-    """One case an integrator and scene."""
+    """One case an integrator and scene, and those that make false claims."""
     names = grid_scenes(LEFT_OUT)
-    return [Case(name, method.name, {"quick": quick}) for name in names for method in integrators().values()]
+    every = [Case(name, method.name, {"quick": quick}) for name in names for method in integrators().values()]
+    return every + planted.cases(quick)
 
 
 def measure(case: Case) -> xr.Dataset:
     """The findings on one integrator, in every chart that it works in."""
+    if case.integrator in planted.LIES:
+        return planted.measured(case)
     return (
         judge(integrator(case.integrator), scene(case.scene), quick=case.settings["quick"])
         .dataset()
@@ -38,12 +41,5 @@ STUDY = Study(
     name="claims",
     title="Claims",
     question="Is every declared property of every integrator true?",
-    how_to_read=(
-        "The same measurements judge what each integrator claims about itself: its order, the structure of a step, the "
-        "constants of the motion over a million steps, what a step costs, what happens at a pole. A claim is confirmed "
-        "or refuted only if the measured value is far beyond the uncertainty of the measurement; what an integrator "
-        "does not claim is measured all the same. The second figure shows whether the defect of a step is real or an "
-        "error of measuring it."
-    ),
-    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
+    cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
 )  # fmt: skip

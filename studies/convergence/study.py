@@ -11,7 +11,7 @@ from symtop.methods.framework.registry import integrator, variants
 from symtop.model.scenes import TAGS, scene
 from symtop.runner.study import Case, Study
 
-from . import figures, tables, words
+from . import facts, figures, measures
 
 LEFT_OUT = {  # tags of scenes, with the reason
     "repeats": "the same orders show",
@@ -42,7 +42,7 @@ def on_scene(name: str, quick: bool) -> list[Case]:
         count = (8 if quick else 17) if variant.fixed_step else 5 if quick else 13
         settings = ladder(variant, on, horizon, count, 1e5 if quick else MOST_STEPS)
         chosen = {"horizon": horizon, "settings": settings, "dense": not quick}
-        if name == WHOLE and variant.method in tables.NAMED:
+        if name == WHOLE and variant.method in measures.NAMED:
             chosen["history"] = HISTORY[quick]
         grid.append(Case(name, variant.name, chosen))
     return grid
@@ -57,22 +57,14 @@ def measure(case: Case) -> xr.Dataset:
     horizon = case.settings["horizon"]
     table = order_table(on, row, case.settings["settings"], horizon, observable(row), dense=case.settings["dense"])
     history = case.settings.get("history")
-    return (table if history is None else table.merge(tables.energy_history(on, row, history))).assign(horizon=horizon)
+    return (table if history is None else table.merge(measures.energy_history(on, row, history))).assign(
+        horizon=horizon
+    )
 
 
 STUDY = Study(
     name="convergence",
     title="Convergence",
     question="At what rate does the error fall with the step, or with the tolerance?",
-    how_to_read=(
-        "Both axes are logarithmic, so a method of order p is a straight line of slope p against its step. Where a "
-        "line bends at the top, the step is too large for the order to show; where it flattens at the bottom, the "
-        "error has reached rounding or the grey band, below which the reference cannot judge. Lines of one order look "
-        "alike; what tells their methods apart is the constant C in error = C h^p, shown as the work that it takes to "
-        "one accuracy. A variant is a method in one "
-        "chart, rk4[axis]: angles are Euler's angles, axis is the direction of the axis with the angular momentum, "
-        "attitude is the quaternion with the angular momentum. Steps of adaptive methods follow from their tolerance; "
-        "they are drawn against it, and against work beside the methods of fixed step."
-    ),
-    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
+    cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
 )  # fmt: skip

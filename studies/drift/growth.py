@@ -16,8 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from symtop.core.numbers import TINY
-from symtop.measure.conservation import Trend, constant_of, residuals, tops
+from symtop.measure.conservation import Trend, constant_of, residuals
 from symtop.measure.order import Fit, power_law
 from symtop.measure.phase import nutation_phase
 from symtop.methods.framework.registry import Integrator
@@ -25,8 +24,6 @@ from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.run.simulation import integrate
 
-WINDOWS = 24  # for a change of law: each side of it needs at least five
-SETTLED = 30.0  # nutations: before, an oscillation switches on, which is no change of law
 DRAWS, SEED = 2000, 1937  # of the bootstrap
 BLOCKS = 50
 
@@ -38,29 +35,17 @@ def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:
     ``largest``, the linear ``slope`` with its ``interval`` and ``rise``, and the ``exponent`` of growth over the last
     two decades; for the phase of the nutation (rad; NaN where there is none) ``largest`` and ``exponent``, over the
     last decade, because a wrong frequency gives way to a drifting one only late. ``exponent_interval`` goes with each,
-    and ``law``, its name; where one law gives way to another, ``change`` is the time, ``before`` and ``after`` are the
-    exponents (NaN where none does).
+    and ``law``, its name.
     """
     run = integrate(scene, method, observe="nutation", **settings)
     time = run.time
     columns: dict[str, Any] = {"sample_time": ("sample", time), "outcome": run.outcome, "steps": run.steps}
-    period = scene.nutation_period
-    late = time > (SETTLED * period if math.isfinite(period) else 0.0)
     for name, values in residuals(scene, run).items():
         columns[f"{name}_residual"] = ("sample", values)
-        columns |= _columns(name, constant_of(time, values)._asdict(), time[late], values[late])
-    phase = nutation_phase(scene, time, run.theta, run.p_theta / scene.top.I1)
-    changed = constant_of(time, phase, 1.0)._asdict()
-    without_trend = {part: value for part, value in changed.items() if part not in Trend._fields}
-    return xr.Dataset(columns | _columns("phase", without_trend, time[late], phase[late]))
-
-
-def _columns(name: str, changed: dict[str, Any], time: np.ndarray, values: np.ndarray) -> dict[str, Any]:
-    """What became of a quantity, and where within the last two decades another law than that of the end ended."""
-    change = change_point(*tops(time, values, count=WINDOWS)) if time.size else None
-    when, before, after = (math.nan,) * 3 if change is None else change
-    parts = changed | {"change": when, "before": before, "after": after}
-    return {f"{name}_{part}": value for part, value in parts.items()}
+        columns |= {f"{name}_{part}": value for part, value in constant_of(time, values)._asdict().items()}
+    phase = constant_of(time, nutation_phase(scene, time, run.theta, run.p_theta / scene.top.I1), 1.0)._asdict()
+    columns |= {f"phase_{part}": value for part, value in phase.items() if part not in Trend._fields}
+    return xr.Dataset(columns)
 
 
 class Ensemble(NamedTuple):
@@ -83,40 +68,6 @@ def ensemble_growth(steps: ArrayLike, drifts: ArrayLike, least: float) -> Ensemb
     x = np.log(n[fit.used]) - np.log(n[fit.used]).mean()
     low, high = np.quantile(again @ x / (x @ x), (0.025, 0.975))
     return Ensemble(rms, fit._replace(interval=float(max(high - fit.slope, fit.slope - low))))
-
-
-class Change(NamedTuple):
-    """Where a growth law gives way to another."""
-
-    time: float
-    before: float  # exponents
-    after: float
-
-
-def change_point(time: ArrayLike, size: ArrayLike, least: int = 5) -> Change | None:
-    """The best break of a log-log curve into two lines, if it halves what one line leaves and earns its two parameters.
-
-    Judged by Schwarz's criterion; each line has at least `least` points, and the two exponents differ by at least 1/4.
-    """
-    t, y = np.asarray(time, float), np.asarray(size, float)
-    good = np.isfinite(t) & np.isfinite(y) & (t > 0.0) & (y > 0.0)
-    u, v = np.log(t[good]), np.log(y[good])
-    n = u.size
-    if n < 2 * least:
-        return None
-
-    def broken(place: float) -> tuple[float, np.ndarray]:
-        columns = np.stack([np.ones(n), u, np.maximum(u - place, 0.0)], axis=1)
-        coefficients = np.linalg.lstsq(columns, v, rcond=None)[0]
-        return float(np.sum((v - columns @ coefficients) ** 2)), coefficients
-
-    straight = float(np.polyfit(u, v, 1, full=True)[1][0]) if n > 2 else 0.0
-    places = u[least - 1 : n - least + 1]
-    rest, place, coefficients = min((*broken(place)[:1], place, broken(place)[1]) for place in map(float, places))
-    gain = n * math.log(max(straight, TINY) / max(rest, TINY)) - 2.0 * math.log(n)
-    if gain <= 0.0 or rest > 0.5 * straight or abs(coefficients[2]) < 0.25:
-        return None
-    return Change(math.exp(place), float(coefficients[1]), float(coefficients[1] + coefficients[2]))
 
 
 class Horizon(NamedTuple):

@@ -10,7 +10,6 @@ import math
 import numpy as np
 import xarray as xr
 
-from symtop.measure.conservation import growth
 from symtop.measure.phase import nutation_phase
 from symtop.measure.settings import seek
 from symtop.methods.framework.registry import Integrator
@@ -62,9 +61,7 @@ def phase_loss(
 
     The run that measures takes `most` steps at most. ``steps`` and force ``evaluations`` a nutation; in nutations,
     ``predicted``, the length ``short`` of the run that predicts, and ``measured``; ``ratio``, predicted over measured.
-    Dimension ``sample``: ``nutations`` and ``phase`` (rad) of the run that measures; ``exponent`` of the growth of its
-    phase error in the last decade, with ``exponent_interval`` (half-width, 95 %). If nothing can be predicted there are
-    only ``steps``, ``predicted`` and ``short``.
+    If nothing can be predicted there are only ``steps``, ``predicted`` and ``short``.
     """
     period = scene.nutation_period
     steps = steps_for(scene, method, target)
@@ -78,14 +75,11 @@ def phase_loss(
         return xr.Dataset({"steps": steps, "predicted": predicted, "short": short})
     length = min(1.1 * predicted, most / steps)
     long = phase_run(scene, method, steps, length)
-    fit = growth(long["time"], long["phase"], 1.0)
     evaluations = long.attrs["force_evaluations"] / length
     measured = lost_at(long["time"], long["phase"], LOST) / period
     return xr.Dataset(
         {
             "steps": steps, "evaluations": evaluations, "predicted": predicted, "short": short,
             "measured": measured, "ratio": predicted / measured,
-            "nutations": ("sample", long["time"].values / period), "phase": ("sample", long["phase"].values),
-            "exponent": fit.slope, "exponent_interval": fit.interval,
         }
     )  # fmt: skip

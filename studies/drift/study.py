@@ -12,9 +12,9 @@ from symtop.model.scenes import TAGS, Scene, scene
 from symtop.run.long_run import PER_NUTATION
 from symtop.runner.study import Case, Study
 
-from . import figures, words
+from . import facts, figures
+from .measures import HISTORIES, HORIZONS, ROUNDINGS, WINDOWS
 from .phase_loss import MOST_STEPS, SHORT, TARGET, phase_loss
-from .tables import HISTORIES, HORIZONS, ROUNDINGS, WINDOWS
 
 LONG = "spheroid"  # the scene of the long runs and of the losses of phase
 LEFT_OUT = {  # tags of scenes, with the reason; a million steps of every method take minutes on each scene
@@ -91,13 +91,5 @@ STUDY = Study(
     name="drift",
     title="Drift",
     question="What happens to energy, momenta and phase over a million steps, and over 10^8?",
-    how_to_read=(
-        "A variant is a method in one chart, method[chart]: rk4[angles] and rk4[axis] take the same step and differ in "
-        "their equations only. Energies are relative to E0 - min V, the energy of the nutation, momenta to the larger "
-        "one. A flat line is a bounded error, slope one a steady drift, slope one half the random walk of rounding. "
-        "Discrete Lagrangians and splittings have a larger but bounded energy error and conserve the momenta to "
-        "rounding. An explicit or adaptive Runge-Kutta method begins with a smaller error and loses energy and momenta "
-        "in time. The tables hold every variant; momenta are recomputed from the increments of the trajectory."
-    ),
-    cases=cases, full=full, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
+    cases=cases, full=full, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
 )  # fmt: skip

@@ -16,8 +16,8 @@ from symtop.run.ensemble.ensemble import ensemble
 from symtop.run.ensemble.population import NUMBERS, population
 from symtop.runner.study import Case, Study
 
-from . import figures, listed, words
-from .tables import HORIZON, SCENES, axis_angle, frames, ladder
+from . import facts, figures
+from .measures import HORIZON, SCENES, axis_angle, frames, ladder
 
 COMPARED = ("strang[axis]", "rk4[axis]", "srkn-11-6[axis]")
 SEED = 1
@@ -65,10 +65,5 @@ STUDY = Study(
     name="engines",
     title="Physics engines",
     question="How well do the integrators of physics engines follow a top?",
-    how_to_read=words.HOW_TO_READ,
-    cases=cases,
-    measure=measure,
-    pictures=figures.pictures,
-    tables=listed.tables,
-    verdict=words.verdict,
-)
+    cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
+)  # fmt: skip

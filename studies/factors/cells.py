@@ -1,11 +1,11 @@
 """The cells of the factorial: a method, the chart of its equations, the language that runs it, the call around it.
 
     method        a scheme: the same coefficients in every chart and language
-    chart         angles, axis, attitude                                        see
-    `symtop.methods.framework.equations` language      compiled        the whole loop, by numba or heyoka
+    chart         angles, axis, attitude          see `symtop.methods.framework.equations`
+    language      compiled        the whole loop, by numba or heyoka
                   scipy-numba     SciPy's loop in Python, the right-hand side compiled
                   scipy-python    SciPy's loop, the right-hand side in Python on floats
-                  numpy           a loop in Python over NumPy arrays            see `plain_numpy`
+                  numpy           a loop in Python over NumPy arrays, see `plain_numpy`
     call          kernel          the bare solver, two samples
                   simulate        `symtop.simulate` as it stands: 501 samples, its guard, a dataset
                   solve_ivp       `scipy.integrate.solve_ivp` with the same 501 samples

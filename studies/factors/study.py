@@ -1,7 +1,8 @@
 """What makes the difference: method, formulation, language or call?
 
 A factorial of the four at equal accuracy: the same error of the axis, over the same horizon, on the same scenes. Every
-time is measured, in interleaved rounds. A factor's effect is the ratio of two times that differ in it alone.
+time is measured by five fresh processes, in interleaved rounds. A factor's effect is the ratio of two times that differ
+in it alone.
 """
 
 import math
@@ -13,9 +14,9 @@ from symtop.methods.framework.registry import integrators
 from symtop.model.scenes import TAGS, scene
 from symtop.runner.study import Case, Study
 
-from . import figures, words
+from . import facts, figures
 from .cells import CALLS, COMPILED, KERNEL, LANGUAGES, QUICK
-from .tables import Goal, factorial
+from .measures import Goal, factorial
 
 LEFT_OUT = {  # tags of scenes, with the reason
     "ordinary": "spheroid and goldstein show it",
@@ -30,8 +31,8 @@ GOALS = (
     (10.0, 1e-9, LANGUAGES, CALLS),
     (1000.0, 1e-6, (COMPILED,), (KERNEL,)),  # long enough that a call's own time does not count
 )
-ROUNDS = 2  # of all cells
-FURTHER = (4, 3)  # times as many rounds for short calls, in full and quick
+ROUNDS = 5  # of all cells, in each process
+PROCESSES = (5, 2)  # that are started for the times of a scene, in full and quick
 BATCH = (0.0015, 0.001)  # seconds, in full and quick
 
 
@@ -43,7 +44,7 @@ def cases(quick: bool) -> list[Case]:
         "goals": [list(goal) for goal in (GOALS[:1] if quick else GOALS)],
         "rounds": ROUNDS,
         "batch": BATCH[quick],
-        "further": FURTHER[quick],
+        "processes": PROCESSES[quick],
     }
     return [Case(name, "together", settings) for name in names]
 
@@ -52,19 +53,13 @@ def measure(case: Case) -> xr.Dataset:
     """The factorial of one scene."""
     plan = case.settings
     goals = [Goal(float(span), float(target), tuple(rows), tuple(calls)) for span, target, rows, calls in plan["goals"]]
-    return factorial(scene(case.scene), plan["schemes"], goals, plan["rounds"], plan["batch"], plan["further"])
+    return factorial(scene(case.scene), plan["schemes"], goals, plan["rounds"], plan["batch"], plan["processes"])
 
 
 STUDY = Study(
     name="factors",
     title="Factors",
     question="What makes the difference: method, formulation, language or call?",
-    how_to_read=words.HOW_TO_READ,
-    cases=cases,
-    measure=measure,
-    pictures=figures.pictures,
-    tables=words.tables,
-    verdict=words.verdict,
-    timed=True,
-    uses=lambda _: list(integrators()),
-)
+    cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
+    timed=True, uses=lambda _: list(integrators()),
+)  # fmt: skip

@@ -16,7 +16,7 @@ from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.run.simulation import integrate
 
-from .tables import SOLVER, Column
+from .measures import SOLVER
 
 FIRST = 1.0  # s, of the times at which the largest error so far is stored
 TIMES = 320  # of them: neighbours are 2 to 3 % apart
@@ -32,7 +32,7 @@ def long_energy(scene: Scene, name: str, setting: float, horizon: float) -> xr.D
     times = np.geomspace(FIRST, horizon, TIMES)
     seen = np.maximum(np.searchsorted(run.time, times * (1.0 + 1e-12), side="right") - 1, 0)
     values = np.where(times <= run.reached_time * (1.0 + 1e-12), largest[seen], math.nan)
-    columns: dict[str, Any] = {Column.LONG_TIME: ("long", times), Column.LONG_ENERGY: ("long", values)}
+    columns: dict[str, Any] = {"long_time": ("long", times), "long_energy": ("long", values)}
     return xr.Dataset(columns)
 
 
@@ -42,8 +42,8 @@ def better_from(data: xr.Dataset, scene: str, name: str) -> float:
     0 means that it is smaller at every stored time.
     """
     cell = data.sel(scene=scene)
-    ours = cell[Column.LONG_ENERGY].sel(variant=name).values
-    times, solver = (cell[column].sel(variant=SOLVER).values for column in (Column.LONG_TIME, Column.LONG_ENERGY))
+    ours = cell["long_energy"].sel(variant=name).values
+    times, solver = (cell[column].sel(variant=SOLVER).values for column in ("long_time", "long_energy"))
     worse = np.flatnonzero(~(ours < solver))
     if not worse.size:
         return 0.0
@@ -52,10 +52,10 @@ def better_from(data: xr.Dataset, scene: str, name: str) -> float:
 
 def notebook_end(data: xr.Dataset, scene: str) -> float:
     """The notebook's own horizon (s)."""
-    return float(data[Column.SAMPLE_TIME].sel(scene=scene).max())
+    return float(data["sample_time"].sel(scene=scene).max())
 
 
 def energy_until(data: xr.Dataset, scene: str, name: str, time: float) -> float:
     """The largest energy error of a variant up to a time."""
     cell = data.sel(scene=scene, variant=name)
-    return float(cell[Column.LONG_ENERGY].values[np.searchsorted(cell[Column.LONG_TIME].values, time)])
+    return float(cell["long_energy"].values[np.searchsorted(cell["long_time"].values, time)])

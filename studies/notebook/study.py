@@ -3,7 +3,7 @@
 The notebook derives the equations of the heavy top from its Lagrangian, integrates them with a library's solver, and
 watches the energy and the two momenta slip. Its figures are drawn again here by its own means, beside the truth.
 
-A discrete Lagrangian conserves the momenta at any step (Noether's theorem, derived in `words.HOW_TO_READ`) and
+A discrete Lagrangian conserves the momenta at any step (Noether's theorem, derived in `page.md`) and
 generates a symplectic map, which bounds the energy. A Runge-Kutta method in the angles has neither property.
 """
 
@@ -12,9 +12,9 @@ import xarray as xr
 from symtop.model.scenes import scene
 from symtop.runner.study import Case, Study
 
-from . import figures, tables, words
+from . import facts, figures, measures
 from .long_energy import long_energy
-from .tables import ALPHA, FILMED, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION
+from .measures import ALPHA, MODIFIED, SOLVER, SOLVER_TOLERANCE, STEPS_A_NUTATION
 
 SCENES = ("spheroid", "goldstein")  # of the notebook's first and of its second part
 QUICK = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "strang[axis]", "cayley[axis]")
@@ -23,27 +23,25 @@ LONG = 3000.0  # s: some 2500 nutations of the first scene, 1000 of the second
 
 def cases(quick: bool) -> list[Case]:
     """The notebook's solver and every discrete variant, on both scenes."""
-    settings = {"film": 20 if quick else 80, "shadow_steps": 3 if quick else 6, "long": 0.2 * LONG if quick else LONG}
-    methods = [*(QUICK if quick else tables.discrete_methods()), SOLVER]
+    settings = {"shadow_steps": 3 if quick else 6, "long": 0.2 * LONG if quick else LONG}
+    methods = [*(QUICK if quick else measures.discrete_methods()), SOLVER]
     return [Case(name, method, settings) for name in SCENES for method in methods]
 
 
 def measure(case: Case) -> xr.Dataset:
-    """Residuals of every method; beside them the solver's derivations, the modified energy, the film."""
+    """Residuals of every method; beside them the solver's derivations, and the modified energy."""
     start, method = scene(case.scene), case.integrator
     period = start.nutation_period
     if method == SOLVER:
-        parts = [tables.residual_history(start, method, SOLVER_TOLERANCE)]
-        parts += [tables.notebook_path(start), tables.both_derivations(start)]
+        parts = [measures.residual_history(start, method, SOLVER_TOLERANCE)]
+        parts += [measures.notebook_path(start), measures.both_derivations(start)]
         parts.append(long_energy(start, method, SOLVER_TOLERANCE, case.settings["long"]))
-        return xr.merge([*parts, tables.alpha_table(start, ALPHA)] if case.scene == "goldstein" else parts)
-    parts = [tables.residual_history(start, method, period / STEPS_A_NUTATION)]
+        return xr.merge([*parts, measures.alpha_table(start, ALPHA)] if case.scene == "goldstein" else parts)
+    parts = [measures.residual_history(start, method, period / STEPS_A_NUTATION)]
     parts.append(long_energy(start, method, period / STEPS_A_NUTATION, case.settings["long"]))
     if method in MODIFIED:
         steps = [period / (40.3 * 2.0**k) for k in range(case.settings["shadow_steps"])]
-        parts.append(tables.modified_energy_table(start, method, steps))
-    if method == FILMED:
-        parts.append(tables.film_table(start, method, period / 30.0, 2.0 * period, case.settings["film"]))
+        parts.append(measures.modified_energy_table(start, method, steps))
     return xr.merge(parts)
 
 
@@ -51,6 +49,5 @@ STUDY = Study(
     name="notebook",
     title="The notebook",
     question="Does it reproduce the notebook that it began with, and why do the discrete methods win there?",
-    how_to_read=words.HOW_TO_READ,
-    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
+    cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
 )  # fmt: skip

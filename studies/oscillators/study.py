@@ -13,11 +13,11 @@ oscillator and, by two of these, the top (`quartic`): the line from the seed to 
 import xarray as xr
 
 from symtop.model.scenes import scene
-from symtop.runner.study import Case, Picture, Study
+from symtop.runner.study import Case, Study
 
-from . import figures, quartic_figures, quartic_tables, tables, words
+from . import facts, figures, measures, quartic_measures
+from .measures import AGAINST_RK45, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOPS
 from .oscillator import ONE_SIDED
-from .tables import AGAINST_RK45, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOPS
 
 
 def cases(quick: bool) -> list[Case]:
@@ -31,35 +31,30 @@ def cases(quick: bool) -> list[Case]:
         grid += [Case(name, RK45, plan)] if name in AGAINST_RK45 else []
     for name in list(TOPS)[: 1 if quick else 2]:
         grid += [Case(name, method, {"counts": counts, "horizon": TOPS[name]}) for method in (*RULES, RK45)]
-    plan = {"periods": quartic_tables.PERIODS, "steps": list(quartic_tables.STEPS)}
-    grid += [Case(name, method, plan) for name in quartic_tables.QUARTICS for method in quartic_tables.MAPS]
+    plan = {"periods": quartic_measures.PERIODS, "steps": list(quartic_measures.STEPS)}
+    grid += [Case(name, method, plan) for name in quartic_measures.QUARTICS for method in quartic_measures.MAPS]
     return grid
-
-
-def pictures(data: xr.Dataset) -> list[Picture]:
-    """Friction first, then the exact map."""
-    return [*figures.pictures(data), *quartic_figures.pictures(data)]
 
 
 def measure(case: Case) -> xr.Dataset:
     """Errors against the analytic solution, or against the damped top's truth; ``chart`` is what was stepped in."""
     plan, method = case.settings, case.integrator
-    if case.scene in quartic_tables.QUARTICS:
-        return quartic_tables.quartic_table(case.scene, method, plan["steps"], plan["periods"]).assign(chart="position")
+    if case.scene in quartic_measures.QUARTICS:
+        table = quartic_measures.quartic_table(case.scene, method, plan["steps"], plan["periods"])
+        return table.assign(chart="position")
     if case.scene not in OSCILLATORS:
-        table = tables.damped_top_table(scene(case.scene), method, plan["counts"], plan["horizon"])
+        table = measures.damped_top_table(scene(case.scene), method, plan["counts"], plan["horizon"])
         return table.assign(chart="angles")
     oscillator = OSCILLATORS[case.scene]
-    data = tables.decay(oscillator, method, plan["long_step"], LONG).assign(chart="position")
+    data = measures.decay(oscillator, method, plan["long_step"], LONG).assign(chart="position")
     if method != RK45:
-        data = data.merge(tables.convergence(oscillator, method, plan["steps"], HORIZON))
-    return data.merge(tables.notebook_history(oscillator, 0.1, HORIZON)) if method == "midpoint" else data
+        data = data.merge(measures.convergence(oscillator, method, plan["steps"], HORIZON))
+    return data.merge(measures.notebook_history(oscillator, 0.1, HORIZON)) if method == "midpoint" else data
 
 
 STUDY = Study(
     name="oscillators",
     title="Oscillators and friction",
     question="What becomes of a discrete Lagrangian when energy is taken away, and when is it exact?",
-    how_to_read=words.HOW_TO_READ,
-    cases=cases, measure=measure, pictures=pictures, tables=words.tables, verdict=words.verdict,
+    cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
 )  # fmt: skip

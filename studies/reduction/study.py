@@ -16,7 +16,7 @@ from symtop.methods.framework.registry import integrator, methods
 from symtop.model.scenes import TAGS, scene
 from symtop.runner.study import Case, Study
 
-from . import figures, tables, words
+from . import facts, figures, tables
 from .commutation import reduced_first
 
 FIRST = "spheroid"
@@ -73,8 +73,6 @@ STUDY = Study(
     name="reduction",
     title="Reduction",
     question="What does modelling less buy?",
-    how_to_read=words.HOW_TO_READ,
-    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
-    timed=True,
-    uses=uses,
+    cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
+    timed=True, uses=uses,
 )  # fmt: skip

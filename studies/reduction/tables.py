@@ -29,27 +29,10 @@ BATCH = 0.005  # seconds, of runs in several charts
 TIMED_STEPS = 20_000  # of a timed run: a call costs as much as a hundred of them
 COMPARED_STEPS = 10_000  # of a reduced kernel and its unreduced form
 COMMUTES = 1e-13  # rad: two paths of a few thousand steps with compensated sums are that close if they are one method
-# rad, over 10 000 steps without compensation: n^1.5 ulp of theta' h, and phi' is steep near a pole
-SAME_MAP = 1e-11
 CHART_PERIODS = 32.0  # nutations: long enough that the call itself does not count
 
 
-class Column:
-    """Variables of the dataset, with unit and dimensions."""
-
-    # an integrator in its charts; chart, setting. Largest errors and the least of the axis (rad) that can be judged
-    AXIS, THETA, ENERGY, AXIS_BOUND, STEPS = "axis", "theta", "energy", "axis_bound", "steps"
-    SECONDS, SPREAD = "seconds", "spread"  # best of the batches; relative
-    # a kernel and its unreduced form over time (s), rad; relative changes of the momenta of the latter; sample
-    TIME, THETA_GAP, PHI_GAP, PSI_GAP = "sample_time", "theta_gap", "phi_gap", "psi_gap"
-    P_PHI_DRIFT, P_PSI_DRIFT = "p_phi_drift", "p_psi_drift"
-    # cost of both at steps (s); kernel, twin_step
-    COMPARED_STEP, SECONDS_A_STEP, ITERATIONS_A_STEP = "twin_step_size", "seconds_per_step", "iterations_per_step"
-    # reduced first against reduced last at steps (s), rad in theta; commutation_step
-    STEP, GAP = "commutation_step_size", "commutation_gap"
-
-
-GAPS = {Column.THETA_GAP: "theta", Column.PHI_GAP: "phi", Column.PSI_GAP: "psi"}
+GAPS = {"theta_gap": "theta", "phi_gap": "phi", "psi_gap": "psi"}
 
 
 def chart_table(
@@ -59,13 +42,13 @@ def chart_table(
 
     Dimensions ``chart`` (all three; NaN where the integrator has no such chart) and ``setting``.
     """
-    columns, charts = [Column.AXIS, Column.THETA, Column.ENERGY, Column.AXIS_BOUND, Column.STEPS], method.charts()
+    columns, charts = ["axis", "theta", "energy", "axis_bound", "steps"], method.charts()
     runs = [bare_run(scene, method, chart, setting, horizon) for chart in charts for setting in settings]
     taken = np.array([(timing.best, timing.spread) for timing in timings(runs, batches, BATCH)])
     tables = []
     for chart, (seconds, spread) in zip(charts, taken.reshape(len(charts), -1, 2).swapaxes(1, 2), strict=True):
         errors = error_table(scene, method.variant(chart), settings, horizon, observe="axis")[columns].astype(float)
-        tables.append(errors.assign({Column.SECONDS: ("setting", seconds), Column.SPREAD: ("setting", spread)}))
+        tables.append(errors.assign({"seconds": ("setting", seconds), "spread": ("setting", spread)}))
     return xr.concat(tables, "chart").assign_coords(chart=list(charts)).reindex(chart=list(CHARTS))
 
 
@@ -81,15 +64,15 @@ class Ratio(NamedTuple):
 def chart_ratios(cell: xr.Dataset) -> list[Ratio]:
     """Every other chart of one integrator on one scene against its smallest; `cell` is a table of `chart_table`."""
     by_size = [cell.sel(chart=chart) for chart in SMALLEST_FIRST["axis"]]
-    base, *larger = [table for table in by_size if np.isfinite(table[Column.SECONDS]).any()] or by_size[:1]
+    base, *larger = [table for table in by_size if np.isfinite(table["seconds"]).any()] or by_size[:1]
     ratios = []
     for other in larger:
-        time = float(np.nanmedian(other[Column.SECONDS] / base[Column.SECONDS]))
+        time = float(np.nanmedian(other["seconds"] / base["seconds"]))
         good = np.ones(other.sizes["setting"], bool)
         for table in (base, other):  # asymptotic, and above what the reference can tell from zero
-            error = table[Column.AXIS].values
-            good &= (error > 10.0 * table[Column.AXIS_BOUND].values) & (error < LARGEST_ERROR)
-        logs = np.log(other[Column.AXIS].values[good] / base[Column.AXIS].values[good])
+            error = table["axis"].values
+            good &= (error > 10.0 * table["axis_bound"].values) & (error < LARGEST_ERROR)
+        logs = np.log(other["axis"].values[good] / base["axis"].values[good])
         error = math.exp(float(np.mean(logs))) if logs.size else math.nan
         ratios.append(Ratio(str(other["chart"].item()), str(base["chart"].item()), time, error))
     return ratios
@@ -115,10 +98,10 @@ def unreduced_gaps(scene: Scene, name: str, horizon: float, steps: int, samples:
         simulate(scene, label, **plan, observe="attitude", guard=False) for label in (name, unreduced_forms()[name])
     )
     columns = {column: np.abs(reduced[angle].values - whole[angle].values) for column, angle in GAPS.items()}
-    for drift, momentum in ((Column.P_PHI_DRIFT, "p_phi"), (Column.P_PSI_DRIFT, "p_psi")):
+    for drift, momentum in (("p_phi_drift", "p_phi"), ("p_psi_drift", "p_psi")):
         values = whole[momentum].values
         columns[drift] = np.abs(values - values[0]) / scene.momentum_scale
-    columns[Column.TIME] = reduced["time"].values
+    columns["sample_time"] = reduced["time"].values
     return xr.Dataset({label: ("sample", values) for label, values in columns.items()})
 
 
@@ -130,9 +113,9 @@ def unreduced_cost(scene: Scene, name: str, step_sizes: Sequence[float], batches
     steps, iterations = work.T.reshape(2, 2, -1)
     seconds = np.array([timing.best for timing in timings(runs, batches)]).reshape(2, -1)
     dims = ("kernel", "twin_step")
-    columns = {Column.SECONDS_A_STEP: (dims, seconds / steps), Column.ITERATIONS_A_STEP: (dims, iterations / steps)}
+    columns = {"seconds_per_step": (dims, seconds / steps), "iterations_per_step": (dims, iterations / steps)}
     coords = {"kernel": ["reduced", "unreduced"]}
-    return xr.Dataset({**columns, Column.COMPARED_STEP: ("twin_step", np.array(step_sizes))}, coords=coords)
+    return xr.Dataset({**columns, "twin_step_size": ("twin_step", np.array(step_sizes))}, coords=coords)
 
 
 def commutation_table(scene: Scene, method: Integrator, horizon: float, counts: Sequence[int]) -> xr.Dataset:
@@ -144,10 +127,10 @@ def commutation_table(scene: Scene, method: Integrator, horizon: float, counts: 
     if step is None:
         raise SymtopError(f"method must be a reduced discrete Lagrangian, not {method.name!r}")
     steps = [(horizon / count, count) for count in counts]
-    rows = [{Column.STEP: h, Column.GAP: gap(scene, step, method, h, count)} for h, count in steps]
+    rows = [{"commutation_step_size": h, "commutation_gap": gap(scene, step, method, h, count)} for h, count in steps]
     return as_table(rows).rename_dims(setting="commutation_step")
 
 
 def commutation_order(cell: xr.Dataset) -> float:
     """The power of the step with which the gap of one integrator falls; the coarsest step does not enter."""
-    return power_law(cell[Column.STEP].values[1:], cell[Column.GAP].values[1:]).slope
+    return power_law(cell["commutation_step_size"].values[1:], cell["commutation_gap"].values[1:]).slope

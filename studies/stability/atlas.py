@@ -1,14 +1,12 @@
 """What the maps of outcomes say in numbers: how far a method is accurate, and from where on it commonly fails.
 
 The *reach* of a row is the largest setting (step or tolerance) up to which every run of the row is accurate. "Slow" and
-"fast" tops are the rows below and above the spin that lets the top sleep upright, r < 1 and r > 3; a sentence quotes
-the reach that nine rows in ten have. A run *fails* if it loses energy, crosses a turning point or ends early; a method
-fails from the smallest setting on at which, and at every larger one, at least half of the rows fail. One row that fails
-at one step says nothing of the next step, and is not quoted.
+"fast" tops are the rows below and above the spin that lets the top sleep upright, r < 1 and r > 3; quoted is the reach
+that nine rows in ten have. A run *fails* if it loses energy, crosses a turning point or ends early; a method fails from
+the smallest setting on at which, and at every larger one, at least half of the rows fail.
 """
 
 import math
-from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -18,15 +16,12 @@ from symtop.methods.framework.registry import Integrator, integrator, integrator
 
 from .many_verdicts import BOUNDED_BUT_WRONG, JUDGED, VERDICTS
 from .outcome_maps import NOT_RUN, SETTLED
-from .tables import MECHANISMS, Column
+from .tables import MECHANISMS
 
 SLOW, FAST = 1.0, 3.0  # relative spin
 LOWER_SHARE = 0.1  # of the rows may reach less far than what is quoted
 COMMON = 0.5  # of the rows must fail, at every larger setting too, before a threshold is quoted
 LASTING = 3  # settings at least, beyond a threshold: at the last one "every larger" would say nothing
-NOTABLE = 0.1  # of the failed runs: a kind of failure with a smaller share is not named
-SAME = 1.0 + 1e-9  # two ladders that end at one value end this close
-ALIKE = 3  # rows without a wrong run, from which on one map stands for all
 NEAR, FAR = 1e-4, 0.1  # gaps delta: next to a pole, and well away from it
 
 
@@ -34,9 +29,7 @@ class Failure(NamedTuple):
     """From which setting on a method commonly fails, and how."""
 
     setting: float  # NaN if no `LASTING` settings follow at each of which at least `COMMON` of the rows fail
-    least: float  # the smallest share of failed rows from there on; the largest anywhere if there is no such setting
-    at_end: bool  # is the share at the largest setting at least `COMMON`?
-    kinds: dict[str, float]  # shares of the failed runs from there on (anywhere), by verdict, the largest first
+    kind: str  # what most of the failed runs do from there on (anywhere); empty without a failed run
 
 
 class OutcomeMap(NamedTuple):
@@ -65,9 +58,9 @@ class OutcomeMap(NamedTuple):
         }
 
     @property
-    def shares(self) -> np.ndarray:
-        """The share of the map that each of `VERDICTS` has."""
-        return np.bincount(self.outcome.ravel(), minlength=len(VERDICTS)) / self.outcome.size
+    def accurate(self) -> float:
+        """The share of the accurate runs."""
+        return float(np.mean(self.outcome == 0))
 
     @property
     def early(self) -> float:
@@ -89,53 +82,31 @@ class OutcomeMap(NamedTuple):
         first = int(rare[-1]) + 1 if rare.size else 0
         lasting = share.size - first >= LASTING
         part = slice(first, None) if lasting else slice(None)
-        counts = np.bincount(self.outcome[:, part][failed[:, part]], minlength=len(VERDICTS))
-        kinds = {word: float(count / counts.sum()) for word, count in zip(VERDICTS, counts, strict=True) if count}
+        kinds = np.bincount(self.outcome[:, part][failed[:, part]], minlength=len(VERDICTS))
         return Failure(
-            float(self.settings[first]) if lasting else math.nan,
-            float(share[part].min() if lasting else share.max()),
-            bool(share[-1] >= COMMON),
-            dict(sorted(kinds.items(), key=lambda one: -one[1])),
+            float(self.settings[first]) if lasting else math.nan, VERDICTS[int(kinds.argmax())] if kinds.any() else ""
         )
 
 
 def map_of(cell: xr.Dataset) -> OutcomeMap | None:
     """The map in the dataset of one scene and one integrator, or None if there is none."""
-    if Column.OUTCOME not in cell:
+    if "outcome" not in cell:
         return None
-    outcome = cell[Column.OUTCOME].values
+    outcome = cell["outcome"].values
     rows, columns = (outcome != NOT_RUN).any(axis=1), (outcome != NOT_RUN).any(axis=0)
     if not rows.any():
         return None
-    parameter, settings = cell[Column.PARAMETER].values[rows], cell[Column.SETTING].values[columns]
+    parameter, settings = cell["parameter_value"].values[rows], cell["control"].values[columns]
     outcome = outcome[rows][:, columns]
     made = outcome != SETTLED
-    return OutcomeMap(np.where(made, outcome, np.uint8(0)), parameter, settings, str(cell[Column.CONTROL].values), made)
-
-
-def common(shown: Mapping[str, OutcomeMap]) -> dict[str, OutcomeMap]:
-    """The parts of some maps that all of them have, so that shares of them compare; where there is none, the maps."""
-    axes = {name: (one.parameter, one.settings) for name, one in shown.items()}
-    ends = [(max(both[k][0] for both in axes.values()), min(both[k][-1] for both in axes.values())) for k in (0, 1)]
-    inside = {
-        name: [(values >= low / SAME) & (values <= high * SAME) for values, (low, high) in zip(both, ends, strict=True)]
-        for name, both in axes.items()
-    }
-    if not all(part.any() for parts in inside.values() for part in parts):
-        return dict(shown)
-    return {
-        name: one._replace(outcome=one.outcome[inside[name][0]][:, inside[name][1]],
-                           made=one.made[inside[name][0]][:, inside[name][1]],
-                           parameter=one.parameter[inside[name][0]], settings=one.settings[inside[name][1]])
-        for name, one in shown.items()
-    }  # fmt: skip
+    return OutcomeMap(np.where(made, outcome, np.uint8(0)), parameter, settings, str(cell["knob_name"].values), made)
 
 
 def maps(data: xr.Dataset, scene: str) -> dict[str, OutcomeMap]:
     """The maps over a family of scenes by the names of their integrators."""
-    if scene not in data["scene"].values or Column.OUTCOME not in data:
+    if scene not in data["scene"].values or "outcome" not in data:
         return {}
-    part = data[[Column.OUTCOME, Column.PARAMETER, Column.SETTING, Column.CONTROL]].sel(scene=scene)
+    part = data[["outcome", "parameter_value", "control", "knob_name"]].sel(scene=scene)
     read = {str(name): map_of(part.sel(variant=name)) for name in data["variant"].values}
     return {name: one for name, one in read.items() if one is not None}
 
@@ -146,35 +117,14 @@ def methods_of(data: xr.Dataset) -> dict[str, Integrator]:
     return {name: integrator(name) for name in names if split_name(name)[0] in integrators()}
 
 
-def accurate_everywhere(shown: Mapping[str, OutcomeMap]) -> list[str]:
-    """The variants that are accurate in every run, whose maps are all alike; empty if they are fewer than `ALIKE`."""
-    names = [name for name, one in shown.items() if not one.outcome.any()]
-    return names if len(names) >= ALIKE else []
-
-
-def closed_forms(data: xr.Dataset, shown: Iterable[str]) -> list[str]:
-    """Those variants that are exact at any step, which are named apart from the others."""
-    known = methods_of(data)
-    return [name for name in shown if name in known and known[name].exact_steps]
-
-
 def families(data: xr.Dataset) -> list[str]:
     """The scenes that have a map over spin."""
     return [str(name) for name in data["scene"].values if str(name) not in MECHANISMS]
 
 
-class PoleEffect(NamedTuple):
-    """How a pole next to the path changes the reach of a method."""
-
-    near: float  # median reach at gaps of `NEAR` and less
-    halves: bool  # is that less than half of the median reach at gaps of `FAR` and more
-    width: float  # rad, distance of the pole below which the reach is less than half of that away from it
-
-
-def pole_effect(one: OutcomeMap | None) -> PoleEffect | None:
-    """The effect of a pole on a method by its map over the gap; None if it has none, or nothing to set."""
+def halved_by_pole(one: OutcomeMap | None) -> bool | None:
+    """Is the median reach at gaps of `NEAR` and less below half of that at `FAR` and more? None with nothing to set."""
     if one is None or one.control == "none":
         return None
     limits, gaps = one.reach, one.parameter
-    away, near = float(np.median(limits[gaps >= FAR])), float(np.median(limits[gaps <= NEAR]))
-    return PoleEffect(near, near < 0.5 * away, 1.1 * float(gaps[limits < 0.5 * away].max(initial=0.0)))
+    return bool(np.median(limits[gaps <= NEAR]) < 0.5 * np.median(limits[gaps >= FAR]))

@@ -1,57 +1,165 @@
-"""The figures of the stability study: pages of small maps, one map enlarged, and a figure a mechanism of failure."""
+"""Figures of the stability study: the maps of known variants, and four ways to fail beside what theory says."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
+import numpy as np
 import xarray as xr
+from matplotlib.colors import ListedColormap
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
-from symtop.report.sentences import counted
-from symtop.report.style import headline
+from symtop.methods.framework.registry import split_name
+from symtop.methods.splitting.space import cayley_sleeps_from, strang_sleeps_from
+from symtop.report import style
+from symtop.report.figures import chosen
 from symtop.runner.study import Picture
 
-from . import mechanism_figures
-from .atlas import common, families, maps
-from .atlas_figures import by_area, enlarged, small_maps
-from .atlas_words import advice, caption, page_message
-from .tables import PERIODS
+from .atlas import OutcomeMap, families, maps
+from .failures import LOST, SEEN
+from .many_verdicts import JUDGED
+from .mechanisms import measured
 
-FAMILIAR = "stormer-verlet[angles]"  # the map that is enlarged, if it is there
-CONTROLLED = {"step_size": "steps", "tolerance": "tolerances"}  # the pages of maps, by what grows to the right
+KNOWN = (  # the variants whose maps are drawn, if they are there
+    "stormer-verlet[angles]", "midpoint[angles]", "rk4[angles]", "rk4[axis]", "strang[axis]", "takahashi-imada[axis]",
+    "yoshida-4[axis]", "gauss-8[axis]", "rk45-compiled[axis]", "dop853[axis]", "lsoda[axis]", "taylor[axis]",
+)  # fmt: skip
+MOST, COLUMNS = len(KNOWN), 4  # maps in a figure, and beside each other
+OUTCOMES = {  # as the key names them; what ends early for any reason is one of them
+    "accurate": style.GREEN, "bounded energy, wrong motion": style.YELLOW, "energy drifts": style.ORANGE,
+    "crosses a turning point of the true motion": style.PURPLE, "ended early": style.BLACK,
+    "accurate, not run": "#9FDAC8",
+}  # fmt: skip
+LINES = {"linear_limit": ("small nutations grow beyond", "-"),
+         "third_turn": ("a step turns the nutation by a third", (0, (4, 2)))}  # fmt: skip
+SETTINGS = {"step_size": "step (nutations)", "tolerance": "tolerance"}
+NAMED = ("stormer-verlet[angles]", "midpoint[angles]", "strang[axis]", "cayley[axis]", "gauss-4[axis]", "rk4[axis]")
+THEORY = {"color": style.BLACK, "lw": 0.9, "ls": (0, (1, 1.5)), "zorder": 4, "label": "theory"}
+OTHERS = {"color": style.GREY, "alpha": 0.5, "zorder": 1, "label": "all other variants"}
 
 
 def pictures(data: xr.Dataset) -> Iterator[Picture]:
-    """All figures that the dataset has something for, one after the other: with a plug-in they are more than twenty."""
-    for family in families(data):
-        yield _enlarged(data, family)
-        yield from _pages(data, family, "spin", f"atlas-{family}")
-    yield from _pages(data, "grazing", "gap", "atlas-pole")
-    yield from mechanism_figures.pictures(data)
+    """The maps of the first family, and the mechanisms that were measured."""
+    for family in families(data)[:1]:
+        shown = {name: one for name, one in maps(data, family).items() if one.control in SETTINGS}
+        if shown:
+            yield Picture("atlas", _atlas(data.sel(scene=family), _chosen(shown)))
+    there = [draw for scene, variable, draw in MECHANISMS if measured(data, scene, variable)]
+    if there:
+        figure, axes = style.grid(len(there), 2, height=2.4)
+        for axis, draw in zip(axes, there, strict=True):
+            draw(axis, data)
+        style.few_ticks(*axes, most=5)
+        style.legend_below(figure, axes)
+        yield Picture("mechanisms", figure)
 
 
-def _pages(data: xr.Dataset, scene: str, over: str, name: str) -> Iterator[Picture]:
-    """The small maps of a scene, a page for methods with a step and one for those with a tolerance."""
-    for control, title in CONTROLLED.items():
-        shown = {row: one for row, one in maps(data, scene).items() if one.control == control}
-        if not shown:
-            continue
-        names = by_area(common(shown))
-        figure = small_maps(data, scene, names, over)
-        headline(figure, page_message(data, scene, shown))
-        count = counted(len(names), "small map")
-        alt = f"{count} of outcomes, from {names[0]}, accurate in the largest part of its map, to {names[-1]}."
-        yield Picture(f"{name}-{title}", figure, caption(data, scene, names), alt)
+def _chosen(shown: Mapping[str, OutcomeMap]) -> dict[str, OutcomeMap]:
+    """The known variants, or all if these are few; those with a step first."""
+    names = chosen(list(shown), KNOWN, MOST)
+    return {name: shown[name] for name in sorted(names, key=lambda name: list(SETTINGS).index(shown[name].control))}
 
 
-def _enlarged(data: xr.Dataset, family: str) -> Picture:
-    shown = maps(data, family)
-    name = FAMILIAR if FAMILIAR in shown else by_area(shown)[0]
-    right, past = shown[name].shares[0], maps(data, "grazing").get(name)
-    beside = "" if past is None else f" with its spin changed and in {past.shares[0]:.0%} past a pole"
-    message = f"{name} is accurate in {right:.0%} of the map of {family}{beside}"
-    figure = enlarged(data, family, name, message)
-    what = "" if past is None else ", and right a fall of the scene grazing past a pole"
-    text = (
-        f"How to read a map of the atlas: one variant, method[chart], enlarged. Left the scene {family} over "
-        f"{PERIODS:g} nutation periods with another spin{what}; all else is held fixed. "
-        f"{advice(data, family)[name].sentence}"
+def _atlas(part: xr.Dataset, shown: Mapping[str, OutcomeMap]) -> Any:
+    """A map a variant: spin upwards, step or tolerance to the right; each control begins a row."""
+    places: dict[int, str] = {}
+    for control in SETTINGS:
+        first = -(-(max(places, default=-1) + 1) // COLUMNS) * COLUMNS
+        places |= dict(enumerate((name for name, one in shown.items() if one.control == control), first))
+    figure, axes = style.panels(max(places) // COLUMNS + 1, COLUMNS, height=1.35)
+    for place, axis in enumerate(axes.flat):
+        axis.set_visible(place in places)
+    for place, name in places.items():
+        one, axis = shown[name], axes.flat[place]
+        codes = np.where(one.made, np.minimum(one.outcome, len(JUDGED)), len(OUTCOMES) - 1)
+        axis.imshow(codes, cmap=ListedColormap(list(OUTCOMES.values())), vmin=-0.5, vmax=len(OUTCOMES) - 0.5,
+                    extent=(*_ends(one.settings), *_ends(one.parameter)), origin="lower", aspect="auto",
+                    interpolation="nearest")  # fmt: skip
+        limits = axis.axis()
+        for variable, (_, dash) in LINES.items():
+            if variable in part:
+                cell = part.sel(variant=name)
+                x, y = np.log10(cell[variable].values), np.log10(cell["limit_parameter"].values)
+                axis.plot(x, y, color="white", lw=2.2)
+                axis.plot(x, y, color="black", lw=0.9, ls=dash)
+        axis.axis(limits)
+        axis.grid(visible=False)
+        for side in (axis.xaxis, axis.yaxis):
+            side.set_major_locator(MaxNLocator(3, integer=True))
+            side.set_major_formatter(lambda power, _: f"{10.0**power:g}" if power > -3 else f"$10^{{{power:.0f}}}$")
+        axis.set_title("{}\n[{}] {:.0f} %".format(*split_name(name), 100.0 * one.accurate), fontsize=style.LEAST_TEXT)
+        axis.tick_params(labelsize=style.LEAST_TEXT)
+        below = places.get(place + COLUMNS)
+        if below is None or shown[below].control != one.control:
+            axis.set_xlabel(SETTINGS[one.control], fontsize=style.LEAST_TEXT)
+        if place % COLUMNS == 0:
+            axis.set_ylabel("spin $r$", fontsize=style.LEAST_TEXT)
+    handles: list[Any] = [Patch(color=color, label=label) for label, color in OUTCOMES.items()]
+    handles += [Line2D([], [], color="black", lw=1.1, ls=dash, label=label) for label, dash in LINES.values()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
+    return figure
+
+
+def _ends(values: Any) -> tuple[float, float]:
+    """Both ends of an axis of cells at logarithmically even values, as decimal logarithms."""
+    low, high = np.log10(values[[0, -1]])
+    half = 0.5 * (high - low) / (values.size - 1) if values.size > 1 else 0.5
+    return float(low - half), float(high + half)
+
+
+def _lines(axis: Any, part: xr.Dataset, x: str, y: str, dots: bool = False) -> None:
+    """A line, or dots, a variant; of many those that are not known in grey and without a name."""
+    variants = list(map(str, part["variant"].values))
+    named = chosen(variants, NAMED, len(NAMED))
+    for name in variants:
+        across, up = (part[key].sel(variant=name).values for key in (x, y))
+        order = np.argsort(across)
+        across, up = across[order], up[order]
+        good = np.isfinite(across) & np.isfinite(up)
+        if good.any():
+            looks = style.line(name) | {"label": name, "markevery": max(1, int(good.sum()) // 8), "zorder": 3}
+            looks = looks if name in named else OTHERS | {"lw": 0.6, "marker": "." if dots else "", "ms": 3.0}
+            axis.plot(across[good], up[good], **(looks | ({"ls": "none", "markevery": 1} if dots else {})))
+
+
+def _pole(axis: Any, data: xr.Dataset) -> None:
+    _lines(axis, data.sel(scene="grazing"), "parameter_value", "grazing_error")
+    axis.set(xscale="log", yscale="log", title="a pole next to the path")
+    axis.set(xlabel=r"gap $\delta$ to the pole (rad)", ylabel="largest axis error (rad)")
+
+
+def _resonance(axis: Any, data: xr.Dataset) -> None:
+    part, resonance = data.sel(scene="steady-fast"), ("third_turn_phase", "surviving_at_third_turn")
+    names = dict(zip(resonance, ("phase_value", "surviving"), strict=True))  # it lies between two of the grid
+    part = xr.concat([part[list(names.values())], part[list(resonance)].rename(names)], "phase")
+    for theory in (np.sqrt(3.0), 2.0 * np.sqrt(3.0)):
+        axis.axvline(theory, **THEORY)
+    _lines(axis, part, "phase_value", "surviving")
+    axis.set(
+        xlabel=r"step $h\omega$ ($\omega$: frequency of the nutation)",
+        ylabel="survives a displacement of (rad)",
+        title="resonance of step and nutation",
     )
-    return Picture(f"atlas-{family}-enlarged", figure, text, f"Two maps of the outcomes of {name}, enlarged.")
+
+
+def _separatrix(axis: Any, data: xr.Dataset) -> None:
+    _lines(axis, data.sel(scene="separatrix"), "early_error", "horizon", dots=True)
+    error = np.geomspace(1e-16, 0.1, 50)
+    axis.plot(error, SEEN + 2.0 * np.log(LOST / error), **THEORY)
+    axis.set(xscale="log", xlabel=rf"axis error at ${SEEN:g}/\lambda$ (rad)", title="next to the separatrix")
+    axis.set_ylabel(rf"time to {LOST:g} rad ($1/\lambda$)")
+
+
+def _sleep(axis: Any, data: xr.Dataset) -> None:
+    _lines(axis, data.sel(scene="sleeping"), "sleeping_step", "sleeping_threshold", dots=True)
+    steps = np.linspace(0.02, 1.0, 60)
+    for law in (cayley_sleeps_from, strang_sleeps_from):
+        axis.plot(steps, [law(float(h)) for h in steps], **THEORY)
+    axis.set(xlabel="step $h$", ylabel="least spin that sleeps $I_3\\omega_3$", title="the upright top")
+
+
+MECHANISMS = (  # scene, variable that it needs, drawing
+    ("grazing", "grazing_error", _pole), ("steady-fast", "surviving", _resonance),
+    ("separatrix", "horizon", _separatrix), ("sleeping", "sleeping_threshold", _sleep),
+)  # fmt: skip

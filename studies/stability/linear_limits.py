@@ -116,7 +116,7 @@ def _growing(method: Integrator, scene: Scene, h: float, frequency: float) -> fl
     What counts is `GROWING`, and the way that the precession itself goes meanwhile: some methods drift to another
     inclination, where nutations have another size, and `FAR` away none is left next to which growth could be told.
     """
-    factor, size = nutation_growth(method, scene, h, method.chart_for("axis"), frequency)
+    factor, size, _ = nutation_growth(method, scene, h, method.chart_for("axis"), frequency)
     return factor - 1.0 - max(GROWING, size) if size < FAR else math.nan
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.measure.verdicts import DRIFT, FEWEST, GROWING, NO_GAP, barriers
-from symtop.methods.framework.plan import NOT_FINITE, OUTCOMES
-from symtop.model.charts import Array
+from symtop.methods.framework.plan import NOT_FINITE, NOT_NORMALISED, OUTCOMES, off_length
+from symtop.model.charts import DIMENSIONS, Array
 from symtop.model.exact import samples
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.scenes import Scene
@@ -76,12 +76,14 @@ def judge_runs(
 
     `phases` (n, samples) are the times of the samples in nutation periods, NaN beyond the last of a run; `states`
     (m, n, samples, dimension) those of a chart, known by its dimension, `momenta` (m, n, samples, 2) p_phi and p_psi as
-    the run showed them, and `outcome` (m, n) indices into `OUTCOMES`. A run that shows a state that is not finite and
-    says nothing of it has ended there. The error of an inaccurate run is the first, counted from its end, that is too
-    large; that of the settings `followed` (n,) is the largest.
+    the run showed them, and `outcome` (m, n) indices into `OUTCOMES`. A run that shows a state that is not finite, or a
+    quaternion that is not of length one, and says nothing of it has ended there. The error of an inaccurate run is the
+    first, counted from its end, that is too large; that of the settings `followed` (n,) is the largest.
     """
     judged = Judged.empty(*outcome.shape)
     counts = np.isfinite(phases).sum(axis=1)
+    if states.shape[-1] == DIMENSIONS["attitude"]:
+        outcome = np.where(off_length("attitude", states).any(axis=-1), NOT_NORMALISED, outcome)
     runs = np.ascontiguousarray(states), np.ascontiguousarray(momenta), np.ascontiguousarray(outcome)
     _kernel()(*truth, phases, counts, followed, *runs, *judged)
     return judged

@@ -11,7 +11,7 @@ from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.scenes import added_scenes
 from symtop.runner.study import Case, Study
 
-from . import figures, words
+from . import facts, figures
 from .tables import MECHANISMS, PERIODS, map_table
 
 FAMILY = "cusp"  # let go at theta = 0.8 with any spin
@@ -109,6 +109,5 @@ STUDY = Study(
     name="stability",
     title="Stability",
     question="Where does each method fail, and how?",
-    how_to_read=words.HOW_TO_READ,
-    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.sentences,
+    cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
 )  # fmt: skip

@@ -29,38 +29,6 @@ CURVE_STEPS = 48  # steps at which it is looked for at every spin of a map
 PAST_RESONANCE = 1.05  # times the resonant step: far enough for what a resonance kills to live again
 
 
-class Column:
-    """Names of the variables of the study's dataset, with dimensions."""
-
-    # maps of outcomes; parameter (relative spin or gap delta), setting (steps in nutation periods, or tolerances)
-    OUTCOME, PARAMETER, SETTING = "outcome", "parameter_value", "control"
-    CONTROL, GRID = "knob_name", "grid"  # step_size, tolerance or none; settings x parameters
-    # runs of scenes that had settled, and scenes that had and were then not accurate
-    CHECKS, REFUTED = "checks", "refuted"
-    # limits of a step along a map over spin; curve
-    LIMIT_PARAMETER, LINEAR_LIMIT, THIRD_TURN = "limit_parameter", "linear_limit", "third_turn"
-    # one column of the map over the gap to a pole; parameter
-    SHOWN_SETTING, GRAZING_ERROR = "shown_knob", "grazing_error"
-    # resonances: largest displacement that survives at h omega; phase. Linear limit, a third of a turn, what survives
-    PHASE, SURVIVING = "phase_value", "surviving"
-    LIMIT_PHASE, THIRD_TURN_PHASE, SOUGHT_PHASE = "limit_phase", "third_turn_phase", "sought_phase"
-    WINDOW_START, WINDOW_END = "window_start", "window_end"  # h omega, of the first narrow window of unstable steps
-    SURVIVING_AT_THIRD_TURN, SURVIVING_PAST_THIRD_TURN = "surviving_at_third_turn", "surviving_past_third_turn"
-    # the sleeping top; rung
-    SLEEPING_STEP, SLEEPING_THRESHOLD = "sleeping_step", "sleeping_threshold"
-    # next to the separatrix; setting
-    EARLY_ERROR, HORIZON, PREDICTED_HORIZON, BROKEN = "early_error", "horizon", "predicted_horizon", "broken"
-    # an energy error that is sampled once a nutation, and at every step
-    ENERGY_ONCE, ENERGY_EVERY = "energy_once", "energy_every"
-    # the solver of an implicit method; tolerance_setting
-    SOLVER_TOLERANCE, SOLVER_ITERATIONS = "solver_tolerance", "solver_iterations"
-    SOLVER_ENERGY, SOLVER_MOMENTUM = "solver_energy", "solver_momentum"
-    TEXTBOOK_ENERGY, ONE_ITERATION_ENERGY = "plain_energy", "one_iteration_energy"
-    # what was held fixed: steps of a displaced precession; steps a nutation, nutations; step and steps of the solver
-    DISPLACED_STEPS, SAMPLED_STEPS, SAMPLED_PERIODS = "displaced_steps", "sampled_steps", "sampled_periods"
-    SOLVER_STEP, SOLVER_STEPS = "solver_step", "solver_steps"
-
-
 def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
     """An outcome map over a family of scenes and the control, with the linear limits of a fixed step over it."""
     parameters, ladder = settings["parameters"], settings["ladder"]
@@ -70,23 +38,23 @@ def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.
         shown = [int(np.argmin(nearest)) if method.control else 0]
     runs = outcome_map(name, parameters, method, ladder, settings["periods"], shown)
     table: dict[str, Any] = {
-        Column.OUTCOME: (("parameter", "setting"), np.where(runs.made, runs.verdict, np.uint8(SETTLED))),
-        Column.CHECKS: float(runs.checks),
-        Column.REFUTED: float(runs.refuted),
-        Column.PARAMETER: ("parameter", np.asarray(parameters, float)),
-        Column.SETTING: ("setting", np.asarray(ladder, float)),
-        Column.CONTROL: method.control or "none",
-        Column.GRID: f"{len(ladder)} x {len(parameters)}",
+        "outcome": (("parameter", "setting"), np.where(runs.made, runs.verdict, np.uint8(SETTLED))),
+        "checks": float(runs.checks),
+        "refuted": float(runs.refuted),
+        "parameter_value": ("parameter", np.asarray(parameters, float)),
+        "control": ("setting", np.asarray(ladder, float)),
+        "knob_name": method.control or "none",
+        "grid": f"{len(ladder)} x {len(parameters)}",
     }
     for column in shown:
-        table[Column.SHOWN_SETTING] = float(ladder[column])
-        table[Column.GRAZING_ERROR] = ("parameter", runs.axis_error[:, column])
+        table["shown_knob"] = float(ladder[column])
+        table["grazing_error"] = ("parameter", runs.axis_error[:, column])
     if method.fixed_step and settings.get("limits"):
         values = np.asarray(settings["limits"], float)
         ends = np.array([family_limits(name, method, float(value), ladder[-1]) for value in values])
-        table[Column.LIMIT_PARAMETER] = ("curve", values)
-        table[Column.LINEAR_LIMIT] = ("curve", ends[:, 0])
-        table[Column.THIRD_TURN] = ("curve", ends[:, 1])
+        table["limit_parameter"] = ("curve", values)
+        table["linear_limit"] = ("curve", ends[:, 0])
+        table["third_turn"] = ("curve", ends[:, 1])
     return xr.Dataset(table)
 
 
@@ -116,16 +84,16 @@ def resonance_table(name: str, method: Integrator, settings: Mapping[str, Any]) 
     steps = [*(phases / omega).tolist(), third, PAST_RESONANCE * third]
     *surviving, at_third, past_third = surviving_displacements(method, scene, steps, settings["steps"]).tolist()
     columns: dict[str, Any] = {
-        Column.PHASE: ("phase", phases),
-        Column.SURVIVING: ("phase", surviving),
-        Column.DISPLACED_STEPS: float(settings["steps"]),
-        Column.LIMIT_PHASE: limit * omega,
-        Column.THIRD_TURN_PHASE: third * omega,
-        Column.WINDOW_START: window.start * omega,
-        Column.WINDOW_END: window.end * omega,
-        Column.SOUGHT_PHASE: SOUGHT_PHASE,
-        Column.SURVIVING_AT_THIRD_TURN: at_third,
-        Column.SURVIVING_PAST_THIRD_TURN: past_third,
+        "phase_value": ("phase", phases),
+        "surviving": ("phase", surviving),
+        "displaced_steps": float(settings["steps"]),
+        "limit_phase": limit * omega,
+        "third_turn_phase": third * omega,
+        "window_start": window.start * omega,
+        "window_end": window.end * omega,
+        "sought_phase": SOUGHT_PHASE,
+        "surviving_at_third_turn": at_third,
+        "surviving_past_third_turn": past_third,
     }
     return xr.Dataset(columns)
 
@@ -134,13 +102,13 @@ def sleeping_table(name: str, method: Integrator, settings: Mapping[str, Any]) -
     """The spin at which the upright top begins to sleep, against the step."""
     steps = np.asarray(settings["steps"], float)
     thresholds = [sleeping_threshold(method, float(h)) for h in steps]
-    return xr.Dataset({Column.SLEEPING_STEP: ("rung", steps), Column.SLEEPING_THRESHOLD: ("rung", thresholds)})
+    return xr.Dataset({"sleeping_step": ("rung", steps), "sleeping_threshold": ("rung", thresholds)})
 
 
 def separatrix_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
     """How long runs next to the separatrix stay right, and how long their early error says that they will."""
     rows = [separatrix_horizon(method, scenes.scene(name), float(value)) for value in settings["ladder"]]
-    names = Column.EARLY_ERROR, Column.HORIZON, Column.PREDICTED_HORIZON, Column.BROKEN  # in the order of a Horizon
+    names = "early_error", "horizon", "predicted_horizon", "broken"  # in the order of a Horizon
     return xr.Dataset(
         {name: ("setting", list(values)) for name, values in zip(names, zip(*rows, strict=True), strict=True)}
     )
@@ -151,22 +119,22 @@ def sampling_table(name: str, method: Integrator, settings: Mapping[str, Any]) -
     scene, rule = scenes.scene(name), rule_of(method)
     once, every = sampled_energy_error(method, scene, settings["steps"], settings["periods"])
     table: dict[str, Any] = {
-        Column.ENERGY_ONCE: once, Column.ENERGY_EVERY: every,
-        Column.SAMPLED_STEPS: float(settings["steps"]), Column.SAMPLED_PERIODS: float(settings["periods"]),
+        "energy_once": once, "energy_every": every,
+        "sampled_steps": float(settings["steps"]), "sampled_periods": float(settings["periods"]),
     }  # fmt: skip
     if rule is not None:
         run, tolerances = (scene, settings["step_size"], settings["solver_steps"]), settings["tolerances"]
         rows = [solver_sweep(rule, *run, float(value)) for value in tolerances]
         columns = {
-            Column.SOLVER_TOLERANCE: tolerances,
-            Column.SOLVER_ENERGY: [entry.energy for entry in rows],
-            Column.SOLVER_MOMENTUM: [entry.momentum for entry in rows],
-            Column.SOLVER_ITERATIONS: [entry.iterations for entry in rows],
+            "solver_tolerance": tolerances,
+            "solver_energy": [entry.energy for entry in rows],
+            "solver_momentum": [entry.momentum for entry in rows],
+            "solver_iterations": [entry.iterations for entry in rows],
         }
-        table[Column.SOLVER_STEP], table[Column.SOLVER_STEPS] = settings["step_size"], float(settings["solver_steps"])
+        table["solver_step"], table["solver_steps"] = settings["step_size"], float(settings["solver_steps"])
         if is_midpoint(method):
-            columns[Column.TEXTBOOK_ENERGY] = [textbook_midpoint(*run, float(value)) for value in tolerances]
-            table[Column.ONE_ITERATION_ENERGY] = textbook_midpoint(*run, 0.0, 1)
+            columns["plain_energy"] = [textbook_midpoint(*run, float(value)) for value in tolerances]
+            table["one_iteration_energy"] = textbook_midpoint(*run, 0.0, 1)
         table |= {column: ("tolerance_setting", np.asarray(values, float)) for column, values in columns.items()}
     return xr.Dataset(table)
 

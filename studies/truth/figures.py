@@ -6,8 +6,7 @@ import xarray as xr
 from symtop.report import style
 from symtop.runner.study import Picture
 
-from . import words
-from .tables import BOUND, ERROR, SOURCES, bound_ratios
+from .measures import BOUND, ERROR, SOURCES
 
 COLORS = (style.ORANGE, style.VERMILLION, style.GREEN, style.BLUE, style.PURPLE, style.SKY, style.BLACK)
 LOOKS = dict(zip(SOURCES, zip(COLORS, "v<^>DX*", strict=True), strict=True))
@@ -32,20 +31,4 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     axes[0].fill_between([], [], [], color=style.GREY, alpha=0.3, lw=0, label="shade: up to the bound it claims")
     style.few_ticks(*axes, most=5)
     style.legend_below(figure, axes)
-    figure.legends[0].set_title(words.measured_against(data))
-    _, broken, ratio = bound_ratios(data)
-    flat = float(data[ERROR].sel(variant="closed form").max())
-    style.headline(figure, words.message(data))
-    caption = (
-        "Error of each source, measured against the closed form in 45 digits, at horizons from "
-        f"{float(data['horizon'].min()):g} s to {float(data['horizon'].max()):.0e} s on {data.sizes['scene']} scenes. "
-        "A "
-        "source is a Taylor integration at the tolerance of its arithmetic's rounding, in the axis or the attitude "
-        "chart, the discrete map iterated in double, or the closed form in double; the start is the same for all. The "
-        "shade above an error reaches up to "
-        f"the bound that the reference claims. Errors above their bound: {broken}. The median bound is {ratio:.0f} "
-        "times the error. The errors of an integration grow with time; those of the closed form in double stay within "
-        f"{flat:.0e} rad at every horizon."
-    )
-    alt = "Log-log plots of axis error against horizon: integrations rise, the closed form stays flat."
-    return [Picture("sources", figure, caption, alt)]
+    return [Picture("sources", figure)]

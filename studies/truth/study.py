@@ -12,8 +12,8 @@ from symtop.model.scenes import scene
 from symtop.run.reference.independent_checks import have_heyoka
 from symtop.runner.study import Case, Study
 
-from . import figures, words
-from .tables import SOURCES, source_errors
+from . import facts, figures
+from .measures import SOURCES, source_errors
 
 LEFT_OUT = {  # tags of scenes, with the reason
     "repeats": "the same errors show",
@@ -53,12 +53,6 @@ STUDY = Study(
     name="truth",
     title="Truth",
     question="How well is the truth known?",
-    how_to_read=(
-        "Errors elsewhere in this report are measured against the closed form in double; oscillators and damped tops "
-        "have references of their own. A line is the true error of a source, "
-        "the shade above it reaches up to the bound that the reference claims. A valid bound lies above the measured "
-        "error; a useful one lies close to it. Points of other figures within ten times of the bound are drawn hollow."
-    ),
-    cases=cases, measure=measure, pictures=figures.pictures, tables=words.tables, verdict=words.verdict,
+    cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
     uses=lambda _: ["exact-discrete"],  # the discrete map
 )  # fmt: skip

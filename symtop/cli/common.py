@@ -5,7 +5,6 @@ import errno
 import functools
 import importlib
 import json
-import math
 import shutil
 import sys
 import tempfile
@@ -18,7 +17,16 @@ from typing import Any, TextIO
 import click
 
 from symtop.core import files
-from symtop.core.errors import SymtopError, SymtopWarning, UnknownNameError, at_home, check_replaceable, file_path
+from symtop.core.errors import (
+    SymtopError,
+    SymtopWarning,
+    UnknownNameError,
+    at_home,
+    check_replaceable,
+    file_path,
+    positive,
+)
+from symtop.core.progress import telling
 from symtop.core.signals import INTERRUPTED, told_apart
 
 LONGEST_NAME = 80  # characters of the name of a file that are shown
@@ -28,6 +36,7 @@ NAMES = {  # what the shell completes: the module and its function
     "integrators": ("symtop.methods.framework.registry", "integrators"),
     "variants": ("symtop.methods.framework.registry", "variants"),
 }  # fmt: skip
+SILENT = ("explore",)  # commands that work until they are ended
 PLUGINS = "symtop.plugins"  # in the context of a command: plug-ins were given
 
 
@@ -37,6 +46,10 @@ def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]
 
         ctx.meta[PLUGINS] = True
         for file in files:
+            if ctx.info_name == "claims":  # a file that ends its process is told of
+                from symtop.judging.remote import tried
+
+                tried(lambda file=file: len(plugins.load(file)), f"plugin {Path(file).name}")  # type: ignore[misc]
             if not plugins.load(file):
                 warn(f"{Path(file).name} registers no integrator and no scene (symtop.register, symtop.register_scene)")
 
@@ -66,6 +79,19 @@ def completing(kind: str) -> Callable[[click.Context, click.Parameter, str], lis
     return complete
 
 
+def step_of(scene: str, settings: dict[str, Any]) -> float | None:
+    """The step of the options --step-size and --per-nutation, of which the second is taken out of `settings`."""
+    step, count = settings.get("step_size"), settings.pop("per_nutation")
+    if step is not None and count is not None:
+        raise SymtopError("give --step-size or --per-nutation, not both")
+    if count is None:
+        return step
+    from symtop.model.scenes import scene as find
+
+    return find(scene).time_scale(settings.get("horizon")) / positive("per_nutation", count)
+
+
+per_nutation_option = click.option("--per-nutation", type=float, help="In place of a step: steps in a nutation period.")
 plugin_option = click.option(
     "--plugin", multiple=True, metavar="FILE", callback=_load_plugins, expose_value=False, is_eager=True,
     help="A Python file that registers integrators or scenes.",
@@ -79,6 +105,15 @@ results_option = click.option(
 
 class Group(click.Group):
     """Prints an error as one sentence that names options, and exits with code 2; 130 after Ctrl-C."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command of a line; from here on it says now and then that it works."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if not ctx.resilient_parsing and name not in SILENT:
+            ctx.with_resource(telling(str(name)))
+        return name, command, rest
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
@@ -140,15 +175,7 @@ def warn(sentence: str) -> None:
 
 def as_text(content: Any) -> str:
     """JSON of anything; a number that is not finite, of which JSON knows none, is null."""
-    return json.dumps(_finite(content), indent=1, allow_nan=False)
-
-
-def _finite(content: Any) -> Any:
-    if isinstance(content, dict):
-        return {name: _finite(value) for name, value in content.items()}
-    if isinstance(content, (list, tuple)):
-        return [_finite(value) for value in content]
-    return None if isinstance(content, float) and not math.isfinite(content) else content
+    return json.dumps(json.loads(json.dumps(content), parse_constant=lambda _: None), indent=1)
 
 
 def say(sentence: str) -> None:

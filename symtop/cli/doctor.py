@@ -22,7 +22,7 @@ import click
 
 from symtop.cli.common import as_text, json_option, results_option
 from symtop.core.errors import words_of
-from symtop.core.files import DAY, by_last_use, cache_root, size_of
+from symtop.core.files import DAY, by_last_use, cache_root, distrust, size_of
 from symtop.core.progress import beating
 
 LEAST_SPACE = 500_000_000  # free bytes below which a full run of the studies may not fit on the disk
@@ -114,6 +114,9 @@ def _heyoka(_: Path) -> list[Finding]:
 def _caches(_: Path) -> list[Finding]:
     root, yesterday = cache_root(), time.time() - DAY
     findings = [_writable("cache", root, "set SYMTOP_CACHE to a folder that can be written")]
+    doubts = [distrust(path) for path in (root, root / "kernels", *(root / "kernels").rglob("*"))]
+    why, remedy = next(filter(any, doubts), ("nobody else can write it", ""))
+    findings.append(Finding("compiled code", why, not remedy, remedy))
     for name, kind, remedy in (("kernels", "kernel", "compiled again"), ("reference", "file", "computed again")):
         entries = by_last_use(root / name)
         size = sum(map(size_of, entries))
@@ -179,8 +182,8 @@ PERIODS = 0.02  # of a nutation: the length of a run that compiles
 
 def _run(name: str) -> str:
     """Compile what a variant runs alone and in an ensemble, or the truth without a name; returns why it could not."""
-    from symtop.core.lazy_kernel import LAZY
     from symtop.methods.framework.registry import integrator
+    from symtop.model.lazy_kernel import LAZY
     from symtop.model.scenes import scene
     from symtop.run.ensemble.ensemble import ensemble
     from symtop.run.reference.truth import reference

@@ -12,6 +12,8 @@ from symtop.cli.common import File, as_text, check_outputs, completing, json_opt
 from symtop.core.errors import SymtopError
 from symtop.core.progress import ticking
 
+CHARTS = ("axis", "attitude", "angles")
+BESIDE, NUTATIONS, MOST_BESIDE = ("rk4", "strang", "dop853", "taylor"), 10.0, 2e4  # of runs, and their evaluations
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
 
 
@@ -30,15 +32,19 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 )  # fmt: skip
 @click.option("--energy", type=click.Choice(["kept", "bounded"]), help="Claim what becomes of the energy.")
 @click.option("--adaptive", is_flag=True, help="Judge a class of SciPy's at a tolerance, not at fixed steps.")
+@click.option("--autonomous", is_flag=True, help="It was written for y' = f(y), without a time.")
 @click.option("--quick", is_flag=True, help="Ten seconds at most: shorter runs.")
+@click.option("--seed", type=int, help="Draw the starts, times and steps of an earlier judging again.")
 @click.option("--output", type=File(dir_okay=False), help="Write the findings to this netCDF file.")
 @click.option("--card", type=File(dir_okay=False), help="Write a page with two figures and the ledger (HTML).")
 @click.option("--badge", type=File(dir_okay=False), help="Write a badge for a README (SVG).")
+@click.option("--figure", type=File(dir_okay=False), help="Draw its error against evaluations, beside four methods.")
 @plugin_option
 @json_option
 def judge(
-    target: str, scene: str, output: str | None, card: str | None, badge: str | None, as_json: bool, **options: Any
-) -> None:
+    target: str, scene: str, output: str | None, card: str | None, badge: str | None, figure: str | None, as_json: bool,
+    **options: Any,
+) -> None:  # fmt: skip
     """Judge TARGET: its order, structure, invariants and drift on the top, beside what you claim of it.
 
     \b
@@ -46,8 +52,10 @@ def judge(
     my.py:step      a function step(f, t, y, h) -> y for y' = f(t, y)
     my.py:MyRK      a class derived from scipy.integrate.OdeSolver
     my.py:solver    an instance of a solver of diffrax
+    my.py:step      with --form rotation, step(q, w, h, inertia, torque) -> q, w of a rigid
+                    body: q = (w, x, y, z) from body to space, or a matrix (3, 3)
     ./my.so         void step(double *y, double h, const double *par, long n)
-    "./engine -x"   a program: a line of numbers in, states out
+    "./engine -x"   with --form program: a line of numbers in, states out
     run.csv         a trajectory without a method: time and states (see symtop.judging.judge_step)
 
     Without a claim it says what the method is. The exit code is 1 if a claim is refuted.
@@ -67,12 +75,12 @@ def judge(
         elif line := findings.line(event, common.terminal_width()):
             click.echo(line)
 
-    check_outputs(output=output, card=card, badge=badge)
+    check_outputs(output=output, card=card, badge=badge, figure=figure)
     ledger = judged(target, scene=scene, tell=None if as_json else tell, **options)
     if as_json:
         click.echo(as_text([finding.plain() for finding in ledger.findings]))
     else:
-        click.echo(findings.summary(ledger.findings, ledger.implied))
+        click.echo(findings.summary(ledger))
     if output is not None:
         from symtop.core import netcdf
 
@@ -83,9 +91,32 @@ def judge(
         for file, write in ((card, cards.card), (badge, cards.write_badge)):
             if file is not None:
                 write(ledger, file)
-    say_written(output, card, badge, err=as_json)
+    _draw_beside(target, scene, figure, as_json, options)
+    say_written(output, card, badge, figure, err=as_json)
     if ledger.refuted:
         sys.exit(1)
+
+
+def _draw_beside(target: str, scene: str, file: str | None, quiet: bool, options: dict[str, Any]) -> None:
+    """Draw a step's error against force evaluations beside `BESIDE`, if a file was named, and say who comes first."""
+    if file is None:
+        return
+    with ticking("comparing"):
+        from symtop.judging.adapters.adapter import integrator
+        from symtop.judging.claims.subject import open_target
+        from symtop.judging.comparison import compare, ranked
+        from symtop.report.plot import draw_compare
+
+        stepper = open_target(target, options["form"], options["chart"], adaptive=options["adaptive"])
+        if stepper.chart not in CHARTS:
+            raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
+        methods = [integrator(stepper, order=options["order"]), *BESIDE]
+        data = compare(scene, methods, cost="evaluations", nutations=NUTATIONS, budget=MOST_BESIDE, quiet=True)
+        draw_compare(data, file)
+    most, errors = ranked(data)
+    if not quiet and errors:
+        words = ", ".join(f"{name} {error:.0e}" for name, error in errors.items())
+        say(f"Axis error (rad) for {most:.0f} force evaluations in {NUTATIONS:g} nutations: {words}.")
 
 
 @click.command(short_help="Measure what integrators claim about themselves.")
@@ -97,14 +128,15 @@ def judge(
 def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> None:
     """Measure every claim of each INTEGRATOR: order, symplecticity, symmetry, conserved quantities, cost.
 
-    The exit code is 1 if a claim is refuted. Without a name: the integrators of the plug-in, or all.
+    The exit code is 1 if a claim is refuted, or if nothing can be measured of an integrator. Without a name: the
+    integrators of the plug-in, or all. A plug-in runs in a process of its own.
 
     \b
     symtop claims midpoint rk4
     symtop claims --plugin my_methods.py
     """
     with ticking("loading"):
-        from symtop.judging.battery import judge as measured
+        from symtop.judging.judge_step import apart
         from symtop.methods.framework import registry
         from symtop.model import scenes
 
@@ -113,8 +145,9 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
     refuted, entries = False, []
     for name in names or added or registry.integrators():
         with ticking(f"measuring {name}"):
-            ledger = measured(registry.integrator(name), chosen, quick=quick)
-        refuted |= any(finding.verdict == "refuted" for finding in ledger.findings)
+            ledger = apart(registry.integrator(name), chosen, quick=quick)
+        verdicts = {finding.verdict for finding in ledger.findings}
+        refuted |= "refuted" in verdicts or not verdicts & {"confirmed", "measured"}
         if as_json:
             about = {"integrator": ledger.integrator, "scene": chosen.name}
             entries += [{**about, **finding.plain()} for finding in ledger.findings]
@@ -130,42 +163,49 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
 @click.argument("scene", shell_complete=completing("scenes"))
 @click.option("--accuracy", type=float, help="The largest error you accept, for example 1e-6; rad of an angle.")
 @click.option("--i-use", "engine", help="A physics engine, for example mujoco: what its settings make of the scene.")
-@click.option("--step-size", type=float, help="Of the engine; 1/240 by default.")
+@click.option("--step-size", type=float, help="The step that you have; of the engine, 1/240 by default.")
+@common.per_nutation_option
+@click.option("--max-step", type=float, help="The longest step that you can take.")
+@click.option("--time-a-step", type=float, help="The most seconds that a step may take here, for example 1e-6.")
+@click.option("--needs", callback=common.separated, help="What methods may need, for example derivative,kicks.")
+@click.option("--general", is_flag=True, help="Only what exists for a body without symmetry.")
+@click.option("--keeps", help="Only what does not let it drift: energy or momenta.")
 @click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
 @click.option("--results", type=File(file_okay=False), help="Folder of a stored study; results by default.")
 @plugin_option
 @json_option
 def recommend(
-    scene: str, accuracy: float | None, engine: str | None, step_size: float | None, quantity: str,
-    horizon: float | None, results: str | None, as_json: bool,
-) -> None:  # fmt: skip
+    scene: str, accuracy: float | None, engine: str | None, results: str | None, as_json: bool, **options: Any
+) -> None:
     """Find the cheapest integrator and step that meet an accuracy on a SCENE.
 
-    The exit code is 1 if none does.
+    The answer is no method that is made for this very top; the best of those is named beside it. The exit code is 1 if
+    none meets the accuracy.
 
     \b
     symtop recommend spheroid --accuracy 1e-6
+    symtop recommend spheroid --accuracy 1e-3 --step-size 0.001 --general
+    symtop recommend spheroid --accuracy 1e-6 --needs derivative,kicks --keeps energy
     symtop recommend goldstein --accuracy 1e-3 --quantity attitude --horizon 1e4
     symtop recommend mine --plugin my_scene.py --accuracy 1e-9
     symtop recommend goldstein --i-use mujoco --step-size 0.002
     """
     with ticking("loading"):
         from symtop import advise
-    if (accuracy is None) is (engine is None):
-        both = "" if accuracy is None else ", not both"
-        raise SymtopError(f"recommend takes one of --accuracy, for example 1e-6, and --i-use{both}")
-    if engine is not None:
-        step = {} if step_size is None else {"step_size": step_size}
-        outcome = advise.i_use(engine, scene, horizon=horizon, **step)
-        click.echo(as_text(dataclasses.asdict(outcome)) if as_json else str(outcome))
-        return
-    if step_size is not None:
-        raise SymtopError("--step-size belongs to --i-use; with --accuracy the step is what is found")
-    if results is None and (Path("results") / advise.STORED_STUDY).is_file():
+        from symtop.measure.ranking import STORED
+    if accuracy is None and engine is None:
+        raise SymtopError("recommend needs --accuracy, for example 1e-6, or --i-use")
+    options |= {"step_size": common.step_of(scene, options), "needs": options["needs"] or ()}
+    if engine is None and results is None and (Path("results") / STORED).is_file():
         results = "results"
     with ticking("trying methods"):
-        advice = advise.recommend(scene, accuracy=accuracy or 0.0, quantity=quantity, horizon=horizon, results=results)
-    click.echo(as_text(dataclasses.asdict(advice))) if as_json else say(str(advice))
-    if advice.integrator is None:
+        answer: Any
+        if engine is not None:
+            answer = advise.i_use(engine, scene, accuracy=accuracy, results=results, **options)
+            advice = answer.advice if accuracy is not None else None
+        else:
+            answer = advice = advise.recommend(scene, accuracy=accuracy or 0.0, results=results, **options)
+    click.echo(as_text(dataclasses.asdict(answer))) if as_json else say(str(answer))
+    if advice is not None and advice.integrator is None:
         sys.exit(1)

@@ -3,6 +3,7 @@
 import contextlib
 import math
 import textwrap
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ import click
 from symtop import __version__
 from symtop.cli.common import File, as_text, completing, facts, json_option, plugin_option, table, terminal_width
 from symtop.core.errors import SymtopError
-from symtop.report import tables
+from symtop.report import formats
 
 if TYPE_CHECKING:
     from symtop.methods.framework.registry import Integrator
@@ -29,14 +30,19 @@ PACKAGE = f"""\
 }}"""
 
 
-def _list(records: list[Record], short: list[Record], note: str, wide: bool, as_json: bool) -> None:
-    """Print all records as a table of the `short` ones, or with all columns, or as JSON."""
-    if as_json:
+def _print(
+    records: list[Record], short: list[Record], note: str, one: Record | None, page: Callable[[Record], str],
+    *, wide: bool, as_json: bool,
+) -> None:  # fmt: skip
+    """Print one entry in full, or all records as a table of the `short` ones, or with all columns, or as JSON."""
+    if one is not None and (as_json or not wide):
+        click.echo(as_text([one]) if as_json else page(one))
+    elif as_json:
         click.echo(as_text(records))
     elif wide:
-        click.echo(table(*tables.columns(records)))
+        click.echo(table(*formats.columns(records)))
     else:
-        click.echo(table(*tables.columns(short), terminal_width()))
+        click.echo(table(*formats.columns(short), terminal_width()))
         click.echo(textwrap.fill(note, terminal_width()))
 
 
@@ -64,17 +70,20 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, eng
     methods = [registry.integrator(name)] if name is not None else list(listed.values())
     records: list[Record] = [method.record() for method in methods]
     if markdown and not as_json:
-        click.echo(tables.table(*tables.columns(records)))
-    elif name is not None and (as_json or not wide):
-        described = _described(methods[0])
-        click.echo(as_text([described]) if as_json else _integrator_page(described))
-    else:
-        short: list[Record] = [
-            {"name": method.name, "order": str(method.order or "?"), "flags": _flags(method), "summary": method.summary}
-            for method in methods
-        ]
-        note = f"flags: {FLAGS}. One in full: symtop integrators NAME; in one chart: NAME[CHART]."
-        _list(records, short, note, wide, as_json)
+        click.echo(formats.table(*formats.columns(records)))
+        return
+    short: list[Record] = [
+        {
+            "name": method.name, "order": str(method.order or "?"), "flags": _flags(method),
+            "needs": method.needs or "?", "summary": method.summary,
+        }
+        for method in methods
+    ]  # fmt: skip
+    needs = "; ".join(f"{name}, {words}" for name, words in registry.NEEDS.items())
+    note = f"flags: {FLAGS}. needs, the weakest thing that suffices: {needs}."
+    note += " One in full: symtop integrators NAME; in one chart: NAME[CHART]."
+    one = None if name is None else _described(methods[0])
+    _print(records, short, note, one, _integrator_page, wide=wide, as_json=as_json)
 
 
 def _flags(method: "Integrator") -> str:
@@ -120,15 +129,12 @@ def scenes(name: str | None, wide: bool, as_json: bool) -> None:
     from symtop.model import scenes as catalogue
 
     chosen = [catalogue.scene(name)] if name is not None else list(catalogue.scenes().values())
-    if name is not None and (as_json or not wide):
-        numbers = _numbers(chosen[0])
-        click.echo(as_text([numbers]) if as_json else _scene_page(numbers))
-        return
     records: list[Record] = [scene.record() for scene in chosen]
     keys = {"name": "name", "horizon": "horizon (s)", "nutation": "nutation period (s)", "purpose": "purpose"}
     short: list[Record] = [{column: record[key] for column, key in keys.items()} for record in records]
     note = "horizon: the time a run covers; nutation: one period of it. One in full: symtop scenes NAME."
-    _list(records, short, note, wide, as_json)
+    one = None if name is None else _numbers(chosen[0])
+    _print(records, short, note, one, _scene_page, wide=wide, as_json=as_json)
 
 
 def _numbers(scene: "Scene") -> Record:
@@ -160,7 +166,7 @@ def cite(files: tuple[Path, ...]) -> None:
 
     \b
     symtop cite
-    symtop cite results/work_precision.nc run.nc
+    symtop cite results/cost.nc run.nc
     """
     from symtop.core import netcdf
     from symtop.methods.framework.registry import bibliography, citation_keys, integrator
@@ -176,8 +182,8 @@ def cite(files: tuple[Path, ...]) -> None:
         sources[name] = []
         with contextlib.suppress(SymtopError):  # not registered here
             sources[name] = citation_keys(integrator(name))
-    keys = dict.fromkeys(key for found in sources.values() for key in found)
+    keys = dict.fromkeys(key for entries in sources.values() for key in entries)
     for text in [PACKAGE, *(bibliography()[key] for key in keys)]:
         click.echo(text + "\n")
-    if unknown := [name for name, found in sources.items() if not found]:
+    if unknown := [name for name, entries in sources.items() if not entries]:
         click.echo(f"symtop: no source is known of {', '.join(unknown)}", err=True)

@@ -1,4 +1,4 @@
-"""The command line: ``symtop integrators | scenes | run | long | ensemble | study | judge | report | ...``.
+"""The command line: ``symtop integrators | scenes | run | compare | ensemble | study | judge | report | ...``.
 
 Exit codes: 0 fine; 1 a case or a check failed; 2 bad input, or a place that cannot be written; 3 a run ended early by
 its outcome (its dataset was written); 130 and 143 it was interrupted or terminated (what a study had computed is kept).
@@ -10,9 +10,10 @@ import sys
 import click
 
 from symtop import __version__
-from symtop.cli import doctor, judge, lists, runs, study
+from symtop.cli import compare, doctor, judge, lists, runs, study
 from symtop.cli.common import Group, warn
 from symtop.core import files
+from symtop.core.progress import post
 
 
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -26,15 +27,15 @@ def main() -> None:
     symtop report
     """
 
-    def announce() -> None:
+    def announce() -> None:  # once, before the first kernel is compiled
         files.on_cold.clear()
-        warn(files.COMPILING)
+        (warn if files.is_terminal(sys.stderr) else post)(files.COMPILING)
 
-    files.on_cold[:] = [announce] if files.is_terminal(sys.stderr) else []  # once, before the first kernel is compiled
+    files.on_cold[:] = [announce]
 
 
 for command in (
-    lists.integrators, lists.scenes, runs.run, runs.long, runs.ensemble, runs.explore, judge.claims, judge.judge,
-    judge.recommend, study.study, study.report, study.archive, lists.cite, doctor.doctor,
+    lists.integrators, lists.scenes, runs.run, compare.compare, runs.long, runs.ensemble, runs.explore, judge.claims,
+    judge.judge, judge.recommend, study.study, study.report, study.archive, lists.cite, doctor.doctor,
 ):  # fmt: skip
     main.add_command(command)

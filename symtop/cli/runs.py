@@ -2,7 +2,10 @@
 
 import math
 import sys
+import time
 from collections import Counter
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import click
@@ -12,6 +15,8 @@ from symtop.cli.common import File, as_text, check_outputs, completing, say, say
 from symtop.core.errors import SymtopError, whole
 from symtop.core.progress import ticking
 
+FEWEST, FEW, MANY = 1000, 100_000, 20  # steps that are timed before a run of many times as many
+LONG_ENOUGH = 0.1  # seconds of steps that are timed
 SAME = 0.01  # relative difference of the step used from --step-size that is printed
 COMPARED = 100_000  # tops whose errors are shown, the first of the population: those of a million take 1 GB
 
@@ -27,6 +32,7 @@ EXECUTION = {
 @click.argument("scene", shell_complete=completing("scenes"))
 @click.argument("integrator", shell_complete=completing("integrators"))
 @click.option("--step-size", type=float, help="Step of a fixed-step method.")
+@common.per_nutation_option
 @click.option("--tolerance", type=float, help="Tolerance of an adaptive method.")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
 @click.option("--samples", type=int, default=501, show_default=True, help="Number of samples in the output.")
@@ -51,7 +57,7 @@ def run(
     symtop run goldstein rk45 --tolerance 1e-9 --horizon 200 --output run.nc --figure run.png
     """
     check_outputs(output=output, figure=figure)
-    with ticking("running"):  # the packages are loaded under the clock, too
+    with ticking("loading"):
         from symtop.core import netcdf
         from symtop.measure.errors import QUANTITIES, errors
         from symtop.measure.verdicts import judgement
@@ -59,6 +65,12 @@ def run(
         from symtop.run.reference.truth import reference
         from symtop.run.simulation import simulate
 
+        settings["step_size"] = h = common.step_of(scene, settings)
+    if h is not None and h > 0.0:
+        few_steps = partial(simulate, scene, integrator, step_size=h, samples=2, guard=False)
+        horizon = settings["horizon"] or scenes.scene(scene).horizon
+        estimate(horizon / h, lambda few: few_steps(horizon=few * h))
+    with ticking("running"):
         data = simulate(scene, integrator, guard=warn if guard else False, **settings)
         if output is not None:
             netcdf.write(data, output)
@@ -93,16 +105,36 @@ def run(
         sys.exit(3)
 
 
+def estimate(steps: float, run: Callable[[int], object]) -> None:
+    """Say before a run of so many steps how long it takes, if that is above ten seconds; `run` makes a few steps."""
+    from symtop.run.guard import MOST_STEPS
+
+    if not MANY * FEW < steps <= MOST_STEPS:  # more are refused
+        return
+    with ticking("timing some steps"):
+        run(FEWEST)  # which compiles
+        for few in (FEWEST, FEW):
+            began = time.monotonic()
+            run(few)
+            spent = time.monotonic() - began
+            took = spent * steps / few
+            if spent > LONG_ENOUGH:
+                break
+    if took > 10.0:
+        warn(f"{steps:.3g} steps take about {f'{took:.2g} s' if took < 100.0 else f'{took / 60.0:.2g} min'}")
+
+
 @click.command(short_help="Run up to billions of steps in little memory.")
 @click.argument("scene", shell_complete=completing("scenes"))
 @click.argument("integrator", shell_complete=completing("integrators"))
 @click.option("--steps", type=float, default=1e9, show_default=True, help="Number of steps.")
 @click.option("--step-size", type=float, help="Step; a thousandth of a nutation period by default.")
+@common.per_nutation_option
 @click.option("--checkpoint", type=File(), help="File to resume from; symtop's own by default.")
 @click.option("--output", type=File(), help="Write the windows to this netCDF file.")
 @common.plugin_option
 def long(
-    scene: str, integrator: str, steps: float, step_size: float | None, checkpoint: str | None, output: str | None
+    scene: str, integrator: str, steps: float, checkpoint: str | None, output: str | None, **settings: Any
 ) -> None:
     """Run one INTEGRATOR on one SCENE for very many steps, in little memory.
 
@@ -115,13 +147,15 @@ def long(
     check_outputs(output=output, checkpoint=checkpoint)
     with ticking("loading"):
         from symtop.model import scenes
+        from symtop.run.guard import MOST_STEPS
         from symtop.run.long_run import PER_NUTATION, long_run
 
-    period = scenes.scene(scene).nutation_period
+    period, step_size = scenes.scene(scene).nutation_period, common.step_of(scene, settings)
     if step_size is None and period == math.inf:
         raise SymtopError(f"{scene} has no nutation to take a step from: give --step-size")
     h = period / PER_NUTATION if step_size is None else step_size
-    count = whole("steps", steps, 1)
+    count = whole("steps", steps, 1, MOST_STEPS)
+    estimate(count, lambda few: long_run(scene, integrator, steps=few, step_size=h, quiet=True))
     try:
         data = long_run(scene, integrator, steps=count, step_size=h, checkpoint=checkpoint or True, output=output)
     except KeyboardInterrupt:
@@ -177,8 +211,9 @@ def ensemble(
     with ticking("drawing tops"):
         from symtop.report.spread import LEVELS, QUANTITIES, largest, member_errors, spread
         from symtop.run.ensemble import ensemble as runs
-        from symtop.run.ensemble.population import population
+        from symtop.run.ensemble.population import check_memory, population
 
+        check_memory("members", members)
         tops = population(members, seed=seed, kind=kind)
     compared = [name for name in QUANTITIES if variables is None or name in variables]
     if figure is not None and not compared:
@@ -195,8 +230,11 @@ def ensemble(
             from symtop.report.plot import draw_ensemble
 
             draw_ensemble(few, shown, figure)
-        worst = {name: spread(largest(member_errors(few, shown, name))[:, None])[:, 0].tolist() for name in compared}
+        own = {name: largest(member_errors(few, shown, name)) for name in compared}
+        worst = {name: spread(values[:, None])[:, 0].tolist() for name, values in own.items()}
     data.close()
+    if output is not None:
+        _add_members(output, tops, own)
     if as_json:
         errors = {name: dict(zip(map("{:g}".format, LEVELS), row, strict=True)) for name, row in worst.items()}
         click.echo(as_text({"outcomes": outcomes, "steps": steps, "largest_errors": errors}))
@@ -210,6 +248,24 @@ def ensemble(
         say_written(output, figure)
     if "ok" not in outcomes:
         sys.exit(3)
+
+
+def _add_members(file: str, tops: Any, errors: dict[str, Any]) -> None:
+    """Put the tops, ``I1`` and ``start_theta``, and the largest ``axis_error`` of each into a file of their runs."""
+    import netCDF4
+
+    from symtop.report.spread import QUANTITIES
+
+    numbers = {str(name): tops[name] for name in tops.data_vars if tops[name].dtype.kind == "f"}
+    with netCDF4.Dataset(file, "a") as data:
+        for name, values in numbers.items():
+            made = data.createVariable(name if name in ("I1", "I3", "mgl") else f"start_{name}", "f8", ("member",))
+            made[:] = values.values
+            made.setncatts(values.attrs)
+        for name, values in errors.items():
+            made = data.createVariable(f"{name}_error", "f8", ("member",))
+            made[: len(values)] = values
+            made.setncatts({"long_name": f"{QUANTITIES[name]}, largest over the run, infinite after a failure"})
 
 
 @click.command(short_help="Open the explorer: one run in a browser, with sliders.")

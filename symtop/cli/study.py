@@ -12,14 +12,13 @@ from symtop.cli import common
 from symtop.cli.common import File, as_text, completing, json_option, plugin_option, results_option, separated
 from symtop.core.errors import SymtopError, positive
 from symtop.core.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
-from symtop.report.sentences import abridged, counted
+from symtop.report.formats import abridged, counted
 
 if TYPE_CHECKING:
     from symtop.runner.pool import Pool
     from symtop.runner.study import Study
 
 MOST_NAMED = 8  # integrators and scenes in a line of the status
-MOST_SENTENCES = 3  # of the findings of a study that has run
 
 
 @click.command(short_help="Run studies: datasets, figures and findings.")
@@ -167,18 +166,22 @@ def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict
 
 
 def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str, Any]:
-    """The summary of a study's findings, which are printed but for JSON: its first sentences, and where the rest is."""
-    verdict, name = findings["verdict"], findings["study"]
-    summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "verdict")}
+    """The summary of a study's findings, which are printed but for JSON: its answer, and where the rest is."""
+    from symtop.report.template import answer
+
+    name = findings["study"]
+    summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "facts")}
     summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
     if not as_json:
         drawn = counted(summary["figures"], "figure")
         click.echo("{study}: {computed} of {cases} cases computed, {drawn}".format(drawn=drawn, **summary))
-        left = len(verdict) - MOST_SENTENCES
-        more = f"{counted(left, 'more finding')} in {name}.json" if left > 0 else ""
-        pictures = f"figures {results / 'figures' / name}-*" if findings["pictures"] else ""
-        rest = ", ".join(filter(None, (pictures, more)))
-        for line in (*(f"- {sentence}" for sentence in verdict[:MOST_SENTENCES]), f"dataset {results / name}.nc", rest):
+        files = [f"dataset {results / name}.nc", f"facts {results / name}.json"]
+        files += [
+            f"{kind} {results / kind / name}-*"
+            for kind, key in (("figures", "pictures"), ("tables", "tables"))
+            if findings[key]
+        ]
+        for line in (answer(findings, results), ", ".join(files)):
             if line:
                 click.echo(common.filled(f"  {line}"))
     for failure in findings["failures"]:
@@ -237,20 +240,12 @@ def check_all(
 def report(results: str, embed: bool) -> None:
     """Gather the findings of all studies into one page beside its figures.
 
-    If the folder holds no findings and its folder ``quick`` does, the page is made of those of ``quick``. A page that
-    is up to date is not written again.
+    If the folder holds no findings and its folder ``quick`` does, the page is made of those of ``quick``.
     """
-    from symtop.report.sources import report_hash
-    from symtop.runner import manifest
-
     folder = Path(results)
     if not any(folder.glob("*.json")) and any((folder / "quick").glob("*.json")):
         common.warn(f"{folder} holds no findings; the report is made of those in {folder / 'quick'}")
         folder /= "quick"
-    made_of = report_hash(folder, embed=embed)
-    if not click.get_current_context().meta.get(common.PLUGINS) and manifest.is_current(folder, manifest.PAGE, made_of):
-        click.echo(f"report: {folder / manifest.PAGE} (up to date)")
-        return
     from symtop.report import page
 
     click.echo(f"report: {page.write(folder, embed=embed)}")

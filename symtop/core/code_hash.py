@@ -307,8 +307,12 @@ class Code:
             constants = [value for value in part.co_consts if not isinstance(value, CodeType)]
             if part is function.__code__ and constants[:1] == [function.__doc__]:
                 del constants[0]
-            self._note(part.co_code.hex(), part.co_exceptiontable.hex(), *map(_constant, constants))
-            counts = part.co_argcount, part.co_kwonlyargcount, _flags(part)
+            # a frozenset prints in another order in every process
+            texts = (f"frozenset({sorted(map(repr, x))})" if isinstance(x, frozenset) else repr(x) for x in constants)
+            self._note(part.co_code.hex(), part.co_exceptiontable.hex(), *texts)
+            # every function has `CO_OPTIMIZED`, but numba clears it where a profiler watches
+            flags = part.co_flags | (inspect.CO_OPTIMIZED if part.co_flags & inspect.CO_NEWLOCALS else 0)
+            counts = part.co_argcount, part.co_kwonlyargcount, flags
             self._note(repr((part.co_names, part.co_freevars, *counts)))
         self._add_all(held(function))
         self._add_all(self._also(function))
@@ -339,16 +343,6 @@ def codes(code: CodeType) -> Iterator[CodeType]:
             yield from codes(constant)
 
 
-def _flags(code: CodeType) -> int:
-    """The flags of a code object; every function has `CO_OPTIMIZED`, but numba clears it where a profiler watches."""
-    return code.co_flags | (inspect.CO_OPTIMIZED if code.co_flags & inspect.CO_NEWLOCALS else 0)
-
-
-def _constant(value: Any) -> str:
-    """A constant in words that are the same in every process."""
-    return f"frozenset({sorted(map(repr, value))})" if isinstance(value, frozenset) else repr(value)
-
-
 def held(function: FunctionType) -> Iterator[object]:
     """What a function holds besides its code: defaults and what it closes over."""
     yield from function.__defaults__ or ()
@@ -365,15 +359,15 @@ def named(function: FunctionType) -> Iterator[tuple[str, object]]:
     inside = list(codes(function.__code__))
     names = sorted({name for code in inside for name in code.co_names})
     package = function.__globals__.get("__package__") or ""
-    found = [(name, function.__globals__[name]) for name in names if name in function.__globals__]
-    found += [pair for code in inside for pair in _imports(code, package)]
+    reached = [(name, function.__globals__[name]) for name in names if name in function.__globals__]
+    reached += [pair for code in inside for pair in _imports(code, package)]
     expanded = set[str]()
-    while found:
-        name, value = found.pop()
+    while reached:
+        name, value = reached.pop()
         yield name, value
         if isinstance(value, ModuleType) and value.__name__ not in expanded and not _of_library(value.__name__):
             expanded.add(value.__name__)
-            found += [(f"{name}.{part}", getattr(value, part)) for part in names if hasattr(value, part)]
+            reached += [(f"{name}.{part}", getattr(value, part)) for part in names if hasattr(value, part)]
 
 
 def _imports(code: CodeType, package: str) -> Iterator[tuple[str, object]]:

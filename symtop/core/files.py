@@ -7,18 +7,18 @@ until the folder is small enough. Another process may be doing the same.
 
 import contextlib
 import errno
-import functools
 import importlib.util
 import os
 import shutil
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import TextIO
 
-from symtop.core.errors import SymtopError, at_home
+from symtop.core.errors import SymtopError, SymtopWarning, at_home
 
 DAY = 86_400.0  # seconds
 UNUSED = 30  # days
@@ -43,13 +43,39 @@ on_cold: list[Callable[[], object]] = [_tell]  # called when a kernel is not in 
 
 def cache_root() -> Path:
     """The folder for everything symtop caches: ``$SYMTOP_CACHE`` or ``symtop`` in the user's cache folder."""
-    return _root(*map(os.environ.get, ("SYMTOP_CACHE", "XDG_CACHE_HOME", "HOME", "USERPROFILE")))
-
-
-@functools.lru_cache(maxsize=16)
-def _root(chosen: str | None, caches: str | None, *_homes: str | None) -> Path:
-    """The folder in these surroundings, of which `Path.home` reads the last; each new start asks four times."""
+    chosen, caches = os.environ.get("SYMTOP_CACHE"), os.environ.get("XDG_CACHE_HOME")
     return Path(chosen) if chosen else Path(caches or Path.home() / ".cache") / "symtop"
+
+
+def make_private(folder: Path) -> None:
+    """Make a folder, and those above it that are missing, for nobody but this user."""
+    if not folder.is_dir():
+        make_private(folder.parent)
+        folder.mkdir(0o700, exist_ok=True)
+
+
+def distrust(path: Path) -> tuple[str, str]:
+    """Why code from this file or folder may be somebody else's, and how to mend it; "" and "" if only we can write it.
+
+    What the system's administrator owns is trusted, and so is what is not there.
+    """
+    try:
+        status = path.stat()
+    except OSError:
+        return "", ""
+    if hasattr(os, "geteuid") and status.st_uid not in (0, os.geteuid()):
+        return f"{path} belongs to user {status.st_uid}", "set SYMTOP_CACHE to a folder of your own, or remove it"
+    if hasattr(os, "geteuid") and status.st_mode & 0o022:
+        return f"{path} can be written by others", f"remove it, or if you trust them: chmod -R go-w '{cache_root()}'"
+    return "", ""
+
+
+def is_trusted(path: Path) -> bool:
+    """Can nobody else have written this file or folder of compiled code? A warning says why not."""
+    why, remedy = distrust(path)
+    if why:
+        warnings.warn(f"kernels are compiled in memory, because {why}; {remedy}", SymtopWarning, stacklevel=2)
+    return not why
 
 
 def touch(entry: Path) -> None:

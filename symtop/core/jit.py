@@ -34,17 +34,20 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from symtop.core.code_hash import Code, Part, by_file, by_name, digest, hashed
 from symtop.core.errors import SymtopError
-from symtop.core.files import cache_root, locked, on_cold, prune, touch
-from symtop.core.jit_functions import Function, fused, inlined_parts, shared_parts, two_product
+from symtop.core.files import cache_root, is_trusted, locked, make_private, on_cold, prune, touch
+from symtop.core.jit_functions import Function, fused, marked, two_product
 from symtop.core.sines import polynomials, sincos
 
-__all__ = ["code_of", "compile_kernel", "fused", "is_cached", "register_jitable", "set_item", "to_fixed_tuple"]
+__all__ = [
+    "code_of", "combined", "compile_kernel", "fused", "is_cached", "register_jitable", "set_item", "to_fixed_tuple",
+]  # fmt: skip
 
 set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple
 
 MOST_BYTES = 200_000_000  # of kernels that are kept, about 2000 of them
 OPTIONS = {"error_model": "numpy", "nogil": True}  # division by zero gives infinity, as in C; threads run at once
 HASH = hashlib.sha256().digest_size  # bytes before the code in its file
+NAMES = "by content"  # of kernels: those that were stored before may share one
 WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # kernels alone call it: 14 % less to compile
 WRAPPERS = ("_ZN7cpython", "cfunc.")  # names of functions that Python and C can call
 INLINED = {"forceinline": True, **WITHIN}
@@ -72,10 +75,8 @@ def register_jitable(function: Function, options: dict[str, Any] = INLINED) -> F
 
 def _register_parts() -> None:
     """Register what modules without numba have marked so far."""
-    for function in inlined_parts:
-        register_jitable(function)
-    for function in shared_parts:
-        register_jitable(function, OPTIONS | WITHIN)
+    for function, is_inlined in marked:
+        register_jitable(function, INLINED if is_inlined else OPTIONS | WITHIN)
 
 
 def _overloads(function: FunctionType) -> Iterator[object]:
@@ -112,7 +113,7 @@ class _Folder:
         if not _pruned:
             _pruned.append(self.path)
             prune(self.path.parent, MOST_BYTES)
-        self.path.mkdir(parents=True, exist_ok=True)
+        make_private(self.path)
 
 
 class _Index(IndexDataCacheFile):  # type: ignore[misc]
@@ -120,7 +121,7 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
 
     numba counts them: two processes that save at the same time give two signatures one file, and each gets the code of
     the other. And it runs what it finds, damaged bytes, too. Here the code follows its hash, and an index that cannot
-    be read is empty.
+    be read is empty. A pickle is a program: one that somebody else may have written is not read.
     """
 
     def save(self, key: Any, data: Any) -> None:
@@ -131,7 +132,8 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
 
     def _load_index(self) -> dict[Any, str]:
         with contextlib.suppress(Exception):  # a damaged pickle raises nearly anything
-            return super()._load_index()  # type: ignore[no-any-return]
+            if is_trusted(Path(self._index_path)):
+                return super()._load_index()  # type: ignore[no-any-return]
         return {}
 
     def _save_data(self, name: str, data: Any) -> None:
@@ -139,8 +141,17 @@ class _Index(IndexDataCacheFile):  # type: ignore[misc]
         with self._open_for_write(self._data_path(name)) as file:
             file.write(hashlib.sha256(code).digest() + code)
 
+    @contextlib.contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[Any]:
+        with super()._open_for_write(filepath) as file:
+            Path(file.name).chmod(0o600)
+            yield file
+
     def _load_data(self, name: str) -> Any:
-        whole = Path(self._data_path(name)).read_bytes()
+        path = Path(self._data_path(name))
+        if not is_trusted(path):
+            raise ValueError("the code on disk may be somebody else's")
+        whole = path.read_bytes()
         checksum, code = whole[:HASH], whole[HASH:]
         if hashlib.sha256(code).digest() != checksum:
             raise ValueError("the code on disk is damaged")
@@ -235,7 +246,8 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
                 stack.callback(gc.enable)
                 gc.disable()
             if isinstance(kernel._cache, _Cache) and not is_cached(kernel, signature):
-                with contextlib.suppress(SymtopError):  # a cache that cannot be written costs time and no run
+                with contextlib.suppress(SymtopError, OSError):  # a cache that cannot be written costs time and no run
+                    make_private(Path(kernel._cache._cache_path))
                     stack.enter_context(locked(Path(kernel._cache._cache_path) / "code", wait=True))
             with _no_code_of_inner_functions():
                 entry = compiling(signature)
@@ -251,20 +263,31 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
 def compile_kernel(function: Callable[..., Any]) -> Any:
     """``njit`` with the disk cache; division by zero gives infinity, as in C.
 
+    A cache that somebody else may write is not used, with a warning (`is_trusted`).
     A kernel with functions typed at a prompt, which have no source file, compiles without the cache. The constructor of
     a NamedTuple has none either, but follows from the fields, which are part of what the kernel is made of.
     """
     _register_parts()
-    kernel = njit(**OPTIONS)(function)
-    kernel.compile = _once(kernel, kernel.compile)
     parts = code_of(function)
+    made_of = digest(by_file(parts) | {"names": NAMES})
+    kernel = njit(**OPTIONS)(_named(function, made_of))
+    kernel.compile = _once(kernel, kernel.compile)
     functions = (part.thing for part in parts if isinstance(part.thing, FunctionType))
     written = [part for part in functions if not part.__module__.startswith("namedtuple_")]
     if all(Path(part.__code__.co_filename).is_file() for part in written):
-        folder = cache_root() / "kernels" / digest(by_file(parts))
-        touch(folder)
-        kernel._cache = _Cache(function, folder)
+        folder = cache_root() / "kernels" / made_of
+        if all(map(is_trusted, (cache_root(), folder.parent, folder))):
+            touch(folder)
+            kernel._cache = _Cache(function, folder)
     return kernel
+
+
+def _named(function: Any, made_of: str) -> FunctionType:
+    """The function under a name of its own: LLVM finds machine code by name, and numba counts names by process."""
+    own = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__,
+                       function.__closure__)  # fmt: skip
+    own.__qualname__, own.__module__ = f"{function.__qualname__}_{made_of[:16]}", function.__module__
+    return own
 
 
 def is_cached(kernel: Any, signature: Any) -> bool:
@@ -303,3 +326,24 @@ def _two_product(a, b):  # type: ignore[no-untyped-def]
         return product, _fma(a, b, -product)
 
     return exactly
+
+
+@intrinsic
+def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
+    """place + h w_0 terms_0 + h w_1 terms_1 + ... of tuples, in this order and without the terms whose weight is None.
+
+    Written out: a closure for each term takes twice as long to compile, a loop four times as long to run.
+    """
+    used = [j for j, weight in enumerate(weights) if weight is not types.none]
+
+    def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        result, rows, numbers, step = arguments
+        factors = [(j, builder.fmul(step, builder.extract_value(numbers, j))) for j in used]
+        for m in range(len(place)):
+            total = builder.extract_value(result, m)
+            for j, factor in factors:
+                total = builder.fadd(total, builder.fmul(factor, builder.extract_value(rows, [j, m])))
+            result = builder.insert_value(result, total, m)
+        return result
+
+    return place(place, terms, weights, h), emit

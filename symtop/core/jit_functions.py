@@ -16,19 +16,18 @@ from typing import Any, TypeVar
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
-inlined_parts: list[Callable[..., object]] = []
-shared_parts: list[Callable[..., object]] = []
+marked: list[tuple[Callable[..., object], bool]] = []  # functions, and whether they are inlined
 
 
 def inlined(function: Function) -> Function:
     """Let kernels call a plain function, copied into each caller: for a few operations."""
-    inlined_parts.append(function)
+    marked.append((function, True))
     return function
 
 
 def shared(function: Function) -> Function:
     """Let kernels call a plain function that is compiled once: for a larger one, called from several places."""
-    shared_parts.append(function)
+    marked.append((function, False))
     return function
 
 

@@ -1,7 +1,7 @@
 """Labelled datasets: names and units of variables, provenance, and files that are whole or absent.
 
-Conventions are CF-1.11 where it applies. Only maps of bytes are compressed: round-off does not compress. No time stamps
-inside, so that equal inputs give equal bytes.
+Conventions are CF-1.11 where it applies. Only maps of bytes and numbers in single precision, which a study has rounded,
+are compressed: round-off does not compress. No time stamps inside, so that equal inputs give equal bytes.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -28,44 +28,37 @@ from symtop.core.code_hash import processor, version
 from symtop.core.errors import SymtopError, words_of
 from symtop.core.signals import deferred
 
-_one_thread = threading.RLock()  # two threads inside the netCDF library at once end the process (segmentation fault)
+one_thread = threading.RLock()  # two threads inside the netCDF library at once end the process (segmentation fault)
 
-# name: (long name, units in SI, where they differ: units of a problem without any)
-VARIABLES: dict[str, tuple[str, ...]] = {
-    "time": ("elapsed time", "s", "1"),
-    "I1": ("moment of inertia across the axis", "kg m2", "1"),
-    "I3": ("moment of inertia along the axis", "kg m2", "1"),
-    "mgl": ("weight times distance of the centre of gravity", "kg m2 s-2", "1"),
-    "theta": ("nutation angle", "rad"),
-    "phi": ("precession angle, unwrapped", "rad"),
-    "psi": ("spin angle, unwrapped", "rad"),
-    "theta_dot": ("rate of theta", "rad s-1", "rad"),
-    "phi_dot": ("rate of phi", "rad s-1", "rad"),
-    "psi_dot": ("rate of psi", "rad s-1", "rad"),
-    "axis": ("unit vector along the axis of the top, space frame", "1"),
-    "quaternion": ("attitude, body to space, (w, x, y, z)", "1"),
-    "energy": ("total energy", "kg m2 s-2", "1"),
-    "p_theta": ("momentum conjugate to theta", "kg m2 s-1", "1"),
-    "p_phi": ("momentum conjugate to phi, recomputed from the trajectory", "kg m2 s-1", "1"),
-    "p_psi": ("momentum conjugate to psi, recomputed from the trajectory", "kg m2 s-1", "1"),
-    **{
-        f"{name}_error_bound": (f"bound on the error of {name}", "rad")
-        for name in ("theta", "phi", "psi", "axis", "attitude")
-    },
-    "step_size": ("time step", "s", "1"),
-    "tolerance": ("tolerance of an adaptive method, relative", "1"),
-    "horizon": ("time that a run was asked for", "s", "1"),
-    "reached_time": ("time of the last completed step", "s", "1"),
-    "steps": ("number of steps", "1"),
-    "force_evaluations": ("number of evaluations of the force", "1"),
-    "newton_iterations": ("number of iterations of Newton or of a sweep", "1"),
-    "outcome": ("how a run ended",),
-    "dithered": ("are the samples dithered, because uniform ones would miss phases of the nutation?",),
-    "stratum": ("kind of motion that a top was drawn for",),
-    "component": ("component of a vector in the space frame",),
-    "part": ("part of a quaternion",),
-}
 
+class Column(NamedTuple):
+    """A line of a table of variables."""
+
+    entry: tuple[str, ...]  # long name, units in SI, where they differ: units of a problem without any
+    flags: dict[int, str]
+
+
+def read_columns(file: Path | None) -> dict[str, Column]:
+    """The table in a file, empty without one; SymtopError for a line that declares no column, or one again.
+
+    Each line has five cells between tabs: `symtop.measure.columns` says what they are.
+    """
+    table: dict[str, Column] = {}
+    lines = [] if file is None else file.read_text(encoding="utf-8").splitlines()
+    for place, line in enumerate(lines[1:], 2):
+        name, *cells = line.split("\t")
+        units, without, flags, long_name = cells if len(cells) == 4 else [""] * 4
+        pairs = [flag.split() for flag in flags.split(",") if flag]
+        meanings = all(len(pair) == 2 and pair[0].isdigit() for pair in pairs)
+        if not (name and long_name and meanings) or name in table:
+            wanted = "a variable that no other line has, its units, those without units, flags, and its long name"
+            raise SymtopError(f"{file}: line {place} must be {wanted}, between tabs, not {line!r}")
+        entry = (long_name, *filter(None, (units, without)))
+        table[name] = Column(entry, {int(number): word for number, word in pairs})
+    return table
+
+
+VARIABLES = {name: column.entry for name, column in read_columns(Path(__file__).with_name("variables.tsv")).items()}
 CONVENTIONS = {"Conventions": "CF-1.11", "source": "symtop", "history": f"made by symtop {__version__}"}
 
 Tree = TypeVar("Tree", bound=xr.Dataset | xr.DataTree)
@@ -128,19 +121,26 @@ def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
 @functools.cache
 def variable_attributes(name: str, units: str) -> dict[str, str]:
     """The long name and units of a variable; none of one that symtop does not know."""
-    long_name, *choice = VARIABLES.get(name, ("",))
-    named = {"long_name": long_name} if long_name else {}
-    return named | ({"units": choice[0 if units == "SI" else -1]} if choice else {})
+    return label(VARIABLES[name], units) if name in VARIABLES else {}
+
+
+def label(entry: tuple[str, ...], units: str, elsewhere: str = "") -> dict[str, str]:
+    """Attributes of a variable with such an entry in `VARIABLES`; `elsewhere` ends a name whose units are not SI's."""
+    long_name, *choice = entry
+    if units == "SI" or len(set(choice)) < 2:
+        elsewhere = ""
+    return {"long_name": long_name + elsewhere} | ({"units": choice[0 if units == "SI" else -1]} if choice else {})
 
 
 def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree:
-    """Give the variables their names and units and the dataset, or a tree's root, its provenance and attributes.
+    """Give variables without a long name theirs and units, and a dataset, or a tree's root, provenance and attributes.
 
     `units` is that of the scene: "SI", or empty for a problem without units, where all but angles have the unit "1".
     """
     for group in groups(data).values():
         for name, variable in group.variables.items():  # ``group[name]`` would make a DataArray
-            variable.attrs.update(variable_attributes(str(name), units))
+            if "long_name" not in variable.attrs:
+                variable.attrs.update(variable_attributes(str(name), units))
     data.attrs.update(attributes_of(title, **attributes))
     return data
 
@@ -209,9 +209,12 @@ def read_json(path: Path) -> Any:
 
 
 def _encoding(data: xr.Dataset) -> dict[Any, dict[str, Any]]:
-    """No fill value in coordinates; bytes compressed."""
+    """No fill value in coordinates; bytes and single precision compressed."""
     bare = {name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"}
-    return bare | {name: {"zlib": True} for name, values in data.data_vars.items() if values.dtype.kind == "u"}
+    return bare | {
+        name: {"zlib": True} for name, values in data.data_vars.items()
+        if values.dtype.kind == "u" or values.dtype == np.float32
+    }  # fmt: skip
 
 
 def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
@@ -227,18 +230,13 @@ def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
 
             stack.enter_context(dask.config.set(scheduler="threads"))
         try:
-            with _one_thread:
+            with one_thread:
                 whole = encoding if isinstance(data, xr.DataTree) else encoding["/"]
                 data.to_netcdf(partial, engine="netcdf4", encoding=whole)
         except RuntimeError as error:  # the netCDF library's own word for a disk that is full
             full = shutil.disk_usage(partial.parent).free < LITTLE
             raise OSError(None, f"no room is left in {partial.parent}" if full else str(error)) from error
     return Path(path)
-
-
-def alone() -> contextlib.AbstractContextManager[Any]:
-    """Hold the netCDF library, of which one thread at a time may make use."""
-    return _one_thread
 
 
 def array_hash(values: Any) -> str:
@@ -267,7 +265,7 @@ def content_hash(data: xr.Dataset) -> str:
 def _netcdf(path: str | os.PathLike[str]) -> Iterator[None]:
     """Hold the netCDF library, and say in a sentence what it could not read."""
     try:
-        with deferred(), _one_thread:
+        with deferred(), one_thread:
             yield
     except Exception as error:  # (a damaged file: HDF5's errors, and those of names and times that make no sense)
         raise SymtopError(f"cannot read {path} as netCDF: {words_of(error)}") from error

@@ -1,9 +1,11 @@
-"""Numbers that many modules need, each defined once; arrays of real numbers; the zeros of a function."""
+"""Numbers that many modules need, each defined once, arrays of real numbers, mpmath for threads, zeros of functions."""
 
 import math
 import sys
+import threading
 from collections.abc import Callable
 from reprlib import repr as short
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +14,18 @@ from symtop.core.errors import SymtopError, finite
 EPSILON = sys.float_info.epsilon  # 2.2e-16: the spacing of doubles at 1
 TINY = sys.float_info.min  # 2.2e-308: a divisor that is never zero
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # steps of this length, modulo 1, are commensurate with no period
+_contexts = threading.local()  # its attributes are the thread's own
+
+
+def context(digits: int) -> Any:
+    """An mpmath context of that many decimal digits, a thread's own: threads spoil the digits of `mpmath.mp`."""
+    mine: dict[Any, Any] = vars(_contexts)
+    if digits not in mine:
+        from mpmath.ctx_mp import MPContext  # mpmath costs 0.1 s to import
+
+        mine[digits] = MPContext()
+        mine[digits].dps = digits
+    return mine[digits]
 
 
 def real_numbers(name: str, values: object) -> np.ndarray:
@@ -45,20 +59,3 @@ def sign_changes(function: Callable[[float], float], grid: np.ndarray, tolerance
             a, b = (middle, b) if (value > 0.0) == (low > 0.0) else (a, middle)
         roots.append(0.5 * (a + b))
     return roots
-
-
-def newton_between(
-    value: Callable[[float], float], slope: Callable[[float], float], below: float, above: float
-) -> float:
-    """The root of a function that is negative at `below` and positive at `above`, to two units in its last place.
-
-    Newton's method from the middle; where a step leaves what is known to hold the root, half of that.
-    """
-    x, before = 0.5 * (below + above), math.inf
-    while x != before:
-        here, rise = value(x), slope(x)
-        below, above = (x, above) if here < 0.0 else (below, x)
-        newton = x - here / rise if rise > 0.0 else math.nan
-        inside = newton if below < newton < above else 0.5 * (below + above)
-        x, before = (x if abs(newton - x) <= 2.0 * math.ulp(x) else inside), x
-    return x

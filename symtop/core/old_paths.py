@@ -4,23 +4,21 @@
 It is read when a name of symtop is found nowhere else.
 """
 
+import functools
 import importlib
 import sys
 import warnings
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-_table: dict[str, str] = {}
 
-
+@functools.cache
 def table() -> dict[str, str]:
     """The new path of each old one, both without ``symtop.``."""
-    if not _table:
-        from pathlib import Path  # not with every `import symtop`
+    from pathlib import Path  # not with every `import symtop`
 
-        lines = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8").splitlines()
-        _table.update((old, new) for old, _, new in (line.partition(" ") for line in lines))
-    return _table
+    lines = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8").splitlines()
+    return {old: new for old, _, new in (line.partition(" ") for line in lines)}
 
 
 class OldPaths:

@@ -1,4 +1,4 @@
-"""Requests of the user, heard as exceptions of their own: to end (SIGTERM), and to interrupt (SIGINT).
+"""Requests of the user, heard as exceptions of their own: to end (SIGTERM, SIGHUP), and to interrupt (SIGINT).
 
 An exception of its own tells a request from what a plug-in raises. It may start between any two instructions, also
 between taking a lock and entering the block that gives it back. Where a library does so (xarray's lock of HDF5: one in
@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 INTERRUPTED, TERMINATED = 130, 143  # exit codes: 128 and the number of the signal, as shells have it
+HANGUP = getattr(signal, "SIGHUP", signal.SIGTERM)  # Windows has none
 
 
 class TerminatedError(SystemExit):
@@ -51,9 +52,14 @@ def _handling(number: int, usual: Any, handler: Callable[..., None]) -> Iterator
             signal.signal(number, usual)
 
 
-def ending_on_sigterm() -> contextlib.AbstractContextManager[None]:
-    """Raise TerminatedError on SIGTERM, in the main thread; a handler that is there already is left in place."""
-    return _handling(signal.SIGTERM, signal.SIG_DFL, _end)
+@contextlib.contextmanager
+def ending_on_sigterm() -> Iterator[None]:
+    """Raise TerminatedError on SIGTERM, and on SIGHUP, of a terminal that was closed, in the main thread.
+
+    A handler that is there already is left in place, also that of ``nohup``.
+    """
+    with _handling(signal.SIGTERM, signal.SIG_DFL, _end), _handling(HANGUP, signal.SIG_DFL, _end):
+        yield
 
 
 def told_apart() -> contextlib.AbstractContextManager[None]:
@@ -63,12 +69,13 @@ def told_apart() -> contextlib.AbstractContextManager[None]:
 
 @contextlib.contextmanager
 def deferred() -> Iterator[None]:
-    """Hear SIGINT and SIGTERM at the end of the block, in the main thread; where they end the process, they still do.
+    """Hear SIGINT, SIGTERM and SIGHUP at the end of the block, in the main thread.
 
-    For calls of milliseconds: until one is over, Ctrl-C has no effect.
+    Where they end the process, they still do. For calls of milliseconds: until one is over, Ctrl-C has no effect.
     """
     heard: list[int] = []
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM) if _in_main_thread()}
+    numbers = {signal.SIGINT, signal.SIGTERM, HANGUP} if _in_main_thread() else ()
+    handlers = {number: signal.getsignal(number) for number in numbers}
     usual = {number: handler for number, handler in handlers.items() if callable(handler)}
     try:
         for number in usual:

@@ -5,7 +5,7 @@
     POST /run  /netcdf  /script  /map   one run: as arrays, as a file, as a script; a grid of runs
 
 It listens on 127.0.0.1. It answers only requests that name this machine as their host, and POST requests only if they
-send JSON, so that a page of another origin cannot use it.
+send JSON and a browser names no other origin, so that a page from elsewhere cannot use it.
 """
 
 import contextlib
@@ -15,6 +15,7 @@ import socket
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -36,6 +37,8 @@ PAGES = {
 }
 PATIENCE = 60.0  # seconds to wait for the rest of a request, or for the next one of a connection
 MOST_WAITING = 256  # connections that the system holds until a thread takes them
+MOST_OPEN, FEW, HURRY = 256, 64, 2.0  # connections at once; those beyond a few wait so many seconds for a request
+BUSY = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 2\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
 LONGEST_BODY = 65_536  # bytes of a POST request
 POLICY = "default-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 
@@ -58,10 +61,34 @@ _at_work = threading.BoundedSemaphore(cores())  # of 200 runs that take turns in
 
 
 class Server(ThreadingHTTPServer):
-    """A thread for each connection; what a connection fails of is nobody else's business."""
+    """A thread for each of `MOST_OPEN` connections; what one fails of is nobody else's business."""
 
     request_queue_size = MOST_WAITING
     daemon_threads = True
+    open, told = 0, 0.0  # connections; when the last refusal was reported
+    counting = threading.Lock()
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Give the connection a thread, or refuse it (503) and say so, at most once a second."""
+        with self.counting:
+            self.open += 1
+        if self.open <= MOST_OPEN:
+            super().process_request(request, client_address)
+            return
+        if time.monotonic() - self.told > 1.0:
+            self.told = time.monotonic()
+            sys.stderr.write(f"symtop: {MOST_OPEN} connections are open, and others are refused (503)\n")
+        with contextlib.suppress(OSError):
+            request.settimeout(0.0)
+            request.sendall(BUSY)
+            request.recv(LONGEST_BODY)  # closed with unread bytes, the answer would be lost
+        self.shutdown_request(request)
+
+    def shutdown_request(self, request: Any) -> None:
+        """Close a connection, which counts no more."""
+        with self.counting:
+            self.open -= 1
+        super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ARG002
         """Say in one line what went wrong, unless the browser has only left."""
@@ -75,7 +102,11 @@ class Handler(BaseHTTPRequestHandler):
 
     protocol_version = "HTTP/1.1"
     disable_nagle_algorithm = True
-    timeout = PATIENCE
+
+    @property
+    def timeout(self) -> float:  # type: ignore[override]
+        """Seconds to wait for bytes: where many connections are open, an idle one makes room."""
+        return PATIENCE if getattr(self.server, "open", 0) <= FEW else HURRY
 
     def handle(self) -> None:
         """Answer the requests of one connection, until the browser closes it, even in the middle of one."""
@@ -154,7 +185,15 @@ class Handler(BaseHTTPRequestHandler):
             return True
 
     def _is_local(self) -> bool:
-        """Does the request name this machine? The check refuses a foreign name that resolves to 127.0.0.1."""
+        """Does the request name this machine, and a POST no page of another origin?
+
+        The check refuses a foreign name that resolves to 127.0.0.1.
+        """
+        origin, site = self.headers.get("Origin"), self.headers.get("Sec-Fetch-Site", "none")
+        foreign = origin not in (None, f"http://{self.headers.get('Host')}") or site not in ("none", "same-origin")
+        if self.command == "POST" and foreign:
+            self._refuse(403, "the explorer answers its own page only")
+            return False
         host = self.headers.get("Host", "").rpartition(":")[0] or self.headers.get("Host", "")
         if host in ("127.0.0.1", "localhost"):
             return True

@@ -1,10 +1,7 @@
 """judge(): anybody's integrator against its claims in a process of its own; or a trajectory, as far as it shows them.
 
-*A step* that hangs, crashes or takes too long costs one verdict. The process is forked, so that any function can be
-judged, and sends its findings as they are made; the one that waits looks at its heartbeat. A call that does not return
-is ended with its process; if it was a step backwards, the next process refuses such steps and measures the same claims
-again, and else the claims stay undecided and say why. Where the system cannot fork, or JAX is loaded here, whose
-threads a fork would lose, the battery runs in this process and has no limits.
+*A step* runs in a process of its own (`symtop.judging.remote`); one that hangs, crashes or takes too long costs the
+verdicts of one stage, which stay undecided and say why.
 
 *A trajectory without a method*: its errors are against the true motion of the scene (`symtop.measure.errors`). Where
 the angular momentum L in space is there, energy and momenta are recomputed from it, whatever the file reports,
@@ -21,55 +18,49 @@ time, elapsed since the start of the scene, and any of
 A netCDF file has time, axis (n, 3), quaternion (n, 4), momentum (n, 3) and the same scalars, or is one of `simulate`.
 """
 
-import contextlib
-import faulthandler
+import functools
 import math
-import multiprocessing
-import os
-import signal
-import sys
-import tempfile
+import secrets
 import time
-import warnings
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from symtop.core import netcdf
-from symtop.core.errors import SymtopError, at_home, one_of, words_of
+from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, whole
 from symtop.judging.adapters.adapter import heartbeat
 from symtop.judging.battery import Stage, measure, stages, unmeasured
 from symtop.judging.claims.constants import KEPT, Constant
-from symtop.judging.claims.subject import Request
-from symtop.judging.findings import NOTHING, About, Finding, Measured, StepLedger, undecided
+from symtop.judging.claims.subject import Subject, open_target, timed
+from symtop.judging.findings import NOTHING, About, Finding, Ledger, Measured, StepLedger, undecided
+from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
 from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import completed, errors, refuse_other_scene, sampled
-from symtop.methods.framework.registry import ENERGY_ERRORS
+from symtop.methods.framework.registry import ENERGY_ERRORS, Integrator
 from symtop.model.charts import CHARTS, space_energy
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.trajectory import Trajectory
 
-Listener = Callable[[About | Finding], object]
 FILES = (".csv", ".txt", ".dat", ".nc")
 VECTORS = {"axis": ("ex", "ey", "ez"), "quaternion": ("qw", "qx", "qy", "qz"), "momentum": ("Lx", "Ly", "Lz")}
 SCALARS = ("time", "theta", "phi", "psi", *CONSTANTS)
 FEWEST = 100  # samples by which a law of growth is judged
-THREADED = "jax"  # hangs in a process that was forked after its import
-LOOK = 0.05  # seconds between two looks
+SEEDS = 1_000_000_000
 OPENING = 60.0  # seconds for loading a file and its imports
 # seconds for the claims of one stage: at most, for all stages together, and at least however many were spent
+PLUGIN = 600.0  # of a registered integrator
 VERDICT, QUICK_VERDICT = (45.0, 120.0, 15.0), (12.0, 40.0, 6.0)
-WORDS = 160  # characters of what a process says before it ends
 
 
 def judge(
     target: Any, *, form: str | None = None, chart: str = "axis", scene: "str | Scene" = "spheroid",
     order: int | None = None, symplectic: bool | None = None, symmetric: bool | None = None,
     explicit: bool | None = None, conserves: Collection[str] | None = None, energy: str | None = None,
-    adaptive: bool = False, quick: bool = False, tell: Listener | None = None,
+    adaptive: bool = False, autonomous: bool = False, quick: bool = False, seed: int | None = None,
+    tell: Callable[[About | Finding], object] | None = None,
 ) -> StepLedger:  # fmt: skip
     """Judge anything that steps: its order, structure, invariants and drift on the top, beside what is claimed of it.
 
@@ -91,7 +82,9 @@ def judge(
     `chart` says what y is: "axis" (e, L), shape (6,); "attitude" (q, L), shape (7,); "angles" (theta, phi, psi and
     their rates), shape (6,), in radians and the units of the scene's top. Claims that are not made are measured all
     the same. `conserves` holds names such as "p_phi", "energy"; `energy` is "kept" or "bounded". The step runs in a
-    process of its own: one that hangs or crashes costs a verdict and says so. `quick` takes ten seconds at most.
+    process of its own: one that hangs or crashes costs a verdict and says so. `quick` takes ten seconds at most. It is
+    also tried at starts, times and steps that are drawn at random; `seed`, which the findings name, draws the same
+    again. `autonomous` says that it was written for y' = f(y), whatever f is called with.
     `tell` is handed what is judged and then each finding, as they are made.
 
     Returns a `StepLedger`: ``ledger["order"]`` is a finding, ``print(ledger)`` shows all of them,
@@ -99,41 +92,50 @@ def judge(
     SymtopError for a target that cannot be loaded and claims that make no sense.
     """
     one_of("chart", chart, CHARTS)
-    if energy not in ENERGY_ERRORS:
-        raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {energy!r}", "energy")
-    claims = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
-    claims_of_energy = {"conserves": conserves, "energy_error": energy}
-    request = Request(target, form, chart, adaptive, find_scene(scene), quick, claims | claims_of_energy)
-    made = request.claimed()  # claims that make no sense are refused before anything is loaded
-    implied = {"time"} | ({"energy"} if energy is None and "energy" not in (conserves or ()) else set())
-    table = isinstance(target, (xr.Dataset, Mapping))
-    file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES) and " " not in str(target)
-    if form is None and (table or file):
-        if {order, symplectic, symmetric, explicit} != {None}:
+    if not isinstance(energy, str | None) or energy not in ENERGY_ERRORS:
+        raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {shown(energy)}", "energy")
+    chosen, listen = find_scene(scene), tell or (lambda _: None)
+    told = {"adaptive": adaptive, "autonomous": autonomous, "quick": quick}
+    for name, flag in told.items():
+        boolean(name, flag)
+    drawn = secrets.randbelow(SEEDS) if seed is None else whole("seed", seed, 0, SEEDS)
+    structure: dict[str, Any] = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
+    claims = structure | {"conserves": conserves, "energy_error": energy}
+    made = Integrator("claims", "other", "", {chart: _no_solver}, **claims)  # checked before anything is loaded
+    kept = made.conserves or frozenset()
+    file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES)
+    if form is None and (file or isinstance(target, (xr.Dataset, Mapping))):
+        if set(structure.values()) != {None}:
             raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
-        implied, about = (
-            set(),
-            About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory", "", "", 0.0),
-        )
-        shown = of_trajectory(target, request.scene, made.conserves or (), energy)
-        events: Iterable[About | Results] = [about, Results(shown, {})]
-    else:
-        events = run(request)
-    findings: list[Finding] = []
-    traces: dict[str, Any] = {}
-    listen = tell or (lambda _: None)
-    for event in events:
-        if isinstance(event, About):
-            about = event
-            listen(about)
-            continue
-        for one in event.findings:
-            listen(one)
-        findings += event.findings
-        traces |= event.traces
-    if not findings:
-        raise SymtopError("it cannot be judged: its process ended before it was open")
-    return StepLedger(about.name, request.scene.name, tuple(findings), traces, about, frozenset(implied))
+        constants = tuple(of_trajectory(target, chosen, kept, energy))
+        about = About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory", "", "", 0.0)
+        listen(about)
+        for finding in constants:
+            listen(finding)
+        return StepLedger(about.name, chosen.name, constants, {}, about)
+    implied = {"time": not autonomous, "energy": energy is None and "energy" not in kept}
+    heartbeat.reset(quick=quick)
+    began, findings = time.monotonic(), list[Finding]()
+    load = functools.partial(open_target, target, form, chart, adaptive=adaptive)
+    with Process(lambda: table_of(load)) as process:
+        process.allow(OPENING)
+        try:
+            stepper = Remote(process)
+            subject = timed(stepper, chosen, claims, quick=quick, seed=drawn, autonomous=autonomous)
+        except SymtopError as error:
+            raise SymtopError(f"it cannot be judged: {error}") if process.lost else error from None
+        facts = stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step
+        about = About(*facts, drawn, chosen.time_scale())
+        listen(about)
+        for finding in _measured("step", subject, process, began, QUICK_VERDICT if quick else VERDICT):
+            listen(finding)
+            findings.append(finding)
+    follow = frozenset(name for name, follows in implied.items() if follows)
+    return StepLedger(about.name, chosen.name, tuple(findings), subject.traces, about, follow)
+
+
+def _no_solver(*_: Any) -> Any:
+    raise SymtopError("these are claims alone, without a step to run")
 
 
 def read(target: Any) -> dict[str, Any]:
@@ -142,25 +144,24 @@ def read(target: Any) -> dict[str, Any]:
         return {name: np.asarray(target[name]) for name in (*VECTORS, *SCALARS) if name in target}
     path = at_home(target)
     try:
-        head, *lines = path.read_text(encoding="utf-8-sig").splitlines()
+        head, *lines = path.read_text(encoding="utf-8-sig").replace(",", " ").splitlines()
     except (OSError, UnicodeDecodeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is no text, or empty"
         raise SymtopError(f"the trajectory {path} cannot be read: {reason}") from None
-    names = head.lstrip("# ").replace(",", " ").split()
+    names = head.lstrip("# ").split()
     known = (*SCALARS, *(part for parts in VECTORS.values() for part in parts))
     if not set(names) <= set(known) or "time" not in names or len(set(names)) < len(names):
         raise SymtopError(
             f"{path.name} must begin with a line of names, time and of {', '.join(known[1:])}, not {head[:60]!r}"
         )
-    rows = [line.replace(",", " ").split() for line in lines if line.strip()]
+    rows = [line.split() for line in lines if line.strip()]
     for k, row in enumerate(rows):
         if len(row) != len(names):
             raise SymtopError(f"{path.name} must have {len(names)} numbers a line, and row {k + 1} has {len(row)}")
     try:
-        table = np.array(rows, dtype=float).reshape(-1, len(names))
+        columns = dict(zip(names, np.array(rows, dtype=float).reshape(-1, len(names)).T, strict=True))
     except ValueError as error:
         raise SymtopError(f"{path.name} must hold numbers: {error}") from None
-    columns = dict(zip(names, table.T, strict=True))
     for name, parts in VECTORS.items():
         if set(parts) <= set(columns):
             columns[name] = np.stack([columns[part] for part in parts], axis=-1)
@@ -226,157 +227,47 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     """What became of a constant of the motion, beside what is claimed of it."""
     scale, grain = (scene.energy_scale, scene.energy_grain) if name == "energy" else (scene.momentum_scale, 1.0)
     true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)
-    change = (values - values[0]) / scale
-    constant = Constant(constant_of(time, change), math.nan, KEPT * grain, grain)
-    largest, off = constant.changed.largest, abs(values[0] - true) / scale
-    why = f"largest relative change {largest:.1e} in {time.size} samples; it begins {off:.1e} from the scene's"
-    kind = constant.kind if time.size >= FEWEST else "kept" if largest <= constant.floor else "unknown"
-    if kind == "unknown":
-        why = f"{why}; no law of growth to judge it by"
-        return Finding(name, declared, NOTHING, "undecided", why, largest, constant.floor)
-    if kind != "kept":
-        why += f", growth exponent {constant.changed.exponent:.2f} +- {constant.changed.exponent_interval:.2f}"
-    if declared == "bounded" and constant.grows is None:
-        why = f"{why}, which leaves open whether it grows"
-        return Finding(name, declared, NOTHING, "undecided", why, largest, constant.floor)
-    holds = {"kept": kind == "kept" or largest <= constant.floor, "bounded": not constant.grows}.get(declared)
-    verdict = "measured" if holds is None else "confirmed" if holds else "refuted"
-    return Finding(name, declared, Measured(kind, largest), verdict, why, largest, constant.floor)
+    changed = constant_of(time, (values - values[0]) / scale)
+    if time.size < FEWEST:
+        changed = changed._replace(exponent=math.nan)
+    constant = Constant(changed, math.nan, KEPT * grain, grain)
+    kind, verdict, off = constant.kind, constant.verdict(declared), abs(values[0] - true) / scale
+    why = f"largest relative change {changed.largest:.1e} in {time.size} samples; it begins {off:.1e} from the scene's"
+    if kind not in ("kept", "unknown"):
+        why += f", growth exponent {changed.exponent:.2f} +- {changed.exponent_interval:.2f}"
+    if verdict == "undecided":
+        why += "; no law of growth to judge it by" if kind == "unknown" else ", which leaves open whether it grows"
+    measured = NOTHING if kind == "unknown" else Measured(kind, changed.largest)
+    return Finding(name, declared, measured, verdict, why, changed.largest, constant.floor)
 
 
-class Results(NamedTuple):
-    """The findings of one stage, and what a figure shows of all stages so far."""
-
-    findings: list[Finding]
-    traces: dict[str, Any]
-
-
-class _LostError(Exception):
-    """A process was ended, or ended by itself: why, and whether it was in a step of -h."""
-
-
-def run(request: Request) -> Iterator[About | Results]:
-    """First what is judged, then findings as they are made; SymtopError if it cannot be opened."""
-    todo = stages("step")
-    if "fork" not in multiprocessing.get_all_start_methods() or THREADED in sys.modules:
-        yield from _work(request, todo)
-        return
-    heartbeat.reset(quick=request.quick)
-    opened, began = False, time.monotonic()
-    while todo:
+def _measured(
+    kind: str, subject: Subject, process: Process, began: float, limits: tuple[float, float, float]
+) -> Iterator[Finding]:
+    """The findings on each claim, undecided where the process was lost: all of a step that makes no call."""
+    most, together, least = limits
+    todo: list[Stage] = stages(kind)
+    for stage in todo:
+        process.allow(max(least, min(most, together - (time.monotonic() - began))))
         try:
-            for event in _isolated(request, todo, began):
-                if isinstance(event, Results):
-                    todo.pop(0)
-                if isinstance(event, Results) or not opened:
-                    yield event
-                opened = True
-        except _LostError as failure:
-            if not opened:
-                raise SymtopError(f"it cannot be judged: {failure.args[0]}") from None
-            yield from _left_open(request, todo, *failure.args)
-        else:
+            findings = measure(stage, subject)
+        except SymtopError:
+            if not process.lost:
+                raise
+        first = stage[0].name == "calls"
+        if process.lost:
+            left = [claim for one in (todo if first else [stage]) for claim in one]
+            findings = unmeasured(tuple(left), subject.method, process.lost)
+        yield from findings
+        if process.lost and first:
             return
 
 
-def _left_open(request: Request, todo: list[Stage], why: str, backwards: bool) -> Iterator[Results]:
-    """What a failure leaves undecided: one stage; all without a call; none if it was a step of -h, then refused."""
-    if backwards and not heartbeat.forward_only:
-        heartbeat.forward_only = True
-        return
-    for stage in todo[:] if todo[0][0].name == "calls" else todo[:1]:
-        todo.remove(stage)
-        yield Results(unmeasured(stage, request.claimed(), why), {})
-
-
-def _work(request: Request, todo: list[Stage]) -> Iterator[About | Results]:
-    """The stages, in this process."""
-    subject = request.open()
-    stepper = subject.stepper
-    yield About(stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step)
-    for stage in todo:
-        yield Results(measure(stage, subject), subject.traces)
-
-
-def _isolated(request: Request, todo: list[Stage], first: float) -> Iterator[About | Results]:
-    """The stages in a forked process; `first` is when the judging began."""
-    context: Any = multiprocessing.get_context("fork")
-    ours, theirs = context.Pipe()
-    with tempfile.TemporaryFile() as output, ours:
-        process = context.Process(target=_child, args=(request, list(todo), theirs, output), daemon=True)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # newer versions of Python warn of threads; the child uses none of theirs
-            heartbeat.inside = False
-            process.start()
-        theirs.close()
-        try:
-            yield from _events(process, ours, output, first, quick=request.quick)
-        finally:
-            if process.is_alive():
-                with contextlib.suppress(OSError):
-                    os.killpg(process.pid, signal.SIGKILL)
-                process.kill()
-            process.join()
-
-
-def _child(request: Request, todo: list[Stage], pipe: Any, output: Any) -> None:
-    os.setsid()  # what it starts is ended with it
-    for stream in (1, 2):
-        os.dup2(output.fileno(), stream)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    faulthandler.disable()  # a crash is reported by the one that waits
-    try:
-        for event in _work(request, todo):
-            pipe.send(event)
-    except BaseException as error:  # noqa: BLE001  (somebody else's code)
-        pipe.send(error if isinstance(error, SymtopError) else _LostError(words_of(error), False))
-    pipe.send(None)
-
-
-def _events(process: Any, pipe: Any, output: Any, first: float, *, quick: bool) -> Iterator[About | Results]:
-    """What the process sends; _LostError if it ends otherwise, hangs in a call or takes too long for a stage."""
-    limit, began = OPENING, _clock(process.pid)
-    calls, since = heartbeat.calls, began
-    while True:
-        if pipe.poll(LOOK):
-            try:
-                event = pipe.recv()
-            except EOFError:
-                event = _LostError(_death(process, output), False)
-            if isinstance(event, Exception):
-                raise event
-            if event is None:
-                return
-            yield event
-            began = _clock(process.pid)
-            most, together, least = QUICK_VERDICT if quick else VERDICT
-            limit = max(least, min(most, together - (began - first)))
-            continue
-        now = _clock(process.pid)
-        if heartbeat.calls != calls or not heartbeat.inside:
-            calls, since = heartbeat.calls, now
-        if now - since > heartbeat.allowed:
-            why = f"a step of h = {heartbeat.step:.3g} had not returned after {now - since:.0f} s"
-            raise _LostError(why, heartbeat.step < 0)
-        if now - began > limit:
-            raise _LostError(f"it was not judged within {limit:.0f} s", False)
-
-
-def _clock(pid: int) -> float:
-    """Seconds, less those that a process has waited for a processor, which Linux counts; elsewhere all time counts."""
-    try:
-        waited = int(Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii").split()[1]) * 1e-9
-    except (OSError, IndexError, ValueError):
-        waited = 0.0
-    return time.monotonic() - waited
-
-
-def _death(process: Any, output: Any) -> str:
-    process.join(2.0)
-    code = process.exitcode
-    if code is not None and code < 0:
-        during = f" in a step of h = {heartbeat.step:.3g}" if heartbeat.inside else ""
-        return f"its process was ended by {signal.Signals(-code).name}{during}"
-    output.seek(0)
-    words = " ".join(output.read()[-4 * WORDS :].decode(errors="replace").split())[-WORDS:]
-    return f"its process ended with code {code}{': ' if words else ''}{words}"
+def apart(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
+    """The ledger of a registered integrator, of `symtop.judging.battery.judge`, with what is not ours in a process."""
+    heartbeat.reset(quick=quick)
+    limits = PLUGIN, math.inf, PLUGIN
+    with Process(lambda: solvers_of(method)) as process:
+        subject = Subject(separated(method, process), scene, quick, seed=secrets.randbelow(SEEDS))
+        findings = tuple(_measured("integrator", subject, process, time.monotonic(), limits))
+    return Ledger(method.name, scene.name, findings, subject.traces)

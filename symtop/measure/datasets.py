@@ -92,7 +92,7 @@ def _blank(kind: "np.dtype[Any]") -> tuple[Any, Any]:
     """What stands for nothing in an array of that type, and the type that can hold it."""
     if kind.kind in "OUT":
         return "", object
-    return (np.iinfo(kind).max, kind) if kind.kind == "u" else (math.nan, float)
+    return (np.iinfo(kind).max, kind) if kind.kind == "u" else (math.nan, kind if kind == np.float32 else float)
 
 
 def as_text(values: Any) -> Any:

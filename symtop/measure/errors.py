@@ -15,7 +15,7 @@ Samples that hold a NaN stay NaN.
 
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -24,9 +24,11 @@ import xarray as xr
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, one_of, positive
 from symtop.core.numbers import EPSILON
+from symtop.methods.framework.lanes import members_of
 from symtop.model import charts
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.model.top import Angles, SymmetricTop
+from symtop.run.ensemble.inputs import read_members
 from symtop.run.reference.truth import PRECISIONS, reference
 from symtop.run.trajectory import Trajectory, dataset
 
@@ -38,15 +40,25 @@ QUANTITIES: dict[str, str] = {
     "p_phi": "relative error of p_phi",
     "p_psi": "relative error of p_psi",
 }
+ERRORS = {  # what each is of and against what, and its units
+    "axis": ("angle between the axis and the true axis", "rad"),
+    "attitude": ("angle of the rotation between the attitude and the true attitude", "rad"),
+    "theta": ("error of theta against the true motion", "rad"),
+    "energy": ("error of the energy against that of the start, relative to E0 - min V", "1"),
+    "p_phi": ("error of p_phi against that of the start, relative to the larger momentum", "1"),
+    "p_psi": ("error of p_psi against that of the start, relative to the larger momentum", "1"),
+}
 
 
 def errors(
-    run: xr.Dataset | Mapping[str, Any], scene: "str | Scene | None" = None, *, precision: str = "closed-form"
-) -> xr.Dataset:
+    run: xr.Dataset | Mapping[str, Any], scene: "str | Scene | xr.Dataset | Iterable[str | Scene] | None" = None, *,
+    precision: str = "closed-form",
+) -> xr.Dataset:  # fmt: skip
     """The errors of a run, or of anybody's trajectory of a scene, at every sample, and how far they can be trusted.
 
     `run` is a dataset of `simulate` (or one read back from its file), which holds its top and start; a `scene` (a Scene
     or a name) must then be the same. A member of an `ensemble` needs its scene; samples without a time are left out.
+    For a whole ensemble `scene` are its members, a dataset or scenes, and all is returned over ``member`` and ``time``.
     With a `scene` it is also any Dataset or mapping with ``time`` (n,), elapsed since the start, increasing, and one of
 
         axis         (n, 3)  unit vectors along the top's axis in the space frame, z up
@@ -67,9 +79,11 @@ def errors(
     name, and no scene where they name none.
     """
     one_of("precision", precision, PRECISIONS)
+    if isinstance(run, xr.Dataset) and "member" in run.dims and not isinstance(scene, (str, Scene, type(None))):
+        return _of_members(run, scene, precision)
     foreign = scene is not None and "integrator" not in getattr(run, "attrs", {})
     run = sampled(run) if isinstance(run, xr.Dataset) else run
-    chosen = scene_of(run) if scene is None else find_scene(scene)
+    chosen = scene_of(run) if scene is None else find_scene(scene)  # type: ignore[arg-type]
     refuse_other_scene(run, chosen)
     data = checked(run) if foreign else Trajectory.of_data(run)
     truth = reference(chosen, data.time, precision)
@@ -81,15 +95,44 @@ def errors(
         warnings.warn(f"on {chosen.name}: {sentence}", SymtopWarning, stacklevel=2)
     shown = dataset(data.time, columns | {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns})
     for name in columns:
-        units = "1" if name in CONSTANTS else "rad"
-        shown.variables[name].attrs.update(long_name=QUANTITIES[name], units=units)
-        shown.variables[f"{name}_bound"].attrs.update(long_name=f"the least {QUANTITIES[name]} to be seen", units=units)
+        words, units = ERRORS[name]
+        shown.variables[name].attrs.update(long_name=words, units=units)
+        shown.variables[f"{name}_bound"].attrs.update(long_name=f"least {words} to be told from none", units=units)
     attributes = {"scene": chosen.name, "precision": truth.attrs["precision"]}
     if isinstance(run, xr.Dataset) and not foreign:
         shown.variables["time"].attrs.update(run["time"].attrs)
         attributes |= {"integrator": run.attrs["integrator"]} if "integrator" in run.attrs else {}
     shown.attrs.update(netcdf.CONVENTIONS, title=f"errors on {chosen.name}", **attributes)
     return shown
+
+
+def _of_members(runs: xr.Dataset, members: Any, precision: str) -> xr.Dataset:
+    """The errors of every member, as alone; a warning that several have comes once, with their number."""
+    given, n = read_members(members), runs.sizes["member"]
+    if len(given.numbers) != n:
+        raise SymtopError(f"members must be the {n} of the ensemble, not {len(given.numbers)}")
+    labels = [
+        [*map(str, data.indexes["member"])] for data in (members, runs) if "member" in getattr(data, "indexes", {})
+    ]
+    if len(labels) == 2 and labels[0] != labels[1]:
+        raise SymtopError("members must be those of the ensemble in their order, and their labels are others")
+    tables = []
+    with warnings.catch_warnings(record=True) as doubtful:
+        warnings.simplefilter("always")
+        for i, (top, start) in enumerate(members_of(given.numbers)):
+            one = runs.isel(member=i)
+            end = float(one["horizon"]) if "horizon" in one else float(np.nanmax(one["time"].values))
+            table = errors(one, Scene(f"member-{i}", top, start, end), precision=precision)
+            tables.append(table.pad(time=(0, runs.sizes["time"] - table.sizes["time"])))
+    if doubtful:
+        words = f"{len(doubtful)} warnings on members, the first: {doubtful[0].message}"
+        warnings.warn(words, SymtopWarning, stacklevel=3)
+    columns = {
+        name: (("member", "time"), np.array([table[name].values for table in tables]), tables[0][name].attrs)
+        for name in ("time", *tables[0].data_vars)
+    }
+    clock = {"time": columns.pop("time"), **runs["member"].coords}
+    return xr.Dataset(columns, clock, {**tables[0].attrs, "title": f"errors of {n} members", "scene": ""})
 
 
 def error_bound(scene: Scene, run: Trajectory, truth: xr.Dataset, quantity: str) -> charts.Array:
@@ -198,13 +241,13 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         if name in columns:
             length = np.sqrt(np.sum(columns[name] ** 2, axis=-1))
             if (off := np.abs(length - 1.0) > LENGTH).any():  # false where it is NaN
-                where = f"{length[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
-                raise SymtopError(f"{name} must be of length 1 within {LENGTH:g}, but its length is {where}")
+                place = f"{length[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
+                raise SymtopError(f"{name} must be of length 1 within {LENGTH:g}, but its length is {place}")
             columns[name] = columns[name] / length[:, None]
     theta = columns.get("theta", np.zeros(1))
     if (off := (theta < 0.0) | (theta > np.pi)).any():
-        where = f"{theta[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
-        raise SymtopError(f"theta must be radians from the vertical in [0, pi], but it is {where}")
+        place = f"{theta[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
+        raise SymtopError(f"theta must be radians from the vertical in [0, pi], but it is {place}")
     return Trajectory(time, **columns)
 
 
@@ -239,7 +282,7 @@ def _numbers(name: str, values: Any) -> charts.Array:
     try:
         given = np.asarray(values)
         return given.astype(np.float64, casting="same_kind" if given.dtype.kind == "c" else "unsafe")
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise SymtopError(f"{name} must be an array of real numbers, not {type(values).__name__}") from error
 
 

@@ -8,7 +8,7 @@ another meets it, and then along the line through both.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from decimal import ROUND_DOWN, Context
 from typing import NamedTuple
 
@@ -192,15 +192,16 @@ def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
 
 def search(
     scene: Scene, method: Integrator, accuracy: float, quantity: str, horizon: float, guess: float | None = None,
-    patience: float = math.inf, least: float = LEAST,
+    patience: float = math.inf, least: float = LEAST, longest: float = math.inf,
 ) -> Met | str:  # fmt: skip
     """The coarsest setting found that meets the accuracy over the horizon, or the reason why there is none.
 
     It begins at an error of about (h/period)^p, or of the tolerance, unless there is a guess. It ends with an error
     between `least` of the accuracy and the accuracy, if that takes few runs. No run is begun that is foreseen to take
-    more than `patience` force evaluations.
+    more than `patience` force evaluations, and none has a setting above `longest`.
     """
-    ends, patience = limits(scene, method, horizon, quantity), min(patience, MOST_EVALUATIONS[method.implementation])
+    finest, coarsest = limits(scene, method, horizon, quantity)
+    ends, patience = (finest, min(coarsest, longest)), min(patience, MOST_EVALUATIONS[method.implementation])
     power = float(method.order or 2) if method.fixed_step else 1.0
     if guess is None:
         guess = likely_step(scene, method, horizon, accuracy) if method.fixed_step else 0.1 * accuracy
@@ -226,8 +227,11 @@ def rounded(scene: Scene, met: Met, accuracy: float, quantity: str) -> Met:
     return again if again.error <= accuracy else met
 
 
-def seconds(scene: Scene, met: Met, quantity: str, horizon: float) -> float:
-    """Wall time of a bare run to a horizon with a setting: measured, or scaled from the run it was found by."""
-    chart = met.integrator.chart_for(observed(quantity))
-    run = timings([bare_run(scene, met.integrator, chart, met.setting, met.horizon)], batches=3, batch=0.004)
-    return float(run[0].best) * horizon / met.horizon
+def seconds(scene: Scene, mets: Sequence[Met], quantity: str, horizon: float) -> list[float]:
+    """Wall times of bare runs to a horizon with settings, timed against each other; scaled from the runs that met."""
+    runs = []
+    for met in mets:
+        chart = met.integrator.chart_for(observed(quantity))
+        runs.append(bare_run(scene, met.integrator, chart, met.setting, met.horizon))
+    taken = timings(runs, batches=5, batch=0.002, patience=0.1)
+    return [timing.best * horizon / met.horizon for timing, met in zip(taken, mets, strict=True)]

@@ -23,6 +23,7 @@ Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1, VI.2, VII
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -154,6 +155,27 @@ def generic_start(scene: Scene) -> Angles:
         return scene.start
     motion = closed_form(scene)(np.array([0.3711 * scene.nutation_period]))
     return Angles(*(float(value[0]) for value in motion))
+
+
+def drawn(scene: Scene, count: int, seed: int, *, same_top: bool) -> Iterator[Scene]:
+    """Starts whose axes are spread over all heights but the poles, on other tops unless they are to be the same.
+
+    Sizes and rates are about those of the scene; one of these `Scene` after another.
+    """
+    draw, rate = np.random.default_rng(seed), 2.0 * math.pi / scene.time_scale()
+    for height in draw.permutation(count):
+        cosine, top = 0.99 * (2.0 * (height + draw.uniform()) / count - 1.0), scene.top
+        size, shape, weight = 2.0 ** draw.uniform(-1.0, 1.0), draw.uniform(0.2, 1.8), 2.0 ** draw.uniform(-1.0, 1.0)
+        if not same_top:
+            top = SymmetricTop(top.I1 * size, top.I1 * size * shape, top.mgl * size * weight)
+        rates = rate * draw.uniform(-1.0, 1.0, 3) * np.array([0.5, 0.5, 2.0])
+        yield Scene("drawn", top, Angles(math.acos(cosine), *draw.uniform(-3.0, 3.0, 2), *rates.tolist()), 1.0)
+
+
+def moved(step: StepMap, scene: Scene) -> StepMap:
+    """The map on another scene's top, of a step that is coarse there."""
+    other = replace(step, top=scene.top, unit=scene.momentum_scale, h=SHARE * scene.time_scale())
+    return coarsest(other, scene.start)
 
 
 def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Angles]:

@@ -17,19 +17,27 @@ import xarray as xr
 from tqdm import tqdm
 
 from symtop.core import code_hash, netcdf
-from symtop.core.errors import SymtopError, boolean, file_path, positive, row, whole
+from symtop.core.errors import SymtopError, boolean, file_path, foreign_code, positive, row, whole
+from symtop.core.jit import code
 from symtop.core.parallel import MOST_THREADS, cores, in_threads
 from symtop.core.progress import beating
+from symtop.measure import columns
 from symtop.measure.accuracy import as_table, blank_row, enough_samples, error_row
-from symtop.measure.errors import QUANTITIES
-from symtop.measure.settings import ANGLES
+from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.simulation import chart_of, make_plan
 
 KEEP_EVERY = 5.0  # seconds between two writings of the file
 RAISED = "raised"  # outcome of a run whose integrator raised an exception
+BATCHES, BATCH, PATIENCE = 15, 0.001, 0.2  # of timings: samples of a run, seconds of one, seconds of all
+SPENT = {"seconds": math.nan, "seconds_spread": math.nan}
+TIMED = (
+    "one call of the method's solver from the start to the horizon, with two samples and nothing around it; the least "
+    f"of at most {BATCHES} batches of at least {1e3 * BATCH:g} ms each, in random order among those of the other runs"
+)
 MOST_NAMED = 4  # cells that a message lists
+_code = functools.cache(code)
 
 
 class _Cell(NamedTuple):
@@ -40,13 +48,15 @@ class _Cell(NamedTuple):
     settings: tuple[float, ...]
     horizon: float
     observe: str | None
+    timed: bool
     made_of: str
 
 
 def sweep(
     scenes: "str | Scene | Iterable[str | Scene]", integrators: "str | Integrator | Iterable[str | Integrator]", *,
     step_size: object = None, tolerance: object = None, per_nutation: object = None, horizon: float | None = None,
-    observe: str | None = None, path: str | Path | None = None, threads: int | None = None, quiet: bool = False,
+    observe: str | None = None, path: str | Path | None = None, threads: int | None = None, timed: bool = False,
+    quiet: bool = False,
 ) -> xr.Dataset:  # fmt: skip
     """Run integrators on scenes at several steps or tolerances and return errors, work and outcomes as one dataset.
 
@@ -62,6 +72,7 @@ def sweep(
         steps, force_evaluations, newton_iterations    work
         step_size, tolerance                           what was set; NaN where the method has no such setting
         chart                                          of the run, over scene and integrator
+        seconds, seconds_spread                        if `timed`: least run time, s, and its spread, as in `compare`
         outcome, message                               "ok", or how the run ended; "not_run" where a method has fewer
                                                        settings; "raised", with the message, if it raised an exception
 
@@ -71,8 +82,8 @@ def sweep(
     integrators may be asked for than are in the file, but not fewer. Raises SymtopError for arguments that make no
     sense.
     """
-    chosen = [find_scene(one) for one in _listed(scenes)]
-    methods = [find_integrator(one) for one in _listed(integrators)]
+    chosen = [find_scene(one) for one in listed(scenes)]
+    methods = [find_integrator(one) for one in listed(integrators)]
     silent = boolean("quiet", quiet)
     workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
     for words, names in (("scenes", [one.name for one in chosen]), ("integrators", [one.name for one in methods])):
@@ -83,9 +94,10 @@ def sweep(
         for name, values in (("step_size", step_size), ("per_nutation", per_nutation), ("tolerance", tolerance))
         if values is not None
     }
-    grid = [[_cell(one, method, given, horizon, observe) for method in methods] for one in chosen]
-    asked = [cell for row in grid for cell in row]
-    pairs = [(cell.scene.name, cell.method.name) for cell in asked]
+    clock = boolean("timed", timed)
+    grid = [[_cell(one, method, given, horizon, observe, clock) for method in methods] for one in chosen]
+    cells = [cell for row in grid for cell in row]
+    pairs = [(cell.scene.name, cell.method.name) for cell in cells]
     file = None if path is None else file_path("path", path)
     stored, done = _stored(file)
     if others := [f"{name} on {of}" for of, name in stored if (of, name) not in pairs]:
@@ -93,10 +105,10 @@ def sweep(
         must = "ask for these as well, or name another path"
         raise SymtopError(f"path {str(file)!r} holds what was not asked for, {few}: {must}")
     # what raised is tried again: the cause may have been of the moment
-    rest = [cell for cell in asked if cell.made_of not in done or RAISED in done[cell.made_of]["outcome"].values]
+    rest = [cell for cell in cells if cell.made_of not in done or RAISED in done[cell.made_of]["outcome"].values]
 
     def combined() -> xr.Dataset:
-        size = max(len(cell.settings) for cell in asked)
+        size = max(len(cell.settings) for cell in cells)
         tables = [[_padded(done.get(cell.made_of), cell, size) for cell in row] for row in grid]
         data = xr.concat([xr.concat(row, "variant") for row in tables], "scene")
         data = data.assign_coords(scene=[one.name for one in chosen], variant=[one.name for one in methods])
@@ -105,30 +117,33 @@ def sweep(
             [[chart_of(method, one.observes, observe) for method in methods] for one in chosen],
         )
         units = chosen[0].units if len({one.units for one in chosen}) == 1 else ""
-        return _described(netcdf.describe(data, "errors and work of a sweep", units=units))
+        words = {"timed": TIMED if timed else "nothing: timed was not asked for"}
+        return netcdf.describe(columns.described(data, units), "errors and work of a sweep", units=units, **words)
 
-    kept = time.monotonic()
+    written = time.monotonic()
     with beating(
-        tqdm(total=len(asked), initial=len(asked) - len(rest), desc="sweep", disable=silent or None, leave=False)
+        tqdm(total=len(cells), initial=len(cells) - len(rest), desc="sweep", disable=silent or None, leave=False)
     ) as bar:
         try:
             for cell, table in zip(rest, in_threads(_table, rest, workers), strict=True):
                 done[cell.made_of] = table
                 bar.update()
-                if file is not None and time.monotonic() - kept > KEEP_EVERY:
+                if file is not None and time.monotonic() - written > KEEP_EVERY:
                     netcdf.write(combined(), file)
-                    kept = time.monotonic()
+                    written = time.monotonic()
+            bar.set_description("timing")
+            changed = _time([cell for cell in cells if timed], done) or bool(rest)
         except BaseException:
             if file is not None and done:
                 netcdf.write(combined(), file)
             raise
     data = combined()
-    if file is not None and (rest or pairs != stored):  # in another order, the file would not be what is returned
+    if file is not None and (changed or pairs != stored):  # in another order, the file would not be what is returned
         netcdf.write(data, file)
     return data
 
 
-def _listed(things: Any) -> list[Any]:
+def listed(things: Any) -> list[Any]:
     """One thing, or several, as a list."""
     if isinstance(things, (str, Scene, Integrator)) or not isinstance(things, Iterable):
         return [things]
@@ -155,8 +170,9 @@ def _settings(name: str, values: object) -> list[float]:
 
 
 def _cell(
-    scene: Scene, method: Integrator, given: dict[str, list[float]], horizon: float | None, observe: str | None
-) -> _Cell:
+    scene: Scene, method: Integrator, given: dict[str, list[float]], horizon: float | None, observe: str | None,
+    timed: bool,
+) -> _Cell:  # fmt: skip
     """A cell, refused before anything is run if one of its runs could not be."""
     until = scene.horizon if horizon is None else positive("horizon", horizon)
     if method.fixed_step:
@@ -173,34 +189,58 @@ def _cell(
     for value in settings:
         make_plan(scene, method, **method.setting(value).kwargs(), horizon=until, samples=enough_samples(scene, until))
     made_of = _code().reasons("sweep", error_row, scene, method) | code_hash.packages()
-    digest = code_hash.digest(made_of | {"settings": repr((settings, until, observe))})
-    return _Cell(scene, method, tuple(settings), until, observe, digest)
-
-
-@functools.cache
-def _code() -> code_hash.Code:
-    from symtop.core.jit import code  # numba
-
-    return code()
+    question = (settings, until, observe, "timed") if timed else (settings, until, observe)
+    digest = code_hash.digest(made_of | {"settings": repr(question)})
+    return _Cell(scene, method, tuple(settings), until, observe, timed, digest)
 
 
 def _table(cell: _Cell) -> xr.Dataset:
     """The error table of a cell; a run that raises is a row that says so."""
-    rows, reasons = [], []
-    for setting in cell.settings:
-        try:
-            row, reason = error_row(cell.scene, cell.method, setting, cell.horizon, cell.observe), ""
-        except SymtopError as error:
-            row, reason = blank_row(cell.method) | {"outcome": RAISED}, str(error)
-            row.update(cell.method.setting(setting).kwargs())
-        rows.append(row)
-        reasons.append(reason)
-    return as_table(rows).assign(message=("setting", reasons))
+    runs = [error_row_or_message(*cell[:2], setting, cell.horizon, cell.observe) for setting in cell.settings]
+    return as_table([run | (SPENT if cell.timed else {}) for run in runs])
+
+
+def error_row_or_message(
+    scene: Scene, method: Integrator, setting: float, horizon: float, observe: str | None, budget: float | None = None
+) -> dict[str, Any]:
+    """One run's entries in an error table, with a ``message`` that is empty unless the run raised an exception."""
+    try:
+        return error_row(scene, method, setting, horizon, observe, budget=budget) | {"message": ""}
+    except SymtopError as error:
+        blank = blank_row(method) | {"outcome": RAISED, "message": str(error)}
+        return blank | method.setting(setting).kwargs()
+
+
+def _time(cells: list[_Cell], done: dict[str, xr.Dataset]) -> bool:
+    """Time the cells that have no times; False if all have."""
+    waiting = [(cell, done[cell.made_of]) for cell in cells if done[cell.made_of]["seconds"].isnull().all()]
+    runs: list[tuple[Scene, Integrator, float, list[dict[str, Any]]]] = []
+    for cell, table in waiting:
+        outcomes = zip(cell.settings, table["outcome"].values, strict=True)
+        rows = [{"setting_value": setting, "outcome": outcome} | SPENT for setting, outcome in outcomes]
+        chart = chart_of(cell.method, cell.scene.observes, cell.observe)
+        runs.append((cell.scene, cell.method.variant(chart), cell.horizon, rows))
+    timed_rows(runs)
+    for (cell, table), (*_, rows) in zip(waiting, runs, strict=True):
+        done[cell.made_of] = table.assign({name: ("setting", [one[name] for one in rows]) for name in SPENT})
+    return bool(waiting)
+
+
+def timed_rows(cells: "list[tuple[Scene, Integrator, float, list[dict[str, Any]]]]") -> None:
+    """Time all runs of some scenes, variants and horizons that ended well, against each other, into their rows."""
+    rows, calls = [], []
+    for scene, method, horizon, runs in cells:
+        rows += (ended := [one for one in runs if one["outcome"] == "ok"])
+        calls += [bare_run(scene, method, method.charts()[0], one["setting_value"], horizon) for one in ended]
+    with foreign_code("a method that is timed"):
+        taken = timings(calls, BATCHES, BATCH, warm=True, patience=PATIENCE) if calls else []
+    for one, timing in zip(rows, taken, strict=True):
+        one |= {"seconds": timing.best, "seconds_spread": timing.spread}
 
 
 def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
     """A cell of so many settings; what was not run has no numbers and no digest."""
-    blank = as_table([blank_row(cell.method) | {"message": ""}] * size)
+    blank = as_table([blank_row(cell.method) | {"message": ""} | (SPENT if cell.timed else {})] * size)
     if table is None:
         return blank.assign(made_of=((), ""))
     short = size - table.sizes["setting"]
@@ -215,7 +255,7 @@ def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Data
     """
     if file is None or not file.exists():
         return [], {}
-    data = netcdf.read(file)
+    data = netcdf.read(file).drop_attrs()
     if "made_of" not in data:
         raise SymtopError(f"path must be a new file or that of a sweep, not {str(file)!r}")
     if "integrator" in data.coords:  # a file of version 0.2
@@ -232,11 +272,18 @@ def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Data
     return pairs, tables
 
 
-def _described(data: xr.Dataset) -> xr.Dataset:
-    """Words and units for the errors, whose names are those of other quantities elsewhere."""
-    ends = {"": "largest over the run", "_end": "at the horizon", "_bound": "the least that can be judged"}
-    for name, words in QUANTITIES.items():
-        for end, what in ends.items():
-            unit = "rad" if name in ANGLES else "1"
-            data[f"{name}{end}"].attrs = {"long_name": f"{words}, {what}", "units": unit}
-    return data
+def failed_setting(cell: xr.Dataset) -> str:
+    """Where a variant on a scene fails, "fails at 5.3 steps a nutation": the finest of its coarsest failed runs."""
+    control = cell["step_size" if cell["step_size"].notnull().any() else "tolerance"].values
+    order = np.argsort(-control)  # coarse to fine, with NaN at the end
+    failed = ~np.isin(cell["outcome"].values[order], ("ok", "not_run"))
+    last = int(np.argmin(np.append(failed, False))) - 1
+    if last < 0:
+        return ""
+    k, word = order[last], str(cell["outcome"].values[order[last]]).replace("_", " ")
+    if not np.isfinite(control[k]) or "ok" not in cell["outcome"].values:
+        return f"no run ended well, {word}"
+    if "steps_per_nutation" not in cell or cell["step_size"].isnull().all():
+        return f"fails at {control[k]:.2g}, {word}"
+    steps = cell["steps_per_nutation"].values[k]
+    return f"fails at {steps if steps < 100.0 else round(steps):.4g} steps a nutation, {word}"

@@ -8,8 +8,8 @@ the result does not hang on the processor.
 `Components` writes the same operations on four scalars each, to the same bits: inside a loop over many members LLVM
 makes vectors of the members, and a component that nobody reads is not computed.
 
-`times` multiplies a row of numbers, each by one instruction: LLVM unrolls a loop over a tuple up to about 16 elements
-and copies the tuple in each pass beyond.
+`times` and `with_item` take a row that is an array, or a tuple, if it is short: LLVM unrolls a loop over a tuple up to
+about 16 elements and copies the tuple in each pass beyond.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,7 +19,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload
 
-from symtop.core.jit import INLINED, set_item
+from symtop.core.jit import INLINED, register_jitable, set_item
 
 LANES = 4
 _INDEX, _DOUBLE = ir.IntType(32), ir.DoubleType()
@@ -145,31 +145,9 @@ def wide_vectors(typing):  # type: ignore[no-untyped-def]
     return types.void(), emit
 
 
-@intrinsic
-def _times(typing, values, by):  # type: ignore[no-untyped-def]
-    def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        result, factor = arguments
-        for i in range(len(values)):
-            result = builder.insert_value(result, builder.fmul(builder.extract_value(result, i), factor), i)
-        return result
-
-    return values(values, types.float64), emit
-
-
-def _scaled(values: Any, by: float) -> Any:
-    for i in range(len(values)):
-        values[i] = values[i] * by
-    return values
-
-
 def _put(values: Any, i: int, value: float) -> Any:
     values[i] = value
     return values
-
-
-def times(values: Any, by: float) -> Any:
-    """A row of doubles, each multiplied by the number `by`: a new tuple, or the same array."""
-    return tuple(value * by for value in values) if isinstance(values, tuple) else _scaled(values, by)
 
 
 def with_item(values: Any, i: int, value: float) -> Any:
@@ -177,11 +155,14 @@ def with_item(values: Any, i: int, value: float) -> Any:
     return (*values[:i], value, *values[i + 1 :]) if isinstance(values, tuple) else _put(values, i, value)
 
 
-@overload(times, jit_options=INLINED, strict=False)
-def _compiled_times(values: Any, by: float) -> Callable[..., Any]:
-    return _scaled if isinstance(values, types.Array) else lambda values, by: _times(values, by)  # noqa: PLW0108
-
-
 @overload(with_item, jit_options=INLINED, strict=False)
 def _compiled_with_item(values: Any, i: int, value: float) -> Callable[..., Any]:
     return _put if isinstance(values, types.Array) else lambda values, i, value: set_item(values, i, value)  # noqa: PLW0108
+
+
+@register_jitable
+def times(values: Any, by: float) -> Any:
+    """A row of doubles, each multiplied by the number `by`: a new tuple, or the same array."""
+    for i in range(len(values)):
+        values = with_item(values, i, values[i] * by)
+    return values

@@ -70,3 +70,11 @@ def accumulate_plainly(state: Any, low: Any, dstate: Any) -> Any:
     for i in range(len(state)):
         state = set_item(state, i, state[i] + dstate[i])
     return state, low
+
+
+@register_jitable
+def zero(like: Any) -> Any:
+    """A tuple of as many zeros."""
+    for i in range(len(like)):
+        like = set_item(like, i, 0.0)
+    return like

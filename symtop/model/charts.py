@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.core.lazy_kernel import LazyKernel
+from symtop.model.lazy_kernel import LazyKernel
 from symtop.model.top import Angles, Momenta, SymmetricTop
 
 Array = NDArray[np.float64]
@@ -169,7 +169,7 @@ def attitude_distance(first: Array, second: Array, low: Array | float = 0.0) -> 
     """Angle of the rotation between two orientations in radians, shape (...); `second` may have a low half."""
     sign = np.where(np.sum(first * second, axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
     gap = np.sqrt(np.sum(((first - sign * second) - sign * low) ** 2, axis=-1))
-    angle: Array = 4.0 * np.arcsin(np.minimum(1.0, 0.5 * gap))
+    angle: Array = np.minimum(4.0 * np.arcsin(np.minimum(1.0, 0.5 * gap)), np.pi)  # of quaternions of any length
     return angle
 
 

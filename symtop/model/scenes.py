@@ -230,13 +230,13 @@ def _kinon_betsch() -> Scene:
 
 @functools.lru_cache(maxsize=1)
 def _catalogue() -> dict[str, Scene]:
-    usual, printed = SymmetricTop(2.0, 1.0, 2.0), "the second top with the printed alpha = 1.6, theta"
+    usual, printed = SymmetricTop(2.0, 1.0, 2.0), "goldstein with more energy: not at rest, theta"
     # fmt: off
     catalogue = [
         Scene("spheroid", SymmetricTop(2.0, 1.0, 9.81 * 2.7386127875258306),
               Angles(theta=0.4, phi=0.1, psi=0.1, theta_dot=0.1, phi_dot=10.0, psi_dot=0.1), 8.0,
-              "the notebook's first top: violent nutation from 23 to 99 degrees", units="SI"),
-        _goldstein("goldstein", 0.0, "the notebook's second top, released at rest (alpha = 1.4981)"),
+              "a heavy spheroid on its tip: violent nutation from 23 to 99 degrees", units="SI"),
+        _goldstein("goldstein", 0.0, "a top of moderate spin, its axis released at 43 degrees"),
         _goldstein("goldstein-falling", -_ALPHA_RATE, f"{printed} falling at first", "repeats"),
         _goldstein("goldstein-rising", _ALPHA_RATE, f"{printed} rising at first", "repeats"),
         _named(spinning(10.0), "cusp", "released from rest: the axis comes to rest again at each cusp",

@@ -29,7 +29,7 @@ the rates hold all of w. Units are any consistent set. Source: Goldstein, Classi
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -37,7 +37,6 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, finite, not_negative, positive, row
 from symtop.core.jit_functions import inlined, shared
-from symtop.core.numbers import newton_between
 
 UNIT = 1e-6  # a quaternion or an axis may differ from unit length by this
 
@@ -344,6 +343,23 @@ def nutation_cubic(top: Any, at: Any) -> tuple[float, float, float, float]:
     momenta, swing = conserved(top, at), at.phi_dot * math.sin(at.theta)
     excess = at.theta_dot * at.theta_dot + swing * swing
     return excess, 2.0 * top.mgl / top.I1, momenta.p_psi / top.I1, momenta.p_phi / top.I1
+
+
+def newton_between(
+    value: Callable[[float], float], slope: Callable[[float], float], below: float, above: float
+) -> float:
+    """The root of a function that is negative at `below` and positive at `above`, to two units in its last place.
+
+    Newton's method from the middle; where a step leaves what is known to hold the root, half of that.
+    """
+    x, before = 0.5 * (below + above), math.inf
+    while x != before:
+        here, rise = value(x), slope(x)
+        below, above = (x, above) if here < 0.0 else (below, x)
+        newton = x - here / rise if rise > 0.0 else math.nan
+        inside = newton if below < newton < above else 0.5 * (below + above)
+        x, before = (x if abs(newton - x) <= 2.0 * math.ulp(x) else inside), x
+    return x
 
 
 @functools.lru_cache(maxsize=1024)

@@ -2,7 +2,7 @@
 
     README.md                     what each file and variable is, its units, and how it was made
     results/*.nc, *.json          datasets and findings of the studies and of the comparisons beside them
-    results/report.html, .md      the report, results/figures/ its figures
+    results/report.html, .md      the report, results/figures/ and results/tables/ what it shows; results/reference.md
     scenes/scenes.csv             tops and starts;  scenes/states.csv, .nc: their states to 30 digits
     citations.bib                 sources of the methods
     versions.txt, machine.txt     every installed package; processor, cores, memory, system
@@ -16,10 +16,9 @@ start and the times as doubles hold them, so that a program that reads the print
 problem. The sign of a quaternion is continued from the start.
 """
 
-import csv
 import functools
 import hashlib
-import io
+import math
 import os
 import platform
 import tempfile
@@ -30,14 +29,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from symtop import __version__
 from symtop.core import netcdf
+from symtop.measure import columns
 from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import Scene, scenes
+from symtop.model.top import NUMBERS, flat
 from symtop.report import page
-from symtop.report.tables import table
+from symtop.report.formats import table
+from symtop.run.ensemble.population import memory
 
 NAME = f"symtop-{__version__}-data"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every file in the bundle: zip has none before
@@ -93,8 +96,11 @@ def bundle(results: Path, target: Path | None = None) -> Path:
 
 def _stored(results: Path) -> list[Path]:
     """The files of a results folder that are bundled: no cases, and no figure that the report does not show."""
-    shown = {results / "figures" / picture["file"] for study in page.gather(results) for picture in study["pictures"]}
-    files = [path for ending in ("*.nc", "*.json", "report.html", "report.md") for path in results.glob(ending)]
+    gathered = page.gather(results)
+    shown = {results / kind / one["file"] for study in gathered for kind, items in (
+        ("figures", study["pictures"]), ("tables", study["tables"])) for one in items}  # fmt: skip
+    endings = "*.nc", "*.json", "report.html", page.WORDS, page.REFERENCE
+    files = [path for ending in endings for path in results.glob(ending)]
     return sorted([*files, *shown])
 
 
@@ -130,14 +136,14 @@ def _machine() -> str:
     """The machine that makes the bundle, a fact a line."""
     facts = {key: value for key, value in netcdf.provenance().items() if key != "dependencies"}
     facts |= {"cores": str(os.cpu_count()), "system": platform.platform()}
-    if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
-        facts["memory"] = f"{os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') / 2**30:.1f} GiB"
+    if math.isfinite(memory()):
+        facts["memory"] = f"{memory() / 2**30:.1f} GiB"
     return "".join(f"{key}: {value}\n" for key, value in facts.items())
 
 
 DIGITS, WORKING = 30, 40  # printed, and computed
 TIMES = 10  # a scene
-ANGLES = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
+ANGLES = NUMBERS[3:]
 COLUMNS = (*ANGLES, "axis_x", "axis_y", "axis_z", "quaternion_w", "quaternion_x", "quaternion_y", "quaternion_z")
 TITLE = f"States of the scenes at {TIMES} times, from the closed form in {WORKING} digits"
 
@@ -147,15 +153,11 @@ def times_of(scene: Scene, count: int = TIMES) -> list[float]:
     return [float(f"{scene.horizon * k / count:.6g}") for k in range(1, count + 1)]
 
 
-def precise(scene: Scene, times: Sequence[float]) -> list[list[Any]]:
-    """The columns of `COLUMNS` at each time, as `mpmath.mpf` of 40 digits."""
-    return _precise(scene, tuple(times))
-
-
 @functools.lru_cache(maxsize=256)  # 0.2 s a scene, and a bundle asks three times
-def _precise(scene: Scene, times: tuple[float, ...]) -> list[list[Any]]:
+def precise(scene: Scene) -> list[list[Any]]:
+    """The columns of `COLUMNS` at each time of a scene, as `mpmath.mpf` of 40 digits."""
     form = PreciseForm(scene.top, scene.start, WORKING)
-    return [[*form(time), *form.axis(time), *form.quaternion(time)] for time in times]
+    return [[*form(time), *form.axis(time), *form.quaternion(time)] for time in times_of(scene)]
 
 
 def printed(number: Any) -> str:
@@ -170,20 +172,20 @@ def states_csv(chosen: Iterable[Scene]) -> str:
     lines = [
         [scene.name, repr(time), *map(printed, state)]
         for scene in chosen
-        for time, state in zip(times_of(scene), precise(scene, times_of(scene)), strict=True)
+        for time, state in zip(times_of(scene), precise(scene), strict=True)
     ]
-    return _csv([["scene", "time", *COLUMNS], *lines])
+    return str(pd.DataFrame(lines, columns=["scene", "time", *COLUMNS]).to_csv(index=False))
 
 
 def scenes_csv(chosen: Iterable[Scene]) -> str:
     """Tops and starts as CSV, every number with the 17 digits that name its double; angles in radians."""
-    header = ["scene", "I1", "I3", "mgl", *ANGLES, "horizon", "nutation_period", "units", "purpose"]
+    header = ["scene", *NUMBERS, "horizon", "nutation_period", "units", "purpose"]
     lines = [
-        [scene.name, *map(repr, _problem(scene)), repr(scene.horizon), repr(scene.nutation_period),
+        [scene.name, *map(repr, (*flat(scene.top, scene.start), scene.horizon, scene.nutation_period)),
          scene.units or "any consistent", scene.purpose]
         for scene in chosen
     ]  # fmt: skip
-    return _csv([header, *lines])
+    return str(pd.DataFrame(lines, columns=header).to_csv(index=False))
 
 
 def states(chosen: Sequence[Scene]) -> xr.Dataset:
@@ -191,40 +193,21 @@ def states(chosen: Sequence[Scene]) -> xr.Dataset:
 
     A value is ``NAME + NAME_lo``, which is good to 31 digits; I1, I3, mgl and the start ``NAME_0`` depend on scene.
     """
-    values = np.empty((len(chosen), TIMES, len(COLUMNS)))
-    low = np.empty_like(values)
-    for place, scene in enumerate(chosen):
-        for sample, state in enumerate(precise(scene, times_of(scene))):
-            values[place, sample] = [float(number) for number in state]
-            low[place, sample] = [float(number - float(number)) for number in state]
+    exact = np.array([precise(scene) for scene in chosen], dtype=object)
+    values = exact.astype(float)
     both = ("scene", "sample")
     variables: dict[str, Any] = {"time": (both, [times_of(scene) for scene in chosen])}
-    for ending, numbers in (("", values), ("_lo", low)):
+    for ending, numbers in (("", values), ("_lo", (exact - values).astype(float))):
         variables |= {f"{name}{ending}": (both, numbers[..., k]) for k, name in enumerate(ANGLES)}
         variables[f"axis{ending}"] = ((*both, "component"), numbers[..., 6:9])
         variables[f"quaternion{ending}"] = ((*both, "part"), numbers[..., 9:])
-    problem = np.array([_problem(scene) for scene in chosen])
-    variables |= {name: ("scene", problem[:, k]) for k, name in enumerate(("I1", "I3", "mgl"))}
-    variables |= {f"{name}_0": ("scene", problem[:, 3 + k]) for k, name in enumerate(ANGLES)}
-    coordinates = {
-        "scene": [scene.name for scene in chosen],
-        "component": ["x", "y", "z"],
-        "part": ["w", "x", "y", "z"],
-    }
-    data = netcdf.describe(xr.Dataset(variables, coordinates), TITLE)
+    for name, column in zip(NUMBERS, zip(*(flat(one.top, one.start) for one in chosen), strict=True), strict=True):
+        variables[f"{name}_0" if name in ANGLES else name] = ("scene", list(column))
+    names = [scene.name for scene in chosen]
+    coordinates = {"scene": names, "component": ["x", "y", "z"], "part": ["w", "x", "y", "z"]}
+    data = netcdf.describe(columns.described(xr.Dataset(variables, coordinates)), TITLE)
     for name in (*ANGLES, "axis", "quaternion"):
         data[f"{name}_lo"].attrs.update(long_name=f"what {name} lacks, to be added", units=data[name].attrs["units"])
     for name in ANGLES:
         data[f"{name}_0"].attrs.update(long_name=f"{name} at the start", units=data[name].attrs["units"])
     return data
-
-
-def _problem(scene: Scene) -> list[float]:
-    top, start = scene.top, scene.start
-    return [top.I1, top.I3, top.mgl, *(getattr(start, name) for name in ANGLES)]
-
-
-def _csv(rows: Iterable[Sequence[str]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()

@@ -18,7 +18,7 @@ import numpy as np
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home
 from symtop.judging.findings import Finding, StepLedger, claim_name, description
-from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels
+from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels, slope_guide
 
 LEAST = 1e-17  # what is smaller is drawn here
 LETTER = 6.6  # width of a letter of the badge, pixels
@@ -56,13 +56,11 @@ def _order(axis: Any, ledger: StepLedger) -> None:
     axis.set(xscale="log", yscale="log")
     claimed = finding.declared.isdigit()
     slope = float(finding.declared) if claimed else finding.value
-    order = round(slope) if 0.5 < slope < 99.0 else None
-    if order is not None:
-        used = np.flatnonzero(valid & fitted) if (valid & fitted).any() else np.flatnonzero(valid)
-        first, last = used[np.argmin(steps[used])], used[np.argmax(steps[used])]
-        ends = steps[[first, last]]
-        label = f"h^{order}{', as claimed' if claimed else ''}"
-        axis.plot(ends, errors[first] * (ends / ends[0]) ** order, color=GREY, lw=0.9, ls=(0, (5, 3)), label=label)
+    if 0.5 < slope < 99.0:
+        used = valid & fitted if (valid & fitted).any() else valid
+        span, order = (steps[used].min(), steps[used].max()), round(slope)
+        label = f"$h^{{{order}}}${', as claimed' if claimed else ''}"
+        slope_guide(axis, order, span, errors[used][np.argmin(steps[used])], label)
     axis.legend(frameon=False)
 
 
@@ -107,15 +105,13 @@ def card(ledger: StepLedger, path: str | Path) -> Path:
         described=description(ledger.findings),
         badge=badge(ledger),
         drawings=[_as_svg(figure) for figure in figures(ledger)],
-        rows=[_row(one) for one in ledger.findings if one.declared or one.verdict != "inapplicable"],
+        rows=[
+            one.plain() | {"verdict": f"{SIGNS[one.verdict]} {one.verdict}", "claim": claim_name(one.claim)}
+            for one in ledger.findings
+            if one.declared or one.verdict != "inapplicable"
+        ],
     )
     return _written(text, path)
-
-
-def _row(finding: Finding) -> dict[str, str]:
-    verdict = f"{SIGNS[finding.verdict]} {finding.verdict}"
-    cells = finding.plain() | {"verdict": verdict, "claim": claim_name(finding.claim)}
-    return {name: str(value) for name, value in cells.items()}
 
 
 def badge(ledger: StepLedger) -> str:

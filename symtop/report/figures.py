@@ -1,6 +1,7 @@
-"""What drawings of studies share: names at the ends of lines, the grey band of the reference's bound, the front."""
+"""What drawings of studies share: names of lines and rows, the grey band of the bound, which variants are named."""
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -10,37 +11,30 @@ from symtop.report.style import LEAST_TEXT, ink
 SMALLEST = 1e-17  # where an error of exactly zero is drawn
 LOWEST = 1e-40  # below every panel
 BELOW = "below the reference's error bound"
-
-
-def bound_of(bounds: Any, least: float = 1e-16) -> float:
-    """The median error bound of the reference, or `least` without one."""
-    return float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else least
+MOST_NAMED = 9  # variants with a name of their own in a figure
 
 
 def error_band(axis: Any, bounds: Any, least: float = 1e-16) -> float:
     """Shade all that lies below the median error bound of the reference; returns that bound, or `least` without one."""
     from matplotlib.patches import Rectangle
 
-    level = bound_of(bounds, least)
+    level = float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else least  # of the reference
     shape = {"color": "#BBBBBB", "alpha": 0.45, "lw": 0, "label": BELOW, "transform": axis.get_yaxis_transform()}
     axis.add_artist(Rectangle((0.0, LOWEST), 1.0, level - LOWEST, **shape))  # to the frame, which it does not move
     return level
 
 
-def pareto(cost: Any, error: Any) -> Any:
-    """Which points no other point beats in both cost and error (boolean, the shape of the arrays)."""
-    shape, cost, error = cost.shape, cost.ravel(), error.ravel()
-    order = np.lexsort((error, np.where(np.isfinite(error), cost, np.inf)))
-    best, front = np.inf, np.zeros(cost.size, bool)
-    for k in order:
-        if np.isfinite(cost[k]) and error[k] < best:
-            best, front[k] = error[k], True
-    return front.reshape(shape)
+def rows(axis: Any, names: Sequence[str], count: int = 0) -> None:
+    """Name the rows of a panel of dots, the first at the top; with room for `count` of them."""
+    axis.set_yticks(range(len(names)), names, fontsize=LEAST_TEXT)
+    axis.set_ylim(max(count, len(names)) - 0.4, -0.6)
+    axis.tick_params(axis="y", length=0)
+    axis.grid(visible=False, axis="y")
 
 
-def largest_so_far(values: Any) -> Any:
-    """The largest size up to each sample; zeros are `SMALLEST`, for a logarithmic axis."""
-    return np.maximum.accumulate(np.maximum(np.abs(np.asarray(values)), SMALLEST))
+def chosen(names: Sequence[str], known: Sequence[str], most: int = MOST_NAMED) -> list[str]:
+    """The variants that a figure names: all if they are few, otherwise those that are known, if any of them is."""
+    return list(names) if len(names) <= most else [name for name in names if name in known] or list(names)[:most]
 
 
 def spread(places: Sequence[float], gap: float) -> list[float]:
@@ -81,3 +75,56 @@ def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]], size: flo
             arrowprops={"arrowstyle": "-", "color": color, "lw": 0.5, "shrinkA": 0, "shrinkB": 1, "relpos": (0.0, 0.5)},
             annotation_clip=False,
         )  # fmt: skip
+
+
+def label_lines(
+    axis: Any,
+    lines: Sequence[tuple[str, str, Any, Any]],
+    others: Sequence[tuple[Any, Any]] = (),
+    size: float = LEAST_TEXT,
+) -> None:
+    """Write the name of each line beside an end of it or its middle, in its colour, where it covers little else.
+
+    `lines` have name, colour, x and y, and `others`, which have no name, x and y. Limits and layout of the panel must
+    be final.
+    """
+    if not lines:
+        return
+    figure = axis.figure.canvas.figure
+    figure.draw_without_rendering()
+    renderer, frame = figure.canvas.get_renderer(), axis.get_window_extent()
+    marks = np.concatenate([_dense(axis, x, y) for *_, x, y in [*lines, *others]])
+    taken: list[Any] = []
+    for name, color, x, y in sorted(lines, key=lambda one: -len(one[0])):
+        look = {"textcoords": "offset points", "va": "center", "fontsize": size, "color": ink(color), "weight": "bold"}
+        tried: list[Any] = []
+        for kind, (dx, dy, side) in product(range(3), PLACES):
+            end = (len(x) - 1, 0, len(x) // 2)[kind]
+            text = axis.annotate(name, (x[end], y[end]), (dx, dy), ha=side, **look)
+            box = text.get_window_extent(renderer)
+            out = box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0 or box.y1 > frame.y1
+            covered = np.all((marks > box.min) & (marks < box.max), axis=1).sum()
+            price = (
+                1e3 * (sum(box.overlaps(other) for other in taken) + out) + covered + abs(dy) / 3.0 + ELSEWHERE[kind]
+            )
+            tried.append((price, len(tried), text, box))
+        best = min(tried)
+        for _, _, text, _ in tried:
+            if text is not best[2]:
+                text.remove()
+        taken.append(best[3])
+
+
+APART = 3.0  # pixels
+ELSEWHERE = (0.0, 2.0, 8.0)  # points of lines that a name covers rather than stand at the first end, or in the middle
+PLACES = tuple(
+    (dx, dy, side) for dx, side in ((5, "left"), (-5, "right")) for dy in (0, -5, 5, -9, 9, -14, 14)
+)  # points
+
+
+def _dense(axis: Any, x: Any, y: Any) -> Any:
+    """Points along a line on the screen, `APART` from each other."""
+    ends = axis.transData.transform(np.stack([x, y], axis=1))
+    length = np.append(0.0, np.cumsum(np.hypot(*np.diff(ends, axis=0).T)))
+    places = np.arange(0.0, length[-1] + APART, APART)
+    return np.stack([np.interp(places, length, ends[:, k]) for k in range(2)], axis=1)

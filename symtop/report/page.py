@@ -1,50 +1,47 @@
-"""The report: one page from the findings that the studies left in the results folder, beside its figures.
+"""The report: a front page and a page a study, from the findings that the studies left in the results folder.
 
-It opens with an answer: the first that a study declares (`Study.opening`), with a line on every method and term in it,
-and the pictures that studies want seen first (`Picture.lead`). How it was measured follows, then a section a question.
-A chart to point at is data for the page's script: each series with the look its integrator has in every figure. The
-page asks for nothing but its figures; with `embed` they are in it, for sending it alone.
+`report.md` holds what a reader decides by, beside its figures and tables; `reference.md` what only checks it: the pages
+of benchmarks from "How to read it" on, or all of one without a figure, the equations and scenes, and the provenance.
+`report.html` is made of both. The page of a study is its template, filled (`symtop.report.template`). A chart to point
+at is data for the page's script, each series with the look its integrator has in every figure; a table that is shown in
+part lies in `report.html` in full, to be searched and sorted. Nothing is fetched but figures; with `embed` they are in
+the page, for sending it alone.
 """
 
 import base64
 import datetime
-import itertools
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError
+from symtop.core.numbers import EPSILON
 from symtop.methods.framework.registry import integrators, split_name
-from symtop.report import markdown, method, tables
-from symtop.report.sources import report_files, report_hash
+from symtop.model.scenes import scenes
+from symtop.model.top import flat
+from symtop.report import formats, template
+from symtop.report.html import Writer, slug
 from symtop.report.style import look
-from symtop.run import plugins
-from symtop.runner import manifest, run as runner
+from symtop.run.reference.truth import reference
+from symtop.runner import run as runner
 
-WORDS = "report.md"
-TITLE = "Integrators on the heavy symmetric top"
-INTRODUCTION = (
-    "Every method is run on rigid bodies whose exact motion is known, and measured against it: accuracy, conservation, "
-    "cost and failure. All numbers and sentences are generated from the stored datasets."
-)
-ROWS = (
-    "rk4[angles] is the method rk4 integrating Euler's angles, rk4[axis] the same method integrating the axis and the "
-    "angular momentum, [attitude] the whole orientation and the angular momentum. In figures the markers of [angles] "
-    "are open, those of [axis] full, those of [attitude] half full."
-)
-KINDS = {".png": "image/png", ".gif": "image/gif"}
-LONGEST_ANCHOR = 60  # letters
-MATHML = "http://www.w3.org/1998/Math/MathML"
+PAGE, WORDS, REFERENCE = "report.html", "report.md", "reference.md"
+TEMPLATES = Path(__file__).parent / "templates"
+EQUATIONS = "The equations, the scenes and the exact motion"
+READING = "**How to read it.**"  # of the page of a benchmark, where its part for reference begins
+QUICK = "This is a quick pass on coarse grids, for checking that every study works."
 
 
 def prepared(chart: Mapping[str, Any]) -> str:
     """JSON of a chart of the findings, safe inside a script element, without points that a log axis cannot show."""
     panels = {title: [_series(name, points) for name, points in series] for title, series in chart["panels"].items()}
-    content = {"title": chart["title"], "x": chart["x"], "y": chart["y"], "panels": panels}
+    content = {key: chart[key] for key in ("title", "x", "y", "choices", "marks") if key in chart} | {"panels": panels}
     return json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
 
 
@@ -56,31 +53,20 @@ def _series(name: str, points: Sequence[tuple[float | None, float | None, str]])
         "color": style.color,
         "marker": style.marker,
         "dashed": method is not None and method.implementation == "python",
-        "points": [list(point) for point in points if all(x is not None and 0.0 < x < math.inf for x in point[:2])],
+        "points": [
+            list(point)
+            for point in points
+            if len(point) > 3 or all(0.0 < (value or 0.0) < math.inf for value in point[:2])
+        ],
     }
 
 
-class Anchors:
-    """Names for the things on a page that a link may lead to, each given once."""
-
-    def __init__(self) -> None:
-        self.given: set[str] = set()
-
-    def __call__(self, *words: str) -> str:
-        """A name made of words; it differs from all that were given before."""
-        name = re.sub(r"[^a-z0-9_]+", "-", " ".join(words).lower()).strip("-")[:LONGEST_ANCHOR].rstrip("-")
-        later = (f"{name}-{count}" for count in itertools.count(2))
-        free = next(one for one in itertools.chain([name], later) if one not in self.given)
-        self.given.add(free)
-        return free
-
-
-def gather(results: Path, *, embed: bool = False) -> list[dict[str, Any]]:
-    """The findings that are in the folder, with their pictures: of all studies, in order, then of `make` targets.
+def gather(results: Path) -> list[dict[str, Any]]:
+    """The findings that are in the folder: of all studies, in order, then of `make` targets.
 
     A target of the Makefile (`make peers`, `make bench`) may leave findings in the form of a study's, as NAME.json.
     They stay as they are when the studies run again, so that their ``measured`` says when, where and with what.
-    Pictures are addresses beside the page, or the files themselves with `embed`.
+    A study that ships with symtop has the page of its folder, any other the page that its findings hold.
     Raises SymtopError if findings are incomplete, or there are none.
     """
     studies, gathered = list(runner.names()), []
@@ -89,21 +75,21 @@ def gather(results: Path, *, embed: bool = False) -> list[dict[str, Any]]:
         findings = netcdf.read_json(results / f"{name}.json")
         if findings is None or (name in others and not (isinstance(findings, dict) and "pictures" in findings)):
             continue
+        shipped = runner.file_beside(name, "page.md") if name in studies else None
         try:
-            for picture in findings["pictures"]:
-                picture.update(_shown(results / "figures" / picture["file"], embed=embed))
-                picture.setdefault("lead", "")
-            for chart in findings["charts"]:
-                chart["prepared"] = prepared(chart)
+            kept = {"measured": findings.get("measured", ""), "dataset": f"{name}.nc"}
+            kept["dataset"] *= (results / f"{name}.nc").is_file()
+            missing = [f"figures/{one['file']}" for one in findings["pictures"]]
+            missing += [f"tables/{one['file']}" for one in findings["tables"]]
+            for file in (file for file in missing if not (results / file).is_file()):
+                raise FileNotFoundError(f"{file} is missing")
+            page = findings["page"] if shipped is None else shipped.read_text(encoding="utf-8")
+            gathered.append({**findings, **kept, "page": page})
         except (OSError, KeyError, TypeError) as error:
             command = f"make {name}" if name in others else f"symtop study {name}"
             raise SymtopError(
                 f"the findings of {name} in {results} are incomplete ({error}); run it again: {command}"
             ) from error
-        findings.setdefault("opening", None)
-        findings.setdefault("measured", "")
-        findings["dataset"] = f"{name}.nc" if (results / f"{name}.nc").is_file() else ""
-        gathered.append(findings)
     if not gathered:
         raise SymtopError(f"no study has left findings in {results}; run one first, for example: symtop study --all")
     return gathered
@@ -111,68 +97,140 @@ def gather(results: Path, *, embed: bool = False) -> list[dict[str, Any]]:
 
 def _shown(file: Path, *, embed: bool) -> dict[str, Any]:
     """Address, width and height of a PNG or a GIF, so that the page does not move while its figures load."""
-    image = file.read_bytes()
-    if image.startswith(b"\x89PNG"):
-        width, height = (int.from_bytes(image[at : at + 4]) for at in (16, 20))
-    else:
-        width, height = (int.from_bytes(image[at : at + 2], "little") for at in (6, 8))
-    inside = f"data:{KINDS.get(file.suffix, 'image/png')};base64,{base64.b64encode(image).decode()}" if embed else ""
+    from PIL import Image
+
+    with Image.open(file) as image:
+        (width, height), kind = image.size, f"image/{str(image.format).lower()}"
+    inside = f"data:{kind};base64,{base64.b64encode(file.read_bytes()).decode()}" if embed else ""
     return {"source": inside or f"figures/{file.name}", "width": width, "height": height}
 
 
-def _named(studies: Sequence[dict[str, Any]]) -> None:
-    """Give every study, picture, chart and table an anchor."""
-    anchor = Anchors()
-    for name in ("answer", "measured", "integrators", "provenance", *(study["study"] for study in studies)):
-        anchor(name)
+def texts(results: Path, studies: Sequence[Mapping[str, Any]]) -> tuple[dict[str, str], dict[str, str]]:
+    """The parts of the report and those for reference, in Markdown, by name: "front", the studies, "measured", ..."""
+    parts, more, pages = dict[str, str](), dict[str, str](), {"measured": _link("How it was measured")}
     for study in studies:
-        for picture in study["pictures"]:
-            picture["id"] = anchor(Path(picture["file"]).stem)
-        for item in [*study["charts"], *study["tables"]]:
-            item["id"] = anchor(study["study"], item["title"])
+        pages[study["study"]] = _link(study["question"], REFERENCE if _checks_only(study) else "")
+    parts["front"] = template.front(_template("front"), studies, results, pages)
+    for study in studies:
+        name, text = study["study"], _lower(template.filled(study, results, pages=pages))
+        if _checks_only(study):
+            more[name] = text
+            continue
+        parts[name], mark, rest = text.partition(READING) if study["measured"] else (text, "", "")
+        if mark:
+            title = f"{study['title']}: tables"
+            parts[name] += f"More: {_link(title, REFERENCE)}.\n"
+            more[f"{name}-tables"] = f"## {title}\n\n{mark}{rest}"
+    known = {"reference": f"{REFERENCE}#{slug(EQUATIONS)}"} | scene_tables()
+    parts["measured"], more["equations"] = (
+        template.rendered(_template(name), name, known) for name in ("measured", "equations")
+    )
+    newest = next((study for study in reversed(studies) if not study["measured"]), studies[-1])["provenance"]
+    versions = ", ".join(f"{name} {version}" for name, version in json.loads(newest["dependencies"]).items())
+    facts = [[key, str(value)] for key, value in {**newest, "dependencies": versions}.items()]
+    more["provenance"] = f"## Provenance\n\n{formats.table(['what', 'which'], facts)}\n"
+    if any(study["quick"] for study in studies):
+        parts["front"] += f"\n{QUICK}\n"
+    return parts, more
+
+
+def _checks_only(study: Mapping[str, Any]) -> bool:
+    """Is it a benchmark of what ships with symtop, which has no figure?"""
+    return bool(study["measured"]) and not study["pictures"]
+
+
+def _template(name: str) -> str:
+    return (TEMPLATES / f"{name}.md").read_text(encoding="utf-8")
+
+
+def _link(heading: str, file: str = "") -> str:
+    return f"[{heading}]({file}#{slug(heading)})"
+
+
+def _lower(text: str) -> str:
+    """A text whose headings are one level lower."""
+    return re.sub(r"^(#+) ", r"\1# ", text, flags=re.MULTILINE)
+
+
+def scene_tables() -> dict[str, Any]:
+    """Of the scenes of the catalogue: uses, starts to the last bit, units, and the largest bound of the truth (rad)."""
+    uses, starts, bounds = [], [], []
+    for scene in scenes().values():
+        bounds.append(float(reference(scene, np.array([scene.horizon]))["axis_error_bound"].values[0]))
+        period = f"{scene.nutation_period:.9g}" if math.isfinite(scene.nutation_period) else "infinite"
+        uses.append([scene.name, scene.purpose, period, f"{scene.horizon:.6g}", f"{bounds[-1]:.1e}"])
+        starts.append([scene.name, *(repr(number).removesuffix(".0") for number in flat(scene.top, scene.start))])
+    what = ["scene", "what it is for", "nutation period", "horizon", "bound of the truth (rad)"]
+    problem = ["scene", "I1", "I3", "mgl", "theta", "phi", "psi", "theta'", "phi'", "psi'"]
+    return {
+        "uses": formats.table(what, uses), "starts": formats.table(problem, starts),
+        "units": ", ".join(scene.name for scene in scenes().values() if scene.units == "SI"),
+        "bound": max(bounds), "roundings": max(bounds) / EPSILON,
+    }  # fmt: skip
 
 
 def write(results: Path, *, embed: bool = False) -> Path:
-    """Write ``report.html``, and ``report.md`` with the same words, into the results folder; returns the page."""
+    """Write ``report.html``, ``report.md`` and ``reference.md`` into the results folder; returns the page."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
-    from latex2mathml.converter import convert
 
     environment = Environment(
         loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    made_of, sources = report_hash(results, embed=embed), report_files(results)
-    studies = gather(results, embed=embed)
-    _named(studies)
-    titles = {study["study"]: study["title"] for study in studies}
-    provenance = next((study for study in reversed(studies) if not study["measured"]), studies[-1])["provenance"]
-    versions = json.loads(provenance["dependencies"])
-    facts = {**provenance, "dependencies": ", ".join(f"{name} {version}" for name, version in versions.items())}
-    first = next((study for study in studies if study["opening"]), None)
-    templates = Path(__file__).parent / "templates"
-    measured = method.parts()
+    studies = gather(results)
+    parts, more = texts(results, studies)
+    images = {
+        f"figures/{one['file']}": _shown(results / "figures" / one["file"], embed=embed)
+        for study in studies
+        for one in study["pictures"]
+    }
+    charts = {f"{study['study']}-{chart['name']}": chart for study in studies for chart in study["charts"]}
+    records = formats.columns([one.record() for one in integrators().values()])
+
+    def marked(kind: str, name: str) -> str:
+        if kind == "table":
+            return _whole(name, *_read(results / "tables" / f"{name}.csv"))
+        return f'<div class="chart"><script type="application/json">{prepared(charts[name])}</script></div>'
+
+    together = parts | more
+    writer = Writer(images, marked, "content", "scheme", *(f"part-{name}" for name in together))
     text = environment.get_template("report.html").render(
-        title=TITLE,
-        introduction=INTRODUCTION,
-        rows=ROWS,
-        css="".join((templates / name).read_text(encoding="utf-8") for name in ("style.css", "report.css")),
-        scripts=[(templates / name).read_text(encoding="utf-8") for name in ("page.js", "chart.js")],
-        studies=studies,
-        answer=first,
-        glossary=method.glossary(markdown.sentences(first)) if first else [],
-        leads=[(study, picture) for study in studies for picture in study["pictures"] if picture["lead"]],
-        measured=measured,
-        mathml=lambda formula: convert(formula, display="block").replace(f' xmlns="{MATHML}"', ""),  # HTML needs none
-        explanations=lambda study: markdown.explanations(study, titles),
-        integrators=tables.columns([method.record() for method in integrators().values()]),
-        provenance=facts,
-        quick=any(study["quick"] for study in studies),
+        title=re.sub(r"^# ", "", parts["front"].partition("\n")[0]),
+        css="".join((TEMPLATES / name).read_text(encoding="utf-8") for name in ("style.css", "report.css")),
+        scripts=[(TEMPLATES / name).read_text(encoding="utf-8") for name in ("page.js", "chart.js")],
+        contents=[(name, _heading(part)) for name, part in together.items()],
+        parts={name: writer(part.replace(f"]({REFERENCE}#", "](#")) for name, part in together.items()},
+        integrators=_whole("integrators", *records),
+        provenance=studies[-1]["provenance"],
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
     )
-    target = results / manifest.PAGE
+    target = results / PAGE
     netcdf.write_text(target, text)
-    opening = ["# " + TITLE, INTRODUCTION, *(markdown.opening(study, titles) for study in studies), ROWS]
-    opening.append(markdown.measured(measured))
-    netcdf.write_text(results / WORDS, markdown.page(studies, opening, facts))
-    manifest.note(results, manifest.PAGE, "" if plugins.loaded() else made_of, [target, results / WORDS, *sources])
+    netcdf.write_text(results / WORDS, "\n".join(parts.values()))
+    netcdf.write_text(results / REFERENCE, "# For reference\n\n" + "\n".join(more.values()))
     return target
+
+
+def _heading(part: str) -> str:
+    return part.partition("\n")[0].lstrip("# ")
+
+
+def _whole(name: str, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """A table in full, folded; the page's script builds it when it is opened."""
+    cells = [["" if value != value else str(value) for value in row] for row in rows]  # noqa: PLR0124  (not a number)
+    content = json.dumps({"header": list(header), "rows": cells}, ensure_ascii=False, separators=(",", ":"))
+    content = content.replace("</", "<\\/")
+    return (
+        f'<details class="whole" data-table="{name}"><summary>All {len(cells):,} rows, to search and to sort</summary>'
+        f'<script type="application/json">{content}</script></details>'
+    )
+
+
+def _read(file: Path) -> tuple[list[str], Iterable[Sequence[Any]]]:
+    """Header and rows of a stored table."""
+    import pandas as pd
+
+    frame = pd.read_csv(file)
+    for name in frame.select_dtypes("float"):
+        frame[name] = [float(f"{value:.4g}") for value in frame[name]]
+    return list(frame.columns), frame.itertuples(index=False)

@@ -1,7 +1,7 @@
 """Runs as pictures: on an Axes of the caller's (`plot`), or as a file of one run or of an ensemble.
 
 a run        its motion beside the true one, its errors, and the residuals of constants of the motion
-a sweep      the largest error against what was varied
+a sweep      the largest error against what was varied, or run time; a comparison likewise
 an ensemble  how the errors of its members spread as time goes on
 """
 
@@ -15,8 +15,10 @@ import xarray as xr
 from symtop.core.errors import SymtopError, at_home, one_of
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES, errors
+from symtop.measure.sweep import failed_setting
 from symtop.model.scenes import Scene
 from symtop.report import spread
+from symtop.report.figures import error_band, name_ends
 from symtop.report.style import (
     BLACK,
     BLUE,
@@ -29,6 +31,7 @@ from symtop.report.style import (
     VERMILLION,
     headline,
     legend_below,
+    line,
     look,
     panels,
     save,
@@ -40,6 +43,7 @@ if TYPE_CHECKING:
 
 LEAST = 1e-17  # what is smaller is drawn here
 LINES = ("-", "--", "-.", ":")  # of a sweep's scenes
+AXES = {"seconds": "time of a run, one core (s)", "force_evaluations": "force evaluations of a run"}
 COLORS = {"axis": BLACK, "attitude": GREY, "theta": SKY, "energy": VERMILLION, "p_phi": GREEN, "p_psi": PURPLE}
 BANDS = ((0, 4, 0.18), (1, 3, 0.38))  # of `spread.LEVELS`, 1 to 99 % and 10 to 90 %, and how opaque
 MOST = {"axis": np.pi, "energy": 1e3}  # what is larger, and members that failed, are drawn here
@@ -49,13 +53,15 @@ def plot(
     data: xr.Dataset, ax: "Axes | None" = None, *, quantity: str = "axis", x: str | None = None,
     members: xr.Dataset | None = None,
 ) -> "Axes":  # fmt: skip
-    """Draw a dataset of `simulate`, `errors`, `sweep` or `ensemble` and return the Axes, a new one if `ax` is None.
+    """Draw a dataset of `simulate`, `errors`, `sweep`, `compare` or `ensemble`; return the Axes, new if `ax` is None.
 
         a run         the error of `quantity` over time, or a variable of the run itself (``phi``, ``p_theta``, ...)
         its errors    (a dataset of `errors`) the error of `quantity` over time, and the least that can be seen
         a sweep       the largest error of `quantity` against ``step_size`` or ``tolerance``, or work where
-                      some methods have one and some the other, or what `x` names: a line for each integrator, dashed
-                      for further scenes
+                      some methods have one and some the other, or what `x` names, or run time if it is there: a line
+                      for each variant, dashed for further scenes; crosses are runs that failed, the grey band is what
+                      the reference cannot judge
+        a comparison  the same for one scene, of the quantity that is compared, with the time of the exact motion
         an ensemble   quantiles over members of the error of `quantity` ("axis" or "energy") over time; `members` are
                       the tops that were run (the dataset does not hold them)
 
@@ -99,11 +105,16 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         ax.plot(times, values.values, color=color, lw=1.2)
         ax.set_ylabel(f"{quantity} ({unit})" if unit else quantity)
     title, ended = (data.attrs.get(word, "") for word in ("title", "outcome_message"))
-    unit = data["time"].attrs.get("units", "")
-    ax.set(xlabel=f"time ({unit})" if unit else "time", title=f"{title}: {ended}" if ended else title)
+    ax.set(xlabel=_clock(data), title=f"{title}: {ended}" if ended else title)
+
+
+def _clock(data: xr.Dataset) -> str:
+    """The name of the axis of time, with its unit on a scene that has units."""
+    return "time (s)" if data["time"].attrs.get("units") == "s" else "time"
 
 
 def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
+    quantity = data.attrs.get("quantity", quantity) if quantity == "axis" else quantity
     one_of("quantity", quantity, [name for name in QUANTITIES if name in data])
     if "integrator" in data.coords:  # a sweep of version 0.2
         data = data.rename(integrator="variant")
@@ -113,26 +124,40 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
         if dim not in data.dims:  # of one alone, as isel leaves it
             data = data.expand_dims(dim)
     controls = [name for name in ("step_size", "tolerance") if name in data and data[name].notnull().any()]
-    x = x or (controls[0] if len(controls) == 1 else "force_evaluations")
+    timed, compared = "seconds" in data and bool(data["seconds"].notnull().any()), "cost" in data.attrs
+    x = x or ("seconds" if timed else controls[0] if len(controls) == 1 and not compared else "force_evaluations")
     numbers = {name: values for name, values in data.data_vars.items() if values.dtype.kind in "iuf"}
     of_runs = [str(name) for name, values in numbers.items() if {*values.dims} == {"scene", "variant", "setting"}]
     x = one_of("x", x, of_runs)
+    words = AXES.get(x, x.replace("_", " "))
+    ax.set(xscale="log", yscale="log", ylabel=f"largest {QUANTITIES[quantity]}", xlabel=words)
+    ends, level = {}, error_band(ax, data[f"{quantity}_bound"].values)
+    edge: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 3}
     for number, scene in enumerate(data["scene"].values):
-        for name in data["variant"].values:
+        for name in map(str, data["variant"].values):
             cell = data.sel(scene=scene, variant=name)
-            across = cell[x].values
-            good = np.isfinite(across) & np.isfinite(cell[quantity].values)
-            if not good.any():
-                continue
-            order = np.argsort(across[good])
-            row = str(name) if "chart" not in cell or str(name).endswith("]") else f"{name}[{cell['chart'].item()}]"
-            label = row if data.sizes["scene"] == 1 else f"{row} on {scene}"
-            ax.plot(
-                across[good][order], np.maximum(cell[quantity].values[good][order], LEAST), LINES[number % len(LINES)],
-                color=look(str(name)).color, marker=look(str(name)).marker, ms=4.5, lw=1.2, label=label,
-            )  # fmt: skip
-    ax.set(xscale="log", yscale="log", ylabel=f"largest {QUANTITIES[quantity]}", xlabel=x.replace("_", " "))
-    ax.legend(fontsize=8, frameon=False)
+            variant = name if "chart" not in cell or name.endswith("]") else f"{name}[{cell['chart'].item()}]"
+            options = line(variant) | ({"ls": LINES[number % len(LINES)]} if data.sizes["scene"] > 1 else {})
+            label = variant if data.sizes["scene"] == 1 else f"{variant} on {scene}"
+            across, errors = cell[x].values, np.maximum(cell[quantity].values, LEAST)
+            good = np.flatnonzero(np.isfinite(across) & np.isfinite(errors))
+            good = good[np.argsort(across[good])]
+            ax.plot(across[good], errors[good], lw=1.4, label=label, **options)
+            failed = across[(cell["outcome"].values != "ok") & np.isfinite(across)]
+            ax.scatter(failed, np.full(failed.size, 0.985), 22.0, options["color"], marker="x", lw=1.0, **edge)
+            last = good[np.argmin(errors[good])] if good.size else 0
+            place = (across[last], errors[last]) if good.size else (np.nanmax(data[x].values, initial=1e-300), np.pi)
+            fails = failed_setting(cell).partition(",")[0]
+            ends[f"{label}: {fails}" if fails else label] = (*map(float, place), options["color"])
+    ax.set_ylim(bottom=0.1 * level)
+    if compared:
+        nutations, end = data.attrs["nutations"], data.attrs["horizon"]
+        runs = f"{nutations:.3g} nutations" if nutations > 0.0 else f"t = {end:g}"
+        ax.set_title(f"{data['scene'].item()}, {runs}", loc="left", weight="bold")
+        if x == "seconds":
+            ax.axvline(exact := data["exact_seconds"].item(), color="0.35", ls=(0, (1, 2)), lw=1.0)
+            ax.text(exact, 0.1, "exact motion ", rotation=90, ha="right", size=LEAST_TEXT, transform=edge["transform"])
+    name_ends(ax, ends)
 
 
 def _ensemble(ax: "Axes", data: xr.Dataset, quantity: str, members: Any) -> None:
@@ -157,7 +182,7 @@ def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Datase
     for name, values in residuals(scene, Trajectory.of_data(run)).items():
         _line(constants, times, np.abs(values), COLORS[name], f"residual of {name}, relative")
     angles.set(yscale="log", ylabel="error (rad)")
-    constants.set(yscale="log", ylabel="|change| since the start", xlabel="time")
+    constants.set(yscale="log", ylabel="|change| since the start", xlabel=_clock(run))
     if run.attrs["outcome"] != "ok":
         for axis in axes[:, 0]:
             axis.axvline(run.attrs["reached_time"], color=VERMILLION, ls="--", label="stopped here")
@@ -214,17 +239,17 @@ def _draw_quantiles(axis: Any, times: Any, errors: Any, most: float, color: str)
         axis.fill_between(times, quantiles[low], quantiles[high], color=color, alpha=opaque, lw=0.0)
     marker = "o" if times.size == 1 else None  # a line has two points at least
     axis.plot(times, quantiles[spread.LEVELS.index(0.5)], color=color, lw=1.8, marker=marker)
-    names = [
-        (f"{100.0 * level:g} %" if level != 0.5 else "median") + (": failed" if np.isinf(end) else "")
-        for level, end in zip(spread.LEVELS, errors[:, -1], strict=True)
-    ]
     if np.isinf(errors).any():
         axis.plot(times[[0, -1]], [most, most], color="0.4", lw=0.8, ls=":")
-    ends, place = np.log10(quantiles[:, -1]), -np.inf
-    least = 0.045 * max(np.ptp(np.log10(quantiles)), 1.0)  # labels do not overlap
-    for end, name in zip(ends, names, strict=True):
-        place = max(end, place + least)
-        axis.annotate(
-            name, (times[-1], 10.0**place), xytext=(5, 0), textcoords="offset points", fontsize=LEAST_TEXT, va="center"
-        )
-    axis.set_xlim(0.0, times[-1] * 1.07)
+    names = ["median" if level == 0.5 else f"{100.0 * level:g} %" for level in spread.LEVELS]
+    ends = {f"{name}: failed" if np.isinf(error) else name: (float(times[-1]), float(shown), color)
+            for name, error, shown in zip(names, errors[:, -1], quantiles[:, -1], strict=True)}  # fmt: skip
+    axis.set(xlim=(0.0, times[-1]), yscale="log")
+    name_ends(axis, ends)
+
+
+def draw_compare(data: xr.Dataset, path: str | Path) -> None:
+    """The figure of a comparison in a file."""
+    figure, axes = panels(1, 1, height=3.6)
+    _sweep(axes[0, 0], data, "axis", None)
+    save(figure, at_home(path))

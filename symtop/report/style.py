@@ -8,7 +8,7 @@ of print, 6.5 inches, and its text is at least 7 points high there.
 import textwrap
 import zlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -16,13 +16,9 @@ import numpy as np
 
 from symtop.core import netcdf
 
-if TYPE_CHECKING:
-    from PIL import Image
-
 WIDTH = 6.5  # inches, of a figure: the text block of a page
 LEAST_TEXT = 7.0  # points, of any text at that width
 DPI, SKETCHED = 200, 100
-LEVEL = 7  # of the compression of a picture: a sixth of the time of 9, for 7 % more bytes
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
@@ -48,7 +44,7 @@ REDS = (VERMILLION, "#F09A66", "#8A3C00")
 YELLOWS = ("#B8A500", YELLOW, "#7A6F00")
 PURPLES = (PURPLE, "#8C4A73", "#E6B8D2")
 SKIES = (SKY, "#2B7BA8", "#A6D5F2")
-_SHADES = {
+SHADES = {
     "discrete-lagrangian": BLUES,
     "splitting": GREENS,
     "runge-kutta": ORANGES,
@@ -63,56 +59,19 @@ DASHES = {  # of a line, by family; a family that is not here has a solid one
     "splitting": (0, (6.0, 1.2)), "runge-kutta": (0, (3.0, 1.2)), "lie-group": (0, (6.0, 1.2, 1.0, 1.2)),
     "taylor": (0, (1.5, 0.8)), "library": (0, (1.0, 1.6)), "engine": (0, (3.0, 1.2, 1.0, 1.2)),
 }  # fmt: skip
-RAISED, FIRM = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"), "\N{NO-BREAK SPACE}"
 UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
 _MARKERS = "osv^<>DPXph8dH"
 
-# Looks set by hand; `look` finds one for every other integrator.
-_LOOKS = {
-    "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "simpson-linear": Look(PURPLE, "v"),
-    "midpoint-unreduced": Look(BLUE, "^"), "trapezoidal-unreduced": Look(BLUES[1], "<"),
-    "galerkin-simpson": Look(BLUE, "P"), "exact-discrete": Look(BLUES[2], "D"),
-    "stormer-verlet": Look(GREEN, "^"), "stormer-verlet-yoshida-4": Look(GREEN, "o"),
-    "stormer-verlet-suzuki-4": Look(GREENS[1], "s"), "stormer-verlet-blanes-moan-6": Look(GREENS[2], "v"),
-    "strang": Look(GREEN, "<"), "cayley": Look(GREENS[1], ">"), "cayley-tuned": Look(GREENS[2], "D"),
-    "takahashi-imada": Look(GREEN, "P"), "chin-4a": Look(GREENS[1], "X"), "yoshida-4": Look(GREENS[2], "p"),
-    "suzuki-4": Look(GREEN, "h"), "stormer-verlet-reversible": Look(GREENS[2], "*"),
-    "srkn-6-4": Look(GREENS[1], "8"), "srkn-11-6": Look(GREENS[2], "d"), "srkn-14-6": Look(GREEN, "H"),
-    "srkn-19-8": Look(GREENS[1], "*"),
-    "kahan-li-6": Look(GREENS[1], "o"), "suzuki-umeno-8": Look(GREENS[2], "s"), "kahan-li-8": Look(GREEN, "v"),
-    "sofroniou-spaletta-10": Look(GREENS[1], "<"),
-    "aba-8-6-4": Look(GREENS[2], ">"), "aba-10-6-4": Look(GREEN, "D"), "aba-10-4": Look(GREENS[1], "P"),
-    "rk4": Look(ORANGE, "o"), "rk45-compiled": Look(ORANGES[1], "s"),
-    "gauss-2": Look(ORANGES[2], "v"), "gauss-4": Look(ORANGE, "^"), "gauss-6": Look(ORANGES[1], "<"),
-    "gauss-8": Look(ORANGES[2], ">"), "gauss-10": Look(ORANGE, "D"), "gauss-12": Look(ORANGES[1], "P"),
-    "kahan": Look(ORANGES[1], "h"),
-    "rkmk-se3-2": Look(YELLOWS[0], "o"), "rkmk-se3-4": Look(YELLOWS[2], "s"),
-    "crouch-grossman-3": Look(YELLOWS[0], "v"), "commutator-free-4": Look(YELLOWS[2], "^"),
-    "simo-wong": Look(YELLOWS[0], "D"), "collective-gauss-2": Look(YELLOWS[2], "<"),
-    "collective-gauss-4": Look(YELLOWS[0], ">"), "collective-gauss-6": Look(YELLOWS[2], "P"),
-    "generalised-alpha": Look(YELLOWS[0], "X"),
-    "lie-variational": Look(BLUES[1], "o"), "lie-variational-suzuki-4": Look(BLUES[2], "X"),
-    "euler-poincare": Look(BLUES[1], "s"),
+_LOOKS = {  # of the methods that people know; `look` finds one for every other integrator
+    "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "stormer-verlet": Look(GREEN, "^"),
+    "strang": Look(GREEN, "<"), "cayley": Look(GREENS[1], ">"), "takahashi-imada": Look(GREEN, "P"),
+    "yoshida-4": Look(GREENS[2], "p"), "srkn-14-6": Look(GREENS[2], "H"), "rk4": Look(ORANGE, "o"),
+    "rk45-compiled": Look(ORANGES[1], "s"), "tsit5-fixed": Look(ORANGES[1], "P"), "vern9-fixed": Look(ORANGES[2], "s"),
+    "dop853-compiled": Look(ORANGE, "v"), "gauss-4": Look(ORANGE, "^"), "gauss-8": Look(ORANGES[2], ">"),
     "rk45": Look(VERMILLION, "D"), "dop853": Look(VERMILLION, "o"), "lsoda": Look(REDS[1], "s"),
-    "radau": Look(REDS[2], "v"),
-    "taylor": Look(BLACK, "*", 6.0), "taylor-longdouble": Look(BLACK, "o"), "taylor-quad": Look(BLACKS[1], "s"),
-    "series": Look(BLACKS[1], "D"), "series-adaptive": Look(BLACKS[1], "^"), "exact": Look(GREY, "x"),
-    "no-gyro": Look(SKY, "o"), "no-gyro-float32": Look(SKIES[2], "o"), "no-gyro-linear": Look(SKIES[1], "o"),
-    "mujoco-euler": Look(SKIES[1], "s"), "mujoco-implicit": Look(SKIES[2], "s"), "bullet": Look(SKY, "v"),
-    "bullet-float32": Look(SKIES[2], "v"), "jolt": Look(SKY, "^"), "jolt-float32": Look(SKIES[2], "^"),
-    "physx": Look(SKY, "<"), "physx-float32": Look(SKIES[2], "<"), "rapier": Look(SKY, ">"),
-    "rapier-float32": Look(SKIES[2], ">"), "ode": Look(SKIES[1], "D"), "lammps-rigid": Look(SKIES[1], "P"),
-    "no-squish": Look(SKY, "P"), "yade": Look(SKIES[1], "X"), "fincham": Look(SKY, "X"),
-    "mujoco3-rk4": Look(SKIES[1], "p"), "rkmk4": Look(SKY, "p"), "jsbsim-default": Look(SKIES[1], "h"),
-    "jsbsim-buss2": Look(SKY, "h"),
+    "radau": Look(REDS[2], "v"), "taylor": Look(BLACK, "*", 6.0), "series": Look(BLACKS[1], "D"),
+    "exact": Look(GREY, "x"),
 }  # fmt: skip
-
-OUTCOME_COLORS = {
-    "accurate": GREEN, "bounded_but_wrong": YELLOW, "drifting": ORANGE, "wrong_regime": PURPLE,
-    "left_chart": VERMILLION, "not_converged": BLUE, "not_finite": BLACK, "step_too_small": GREY,
-    "out_of_budget": SKY,
-}  # fmt: skip
-
 
 FILLS = {"angles": "none", "axis": "full", "attitude": "left"}  # of a marker, by chart
 
@@ -120,8 +79,8 @@ FILLS = {"angles": "none", "axis": "full", "attitude": "left"}  # of a marker, b
 def look(name: str) -> Look:
     """Colour and marker of an integrator or a variant: the marker of ``rk4[angles]`` is open, of ``rk4[axis]`` full.
 
-    One that `_LOOKS` does not name gets a shade of its family and a marker that none of these has; which of them
-    depends on its name alone, not on what else is registered.
+    One that `_LOOKS` does not name gets a shade of its family and a marker that no other has, by its place in the
+    registry, to which others are added at the end; of a name that is not registered they follow from the name alone.
     """
     from symtop.methods.framework.registry import integrators, split_name
 
@@ -133,10 +92,11 @@ def look(name: str) -> Look:
     dash = DASHES.get(family, "-")
     if name in _LOOKS:
         return _LOOKS[name]._replace(dash=dash)
-    shades = _SHADES[family]
-    free = [Look(shade, marker) for marker in _MARKERS for shade in shades]
-    free = [one for one in free if all((one.color, one.marker) != shipped[:2] for shipped in _LOOKS.values())]
-    return free[zlib.crc32(name.encode()) % len(free)]._replace(dash=dash)
+    taken = {one[:2] for one in _LOOKS.values()}
+    free = [Look(shade, marker) for marker in _MARKERS for shade in SHADES[family] if (shade, marker) not in taken]
+    alike = [one for one, method in registered.items() if method.family == family and one not in _LOOKS]
+    place = alike.index(name) if name in alike else zlib.crc32(name.encode())
+    return free[place % len(free)]._replace(dash=dash)
 
 
 def line(name: str, scale: float = 1.0) -> dict[str, Any]:
@@ -173,37 +133,8 @@ def use() -> None:
     plt.rcParams.update(PAPER)
 
 
-def compact(picture: "Image.Image") -> "Image.Image":
-    """A picture with 256 colours, a third of the bytes: ours exactly as they are, the rest as the picture needs.
-
-    A palette made from the picture alone would merge the colour of a few small markers with a neighbour's.
-    """
-    from PIL import Image  # matplotlib brings it
-    from PIL.ImageColor import getrgb
-
-    shades = [shade for family in _SHADES.values() for shade in family]
-    ours = dict.fromkeys([*shades, *(look.color for look in _LOOKS.values()), *OUTCOME_COLORS.values(), "#FFFFFF"])
-    fixed = np.array([getrgb(color) for color in ours], np.uint8)
-    picture = picture.convert("RGB")
-    free = picture.quantize(256 - len(ours)).getpalette() or []
-    palette = Image.new("P", (1, 1))
-    palette.putpalette([*fixed.ravel().tolist(), *free][:768])
-    drawn = picture.quantize(palette=palette, dither=Image.Dither.NONE)
-    colors, known = (  # every colour as one number
-        np.asarray(image.convert("RGBA")).view(np.uint32)[..., 0]
-        for image in (picture, Image.fromarray(fixed[np.newaxis]))
-    )
-    known = known.ravel()
-    order = np.argsort(known)
-    nearest = order[np.minimum(np.searchsorted(known, colors, sorter=order), len(known) - 1)]
-    # The library's search for the nearest is a little coarse.
-    places = np.where(known[nearest] == colors, nearest, np.asarray(drawn))
-    drawn.frombytes(places.astype(np.uint8).tobytes())
-    return drawn
-
-
 def save(figure: Any, target: Path) -> None:
-    """Write a figure as a compact PNG, an SVG or a PDF, or a film as it is, whole or not at all, and close it."""
+    """Write a figure as a PNG, an SVG or a PDF, whole or not at all, and close it."""
     _write(figure, target)
     plt.close(figure)
 
@@ -215,7 +146,7 @@ def sketch(figure: Any, target: Path) -> None:
 
 
 def publish(figure: Any, target: Path) -> None:
-    """Write a figure as a PNG and, for print, as a PDF beside it, laid out once; a film has no PDF."""
+    """Write a figure as a PNG and, for print, as a PDF beside it, laid out once."""
     _write(figure, target)
     if target.suffix == ".png":
         figure.set_layout_engine("none")
@@ -227,7 +158,6 @@ def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
     """A figure in a file of its kind; ``savefig`` would draw a PNG or a PDF twice, once to lay it out."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
-    from PIL import Image
 
     metadata = {UNDATED.get(target.suffix, "Software"): None}
     netcdf.sweep(target)
@@ -238,20 +168,8 @@ def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
         figure.set_dpi(dpi)
         if target.suffix == ".pdf":
             FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
-        elif dpi == DPI:
-            canvas = FigureCanvasAgg(figure)
-            canvas.draw()
-            compact(Image.fromarray(np.asarray(canvas.buffer_rgba()))).save(path, compress_level=LEVEL)
         else:
             FigureCanvasAgg(figure).print_png(path, metadata=metadata)
-
-
-def number(value: float, digits: int = 2) -> str:
-    """A number of a title as it is printed: ``10⁻⁶``, ``1.4 × 10⁻¹³``, ``0.012``, ``340``; no line breaks within it."""
-    text = f"{value:.{digits}g}" if not 10.0**digits <= abs(value) < 1e4 else f"{value:.0f}"
-    mantissa, mark, power = text.partition("e")
-    ten = f"10{str(int(power or 0)).translate(RAISED)}"
-    return text if not mark else ten if mantissa == "1" else f"{mantissa}{FIRM}×{FIRM}{ten}"
 
 
 def headline(figure: Any, message: str) -> None:

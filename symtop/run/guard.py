@@ -363,7 +363,7 @@ def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expec
     growth, steps = _growth(scene, method, chart, step, frequency), plan.horizon / step
     beside = marks.gap if marks.gap < BESIDE else 0.0  # of a pole, what grows is the tilt
     size, folds = marks.width + beside + growth.size, steps * math.log(max(growth.factor, 1.0))
-    grows = growth.factor > 1.0 + max(NO_GROWTH, NONLINEAR * growth.size)
+    grows = growth.factor > 1.0 + max(NO_GROWTH, NONLINEAR * growth.size, growth.doubt)
     if not grows or not size * math.expm1(min(folds, MOST_FOLDS)) > EXPECTED:
         return None
     good, bad = SMALL_TURN / frequency, step
@@ -439,5 +439,5 @@ def _coarse(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: 
 
 def _smaller(method: Integrator, plan: Plan, expected: Forecast) -> float:
     """The step at which the forecast would be `AIM`, if the method keeps its order."""
-    step = plan.step_size * math.pow(AIM / min(expected.axis_error, 1.0), 1.0 / (method.order or 1))
+    step = plan.step_size * math.pow(AIM / (min(expected.axis_error, 1.0) or AIM), 1.0 / (method.order or 1))
     return min(step, plan.step_size * expected.steps_per_nutation / 20.0) if expected.axis_error > 1.0 else step

@@ -126,6 +126,7 @@ class Growth(NamedTuple):
 
     factor: float  # of their size; NaN if it is not known
     size: float  # rad, of what the method adds to them: its own offset from the steady precession, and its rounding
+    doubt: float = 0.0  # of the factor: its rounding
 
 
 def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, frequency: float) -> Growth:
@@ -136,7 +137,9 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
     even in the distance cancels. Beside a pole the difference is that of e_x + i e_y, and t and d are complex. Some
     steps of a fine h are one of the recurrence, so that it turns by a good part of a radian; `frequency` is that of
     small nutations. Where the difference does not obey it (a method with more roots than two, say), its size is
-    followed for longer. Rounding of each step adds up, as a random walk, until that of the first has grown by e.
+    followed for longer. Rounding of each step adds up, as a random walk, until that of the first has grown by e. Where
+    so many steps of a fine h turn it by a small angle a, the two terms are nearly one, and rounding e of the difference
+    leaves a doubt of e/a^2 in their roots.
     """
     stride = max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))  # steps
     runs, delta, off = _apart(method, scene, h, chart, NUDGE, stride)
@@ -155,7 +158,8 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
     if not math.isfinite(factor):
         return Growth(math.nan, 0.0)
     factor **= 1.0 / stride
-    return Growth(factor, off + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), SLOWEST)))
+    doubt = ROUNDING / nudge / min(stride * h * frequency, 1.0) ** 2 / stride
+    return Growth(factor, off + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), SLOWEST)), doubt)
 
 
 def _apart(

@@ -24,7 +24,7 @@ from tqdm import tqdm
 from symtop.core import netcdf
 from symtop.core.code_hash import by_file, digest, hashed
 from symtop.core.errors import SymtopError, SymtopWarning, check_replaceable, file_path, positive, whole
-from symtop.core.files import cache_root
+from symtop.core.files import cache_root, make_private
 from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
 from symtop.core.progress import beating
@@ -136,9 +136,7 @@ def long_run(
     cannot be written.
     """
     chosen, method = find_scene(scene), find_integrator(integrator)
-    count, h = whole("steps", steps, 1), positive("step_size", step_size)
-    if count > MOST_STEPS:
-        raise SymtopError(f"steps must be at most {MOST_STEPS}, not {count}", "steps")
+    count, h = whole("steps", steps, 1, MOST_STEPS), positive("step_size", step_size)
     _, solver = chart_of(method)
     assert isinstance(solver.loop, Loop)  # noqa: S101
     loop = solver.loop if compensated else solver.loop.plain()
@@ -273,6 +271,8 @@ class _Checkpoint:
         columns: dict[str, Any] = {"position": ("number", numbers), "rows": (("window", "part"), rows)}
         data = xr.Dataset({**columns, "steps_done": ((), at.k)})
         data.attrs.update(content=netcdf.content_hash(data), identity=self.identity)
+        if self.own:
+            make_private(self.file.parent)
         netcdf.write(data, self.file)
         self.saved, self.latest = time.monotonic(), None
 

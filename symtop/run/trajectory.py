@@ -44,7 +44,10 @@ class Trajectory(NamedTuple):
 
     @classmethod
     def of_run(cls, scene: Scene, chart: str, plan: Plan, run: Run) -> Self:
-        """The observables of a run, whatever chart it was computed in; phi and psi are made continuous."""
+        """The observables of a run, whatever chart it was computed in; phi and psi are made continuous.
+
+        A run that ends well, and whose states are so large that one of these is not finite, ends where that begins.
+        """
         with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up, and that is a result
             view = View(chart, scene.top, run.states, run.p_phi, run.p_psi)
             phi, psi = view.phi, view.psi
@@ -54,9 +57,12 @@ class Trajectory(NamedTuple):
                 phi, psi = (*continuous(np.array(angles), guides), None)[:2]
             axis, energy, p_theta = readings(view)
             quaternion = view.quaternion if chart == "attitude" else None
+            outcome, reached = run.outcome, run.reached
+            if outcome == "ok" and not (whole := np.isfinite(energy + run.p_phi)).all():  # its squares overflow
+                outcome, reached = "not_finite", plan.last_of(whole)
             return cls(
                 plan.times, view.theta, phi, psi, axis, quaternion, energy, p_theta, run.p_phi, run.p_psi, chart,
-                plan.step_size, plan.tolerance, *run[3:],
+                plan.step_size, plan.tolerance, *run[3:6], outcome, reached,
             )  # fmt: skip
 
     @classmethod

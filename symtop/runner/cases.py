@@ -20,7 +20,7 @@ from typing import Any, Self
 import xarray as xr
 
 from symtop.core import code_hash, netcdf
-from symtop.core.progress import beating, progress_bar
+from symtop.core.progress import beating, post, progress_bar
 from symtop.measure.datasets import Combined, combine, differences
 from symtop.run import plugins
 from symtop.runner import fingerprint, store
@@ -60,8 +60,7 @@ class StudyCases:
 
     def add(self, cases: Iterable[Case]) -> dict[Path, Case]:
         """Take cases in; returns them by their files."""
-        chosen = list(cases)
-        new = dict(zip(store.case_paths(self.results, self.study, chosen), chosen, strict=True))
+        new = {store.case_path(self.results, self.study, case): case for case in cases}
         self.cases |= new
         return new
 
@@ -89,6 +88,7 @@ class StudyCases:
         """Have cases computed, with a progress bar where somebody is watching."""
         script = str(file_of(self.study.name))
         tasks = [Task(script, case, path, plugins.loaded(), limit, fresh) for path, case in missing.items()]
+        before = self.computed + len(self.failures)
         with beating(progress_bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case")) as bar:
 
             def on_result(task: Task, result: Result) -> None:
@@ -98,6 +98,8 @@ class StudyCases:
                     self.failures.append(result.message)
                     bar.set_postfix_str(f"{len(self.failures)} failed", refresh=False)
                 self.computed += result.state == "computed"
+                done = self.computed + len(self.failures) - before
+                post(f"{self.study.name}: {done} of {len(tasks)} cases")
                 bar.update()
 
             pool.run(self.study, tasks, on_result)

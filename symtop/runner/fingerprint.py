@@ -1,4 +1,4 @@
-"""What a case's numbers and a study's figures are made of, found without running them (`core.code_hash`).
+"""What a case's numbers are made of, found without running them (`core.code_hash`).
 
 The measure of a study, a scene and the integrators that the case runs (`Study.uses`) count by the code that they reach
 and by their values, so that an edit of one method's coefficients makes the cases of that method stale and no other.
@@ -7,32 +7,24 @@ Settings and versions of packages count besides, and for timed cases the process
 
 import functools
 import json
-from collections.abc import Iterable
-from pathlib import Path
-from typing import Any
 
 from symtop.core import code_hash
-from symtop.core.code_hash import Code, Reasons
+from symtop.core.code_hash import Reasons
+from symtop.core.jit import code
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.model.scenes import scenes
 from symtop.runner.study import REFERENCE, Case, Study, failing
 
 EVERY = "*"  # in place of an integrator's or a scene's name: all of them
 _known: dict[tuple[str, int], tuple[object, Reasons]] = {}  # by label and id of a thing, which is held for its id
-
-
-@functools.cache
-def _code() -> Code:
-    from symtop.core.jit import code  # numba
-
-    return code()
+reached = functools.cache(code)  # what every fingerprint of the process looks for code with
 
 
 def made_of(label: str, thing: object) -> Reasons:
     """What a thing leads to, as it was when it was first asked for."""
     key = label, id(thing)
     if key not in _known:
-        _known[key] = thing, _code().reasons(label, thing)
+        _known[key] = thing, reached().reasons(label, thing)
     return _known[key][1]
 
 
@@ -46,8 +38,8 @@ def used(study: Study, case: Case) -> list[str]:
 
 def settings_key(study: Study, case: Case) -> str:
     """Hash of what a case was asked to do, which an edit of the code does not change."""
-    asked = [study.name, case.scene, case.integrator, case.group, dict(case.settings)]
-    return code_hash.hashed(json.dumps(asked, sort_keys=True))
+    question = [study.name, case.scene, case.integrator, case.group, dict(case.settings)]
+    return code_hash.hashed(json.dumps(question, sort_keys=True))
 
 
 def reasons(study: Study, case: Case) -> Reasons:
@@ -60,17 +52,6 @@ def reasons(study: Study, case: Case) -> Reasons:
     return code_hash.merged(parts) | ({"processor": code_hash.processor()} if study.is_timed(case) else {})
 
 
-def digests(study: Study, cases: Iterable[Case]) -> list[str]:
-    """Hashes of everything that the numbers of cases depend on."""
-    return [code_hash.digest(reasons(study, case)) for case in cases]
-
-
-def drawing_digest(study: Study, script: Path, *drawing: Any) -> str:
-    """Hash of what makes a study's figures, tables and sentences, and of the files beside its script that they fill."""
-    shown = (
-        study.pictures, study.verdict, study.tables, study.charts, study.opening,
-        study.title, study.question, study.how_to_read,
-    )  # fmt: skip
-    templates = {f"file {file.name}": code_hash.file_hash(file) for file in sorted(script.parent.glob("*.md"))}
-    code = _code().reasons("drawing", shown, drawing)
-    return code_hash.digest(code | templates | code_hash.packages("matplotlib"))
+def digest(study: Study, case: Case) -> str:
+    """Hash of everything that the numbers of a case depend on."""
+    return code_hash.digest(reasons(study, case))

@@ -1,6 +1,6 @@
 """What the files of a results folder were made of: ``cases/manifest.json``.
 
-An entry, of a study or of the report, holds a hash of what its files were made of, and size and time of the last
+The entry of a study holds a hash of what its files were made of, and size and time of the last
 change of each. A disk that loses bits by itself is found by ``symtop study --check``. Without the manifest everything
 is read and drawn again, and nothing is computed again.
 """
@@ -12,8 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from symtop.core import files
-
-PAGE = "report.html"  # the entry that is no study's
 
 
 def path_of(results: Path) -> Path:

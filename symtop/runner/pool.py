@@ -20,6 +20,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from functools import partial
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,7 +30,7 @@ from tqdm import tqdm
 
 from symtop.core import files, netcdf, parallel
 from symtop.core.errors import SymtopError, words_of
-from symtop.core.signals import at_most, is_of_user
+from symtop.core.signals import HANGUP, at_most, is_of_user
 from symtop.measure.timing import DISTURBED, slowdown
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.run import cluster, plugins
@@ -83,7 +84,7 @@ def execute_case(task: Task, study: Study | None = None) -> Result:
     """
     study = study or prepare(task.study, task.plugins)
     path, case = task.path, task.case
-    if fingerprint.digests(study, [case]) != [store.digest_of(path)]:
+    if fingerprint.digest(study, case) != store.digest_of(path):
         raise SymtopError(
             f"the sources or dependencies of {case.integrator} on {case.scene} are not those that the study was "
             "started with; if a file was edited meanwhile, run the study again"
@@ -116,15 +117,12 @@ def _traced(task: Task) -> Iterator[None]:
         yield
         return
     trace = store.trace_path(task.path)
-    try:
-        with trace.open("w") as file:
-            faulthandler.dump_traceback_later(task.limit + 0.5 * GRACE, file=file)
-            try:
-                yield
-            finally:
-                faulthandler.cancel_dump_traceback_later()
-    finally:
-        trace.unlink(missing_ok=True)
+    with contextlib.ExitStack() as stack:
+        stack.callback(trace.unlink, missing_ok=True)
+        file = stack.enter_context(trace.open("w"))
+        stack.callback(faulthandler.cancel_dump_traceback_later)
+        faulthandler.dump_traceback_later(task.limit + 0.5 * GRACE, file=file)
+        yield
 
 
 def failed(task: Task, why: object, trace: str = "") -> Result:
@@ -154,6 +152,11 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             wait(self._analyses)
             self.close_workers()
             self.size = min(size, self.jobs)
+            if threading.current_thread() is threading.main_thread():
+                # the process in which Python counts semaphores is deaf to SIGHUP; Python protects it from SIGTERM alone
+                before = signal.signal(HANGUP, signal.SIG_IGN)
+                resource_tracker.ensure_running()
+                signal.signal(HANGUP, before)
             self._workers = ProcessPool(
                 self.size, initializer=begin_worker, initargs=(os.getpid(),), context=parallel.OneThreadEach()
             )
@@ -161,8 +164,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
     def submit(self, function: Callable[..., Any], *args: Any, limit: float | None = None) -> "Future[Any]":
         """Call a function in a worker; after `limit` seconds the worker is ended, and the result is TimeoutError."""
         assert self._workers is not None  # noqa: S101
-        future: Future[Any] = self._workers.schedule(function, args=args, timeout=limit)
-        return future
+        return self._workers.schedule(function, args=args, timeout=limit)
 
     def analyse(self, function: Callable[..., Any], *args: Any) -> "Future[Any]":
         """Call a function in a worker beside the cases of the next study; timed ones wait until it is done."""
@@ -180,13 +182,19 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             chosen = in_order([task for task in tasks if study.is_timed(task.case) == timed])
             if chosen and timed:
                 wait(self._analyses)
-            local = any(plugins.is_local(name) for task in chosen for name in task.case.names)
+            local = any(plugins.is_local(name) for task in chosen for name in (task.case.scene, *task.case.integrators))
             if self.client is not None and not timed and not local:
                 submit = partial(self.client.get_executor(pure=False).submit, execute_case)
                 _drain(chosen, submit, cluster.width(self.client), on_result)
             elif local or (len(chosen) < WORTH_WORKERS and not self.size):
-                here = [task._replace(timed=(1, math.nan) if timed else None) for task in chosen]
-                _drain(here, lambda task: _done(execute_case, task, study), 1, on_result)
+                ahead = deque(task._replace(timed=(1, math.nan) if timed else None) for task in chosen)
+                while ahead:
+                    task = ahead.popleft()
+                    if (result := execute_case(task, study)).state == "busy":
+                        ahead.append(task)
+                        time.sleep(BUSY)
+                    else:
+                        on_result(task, result)
             else:
                 self._in_workers(chosen, on_result, timed=timed)
 
@@ -204,16 +212,14 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             else:
                 on_result(task, failed(task, ENDED) if result.state == "died" else result)
 
-        def submit(task: Task) -> "Future[Result]":
-            return self.submit(execute_case, task, limit=task.limit + GRACE)
-
         for alone in (False, True):
             while left:
                 self.open(min(self.jobs, len(left)))
                 together = self.at_once(min(self.size, len(left))) if timed else None
                 width = 1 if alone else AHEAD * self.size if together is None else together[0]
                 try:
-                    _drain([task._replace(timed=together) for task in left.values()], submit, width, settle)
+                    ahead = [task._replace(timed=together) for task in left.values()]
+                    _drain(ahead, lambda task: self.submit(execute_case, task, limit=task.limit + GRACE), width, settle)
                 except BrokenExecutor:
                     self.close_workers()
                     fruitless += 1
@@ -281,16 +287,6 @@ def in_order(tasks: Sequence[Task]) -> list[Task]:
         return count[family]
 
     return sorted(tasks, key=rank)
-
-
-def _done(function: Callable[..., Any], *args: Any) -> "Future[Any]":
-    """What a call in this process returned, as the future of one elsewhere."""
-    future: Future[Any] = Future()
-    try:
-        future.set_result(function(*args))
-    except Exception as error:  # noqa: BLE001  (a future hands on what its function raised)
-        future.set_exception(error)
-    return future
 
 
 def _drain(tasks: Sequence[Task], submit: Callable[[Task], "Future[Result]"], width: int, settle: OnResult) -> None:

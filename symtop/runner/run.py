@@ -2,11 +2,13 @@
 
 A case is computed only if no file holds its digest: an interrupted study resumes, an unchanged one ends in seconds. Two
 commands may share one folder: each case is computed by one of them. How a picture is written is the caller's choice.
+The findings, NAME.json, hold the facts of a study and the names of its tables, figures and charts, for the report.
 """
 
 import contextlib
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, CancelledError
 from itertools import chain
 from pathlib import Path
@@ -14,22 +16,23 @@ from typing import Any, NamedTuple
 
 from pebble import ProcessExpired
 
-from symtop.core import files, netcdf
-from symtop.core.code_hash import hashed
-from symtop.core.errors import positive
+from symtop.core import code_hash, files, netcdf
+from symtop.core.errors import label, positive, shown
 from symtop.core.progress import beating, progress_bar
-from symtop.measure.datasets import combine
+from symtop.measure import columns
+from symtop.measure.datasets import Combined, combine
 from symtop.model.scenes import scenes
 from symtop.run import plugins
 from symtop.runner import fingerprint, manifest, store
 from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool, prepare
-from symtop.runner.scripts import file_of, folder, load, names
-from symtop.runner.study import Case, Save, Study, findings_of
+from symtop.runner.scripts import file_beside, file_of, folder, load, names
+from symtop.runner.study import LONGEST, Case, Chart, Picture, Save, Study, StudyError, each, failing
 
-__all__ = ["findings_of", "folder", "load", "names", "run", "start"]
+__all__ = ["file_beside", "findings_of", "folder", "load", "names", "run", "start"]
 
 Findings = dict[str, Any]
+QUICK = "quick pass: coarse grid"  # beside a figure of one
 
 
 class Started(NamedTuple):
@@ -66,7 +69,7 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
     rounds = cases.rounds(quick=quick, full=full)
     first = next(rounds)
     drawing = drawing_digest(study, save)
-    made_of = hashed(*sorted(path.name for path in first), drawing)
+    made_of = code_hash.hashed(*sorted(path.name for path in first), drawing)
     if not fresh and manifest.is_current(results, study.name, made_of):
         known = netcdf.read_json(results / f"{study.name}.json")
         if isinstance(known, dict):
@@ -78,7 +81,7 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
         pool.close()  # before what its processes have left is removed
         store.tidy(results, study)
         raise
-    local = any(plugins.is_local(name) for case in cases.cases.values() for name in case.names)
+    local = any(plugins.is_local(name) for case in cases.cases.values() for name in (case.scene, *case.integrators))
     script = str(file_of(study.name))
     future = None
     if beside and pool.jobs > 1 and not local and study is load(script):
@@ -114,8 +117,13 @@ def analyse_stored(
 
 
 def drawing_digest(study: Study, save: Save | None) -> str:
-    """Hash of what combines, draws and judges."""
-    return fingerprint.drawing_digest(study, file_of(study.name), combine, save)
+    """Hash of what combines, draws and judges, and of the files beside a study that they fill."""
+    answers = study.facts, study.pictures, study.tables, study.charts, study.title, study.question
+    drawing = combine, columns.described, findings_of, save
+    files_beside = (file_beside(study.name, name) for name in ("page.md", "columns.tsv"))
+    texts = {f"file {file.name}": code_hash.hashed(file.read_text(encoding="utf-8")) for file in files_beside if file}
+    code = fingerprint.reached().reasons("drawing", answers, drawing)
+    return code_hash.digest(code | texts | code_hash.packages("matplotlib"))
 
 
 def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> Findings:
@@ -126,15 +134,90 @@ def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> 
         for file in (dataset, words):
             netcdf.sweep(file)
         combined = cases.combined()
-        places = [catalogue.get(case.scene) for case in cases.cases.values()]
-        units = "SI" if all(place is not None and place.units == "SI" for place in places) else ""
+        systems = {getattr(catalogue.get(case.scene), "units", "") for case in cases.cases.values()}
+        units = "SI" if systems == {"SI"} else ""
+        combined = columns.described(combined, units, netcdf.read_columns(file_beside(study.name, "columns.tsv")))
         combined = netcdf.describe(combined, study.title, units=units, question=study.question)
         netcdf.write(combined, dataset)
         store.forget(results, study, cases.cases)
-        findings = findings_of(study, combined, results, save, failures=cases.failures, cases=len(cases.cases))
-        findings["quick"] = quick
+        findings = findings_of(
+            study, combined, results, save, failures=cases.failures, cases=len(cases.cases), quick=quick,
+            page=file_beside(study.name, "page.md"),
+        )  # fmt: skip
         netcdf.write_json(words, findings)
         if not cases.failures and made_of:
             pictures = [results / "figures" / picture["file"] for picture in findings["pictures"]]
-            manifest.note(results, study.name, made_of, [dataset, words, *pictures, *cases.cases])
+            tables = [results / "tables" / table["file"] for table in findings["tables"]]
+            manifest.note(results, study.name, made_of, [dataset, words, *pictures, *tables, *cases.cases])
     return findings
+
+
+def findings_of(
+    study: Study, data: Combined, results: Path, save: Save | None, *, failures: list[str], cases: int,
+    quick: bool = False, page: Path | None = None,
+) -> Findings:  # fmt: skip
+    """Draw a dataset, write its tables, and say what it shows; `page` is the template of its page."""
+    charts = each(study.name, "charts", lambda: study.charts(data), Chart, "a list of Chart")
+    return {
+        "study": study.name, "title": study.title, "question": study.question,
+        "charts": [chart._asdict() | {"marks": dict(chart.marks)} for chart in charts],
+        "failures": failures, "cases": cases, "quick": quick,
+        "provenance": netcdf.provenance(changes=True),
+        "facts": dict(_facts(study, data)),
+        "tables": list(_tables(study, data, results)),
+        "pictures": [] if save is None else list(_saved(study, data, results, save, quick=quick)),
+        "page": None if page is None else page.read_text(encoding="utf-8"),
+    }  # fmt: skip
+
+
+def _answers(study: Study, function: str, data: Combined, wanted: str) -> Iterator[tuple[Any, Any]]:
+    """What the facts or the tables of a study return, by name."""
+    with failing(study.name, function):
+        made = getattr(study, function)(data)
+    if not isinstance(made, Mapping):
+        raise StudyError(f"study {study.name}: {function} must return {wanted} by name, not {shown(made)[:LONGEST]}")
+    yield from made.items()
+
+
+def _facts(study: Study, data: Combined) -> Iterator[tuple[str, float | str | bool | None]]:
+    """Facts as JSON holds them: numbers, names, and None for what was not measured."""
+    for name, given in () if study.facts is None else _answers(study, "facts", data, "numbers"):
+        if not (isinstance(name, str) and name.isidentifier()):
+            must = f"the name of a fact must be a word of letters, digits and _, not {name!r}"
+            raise StudyError(f"study {study.name}: {must}")
+        value = given.item() if getattr(given, "ndim", None) == 0 else given  # of NumPy
+        if value is not None and not isinstance(value, (bool, int, float, str)):
+            must = f"fact {name} must be a number, text or None, not {shown(value)[:LONGEST]}"
+            raise StudyError(f"study {study.name}: {must}")
+        yield name, None if isinstance(value, float) and math.isnan(value) else value
+
+
+def _tables(study: Study, data: Combined, results: Path) -> Iterator[dict[str, Any]]:
+    """Write the tables, one CSV each."""
+    import pandas as pd
+
+    for name, frame in _answers(study, "tables", data, "tables"):
+        if not isinstance(frame, pd.DataFrame):
+            raise StudyError(f"study {study.name}: table {name} must be a DataFrame, not a {type(frame).__name__}")
+        with failing(study.name, "tables"):
+            label("name of a table", name)
+        file = f"{study.name}-{name}.csv"
+        netcdf.write_text(results / "tables" / file, frame.to_csv(index=False))
+        yield {"name": name, "file": file, "rows": len(frame)}
+
+
+def _saved(study: Study, data: Combined, results: Path, save: Save, *, quick: bool) -> Iterator[dict[str, str]]:
+    """Save the pictures one by one; StudyError for what is none."""
+    for picture in each(study.name, "pictures", lambda: study.pictures(data), Picture, "or yield Pictures"):
+        if not hasattr(picture.figure, "savefig"):
+            kind = type(picture.figure).__name__
+            raise StudyError(f"study {study.name}: the figure of a Picture must be one of matplotlib, not a {kind}")
+        with failing(study.name, "pictures"):
+            label("name of a picture", picture.name)
+        file = f"{study.name}-{picture.name}.{getattr(picture.figure, 'suffix', 'png')}"  # a film is a GIF
+        if quick and hasattr(picture.figure, "text"):
+            picture.figure.text(
+                0.998, 0.01, QUICK, rotation=90.0, ha="right", va="bottom", fontsize=6.0, color="#AD4A00"
+            )
+        save(picture.figure, results / "figures" / file)
+        yield {"name": picture.name, "file": file}

@@ -47,15 +47,27 @@ def install() -> ModuleType:
 def names() -> list[str]:
     """Names of the studies that ship with symtop, in the order of the report, which their package says."""
     shipped = sorted(path.parent.name for path in folder().glob("*/study.py"))
-    order = [name for name in install().ORDER if name in shipped]
-    return order + [name for name in shipped if name not in order]
+    order = install().ORDER
+    return sorted(shipped, key=lambda name: [*order, name].index(name))
 
 
 def file_of(name: str) -> Path:
     """The script of a study: a shipped one by its name, or any by its path, which ends in .py."""
     if name.endswith(".py"):
         return python_file(name, "study", "a name or a Python file that is there")
+    if (new := install().FORMER.get(name)) is not None:
+        raise SymtopError(f"study {name} is now {new}: symtop study {new}")
     return _elsewhere.get(name) or folder() / one_of("study", name, names()) / "study.py"
+
+
+def file_beside(name: str, file: str) -> Path | None:
+    """A file of a study beside its script: page.md, the template of its page, or columns.tsv, the table of its columns.
+
+    Beside study.py it has that name, beside any other script, NAME.py, it is NAME.md or NAME.tsv; None without one.
+    """
+    script = file_of(name)
+    path = script.with_name(file) if script.stem == "study" else script.with_suffix(Path(file).suffix)
+    return path if path.is_file() else None
 
 
 def _module(file: Path) -> ModuleType:

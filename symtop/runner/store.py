@@ -4,8 +4,8 @@ results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.npz            what one 
 results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.failed.json    or how it failed, with its traceback
 results/cases/STUDY/.SCENE--INTEGRATOR--SETTINGS--DIGEST.lock          while it is being computed
 results/STUDY.nc                                                       all of them, with labelled dimensions
-results/STUDY.json                                                     verdict, tables and captions for the report
-results/figures/STUDY-NAME.png
+results/STUDY.json                                                     facts, and names of figures and tables
+results/figures/STUDY-NAME.png, results/tables/STUDY-NAME.csv
 results/cases/manifest.json                                            what these were made of (`manifest`)
 
 SETTINGS is a hash of what the case was asked to do, DIGEST one of everything that its numbers depend on; its file holds
@@ -15,7 +15,7 @@ case with the same SETTINGS and another DIGEST takes its place. The operating sy
 
 import json
 import tempfile
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -33,12 +33,10 @@ from symtop.runner.study import Case, Study
 SEED = 0  # of the order in which batches are timed; nothing else here is random
 
 
-def case_paths(results: Path, study: Study, cases: Sequence[Case]) -> list[Path]:
-    """The files of cases; their names hold the digest of everything the numbers depend on."""
-    return [
-        results / "cases" / study.name / f"{case.label}--{fingerprint.settings_key(study, case)[:8]}--{digest}.npz"
-        for case, digest in zip(cases, fingerprint.digests(study, cases), strict=True)
-    ]
+def case_path(results: Path, study: Study, case: Case) -> Path:
+    """The file of a case; its name holds the digest of everything the numbers depend on."""
+    name = f"{case.label}--{fingerprint.settings_key(study, case)[:8]}--{fingerprint.digest(study, case)}.npz"
+    return results / "cases" / study.name / name
 
 
 def digest_of(path: Path) -> str:
@@ -84,14 +82,12 @@ def save_case(data: xr.Dataset, path: Path, study: Study, case: Case) -> None:
 
 def load_case(path: Path) -> xr.Dataset | None:
     """The dataset of a finished case, or None if there is none or it is damaged (then it is computed again)."""
-    if not path.is_file():
-        return None
     try:
         with path.open("rb") as stream, np.load(stream) as file:
             arrays = {name: file[name] for name in file.files}
         text, content = str(arrays.pop("about")), str(arrays.pop("content"))
         about = json.loads(text)
-    except Exception:  # noqa: BLE001  (a damaged archive raises nearly anything)
+    except Exception:  # noqa: BLE001  (no file, or a damaged archive, which raises nearly anything)
         return None
     if content != _content(text, arrays) or about["attributes"]["sources"] != digest_of(path):
         return None

@@ -1,5 +1,5 @@
 """The declaration of a study: a question, a grid of cases, a function that measures one case, and functions that turn
-the combined dataset into figures, tables and sentences. The runner does the rest.
+the combined dataset into facts, figures and tables. The runner does the rest; what is said of them is in a template.
 """
 
 import json
@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import xarray as xr
 
-from symtop.core import netcdf
 from symtop.core.errors import SymtopError, foreign_code, label, shown
 from symtop.measure.datasets import Combined
 from symtop.methods.framework.registry import split_name
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 REFERENCE = "exact"  # the integrator that is the closed form
@@ -39,9 +39,7 @@ def each(study: str, function: str, make: Callable[[], Any], kind: type, wanted:
     with failing(study, function):
         made = make()
     if isinstance(made, (str, bytes, Mapping, kind)) or not isinstance(made, Iterable):
-        text = " ".join(shown(made).split())
-        text = text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
-        raise StudyError(f"study {study}: {function} must return {wanted}, not {text}")
+        raise StudyError(f"study {study}: {function} must return {wanted}, not {shown(made)[:LONGEST]}")
     entries, end = iter(made), object()
     while True:
         with failing(study, function):
@@ -54,53 +52,35 @@ def each(study: str, function: str, make: Callable[[], Any], kind: type, wanted:
 
 
 class Picture(NamedTuple):
-    """A figure of the report: its file name, caption and text for those who cannot see it.
-
-    One with a `lead` opens the report: it is shown small on the first screen, under these few words on what it answers.
-    """
+    """A figure of the report and its file name; its title, caption and text for the blind stand in the template."""
 
     name: str
     figure: "Figure"
-    caption: str
-    alt: str
-    lead: str = ""
 
 
 class Series(NamedTuple):
-    """One line of a chart: an integrator's points (x, y, words shown at the pointer)."""
+    """One line of a chart: an integrator's points (x, y or more numbers, words shown at the pointer)."""
 
     integrator: str
-    points: Sequence[tuple[float, float, str]]
+    points: Sequence[tuple[Any, ...]]
 
 
 class Chart(NamedTuple):
     """A log-log chart the reader can point at and filter; the page draws it, beside the figure it repeats.
 
-    ``panels`` holds the series of each choice (a scene, a quantity), the first one shown at first.
+    ``panels`` holds the series of each choice (a scene, a quantity), the first one shown at first; `choices` says what
+    each part between ``" | "`` of their names chooses. `x` and `y` name the axes, or each is a choice of columns: of
+    places in a point, by their names. `marks` are, by panel, the x of a vertical line, the exact motion without an
+    integrator, and the y below which the truth cannot judge, both for the first columns.
     """
 
     name: str
     title: str
-    x: str
-    y: str
+    x: str | Mapping[str, int]
+    y: str | Mapping[str, int]
     panels: Mapping[str, Sequence[Series]]
-
-
-class Table(NamedTuple):
-    """A table of the report; cells are shown as they are."""
-
-    title: str
-    header: Sequence[str]
-    rows: Sequence[Sequence[str]]
-
-
-class Opening(NamedTuple):
-    """What the page says first: an answer in sentences, the table they come from, and the studies that explain it."""
-
-    question: str
-    sentences: Sequence[str]
-    table: Table
-    explained: Mapping[str, str] = MappingProxyType({})  # by studies, with what they are called here
+    choices: Sequence[str] = ("Show",)
+    marks: Mapping[str, tuple[float, float]] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -139,11 +119,6 @@ class Case:
         return self.integrator, *self.settings.get("integrators", ())
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """The scene and the integrators."""
-        return self.scene, *self.integrators
-
-    @property
     def label(self) -> str:
         """A name that is safe in a file: ``spheroid--rk4@axis`` for the variant rk4[axis]."""
         parts = "--".join(filter(None, (self.scene, self.integrator, self.group)))
@@ -154,21 +129,21 @@ class Case:
 class Study:
     """A question and how it is answered.
 
-    `pictures`, `verdict`, `tables`, `charts`, `opening` and `follow_up` get everything that was measured. Each picture
-    is saved and closed before the next one is drawn, if `pictures` draws them one by one.
+    `facts`, `tables`, `pictures`, `charts` and `follow_up` get everything that was measured. Facts are numbers or
+    names by name, None for what was not measured. Tables are stored as CSV. Each picture is saved and closed before the
+    next one is drawn, if `pictures` draws them one by one. A template beside the study says what they show
+    (`symtop.report.template`).
     """
 
     name: str
     title: str
     question: str
-    how_to_read: str
     cases: Callable[[bool], list[Case]]  # quick -> grid
     measure: Callable[[Case], xr.Dataset]
+    facts: Callable[[Any], Mapping[str, Any]] | None = None
     pictures: Callable[[Any], Iterable[Picture]] = lambda _: []
-    verdict: Callable[[Any], list[str]] = lambda _: []
-    tables: Callable[[Any], list[Table]] = lambda _: []
+    tables: Callable[[Any], Mapping[str, "pd.DataFrame"]] = lambda _: {}
     charts: Callable[[Any], list[Chart]] = lambda _: []
-    opening: Callable[[Any], Opening] | None = None  # for the first screen of the page
     full: Callable[[], list[Case]] | None = None  # a grid that takes much longer, for `--full`
     timed: bool = False  # all cases are
     follow_up: Callable[[Any], list[Case]] | None = None  # a second round, made from what the first one found
@@ -229,53 +204,8 @@ class Study:
             return answer and answered
 
         full, later = self.full, self.follow_up
-        answers = {name: able(getattr(self, name)) for name in ("pictures", "verdict", "tables", "charts", "opening")}
+        answers = {name: able(getattr(self, name)) for name in ("facts", "pictures", "tables", "charts")}
         return replace(
             self, cases=first, full=full and (lambda: chosen(full())),
             follow_up=later and (lambda data: chosen(later(data))), **answers,
         )  # fmt: skip
-
-
-def findings_of(
-    study: Study, data: Combined, results: Path, save: Save | None, *, failures: list[str], cases: int
-) -> dict[str, Any]:
-    """Draw a dataset and say what it shows, as the report wants it."""
-    verdict = each(study.name, "verdict", lambda: study.verdict(data), str, "a list of sentences")
-    tables = each(study.name, "tables", lambda: study.tables(data), Table, "a list of Table")
-    charts = each(study.name, "charts", lambda: study.charts(data), Chart, "a list of Chart")
-    opening = None
-    if study.opening is not None:
-        with failing(study.name, "opening"):
-            first = study.opening(data)
-        if not isinstance(first, Opening):
-            raise StudyError(f"study {study.name}: opening must return an Opening, not {shown(first)[:LONGEST]}")
-        opening = first._asdict() | {"table": first.table._asdict(), "explained": dict(first.explained)}
-    return {
-        "study": study.name,
-        **{name: getattr(study, name) for name in ("title", "question", "how_to_read")},
-        "verdict": list(verdict),
-        "tables": [table._asdict() for table in tables],
-        "charts": [chart._asdict() for chart in charts],
-        "opening": opening,
-        "pictures": [] if save is None else list(_saved(study, data, results, save)),
-        "failures": failures,
-        "cases": cases,
-        "quick": False,
-        "provenance": netcdf.provenance(changes=True),
-    }
-
-
-def _saved(study: Study, data: Combined, results: Path, save: Save) -> Iterator[dict[str, str]]:
-    """Save the pictures one by one; StudyError for what is none."""
-    for picture in each(study.name, "pictures", lambda: study.pictures(data), Picture, "or yield Pictures"):
-        words = {key: getattr(picture, key) for key in ("name", "caption", "alt", "lead")}
-        for key in (key for key, text in words.items() if not isinstance(text, str)):
-            raise StudyError(f"study {study.name}: a Picture must have a {key} that is text, not {shown(words[key])}")
-        if not hasattr(picture.figure, "savefig"):
-            kind = type(picture.figure).__name__
-            raise StudyError(f"study {study.name}: the figure of a Picture must be one of matplotlib, not a {kind}")
-        with failing(study.name, "pictures"):
-            label("name of a picture", picture.name)
-        file = f"{study.name}-{picture.name}.{getattr(picture.figure, 'suffix', 'png')}"  # a film is a GIF
-        save(picture.figure, results / "figures" / file)
-        yield {"file": file} | words

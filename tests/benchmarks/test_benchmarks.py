@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from benchmarks import bench, ensemble, kernels, lanes, measured, targets, truth, twin, whole_run
+from benchmarks import adaptive, bench, ensemble, kernels, lanes, measured, targets, truth, twin, whole_run
 from symtop.core import netcdf
 from symtop.measure.timing import Timing, timings
 from symtop.methods.framework import loop as loops
@@ -67,6 +67,7 @@ def test_a_twin_that_leaves_the_chart_says_so():
         ("strang", "axis"),
         ("midpoint", "angles"),
         ("rk4", "axis"),
+        ("dop853-compiled-fixed", "axis"),
         ("gauss-6", "axis"),
         ("gauss-2", "attitude"),  # nine components: the widest state that the loop adds up
     ],
@@ -104,7 +105,7 @@ def test_what_the_benchmark_leaves_is_what_the_report_shows(tmp_path):
     content = bench.findings(rows, {}, forms, reached, items, one_step, many, together, 1e-9, facts)
     netcdf.write_json(tmp_path / "bench.json", content)
     text = page.write(tmp_path).read_text()
-    markdown = (tmp_path / "report.md").read_text()
+    markdown = (tmp_path / "report.md").read_text() + (tmp_path / "reference.md").read_text()
     counted = ("1 of 2 kernels", "3.0 us at most", "123 times faster", "explicit: 1 of 2 methods")
     for words in (*counted, "gauss: 1 of 1 methods", "4.5 times with rk4[axis]", "2001-02-03", "an abacus"):
         assert words in text
@@ -158,3 +159,22 @@ def test_a_closed_form_is_set_up_and_sampled_in_ten_microseconds():
     constants, kept = (row for row in others if row not in samples)
     assert constants.median < 10e-6  # of one top among many
     assert kept.median < 10e-3  # a reference at 1001 times, asked for again
+
+
+# ---- adaptive steps in C ---------------------------------------------------------------------------------------------
+
+
+@needs_gcc
+@pytest.mark.parametrize("chart", ["axis", "attitude"])
+def test_the_adaptive_loop_in_c_takes_the_same_steps(chart):
+    row = adaptive.measure(chart, 1e-8, nutations=10.0, batches=2)
+    assert row.steps[0] == row.steps[1]
+    assert row.evaluations[0] == row.evaluations[1] + 3  # for the sample at the end
+    assert row.difference < 1e-9
+
+
+@needs_gcc
+@pytest.mark.slow
+@pytest.mark.parametrize("chart", ["angles", "axis", "attitude"])
+def test_an_adaptive_evaluation_takes_at_most_six_tenths_more_than_in_c(chart):
+    assert adaptive.measure(chart, 1e-6).ratio < 1.6

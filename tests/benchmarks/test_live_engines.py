@@ -54,6 +54,9 @@ def test_an_engine_that_raises_is_a_row_with_its_reason():
     made = measure.row(engines.Setting("Engine", "1", "bad", engines.FREE, "ode", broken))
     assert made["failed"] == "RuntimeError: no such body"
     assert not measure.agrees(made)
+    unknown = {**made, "method": "", "goldstein_step": 0.0, "fast_step": 0.0}
+    assert not measure.agrees(unknown)  # a map that the catalogue does not have
+    assert "1 setting of Engine ran without a map" in study.findings([unknown], [], "today")["page"]
     found = study.findings([made], ["Other is not installed here and was skipped: reason."], "today")
     assert found["failures"] == [*found["missing"], "Engine (bad): RuntimeError: no such body"]
 

@@ -115,18 +115,6 @@ def test_a_peer_that_is_not_installed_is_named_and_skipped(monkeypatch):
     assert all("skipped" in sentence for sentence in missing)
 
 
-def test_nothing_is_missing_where_everything_is_there():
-    found, missing = peers.load(("scipy", "odeint"))
-    assert missing == []
-    assert len({peer.row for peer in found}) == len(found)
-    assert {(peer.package, peer.chart, peer.language) for peer in found} == {
-        (package, chart, language)
-        for package, charts in (("scipy", ("axis", "angles")), ("scipy-odeint", ("axis",)))
-        for chart in charts
-        for language in (common.PYTHON, common.NUMBA_IN_PYTHON)
-    }
-
-
 def _own(name):
     return peers.Peer(measure.OURS, symtop.integrator(name), own.LANGUAGE)
 
@@ -204,28 +192,3 @@ def test_the_search_finds_the_loosest_setting():
     meets = next(point for point in points if point.error <= 1e-6)
     assert measure.accuracy(scene, method, 1.15 * meets.setting).error > 1e-6
     assert points == sorted(points, key=lambda point: -point.error)
-
-
-def test_compiling_is_not_taken_for_a_slow_solver(scene, monkeypatch):
-    """The first call of a jitted solver takes seconds; the ladder goes on all the same, until a run is slow itself."""
-    method = symtop.integrator("rk4")
-    calls = []
-
-    def run(_scene, _method, setting):
-        calls.append(setting)
-        slow = len(calls) == 1 or len(calls) == 6
-        return measure.Point(setting, 1.0, 0.0, 1, 1, 9.0 if slow else 0.0)
-
-    monkeypatch.setattr(measure, "accuracy", run)
-    assert len(measure.search(scene, method)) == 5
-    assert calls[0] == calls[1]
-
-
-# ---- our own rows ----------------------------------------------------------------------------------------------------
-
-
-def test_own_rows_are_those_that_integrate_and_heyokas_is_one_alone(scene, monkeypatch):
-    wanted = ("exact", "exact-discrete", "series", "taylor", "strang")
-    monkeypatch.setattr(measure, "methods", lambda: {name: symtop.integrator(name) for name in wanted})
-    packages = {peer.method.name: peer.package for peer, _ in measure.ours(scene, lambda _: None)}
-    assert packages == {"series": measure.OURS, "strang": measure.OURS, "taylor": measure.HEYOKA}

@@ -53,7 +53,7 @@ def test_both_ratios_against_scipy_stand_side_by_side_for_each_chart_and_languag
         "symtop": (1e-3, 2e-5), "scipy[axis] C": (6e-3, 4e-3), "scipy[axis] Python": (7e-3, 5e-3),
         "scipy[angles] Python": (1.2e-2, 1e-2),
     })  # fmt: skip
-    said = {sentence.partition(":")[0]: sentence for sentence in summary.verdict(data)}
+    said = {sentence.partition(":")[0]: sentence for sentence in summary.pairs(data)}
     for name, public, inner in (
         ("scipy[axis], C", "6", "200"), ("scipy[axis], Python", "7", "250"), ("scipy[angles], Python", "12", "500"),
     ):  # fmt: skip
@@ -78,9 +78,9 @@ def test_noise_is_not_called_a_win():
 
 def _peers_into(folder):
     data = _stored({"symtop": (1e-3, 2e-5), "scipy[axis] C": (6e-3, 4e-3)})
-    found = runner.findings_of(study.STUDY, data, folder, style.save, failures=["drake was skipped."], cases=2)
+    found = study.findings(data, [], folder, ["drake was skipped."])
     found["provenance"] = {**found["provenance"], "processor": "an abacus"}
-    netcdf.write_json(folder / "peers.json", found | {"measured": study.measured(data)})
+    netcdf.write_json(folder / "peers.json", found)
 
 
 def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_path, quick_results):
@@ -90,10 +90,10 @@ def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_p
     truth = runner.load("truth")
     runner.run(truth, tmp_path, quick=True, jobs=1, quiet=True, save=style.save)
     page.write(tmp_path)
-    text = (tmp_path / "report.md").read_text()
+    text = (tmp_path / "report.md").read_text() + (tmp_path / "reference.md").read_text()
     sections = re.findall(r"^## (.+)$", text, re.MULTILINE)
-    assert study.STUDY.title in sections
-    assert truth.title in sections
+    assert study.STUDY.question in sections
+    assert truth.question in sections
     assert "Measured on 2001-02-03" in text
     assert "an abacus" not in text.partition("## Provenance")[2]  # the studies were run here
 

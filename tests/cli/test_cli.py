@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+import symtop
 from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError
@@ -34,6 +35,13 @@ def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):
     assert done.exit_code == 3, done.output
     assert "theta left (0, pi)" in done.output
     assert netcdf.read(path).attrs["outcome"] == "left_chart"
+
+
+def test_recommend_tries_only_methods_that_need_no_more_than_there_is():
+    line = ("recommend", "spheroid", "--accuracy", "1e-4", "--horizon", 2, "--json", "--needs")
+    advice = json.loads(call(*line, "kicks, group").stdout)
+    assert symtop.integrator(advice["integrator"]).needs in ("kicks", "group")
+    assert call(*line, "solution").exit_code == 1  # the closed form has no step that could be recommended
 
 
 def test_the_table_for_the_documents_is_markdown():
@@ -78,9 +86,15 @@ def test_the_table_for_the_documents_is_markdown():
         ("scenes rk4", ["scene 'rk4'", "the name of an integrator"]),
         ("claims strang --scene nope", ["--scene 'nope'", "symtop scenes"]),
         ("recommend spheroid", ["--accuracy", "--i-use"]),
-        ("recommend spheroid --accuracy 1e-3 --i-use mujoco", ["--accuracy", "--i-use", "not both"]),
-        ("recommend spheroid --accuracy 1e-3 --step-size 1", ["--step-size", "--i-use"]),
+        ("recommend spheroid --i-use mujoco --quantity theta", ["--quantity", "axis", "'theta'"]),
+        ("recommend spheroid --accuracy 1e-3 --step-size 10", ["--step-size", "below the horizon 8", "10"]),
+        (
+            "recommend spheroid --accuracy 1e-3 --step-size 1 --per-nutation 9",
+            ["--step-size", "--per-nutation", "not both"],
+        ),
+        ("recommend spheroid --accuracy 1e-3 --keeps time", ["--keeps 'time'", "energy", "momenta"]),
         ("recommend spheroid --accuracy 5", ["--accuracy", "below pi", "5.0"]),
+        ("recommend spheroid --accuracy 1 --needs kicks,luck", ["--needs 'luck'", "derivative", "kicks", "this-top"]),
         ("study convergense", ["'convergense'", "convergence"]),
         ("study", ["name a study", "--all", "convergence"]),
         ("study convergence --all", ["--all", "not both"]),
@@ -145,7 +159,7 @@ def test_a_folder_is_no_output_and_nothing_is_computed_for_it(words, computes, t
     [
         (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
         (["recommend", "spheroid", "--accuracy", "1e-3"], "symtop.advise.recommend"),
-        (["claims", "strang", "--quick"], "symtop.judging.battery.judge"),
+        (["claims", "strang", "--quick"], "symtop.judging.judge_step.apart"),
     ],
 )
 def test_ctrl_c_is_neither_a_failed_case_nor_bad_input(words, called, monkeypatch):

@@ -48,3 +48,16 @@ def test_the_command_says_what_an_engine_does():
     done = CliRunner().invoke(main, ["recommend", "goldstein", "--i-use", "havok", "--horizon", "10", "--json"])
     assert done.exit_code == 0, done.output
     assert json.loads(done.output)["errors"]["default"] > 1.5
+
+
+def test_an_accuracy_beside_an_engine_is_advised_at_its_step_below_its_errors():
+    words = ["recommend", "spheroid", "--i-use", "mujoco-euler", "--accuracy", "1e-3", "--per-nutation", "500"]
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 0, done.output
+    engine, advice = done.output.split(" rad  mujoco-euler (mujoco-euler)\n")
+    step = symtop.scene("spheroid").nutation_period / 500.0
+    assert f"step {step:g}" in engine
+    assert f"step_size={step!r}" in advice
+    assert "meets axis error 0.001" in advice
+    assert CliRunner().invoke(main, [*words, "--step-size", "0.01"]).exit_code == 2
+    assert CliRunner().invoke(main, ["recommend", "spheroid", "--per-nutation", "0"]).exit_code == 2

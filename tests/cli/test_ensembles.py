@@ -11,6 +11,7 @@ from PIL import Image
 
 import symtop
 from symtop.cli.main import main
+from symtop.core import netcdf
 
 STEPS = ("--per-nutation", 30, "--nutations", 2)
 
@@ -30,9 +31,25 @@ def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path):
         symtop.population(50, seed=3), "strang", per_nutation=30, nutations=2, samples=21, quiet=True
     )
     with xr.open_dataset(path) as data:
-        assert data.load().identical(wanted)
+        assert data.load()[list(wanted.data_vars)].identical(wanted)
+        assert {"I1", "start_theta", "axis_error"} < set(data.data_vars) - set(wanted.data_vars)
     with Image.open(figure) as picture:
         assert np.asarray(picture.convert("L")).std() > 10.0
+
+
+def test_a_file_of_runs_holds_the_tops_their_starts_and_the_errors(tmp_path):
+    words = ("strang", "--members", 7, "--seed", 2, "--per-nutation", 50, "--nutations", 2, "--output")
+    file, tops = tmp_path / "runs.nc", symtop.population(7, seed=2)
+    for _ in range(2):  # the second call runs them again, into the same file
+        assert call(*words, file).exit_code == 0
+        data = netcdf.read(file)
+        np.testing.assert_array_equal(data["I1"].values, tops["I1"].values)
+        np.testing.assert_array_equal(data["start_theta_dot"].values, tops["theta_dot"].values)
+        wrong = symtop.errors(data, tops)
+        np.testing.assert_allclose(data["axis_error"].values, wrong["axis"].max("time").values, rtol=1e-6, atol=1e-14)
+        assert data["axis_error"].attrs["long_name"].startswith("angle between axes")
+    assert call(*words, tmp_path / "theta.nc", "--variables", "theta").exit_code == 0
+    assert "axis_error" not in netcdf.read(tmp_path / "theta.nc")
 
 
 def test_json_has_outcomes_and_errors_and_a_finer_step_has_smaller_ones():

@@ -15,13 +15,13 @@ import symtop
 from symtop.core import netcdf
 
 
-def lacking(data: xr.Dataset) -> list[str]:
-    """What breaks the convention."""
+def lacking(data: xr.Dataset | xr.DataTree) -> list[str]:
+    """What breaks the convention, in all groups."""
     left = [f"global {name}" for name in ("Conventions", "title", "source", "history") if not data.attrs.get(name)]
-    for name, variable in data.variables.items():
-        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", str(name)):
-            left.append(f"name {name}")
-        if name not in data.coords or name == "time":
+    for group in netcdf.groups(data).values():
+        for name, variable in group.variables.items():
+            if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", str(name)):
+                left.append(f"name {name}")
             left += [] if variable.attrs.get("long_name") else [f"long_name of {name}"]
             numbers = variable.dtype.kind in "fiu"
             left += [] if bool(variable.attrs.get("units")) == numbers else [f"units of {name}"]
@@ -40,6 +40,7 @@ MADE = {
     "ensemble": lambda _: symtop.ensemble(symtop.population(8, seed=1), "strang", per_nutation=50, nutations=1),
     "long_run": lambda _: symtop.long_run("spheroid", "strang", steps=20_000, step_size=0.001, quiet=True),
     "run": lambda run: run,
+    "sweep": lambda _: symtop.sweep("spheroid", "strang", step_size=[0.1, 0.01], horizon=1.0, quiet=True),
 }
 
 

@@ -69,11 +69,23 @@ def test_a_write_is_whole_and_gives_back_its_lock_wherever_it_is_interrupted(tmp
         assert file.read_bytes() == (tmp_path / "whole.nc").read_bytes()
 
 
+@pytest.fixture
+def default_handlers():
+    """SIGHUP as it is without ``nohup``, under which nobody hears it."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
 @pytest.mark.parametrize(
     ("number", "hearing", "kind"),
-    [(signal.SIGTERM, ending_on_sigterm, TerminatedError), (signal.SIGINT, told_apart, InterruptedByUser)],
+    [
+        (signal.SIGTERM, ending_on_sigterm, TerminatedError),
+        (signal.SIGHUP, ending_on_sigterm, TerminatedError),
+        (signal.SIGINT, told_apart, InterruptedByUser),
+    ],
 )
-def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, hearing, kind):
+def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, hearing, kind, default_handlers):
     done = []
     with hearing(), pytest.raises(kind):  # noqa: PT012 (the moment at which it is raised is what is tested)
         with deferred():

@@ -36,8 +36,9 @@ def test_what_is_no_netcdf_is_refused_in_a_sentence(tmp_path, content):
     path = tmp_path / "broken.nc"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(SymtopError, match=r"cannot read .*broken\.nc as netCDF"):
-        netcdf.read_any(path)
+    for read in (netcdf.read, netcdf.read_any):
+        with pytest.raises(SymtopError, match=r"cannot read .*broken\.nc as netCDF"):
+            read(path)
 
 
 def test_a_tree_can_be_read_beside_lazy_ones(stored):

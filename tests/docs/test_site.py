@@ -32,9 +32,9 @@ SOURCED = [  # modules of the mathematics that name where it is from
 ]
 SMALL = """# Report
 
-## Convergence
+## At what rate?
 
-*At what rate?*
+**Error against step**
 
 ![Lines.](figures/convergence-a.png)
 

@@ -54,51 +54,92 @@ REPORT = """# T
 
 Words.
 
-## Which?
+**Figure 1**
 
-- Begin with a; it is the cheapest on most of the tops that were drawn at random, and its error is the least of all.
-- Then b.
+![A](figures/a.png)
+
+## What do you have?
 
 | x | y |
 |---|---|
 | 1 | 2 |
 
+## What will go wrong
+
 More.
 
-## Next
+## Which is it? With what I have?
 
-- Not this.
+This is it, to `1e-6`.
+
+All: [table](tables/a-b.csv), [CSV](tables/c.csv).
+
+<!-- table a-b -->
+
+Data: [a.nc](a.nc).
 """
 
 
-def test_the_first_answer_is_put_between_the_marks_of_a_page():
+def test_what_is_not_tracked_is_not_linked(results, tmp_path):
+    (results / "report.md").write_text(REPORT)
+    _taker().take(results, tmp_path / "snapshot")
+    text = (tmp_path / "snapshot" / "report.md").read_text()
+    assert "All: table, CSV.\n\nData: a.nc.\n" in text
+    assert "![A](figures/a.png)" in text
+
+
+def test_what_is_quoted_is_put_between_the_marks_of_a_page():
     taker = _taker()
     page = f"# P\n\n{taker.BEGIN}old\n{taker.END}\nrest\n"
-    made = taker.quote(taker.answer(REPORT), page)
-    assert made == f"# P\n\n{taker.BEGIN}{taker.answer(REPORT)}{taker.END}\nrest\n"
-    assert " ".join(taker.answer(REPORT).split()).startswith(" ".join(REPORT.split("\n\n")[3].split()))
-    assert taker.answer(REPORT).endswith("- Then b.\n\n| x | y |\n|---|---|\n| 1 | 2 |\n")
-    assert taker.quote(taker.answer(REPORT), made) == made
+    said = taker.answer(REPORT, "Which is it?")
+    assert said == "This is it, to `1e-6`.\n"
+    made = taker.quote(said, page)
+    assert made == f"# P\n\n{taker.BEGIN}{said}{taker.END}\nrest\n"
+    assert taker.quote(said, made) == made
     for bad in ("no marks\n", f"{taker.END}{taker.BEGIN}"):
         with pytest.raises(SystemExit, match="once each, in this order"):
-            taker.quote(taker.answer(REPORT), bad)
+            taker.quote(said, bad)
+    with pytest.raises(SystemExit, match="no page with the question Who"):
+        taker.answer(REPORT, "Who?")
 
 
-@pytest.mark.parametrize("name", ["choosing.md", "results.md"])
-def test_what_a_page_quotes_is_what_the_stored_report_says(name):
-    page = (ROOT / "docs" / name).read_text(encoding="utf-8")
+def test_the_readme_has_the_beginning_of_the_front_page():
+    begun = _taker().beginning(REPORT)
+    assert begun.startswith("**Figure 1**\n\n![A](docs/snapshot/figures/a.png)\n")
+    assert begun.endswith("| 1 | 2 |\n")
+
+
+def test_what_pages_quote_is_what_the_stored_report_says():
     report = (ROOT / "docs" / "snapshot" / "report.md").read_text(encoding="utf-8")
-    assert _taker().quote(_taker().quoted(report)[name], page) == page
+    for name, said in _taker().quoted(report).items():
+        page = (ROOT / name).read_text(encoding="utf-8")
+        assert _taker().quote(said, page) == page, name
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is no checkout")
 def test_what_a_run_of_the_studies_writes_is_not_tracked():
-    written = ["convergence.nc", "convergence.json", "report.md", "report.html", "figures/x.png", "cases/x/y.nc"]
+    written = [
+        "convergence.nc",
+        "convergence.json",
+        "report.md",
+        "report.html",
+        "figures/x.png",
+        "tables/x.csv",
+        "cases/x/y.npz",
+    ]
     paths = [f"results/{name}" for name in written]
     done = subprocess.run(["git", "check-ignore", *paths], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.stdout.split() == paths
     kept = subprocess.run(["git", "ls-files", "results"], cwd=ROOT, capture_output=True, text=True, check=True)
-    benchmarks = ("bench.json", "live-engines.json", "peers.json", "peers.nc", "figures/peers-fronts.png")
+    benchmarks = (
+        "bench.json",
+        "live-engines.json",
+        "peers.json",
+        "horizon.json",
+        "repeat.json",
+        "peers.nc",
+        "figures/peers-fronts.png",
+    )
     assert set(kept.stdout.split()) == {f"results/{name}" for name in benchmarks}
     shown = [
         f"results/figures/{picture['file']}"

@@ -3,7 +3,6 @@
 import base64
 import json
 import re
-import threading
 
 import numpy as np
 import pytest
@@ -11,21 +10,12 @@ import pytest
 import symtop
 from symtop.core.errors import SymtopError
 from symtop.explore import answers
-from symtop.explore.server import STATIC, address, serve
+from symtop.explore.server import STATIC, address
 from tests.browser import FAINT, Browser
 from tests.explore.test_explore import fields
 
 TOLD = (STATIC / "stories.js").read_text(encoding="utf-8")
 RANGE = {"step_least": 0.01, "step_most": 0.6, "spin_least": -4.0, "spin_most": 4.0}
-
-
-@pytest.fixture(scope="module")
-def server():
-    running = serve()
-    threading.Thread(target=running.serve_forever, daemon=True).start()
-    yield running
-    running.shutdown()
-    running.server_close()
 
 
 def test_a_cell_of_the_map_is_the_run_that_a_click_asks_for():
@@ -66,9 +56,9 @@ def text(browser, name):
     return browser.evaluate(f"document.querySelector('#{name}').textContent")
 
 
-def test_a_story_a_cell_and_a_link(server):
+def test_a_story_a_cell_and_a_link(site):
     with Browser(1280, 900) as browser:
-        browser.open(address(server))
+        browser.open(address(site))
         browser.wait_for("+document.body.dataset.maps > 0")
         answered(browser, "#story", "resonance")
         browser.wait_for("document.querySelector('#status').textContent.startsWith('stormer-verlet: reached t = 20')")
@@ -99,9 +89,9 @@ def test_a_story_a_cell_and_a_link(server):
         assert browser.outside() == []
 
 
-def test_a_hand_reaches_everything_and_every_text_can_be_read(server):
+def test_a_hand_reaches_everything_and_every_text_can_be_read(site):
     with Browser(1280, 1400) as browser:
-        browser.open(address(server))
+        browser.open(address(site))
         browser.wait_for("+document.body.dataset.maps > 0")
         answered(browser, "#second", "strang")
         for scheme in ("light", "dark"):

@@ -1,27 +1,23 @@
 """Random guarded runs: every method in every chart on sixteen kinds of scenes, and what the guard had said of them.
 
-python -m tests.hostile.random_runs 20000 --into runs.jsonl     resumable: runs that the file has are not run again
-python -m tests.hostile.random_runs --told runs.jsonl           what became of them
+python -m tests.hostile.random_runs 20000 [--seed 3]
 
 Run k is drawn from a seed of its own and can be run again alone (`one`). A run is wrong if it ends `ok` and its axis
 was ever further than `WRONG` from the closed form; it is silent if the guard had said nothing. A run is right below
-`RIGHT`. A run that takes more than `LONGEST` of processor time ends its process and is recorded by the next.
+`RIGHT`, and takes too long from `LONGEST` on.
 """
 
 import argparse
 import collections
-import json
 import math
+import multiprocessing
 import random
-import signal
-import subprocess
-import sys
 import time
 import warnings
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from pebble import ProcessPool
 
 import symtop
 from symtop.methods.framework.registry import integrators
@@ -30,12 +26,14 @@ from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 
 WRONG, RIGHT = 0.05, 1e-3  # rad
-LATER = ("srkn-19-8", "stormer-verlet-reversible")  # methods that came after the runs which tests name
-LONGEST = 60.0  # s of processor time
+NEWER = (  # methods that came after the draws whose rates tests bound
+    *("strang-drift-first", "dprkn8", "extrapolation", "adams", "tsit5", "tsit5-fixed", "dop853-compiled"),
+    *("dop853-compiled-fixed", "vern9", "vern9-fixed", "series-general", "series-general-adaptive"),
+)
+LATER = ("srkn-19-8", "stormer-verlet-reversible", *NEWER)  # and after the runs which tests name
+LONGEST, PATIENCE = 60.0, 240.0  # s of processor time, and of the clock on a busy machine
 MOST_STEPS = 1.5e5
 SEED = 20_000
-BATCH = 1000  # runs of a process
-FAILED = 77  # exit code of a process that has met an exception that is none of the package's
 
 
 class Outcome(NamedTuple):
@@ -186,6 +184,31 @@ KINDS = {
 }
 
 
+def _at_pole(draw):
+    """From a pole itself, mostly with a rate that leaves it."""
+    top, at = _any_start(draw, _top(draw))
+    rate = draw.choice([0.0, 1.0, 1.0, 1.0]) * at.theta_dot
+    return top, Angles(draw.choice([0.0, math.pi]), at.phi, at.psi, rate, at.phi_dot, at.psi_dot)
+
+
+def _scaled(draw):
+    """Any motion in units of inertia and of time from 1e-12 to 1e12."""
+    top, at = _any_start(draw, _top(draw))
+    mass, clock = 10.0 ** draw.uniform(-12.0, 12.0), 10.0 ** draw.uniform(-12.0, 12.0)
+    rates = (rate / clock for rate in (at.theta_dot, at.phi_dot, at.psi_dot))
+    return SymmetricTop(top.I1 * mass, top.I3 * mass, top.mgl * mass / clock**2), Angles(
+        at.theta, at.phi, at.psi, *rates
+    )
+
+
+HOSTILE = {  # drawn from by seeds below zero
+    "near-sphere": lambda draw: _any_start(draw, _top(draw, 1.0 + _excess(draw, -1.0))),
+    "flat-or-thin": lambda draw: _any_start(draw, _top(draw, draw.choice([10.0 ** draw.uniform(-3.0, 0.0), 1.999]))),
+    "scaled": _scaled,
+    "at-pole": _at_pole,
+}
+
+
 # ---- runs ------------------------------------------------------------------------------------------------------------
 
 
@@ -196,8 +219,9 @@ def drawn(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outc
     the methods that came after them.
     """
     draw = random.Random(f"{seed}/{k}")
-    kind = draw.choice([*KINDS])
-    top, at = KINDS[kind](draw)
+    kinds = KINDS if seed >= 0 else HOSTILE
+    kind = draw.choice([*kinds])
+    top, at = kinds[kind](draw)
     known = [entry for entry in integrators().values() if entry.control is not None and entry.name not in without]
     method = draw.choice(known)
     period = Scene("drawn", top, at, 1.0).nutation_period
@@ -245,69 +269,41 @@ def one(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outcom
     return asked._replace(warning=" ".join(told), outcome=ended, error=largest, seconds=seconds)
 
 
-def work(ks: list[int], path: Path, seed: int = SEED) -> None:
-    """Do these runs and add a line for each to the file; before each, the line of its beginning."""
-    warnings.simplefilter("ignore", symtop.SymtopWarning)
-    with path.open("a", buffering=1) as file:
-        for k in ks:
-            file.write(json.dumps({"begun": k}) + "\n")
-            signal.setitimer(signal.ITIMER_PROF, LONGEST + 5.0)  # its signal ends the process
-            try:
-                done = one(k, seed, without=())
-            except Exception as error:  # noqa: BLE001
-                done = drawn(k, seed)._replace(outcome="crashed", warning=f"{type(error).__name__}: {error}")
-            signal.setitimer(signal.ITIMER_PROF, 0.0)
-            file.write(json.dumps(done._asdict()) + "\n")
-
-
-def read(path: Path, seed: int = SEED) -> dict[int, Outcome]:
-    """The runs of a file; one that was begun before another and never ended has the outcome `endless`."""
-    lines = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    done = {entry["k"]: Outcome(**entry) for entry in lines if "k" in entry}
-    for entry in lines[:-1] if lines and "begun" in lines[-1] else lines:
-        if "begun" in entry and entry["begun"] not in done:
-            done[entry["begun"]] = drawn(entry["begun"], seed)._replace(outcome="endless", seconds=LONGEST)
-    return done
-
-
 def told(runs: list[Outcome]) -> str:
     """The figures of so many runs, and each run that should not be."""
     wrong, right = [run for run in runs if run.wrong], [run for run in runs if run.right]
     silent, false = [run for run in wrong if not run.warning], [run for run in right if run.warning]
+    ended = [run for run in runs if run.outcome not in ("ok", "refused", "endless", "crashed")]
+    sudden = [run for run in ended if not run.warning]
     odd = [run for run in runs if run.outcome in ("endless", "crashed") or run.seconds >= LONGEST]
     lines = [
         f"{len(runs)} runs: {dict(collections.Counter(run.outcome for run in runs))}",
         f"{len(wrong)} wrong by more than {WRONG} rad, of them silent: {len(silent)}",
         f"{len(right)} right to {RIGHT} rad, of them warned of: {len(false)}",
+        f"{len(ended)} ended early, of them not announced: {len(sudden)}",
     ]
-    return "\n".join([*lines, *map(repr, silent), *map(repr, odd)])
+    return "\n".join([*lines, *map(repr, silent), *map(repr, sudden), *map(repr, odd)])
 
 
-def run_all(count: int, path: Path, seed: int = SEED) -> dict[int, Outcome]:
-    """Do the first `count` runs, in processes one after another: each goes on where the last one was ended."""
-    while missing := sorted({*range(count)} - {*read(path, seed)}):
-        batch = missing[:BATCH]
-        command = [sys.executable, "-m", "tests.hostile.random_runs", "--into", str(path), *map(str, batch)]
-        code = subprocess.run([*command, "--these", "--seed", str(seed)], check=False).returncode
-        if code not in (0, -signal.SIGPROF):
-            print(f"a process ended with {code}", flush=True)
-        if code:  # the run that ended it stands last in the file
-            with path.open("a") as file:
-                file.write("{}\n")
-    return read(path, seed)
+def run_all(count: int, seed: int = SEED, without: tuple[str, ...] = ()) -> list[Outcome]:
+    """Do the first `count` runs in a process apart, and in a new one after a run that does not end or that ends it."""
+    made = []
+    spawn = multiprocessing.get_context("spawn")
+    ignored = "ignore", symtop.SymtopWarning
+    with ProcessPool(1, context=spawn, initializer=warnings.simplefilter, initargs=ignored) as pool:
+        asked = [pool.schedule(one, (k, seed), {"without": without}, timeout=PATIENCE) for k in range(count)]
+        for k, task in enumerate(asked):
+            try:
+                made.append(task.result())
+            except Exception as error:  # noqa: BLE001
+                ended = "endless" if isinstance(error, TimeoutError) else "crashed"
+                made.append(drawn(k, seed, without=without)._replace(outcome=ended, warning=repr(error)))
+    return made
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("numbers", nargs="*", type=int)
-    parser.add_argument("--into", type=Path, default=Path("random-runs.jsonl"))
-    parser.add_argument("--these", action="store_true", help="the numbers are runs, and not how many")
-    parser.add_argument("--seed", type=int, default=SEED)
-    parser.add_argument("--told", type=Path)
+    parser.add_argument("count", type=int)
+    parser.add_argument("--seed", type=int, default=SEED, help="below zero: hostile kinds of scenes")
     asked = parser.parse_args()
-    if asked.told:
-        print(told([*read(asked.told, asked.seed).values()]))
-    elif asked.these:
-        work(asked.numbers, asked.into, asked.seed)
-    else:
-        print(told([*run_all(asked.numbers[0], asked.into, asked.seed).values()]))
+    print(told(run_all(asked.count, asked.seed)))

@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from tests.commands import PROBE, ended, leftovers, stop, symtop
+from tests.commands import PROBE, ended, leftovers, same, stop, symtop
 
 pytest.importorskip("distributed")
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("processes_with_dask")]
@@ -107,6 +107,9 @@ def test_a_worker_that_dies_costs_nothing(cluster, log, tmp_path):
     # one at most is made twice, which the killed worker was computing, or found, which it had written and not told of
     assert made >= 12
     assert 0 <= made - told <= 1
+    code, _, err = ended(symtop("study", PROBE, "--results", tmp_path / "here", "--jobs", 1))
+    assert code == 0, err
+    same(tmp_path / "here", tmp_path / "r")
     assert_nothing_is_lost(log, tmp_path / "r", computed(tmp_path / "r"))
 
 

@@ -1,5 +1,6 @@
 """The explorer under a crowd: aborted requests, many at once, and clients that never finish a sentence."""
 
+import contextlib
 import json
 import os
 import socket
@@ -97,3 +98,35 @@ def test_clients_that_never_finish_do_not_keep_others_waiting(crowd):
         link.close()
     time.sleep(0.2)
     assert log.read_text() == ""
+
+
+def test_three_thousand_connections_are_refused_and_forgotten(crowd):
+    """Idle ones beyond the limit get 503, which is reported; the explorer answers while they are still open."""
+    port, log, memory = crowd
+    assert asked(port, b"/run", QUESTION) == GOOD
+    before, began = int(memory.read_text().split()[1]), time.monotonic()
+    resource = pytest.importorskip("resource")
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 4096) if hard > 0 else 4096, hard))
+    try:
+        idle = [socket.create_connection(("127.0.0.1", port), timeout=10.0) for _ in range(3000)]
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    refused = 0
+    for link in idle:
+        link.settimeout(0.0)
+        with contextlib.suppress(OSError):
+            refused += link.recv(64).startswith(b"HTTP/1.1 503 ")
+    assert refused > 2000
+    assert "connections are open, and others are refused (503)" in log.read_text()
+    assert len(log.read_text().splitlines()) < 2.0 + time.monotonic() - began
+    end = time.monotonic() + 5.0
+    answer = b""
+    while answer != GOOD and time.monotonic() < end:
+        with contextlib.suppress(OSError):
+            answer = asked(port, b"/run", QUESTION, patience=5.0)
+        time.sleep(0.1)
+    assert answer == GOOD
+    for link in idle:
+        link.close()
+    assert int(memory.read_text().split()[1]) < 1.2 * before

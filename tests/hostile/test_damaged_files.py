@@ -11,7 +11,6 @@ import symtop
 from symtop.core import netcdf
 from symtop.core.jit import compile_kernel, is_cached
 from symtop.run import long_run as longrun
-from symtop.run.reference import truth as references
 from symtop.run.reference.truth import cached
 
 FLIPS = [pytest.param(12, id="few"), pytest.param(200, id="many", marks=pytest.mark.slow)]
@@ -139,14 +138,3 @@ def test_a_damaged_checkpoint_is_not_gone_on_from(tmp_path, monkeypatch, flips):
                     assert (at.k == 0) == any("damaged" in str(one.message) for one in told)
             book.file.write_bytes(whole)
         assert begun if file is True else refused
-
-
-def test_a_damaged_reference_of_a_scene_says_so(tmp_path, monkeypatch):
-    pytest.importorskip("heyoka")
-    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
-    scene = symtop.scene("spheroid")
-    first = symtop.reference(scene, [0.5], precision="double")
-    path = references._cache_path(scene, np.array([0.5]), "double")
-    path.write_bytes(path.read_bytes()[:-100])
-    with pytest.warns(symtop.SymtopWarning, match="is damaged and is computed again"):
-        assert symtop.reference(scene, [0.5], precision="double").equals(first)

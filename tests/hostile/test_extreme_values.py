@@ -15,7 +15,7 @@ from symtop.model.exact.closed_form import ClosedForm, ClosedForms
 ODD_TIMES = [
     10**400, [10**400], 1j, [1j], np.array([1.0 + 0j]), {1: 2}, {}, {0.0}, "abc", "1", ["1"], b"1", np.array(["1"]),
     None, [None], object(), [object()], [[1.0, 2.0], [3.0]], np.datetime64("2020"), datetime.date(2020, 1, 1), [True],
-    True, iter([1.0]), lambda: 1.0, [math.nan], [math.inf],
+    True, iter([1.0]), lambda: 1.0, [math.nan], [math.inf], 1e101,
 ]  # fmt: skip
 SPHEROID = symtop.scene("spheroid")
 FORM = ClosedForm(SPHEROID.top, SPHEROID.start)
@@ -78,3 +78,18 @@ def test_references_of_extreme_tops_are_told_or_refused(numbers, spin):
         except symtop.SymtopError as error:
             assert "ends at t = 0" in str(error)  # noqa: PT017
             assert numbers[2] == 1e30
+
+
+@pytest.mark.parametrize("theta", [5e-324, 1e-320, 1e-200, 1e-162])
+def test_a_swing_too_narrow_for_numbers_is_refused_and_one_that_is_not_is_followed(theta):
+    """A hanging top that swings through the pole: its distance from it is theta^2/2."""
+    hanging = symtop.SymmetricTop(1.0, 1.5, -1.0)
+    for ask in (
+        lambda: ClosedForm(hanging, symtop.Angles(theta)),
+        lambda: symtop.simulate(symtop.Scene("s", hanging, symtop.Angles(theta), 3.0), "rk4", step_size=0.01),
+    ):
+        with pytest.raises(symtop.SymtopError, match="leave it by as much"):
+            ask()
+    swing = ClosedForm(hanging, symtop.Angles(1e-140))(np.array([0.0, 1.0])).theta
+    assert swing[0] == pytest.approx(1e-140, rel=1e-12)
+    assert abs(swing[1]) == pytest.approx(1e-140 * math.cos(1.0), rel=1e-6)

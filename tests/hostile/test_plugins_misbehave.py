@@ -114,8 +114,8 @@ def test_a_study_whose_measure_exits_has_a_case_that_failed(tmp_path):
         "import sys\nfrom symtop.runner.study import Case, Study\n"
         "class Odd(BaseException):\n    def __str__(self):\n        raise ValueError\n"
         "def measure(case):\n    sys.exit(0) if case.settings['k'] else (_ for _ in ()).throw(Odd())\n"
-        "STUDY = Study('leaving', 't', 'q', 'h', lambda quick: [Case('spheroid', 'midpoint', {'k': k}) "
-        "for k in range(2)], measure, lambda data: [], lambda data: [])\n"
+        "STUDY = Study('leaving', 't', 'q', lambda quick: [Case('spheroid', 'midpoint', {'k': k}) "
+        "for k in range(2)], measure)\n"
     )
     code, lines = said_of(["study", str(script), "--results", str(tmp_path / "r")])
     assert code == 2

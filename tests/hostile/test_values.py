@@ -10,12 +10,25 @@ import math
 import time
 import warnings
 
+import hypothesis.strategies as st
 import numpy as np
 import pytest
 import xarray as xr
+from hypothesis import given
 
 import symtop
-from tests.cli.test_bad_input import CALLS, NOT_FINITE, NOT_POSITIVE, NOT_ROW, NOT_WHOLE, START, TOP, UNKNOWN
+from tests.cli.test_bad_input import (
+    ANYTHING,
+    CALLS,
+    CALM,
+    NOT_FINITE,
+    NOT_POSITIVE,
+    NOT_ROW,
+    NOT_WHOLE,
+    START,
+    TOP,
+    UNKNOWN,
+)
 
 SECONDS = 20.0  # of processor time for one call
 
@@ -61,10 +74,19 @@ MORE = {
         {**dict.fromkeys(("mass", "at_centre", "axial"), NOT_POSITIVE), "distance": NOT_FINITE, "gravity": NOT_FINITE},
     ),
     "errors": (symtop.errors, {"run": RUN}, {"run": NOT_DATA, "scene": UNKNOWN[1:]}),
+    "errors of a table": (
+        lambda time, theta: symtop.errors({"time": time, "theta": theta}, "spheroid"),
+        {"time": [0.0, 0.5], "theta": [0.4, 0.4]},
+        {"time": ["x", [0.0, 10**400], [0.0, -(10**400)]], "theta": ["x", [10**400, 0.4], [0.4, math.inf, 1.0]]},
+    ),
     "recommend": (
         symtop.recommend,
         {"scene": "spheroid", "accuracy": 1e-2, "horizon": 0.1},
-        {"scene": UNKNOWN, "accuracy": NOT_POSITIVE, "quantity": UNKNOWN, "horizon": NOT_HORIZONS},
+        {
+            "scene": UNKNOWN, "accuracy": NOT_POSITIVE, "quantity": UNKNOWN, "horizon": NOT_HORIZONS,
+            **dict.fromkeys(("step_size", "max_step", "time_a_step"), NOT_HORIZONS), "general": ["yes", 2],
+            "keeps": ["time", 3],
+        },
     ),
     "population": (
         symtop.population, {"n": 3, "seed": 1}, {"n": NOT_WHOLE, "seed": [None, "x", -1, 1.5, math.nan, [], 1j]}
@@ -73,7 +95,8 @@ MORE = {
         symtop.ensemble,
         {"members": SMALL, "integrator": "strang", "step_size": 0.05, "horizon": 0.2, "samples": 3, "quiet": True},
         {
-            "members": NOT_DATA[:4], "integrator": UNKNOWN, "step_size": NO_NUMBER, "horizon": NO_NUMBER[1:],
+            "members": [*NOT_DATA[:4], xr.Dataset({"I1": 1.0}), [symtop.scene("spheroid"), 3], SMALL.to_dataframe()],
+            "integrator": UNKNOWN, "step_size": NO_NUMBER, "horizon": NO_NUMBER[1:],
             "samples": [*NOT_WHOLE, 1], "observe": [value for value in UNKNOWN if value is not None],
             "threads": [value for value in NOT_WHOLE if value is not None],
         },
@@ -82,6 +105,14 @@ MORE = {
         symtop.sweep,
         {"scenes": "spheroid", "integrators": "strang", "step_size": [0.05], "horizon": 0.2, "quiet": True},
         {"scenes": UNKNOWN, "integrators": UNKNOWN, "step_size": ["x", [0.0], [-1.0], [math.nan], object()]},
+    ),
+    "compare": (
+        symtop.compare,
+        {"scene": "spheroid", "methods": "strang", "nutations": 1.0, "cost": "evaluations", "budget": 1e3},
+        {
+            "scene": UNKNOWN, "methods": UNKNOWN, "quantity": UNKNOWN, "cost": UNKNOWN, "budget": NOT_POSITIVE[1:],
+            "nutations": NOT_POSITIVE[1:],
+        },
     ),
     "long_run": (
         symtop.long_run,
@@ -97,8 +128,14 @@ MORE = {
         {"target": lambda f, t, y, h: y, "quick": True},
         {
             "form": [value for value in UNKNOWN[1:] if value], "chart": UNKNOWN, "scene": UNKNOWN,
-            "order": NOT_WHOLE[1:], "energy": UNKNOWN[1:],
+            "order": NOT_WHOLE[1:], "energy": [*UNKNOWN[1:], np.array([1.0, 2.0])],
+            "conserves": ["energy", np.array(1.0), np.array([1.0]), np.array(["x"]), [10**400], {"x": 1}, 3],
         },
+    ),
+    "judge of nothing": (
+        symtop.judge,
+        {"target": "no-such-file.py:step", "form": "ode", "conserves": ["energy"], "energy": "kept", "quick": True},
+        {"chart": UNKNOWN, "order": NOT_WHOLE[1:], "symplectic": ["x", 2, np.array([True, False])]},
     ),
 }  # fmt: skip
 BAD = [
@@ -106,7 +143,7 @@ BAD = [
     for name, (function, good, bad) in {**CALLS, **MORE}.items()
     for argument, values in bad.items()
 ]
-COST = {"judge", "recommend"}  # seconds for every value that is taken: their bad ones only
+COST = {"judge", "recommend", "compare"}  # seconds for every value that is taken: their bad ones only
 WHATEVER = [
     pytest.param(function, good, argument, ANY, id=f"{name} {argument} any")
     for name, (function, good, bad) in {**CALLS, **MORE}.items()
@@ -149,3 +186,24 @@ def test_anything_is_used_or_refused(function, good, argument, values):
         except Exception as error:  # noqa: BLE001
             faults.append((k, type(value).__name__, type(error).__name__, str(error)[:200]))
     assert not faults
+
+
+PLACES = [(name, key) for name, call in MORE.items() if name not in COST for key in sorted({*call[1], *call[2]})]
+
+
+def _cheap(value):
+    """Is it no number of steps, samples or members that would be computed for minutes?"""
+    try:
+        size = abs(float(value))
+    except Exception:  # noqa: BLE001
+        return True
+    return not (1e-13 < size < 1e-3 or 1e4 < size < 1e13)
+
+
+@CALM
+@given(place=st.sampled_from(PLACES), value=ANYTHING.filter(_cheap))
+def test_anything_at_all_is_used_or_refused(place, value):
+    """The same for the functions of `tests.cli.test_bad_input` stands there."""
+    name, argument = place
+    function, good, _ = MORE[name]
+    came(function, {**good, argument: value})

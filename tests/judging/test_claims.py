@@ -5,18 +5,19 @@ import importlib
 import json
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from symtop_studies.claims import planted
 
 import symtop
 from symtop.cli.main import main
+from symtop.core import netcdf
 from symtop.judging.battery import CLAIMS, judge
 from symtop.judging.claims import constants, constants as long, order, structure
 from symtop.judging.claims.subject import Subject
-from symtop.judging.findings import NOTHING, VERDICTS, Finding, read
+from symtop.judging.findings import NOTHING, VERDICTS, Finding
 from symtop.measure.conservation import behaviour
 from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
 from symtop.methods.framework.plan import Run
@@ -27,9 +28,9 @@ from symtop.run import plugins
 from symtop.run.simulation import integrate
 from symtop.runner import run as runner
 from tests.conftest import random_scenes
+from tests.templates import checked
 
 registry = importlib.import_module("symtop.methods.framework.registry")
-LIARS = Path(__file__).parent / "liars"
 SPHEROID = symtop.scene("spheroid")
 CHARTS = ("angles", "axis", "attitude")
 
@@ -231,7 +232,7 @@ def test_honest_claims_are_confirmed(name):
     assert [found.claim for found in ledger.findings] == list(CLAIMS)
     assert {found.verdict for found in ledger.findings} <= set(VERDICTS) - {"refuted", "undecided"}
     assert {ledger[claim].verdict for claim in ("order", "symplectic", "symmetric", "explicit")} == {"confirmed"}
-    assert read(ledger.dataset())[0].sentence(name) == ledger["order"].sentence(name)
+    assert str(ledger.dataset()["why"].sel(claim="order").values) == ledger["order"].why
 
 
 def test_what_nobody_claimed_is_measured():
@@ -320,7 +321,10 @@ OWN_KERNEL = {"one_newton", "coefficient_off", "verlet_swapped", "leaking_moment
 
 
 def test_every_file_of_false_claims_is_tested():
-    assert {path.stem for path in LIARS.glob("*.py")} == set(CAUGHT)
+    assert {path.stem for path in planted.LIARS.glob("*.py")} == set(CAUGHT)
+    assert {planted.file_of(name).stem: lie for name, lie in planted.LIES.items()} == {
+        liar: claim for liar, (claim, _) in CAUGHT.items()
+    }
 
 
 def run_claims(*arguments):
@@ -331,7 +335,7 @@ def run_claims(*arguments):
 @pytest.mark.parametrize("liar", [pytest.param(n, marks=pytest.mark.slow if n in OWN_KERNEL else []) for n in CAUGHT])
 def test_a_liar_is_caught_for_the_right_reason(liar, clean_registry):
     quick = [] if liar in OWN_KERNEL else ["--quick"]
-    code, output = run_claims("--plugin", str(LIARS / f"{liar}.py"), "--json", *quick)
+    code, output = run_claims("--plugin", str(planted.LIARS / f"{liar}.py"), "--json", *quick)
     claim, why = CAUGHT[liar]
     findings = {row.pop("claim"): row for row in json.loads(output)}
     assert code == 1
@@ -383,18 +387,28 @@ def test_the_command_prints_one_sentence_for_each_claim():
     assert "order: claims 2; confirmed: its table meets the conditions up to order 2 to 1e-16; slopes att" in lines[0]
 
 
-def test_the_study_shows_a_refuted_claim(tmp_path, clean_registry, monkeypatch):
-    plugins.load(LIARS / "symplectic_rk4.py")
+def test_the_study_counts_lists_and_draws_a_refuted_claim(tmp_path, clean_registry):
+    plugins.load(planted.LIARS / "symplectic_rk4.py")
     study = runner.load("claims")
     mine = dataclasses.replace(
         study, cases=lambda quick: [case for case in study.cases(quick) if case.integrator in ("symplectic-rk4", "rk4")]
     )
     found = runner.run(mine, tmp_path, quick=True, jobs=1, quiet=True, save=style.save)
     assert found["failures"] == []
-    assert any("symplectic-rk4, symplectic: claims yes; refuted" in line for line in found["verdict"])
-    cells = next(row for row in found["tables"][0]["rows"] if row[0] == "symplectic-rk4")
-    assert cells[1 + CLAIMS.index("symplectic")].startswith("✗ yes | no")
-    assert cells[1 + CLAIMS.index("order")].startswith("✓ 4 | ")
+    data = netcdf.read_any(tmp_path / "claims.nc")
+    ledger = study.tables(data)["ledger"].set_index(["integrator", "claim"])
+    lie = ledger.loc["symplectic-rk4", "symplectic"]
+    assert (lie["declared"], lie["measured"].split(",")[0], lie["verdict"]) == ("yes", "no", "refuted")
+    assert ledger.loc["symplectic-rk4", "order"]["verdict"] == "confirmed"
+    facts = study.facts(data)
+    refuted = ledger[ledger["verdict"] == "refuted"]
+    assert facts["refuted"] == len(refuted) > 0
+    assert set(refuted.index.get_level_values("integrator")) == {"symplectic-rk4"}
+    assert facts["declared"] == facts["held"] + facts["refuted"]
+    assert list(ledger["verdict"].iloc[: len(refuted)]) == ["refuted"] * len(refuted)
+    honest = study.facts(data.sel(variant=["rk4"]))
+    assert (honest["integrators"], honest["refuted"]) == (1, 0)
+    checked("claims", data, tmp_path)
     assert (tmp_path / "figures" / "claims-ledger.png").is_file()
 
 

@@ -62,7 +62,7 @@ def test_an_explicit_adaptive_method_pays_the_same_for_every_attempt(name, stage
     assert [forces_of_an_attempt(method, chart) for chart in method.charts()] == [stages] * len(method.charts())
 
 
-@pytest.mark.parametrize("name", ["radau", "lsoda"])
+@pytest.mark.parametrize("name", [pytest.param("radau", marks=pytest.mark.slow), "lsoda"])
 def test_a_method_that_iterates_does_not(name):
     assert forces_of_an_attempt(symtop.integrator(name), "angles") == 1
 

@@ -12,13 +12,10 @@ from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.judging.claims.subject import open_target
 from symtop.methods.framework.equations import FORMULATIONS
+from tests.judging.blind.right import midpoint
 
 SPHEROID = symtop.scene("spheroid")
 H, STRIDE, SAMPLES = 0.01, 10, 1001
-
-
-def midpoint(f, t, y, h):
-    return y + h * f(t + h / 2, y + h / 2 * f(t, y))
 
 
 @pytest.fixture(scope="module")

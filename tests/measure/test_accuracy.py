@@ -93,9 +93,10 @@ def test_added_steps_lie_where_the_error_is_a_power_of_the_step():
 
 @pytest.mark.skipif(not have_heyoka(), reason="long double needs heyoka")
 @pytest.mark.skipif(np.finfo(np.longdouble).eps == np.finfo(float).eps, reason="long double is double here")
-def test_a_composition_in_long_double_has_its_order_where_double_runs_out():
+@pytest.mark.parametrize("name", ["goldstein", "spheroid"])
+def test_a_composition_in_long_double_has_its_order_where_double_runs_out(name):
     """Order 10 falls from 1e-10 to 1e-17: in double only the first decades of it are above round-off."""
-    where = scene("goldstein")
+    where = scene(name)
     data = extended_errors(where, integrator("sofroniou-spaletta-10"))
     error = data["extended_error"].values
     assert error.min() < 1e-17 < EPSILON < 1e-11 < error.max()

@@ -224,3 +224,36 @@ def test_another_unit_of_time_is_asked_about():
             symtop.errors(data, "spheroid")
         said = [str(one.message) for one in heard]
         assert [("are they in the scene's unit of time" in one) for one in said] == [True] * doubtful
+
+
+def test_errors_of_an_ensemble_are_those_of_its_members_alone():
+    members = symtop.population(5, seed=3)
+    runs = symtop.ensemble(
+        members, "strang", per_nutation=40, nutations=2.0, samples=21, observe="attitude", quiet=True
+    )
+    wrong = symtop.errors(runs, members)
+    assert wrong["axis"].dims == ("member", "time")
+    assert wrong["axis"].shape == runs["axis"].shape[:2]
+    for i in range(5):
+        numbers = members.isel(member=i)
+        top = symtop.SymmetricTop(*(float(numbers[name]) for name in ("I1", "I3", "mgl")))
+        names = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
+        start = symtop.Angles(**{name: float(numbers[name]) for name in names})
+        horizon = float(runs["horizon"][i])
+        alone = symtop.errors(runs.isel(member=i), symtop.Scene(f"one-{i}", top, start, horizon))
+        for name in ("axis", "attitude", "energy", "p_phi"):
+            np.testing.assert_array_equal(wrong[name].values[i][: alone.sizes["time"]], alone[name].values)
+    few = symtop.ensemble(["spheroid", "goldstein"], "rk4", step_size=0.5, horizon=[4.0, 8.0], samples=30, quiet=True)
+    ragged = symtop.errors(few, ["spheroid", "goldstein"])
+    assert np.isfinite(ragged["time"].values).sum(axis=1).tolist() == [9, 17]
+    assert ragged.sizes["member"] == 2
+
+
+def test_an_ensemble_and_other_members_are_refused():
+    runs = symtop.ensemble(["spheroid", "goldstein"], "strang", step_size=0.05, horizon=1.0, samples=5, quiet=True)
+    with pytest.raises(symtop.SymtopError, match="members must be the 2 of the ensemble, not 3"):
+        symtop.errors(runs, ["spheroid", "goldstein", "fast"])
+    labelled = symtop.population(2, seed=1).assign_coords(member=["a", "b"])
+    many = symtop.ensemble(labelled, "strang", step_size=0.01, horizon=0.1, samples=3, quiet=True)
+    with pytest.raises(symtop.SymtopError, match="their labels are others"):
+        symtop.errors(many, labelled.assign_coords(member=["b", "a"]))

@@ -17,7 +17,7 @@ from symtop.measure.order_conditions import (
     triangle,
     vanishing,
 )
-from symtop.methods.runge_kutta.dormand_prince import DORMAND_PRINCE
+from symtop.methods.runge_kutta.pair_tables import DORMAND_PRINCE
 
 RK4 = ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
 
@@ -35,7 +35,7 @@ def test_there_are_as_many_trees_as_there_are():
 
 def test_known_tables_have_their_orders():
     assert conditions(square(RK4[0]), RK4[1]).order == 4
-    fine = [*DORMAND_PRINCE.a]
+    fine = [value for row in DORMAND_PRINCE.a for value in row]
     stages = len(DORMAND_PRINCE.b)
     assert conditions(triangle(fine, stages), DORMAND_PRINCE.b).order == 5
     r = 3**0.5 / 6

@@ -1,11 +1,13 @@
 """Kernels that are on disk are loaded and not compiled again, in every family."""
 
+import errno
 import os
 import subprocess
 import sys
 
 import pytest
 
+from symtop.core import jit
 from symtop.core.jit import compile_kernel
 
 EVERY = "midpoint galerkin-simpson midpoint-unreduced stormer-verlet strang gauss-4 rk4"
@@ -82,3 +84,31 @@ def test_the_code_of_another_signature_is_not_run(monkeypatch, tmp_path):
     again = compile_kernel(_doubled)
     assert (again(2), again(2.5)) == (4, 5.0)
     assert {signature[0].name for signature in again.signatures} == {"int64", "float64"}
+
+
+def test_a_full_disk_costs_time_and_no_run(monkeypatch, tmp_path):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
+    with monkeypatch.context() as patch:
+        patch.setattr(jit._Index, "_save_data", full)
+        assert compile_kernel(_doubled)(2.0) == 4.0
+    assert not list(tmp_path.rglob("*.nbc"))
+    assert compile_kernel(_doubled)(2.0) == 4.0
+    assert list(tmp_path.rglob("*.nbc"))
+
+
+def test_kernels_of_one_factory_have_names_of_their_own():
+    """Machine code is found by name: two stored kernels of one name, loaded into one process, would be one."""
+
+    def adding(number):
+        def added(x):
+            return x + number
+
+        return compile_kernel(added)
+
+    one, same, other = adding(1.0), adding(1.0), adding(2.0)
+    assert (one(1.0), same(1.0), other(1.0)) == (2.0, 2.0, 3.0)
+    names = [kernel.py_func.__qualname__ for kernel in (one, same, other)]
+    assert names[0] == names[1] != names[2]

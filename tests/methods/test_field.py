@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from conftest import random_scenes
 from scipy.integrate import solve_ivp
 
 import symtop
 from symtop.model import charts
+from tests.conftest import random_scenes
 
 CHARTS = ("angles", "axis", "attitude")
 

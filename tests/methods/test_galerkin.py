@@ -11,7 +11,6 @@ from symtop.methods.framework.angles import on_angles
 from symtop.methods.lagrangian import galerkin as kernel
 from symtop.model.top import effective_force, effective_stiffness
 from tests.conftest import random_scenes
-from tests.methods.test_integrators import fitted
 
 SCENES = ("spheroid", "goldstein")
 NAME = "galerkin-simpson"
@@ -58,22 +57,6 @@ def independent_step(top, point, h, weights=SIMPSON):
     return np.concatenate([found.x[3:], slopes(found.x)[2]])
 
 
-@pytest.mark.parametrize("quantity", ["attitude", "theta", "energy"])
-@pytest.mark.parametrize("scene_name", SCENES)
-def test_order_four_on_the_nonlinear_top(scene_name, quantity):
-    fit = fitted(scene_name, NAME, quantity)
-    assert fit.used.sum() >= 5
-    assert abs(fit.slope - 4.0) + fit.interval < 0.05
-
-
-@pytest.mark.parametrize("scene_name", SCENES)
-def test_the_same_quadrature_on_a_straight_line_has_order_two(scene_name):
-    """The negative control: Simpson's rule alone does not make a method of order 4."""
-    fit = fitted(scene_name, "simpson-linear")
-    assert not abs(fit.slope - 4.0) + fit.interval < 0.05
-    assert fit.slope == pytest.approx(2.0, abs=0.05)
-
-
 @pytest.mark.parametrize("where", random_scenes(8, seed=21), ids=lambda s: s.name)
 def test_one_step_is_the_stationary_parabola(where):
     """The reduction to two unknowns, and all six results of a step, against six equations solved as they stand."""
@@ -89,18 +72,6 @@ def test_other_weights_are_another_method():
     found = StepMap(symtop.integrator(NAME), "angles", where.top, 1.0, 0.1).image(point)
     wrong = independent_step(where.top, point, 0.1, weights=(0.17, 0.66, 0.17))
     assert not np.max(np.abs(found - wrong)) < 2e-12
-
-
-@pytest.mark.parametrize("where", random_scenes(6, seed=22), ids=lambda s: s.name)
-def test_the_six_dimensional_step_map_is_symplectic(where):
-    defect = symplectic_defect(one_step(symtop.integrator(NAME), "angles", where, 0.02), where.start)
-    assert defect.size < 2e-10
-    assert defect.raw[-1] < defect.raw[0] / 100.0  # what is left is the differencing, which falls as its square
-
-
-@pytest.mark.parametrize("where", random_scenes(8, seed=23), ids=lambda s: s.name)
-def test_a_step_and_its_reverse_return_to_the_start(where):
-    assert return_miss(one_step(symtop.integrator(NAME), "angles", where, 0.02), where.start) < 2e-14
 
 
 def test_a_step_without_its_last_force_is_neither_symplectic_nor_symmetric():

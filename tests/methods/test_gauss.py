@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from symtop_studies.notebook.solid import transverse_from_quaternion
+from scipy.spatial.transform import Rotation
 from symtop_studies.stability.linear_limits import linear_limits
 
 import symtop
@@ -221,7 +221,8 @@ def test_frames_are_attitudes(theta):
     # half-turns about every axis are where three of the four rows of q q^T vanish
     phi, psi = (values.ravel() for values in np.meshgrid(np.linspace(-3, 3, 7), np.linspace(0, 6, 7)))
     quaternion = charts.quaternion_from_angles(theta, phi, psi)
-    axis, across = charts.axis_from_quaternion(quaternion), transverse_from_quaternion(quaternion)
+    axis = charts.axis_from_quaternion(quaternion)
+    across = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()[..., 0]
     frames = np.concatenate([axis, np.zeros_like(axis), across], axis=1)
     again = frame_to_attitude(SpaceTop(1.0, 1.0, 0.0), np.zeros(phi.size), frames)[:, :4]
     assert np.max(charts.attitude_distance(again, quaternion)) < 2e-15

@@ -1,4 +1,4 @@
-"""Lie-group integrators in lanes: the bits and counts of runs alone, one kernel for both charts and for all numbers."""
+"""Lie-group integrators in lanes: one kernel for both charts and for all numbers; the bits are in `test_lanes`."""
 
 import dataclasses
 
@@ -6,33 +6,14 @@ import numpy as np
 import pytest
 
 from symtop.methods.framework.lanes import W
-from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.lie_group.generalised_alpha import generalised_alpha
 from symtop.methods.lie_group.runge_kutta import LieTable, lie_runge_kutta
 from symtop.methods.lie_group.variational import EULER_POINCARE, Variational, lie_variational
 from symtop.methods.splitting.coefficients import SUZUKI_4
-from tests.methods.test_lanes import FAR, SOLVERS, assert_runs_alone, left_alone, members
-from tests.methods.test_newton_lanes import spread
+from tests.methods.test_lanes import FAR, ITERATED, SOLVERS, assert_runs_alone, left_alone, members
 
 EXPLICIT = ("rkmk-se3-2", "rkmk-se3-4", "crouch-grossman-3", "commutator-free-4")
-ITERATED = ("lie-variational", "lie-variational-suzuki-4", "euler-poincare", "simo-wong", "generalised-alpha")
 CHARTS = ("axis", "attitude")
-
-
-@pytest.mark.parametrize("chart", CHARTS)
-@pytest.mark.parametrize("name", ["rkmk-se3-2", "crouch-grossman-3", "lie-variational", "generalised-alpha"])
-def test_members_have_the_bits_of_runs_alone(name, chart):
-    """A few of them; the slow tests of `test_lanes` have all."""
-    solver, given = SOLVERS[f"{name}[{chart}]"], members(400, seed=10)
-    done = solver.many(*given)
-    assert_runs_alone(solver, *given, done)
-    assert {OUTCOMES[k] for k in done.outcome} == {"ok", "not_finite" if name in EXPLICIT else "not_converged"}
-
-
-def test_all_of_them_have_lanes_but_for_the_collective_ones():
-    for name in (*EXPLICIT, *ITERATED):
-        assert all(SOLVERS[f"{name}[{chart}]"].in_lanes for chart in CHARTS)
-    assert not any(SOLVERS[f"collective-gauss-{order}[{chart}]"].in_lanes for order in (2, 4, 6) for chart in CHARTS)
 
 
 def test_kernels_are_shared_by_charts_compositions_and_numbers():
@@ -106,21 +87,3 @@ def test_cayleys_rotation_turns_as_far_as_it_likes_in_lanes(name):
     assert failed <= left
     assert len(left) <= len(failed) + 5
     assert len(set(range(400)[FAR]) - left) > (0 if name == "lie-variational" else 5)
-
-
-@pytest.mark.parametrize("name", ITERATED)
-def test_a_lane_that_takes_more_iterations_changes_no_other(name):
-    """A step so large that one lane takes more passes; the others keep bits and counts, and that one does not."""
-    numbers, h, marks = spread(W, 40)
-    solver = SOLVERS[f"{name}[attitude]"]
-    before = solver.many(numbers, h, marks)
-    h[5] *= 20.0
-    after = solver.many(numbers, h, marks)
-    others = np.arange(W) != 5
-    assert left_alone(solver, numbers, h, marks).size == 0
-    assert (before.outcome == 0).all()
-    assert after.work[5] > before.work[5]
-    assert not np.array_equal(before.states[5], after.states[5])
-    for one, other in zip(before, after, strict=True):
-        np.testing.assert_array_equal(one[others], other[others])
-    assert_runs_alone(solver, numbers, h, marks, after)

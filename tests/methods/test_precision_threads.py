@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.core.multiprecision import context
+from symtop.core.numbers import context
 from symtop.methods.runge_kutta.gauss import gauss_rule
 from symtop.methods.taylor import heyoka
 

@@ -11,7 +11,7 @@ import pytest
 import symtop
 from symtop.core.errors import SymtopError
 from symtop.methods.framework import registry
-from symtop.methods.framework.registry import Integrator, integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta import gauss
 
 
@@ -67,10 +67,3 @@ def test_a_field_that_makes_no_sense_is_refused_and_one_that_does_is_not(fields,
         Integrator(**right | fields)
     claims = {"explicit": True, "symplectic": False, "symmetric": np.bool_(True), "least_tolerance": 0}
     assert Integrator(**right | claims, default_tolerance=1e-6, reference="x").record()["symmetric"] == "yes"
-
-
-@pytest.mark.parametrize("name", ["rk4[]", "rk4[ ]", "[]"])
-def test_empty_brackets_are_no_chart(name):
-    with pytest.raises(SymtopError, match="is unknown"):
-        integrator(name)
-    assert integrator("rk4[axis]").charts() == ("axis",)

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numba import njit
 
 import symtop
+from symtop.core.jit import compile_kernel
 from symtop.measure.accuracy import error_table
 from symtop.measure.conservation import trend
 from symtop.measure.order import power_law
@@ -22,7 +22,6 @@ from symtop.model.top import effective_force, effective_potential
 
 METHOD = symtop.integrator("stormer-verlet-reversible")
 SOLVER = METHOD.solvers["angles"]
-force = njit(effective_force)
 
 
 def run(scene, h, marks, solver=SOLVER):
@@ -120,7 +119,7 @@ def read_off(scene, eps, marks):
     return states, back[-1] * (1.0, -1.0)
 
 
-@njit
+@compile_kernel
 def _read_off(par, theta, p, eps, marks):
     I1, _, mgl, _, north, south = par
     states = np.empty((len(marks), 2))
@@ -128,9 +127,9 @@ def _read_off(par, theta, p, eps, marks):
     for j in range(len(marks)):
         while done < marks[j]:
             h = eps * np.sin(theta)
-            p -= 0.5 * h * force(theta, north, south, I1, mgl)[0]
+            p -= 0.5 * h * effective_force(theta, north, south, I1, mgl)[0]
             theta += h * p / I1
-            p -= 0.5 * h * force(theta, north, south, I1, mgl)[0]
+            p -= 0.5 * h * effective_force(theta, north, south, I1, mgl)[0]
             done += 1
         states[j] = theta, p
     return states, states[-1]

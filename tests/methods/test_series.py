@@ -1,7 +1,6 @@
 """The own Taylor series: coefficients, orders, agreement with the closed form, tolerance, and the vectors beneath."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -174,30 +173,6 @@ def test_the_error_follows_the_tolerance(chart, method, name):
     assert strict.p_psi == pytest.approx(np.full(41, p_psi), rel=1e-11)
 
 
-@pytest.mark.parametrize(("chart", "method"), ADAPTIVE)
-def test_samples_do_not_change_the_steps_and_a_budget_ends_a_run(chart, method):
-    scene = symtop.scene("goldstein")
-    times = [np.linspace(0.0, 40.0, count) for count in (2, 401)]
-    few, many = (method.solvers[chart](scene.top, scene.start, Plan.until(grid, 1e-10)) for grid in times)
-    assert few.steps == many.steps
-    assert few.force_evaluations == many.force_evaluations
-    assert few.states[-1] == pytest.approx(many.states[-1], abs=0.0)
-    short = method.solvers[chart](scene.top, scene.start, Plan.until(np.linspace(0.0, 400.0, 41), 1e-10, budget=500.0))
-    assert short.outcome == "out_of_budget"
-    assert 0.0 < short.reached < 400.0
-    assert np.isnan(short.states[-1]).all()
-
-
-def test_blocks_of_series_join_without_a_seam():
-    scene = symtop.scene("goldstein")
-    plan = Plan.until(np.linspace(0.0, 40.0, 41), 1e-10)
-    for chart, method in ADAPTIVE:
-        whole = method.solvers[chart](scene.top, scene.start, plan)
-        parts = replace(method.solvers[chart], block=7)(scene.top, scene.start, plan)
-        assert np.array_equal(whole.states, parts.states)
-        assert whole.steps == parts.steps
-
-
 def test_a_free_top_and_one_at_rest_and_bad_input():
     with pytest.raises(SymtopError, match="order"):
         series("trial", 10)
@@ -228,17 +203,3 @@ def test_series_axis_and_series_attitude_are_names_of_rows():
             symtop.integrator(wrong)
     with pytest.raises(KeyError):
         symtop.integrators()["serious-axis"]
-
-
-def test_a_user_makes_a_series_of_any_of_its_orders():
-    scene = symtop.scene("spheroid")
-    plan = Plan.steps(scene.nutation_period / 20, [20])
-    errors = []
-    for order in ORDERS:
-        method = symtop.series(f"mine-{order}", order)
-        assert method.order == order
-        done = method.solvers["axis"](scene.top, scene.start, plan)
-        errors.append(charts.axis_distance(done.states[:, :3], closed_form(scene).axis(plan.times))[0])
-    assert errors[0] > 100 * errors[1] > 1e4 * errors[-1]
-    with pytest.raises(symtop.SymtopError, match="order must be one of 8, 12, 16, 20, not 9"):
-        symtop.series("mine", 9)

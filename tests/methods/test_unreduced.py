@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from symtop_studies.reduction.tables import Column, unreduced_cost, unreduced_forms, unreduced_gaps
+from symtop_studies.reduction.tables import unreduced_cost, unreduced_forms, unreduced_gaps
 
 import symtop
 from symtop.measure.conservation import trend
@@ -12,7 +12,6 @@ from symtop.methods.lagrangian import unreduced as kernel
 from symtop.methods.lagrangian.discrete_lagrangian import RULES, Quadrature
 from symtop.methods.lagrangian.unreduced import march, unreduced, with_momenta
 from tests.conftest import random_scenes
-from tests.methods.test_integrators import fitted
 
 PAIRS = ("midpoint", "trapezoidal")
 TWIN = "-unreduced"
@@ -43,24 +42,8 @@ def test_every_twin_is_of_a_registered_method_and_its_history_is_rounding():
     assert {name: name + TWIN for name in PAIRS}.items() <= unreduced_forms().items()
     where = symtop.scene("goldstein")
     history = unreduced_gaps(where, "midpoint", where.nutation_period, 500, samples=51)
-    assert float(history[Column.PSI_GAP].max()) < 1e-12
-    assert float(history[Column.P_PHI_DRIFT].max()) < 1e-13
-
-
-@pytest.mark.parametrize("quantity", ["attitude", "theta", "energy"])
-@pytest.mark.parametrize("scene_name", SCENES)
-@pytest.mark.parametrize("name", [*(name + TWIN for name in PAIRS), "simpson-linear"])
-def test_order_two_on_the_nonlinear_top(scene_name, name, quantity):
-    fit = fitted(scene_name, name, quantity)
-    assert abs(fit.slope - 2.0) + fit.interval < 0.05
-
-
-@pytest.mark.parametrize("where", random_scenes(6, seed=11), ids=lambda s: s.name)
-@pytest.mark.parametrize("name", [name + TWIN for name in PAIRS])
-def test_the_six_dimensional_step_map_is_symplectic(name, where):
-    defect = symplectic_defect(one_step(symtop.integrator(name), "angles", where, 0.02), where.start)
-    assert defect.size < 2e-10
-    assert defect.raw[-1] < defect.raw[0] / 100.0  # what is left is the differencing, which falls as its square
+    assert float(history["psi_gap"].max()) < 1e-12
+    assert float(history["p_phi_drift"].max()) < 1e-13
 
 
 def test_a_map_that_invents_its_momenta_is_not_symplectic():
@@ -75,12 +58,6 @@ def test_a_map_that_invents_its_momenta_is_not_symplectic():
     where = random_scenes(1, seed=11)[0]
     step = one_step(wrong, "angles", where, 0.02)
     assert symplectic_defect(step, where.start).size * step.unit > 1e-5
-
-
-@pytest.mark.parametrize("where", random_scenes(6, seed=12), ids=lambda s: s.name)
-@pytest.mark.parametrize("name", [name + TWIN for name in PAIRS])
-def test_a_step_and_its_reverse_return_to_the_start(name, where):
-    assert return_miss(one_step(symtop.integrator(name), "angles", where, 0.02), where.start) < 1e-13
 
 
 def test_a_lopsided_rule_misses_the_start():
@@ -172,8 +149,8 @@ def test_the_three_by_three_solver_is_exact():
 def test_the_iteration_ends_within_a_handful(scene_name):
     where = symtop.scene(scene_name)
     cost = unreduced_cost(where, "midpoint", [where.nutation_period / 300.0], batches=1)
-    assert (cost[Column.ITERATIONS_A_STEP] < 5.0).all()
-    assert (cost[Column.ITERATIONS_A_STEP] >= 1.0).all()
+    assert (cost["iterations_per_step"] < 5.0).all()
+    assert (cost["iterations_per_step"] >= 1.0).all()
 
 
 def test_long_horizons_do_not_slow_it_down():

@@ -9,13 +9,13 @@ import pytest
 
 from benchmarks.families import tops
 from symtop.core.errors import SymtopError
-from symtop.core.lazy_kernel import LazyKernel
 from symtop.methods.framework.plan import Plan
 from symtop.methods.library import exact
 from symtop.model import charts
 from symtop.model.charts import space_momenta
 from symtop.model.exact import closed_form, samples
 from symtop.model.exact.closed_form import NUMBERS, ClosedForm, ClosedForms
+from symtop.model.lazy_kernel import LazyKernel
 from symtop.model.top import Angles, SymmetricTop, flat
 from tests.model.test_closed_form import SEPARATRIX
 

@@ -431,12 +431,6 @@ def test_times_of_any_shape():
     assert form.axis(0.5).shape == form.momentum(0.5).shape == (3,)
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf, [0.0, -math.inf], 1e101])
-def test_times_that_are_not_finite_are_refused(bad):
-    with pytest.raises(SymtopError, match="times must be finite"):
-        ClosedForm(*SPHEROID)(bad)
-
-
 @pytest.mark.parametrize(
     ("body", "state", "words"),
     [

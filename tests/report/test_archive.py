@@ -4,6 +4,7 @@ import hashlib
 import re
 import zipfile
 
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -13,27 +14,27 @@ from symtop.core.errors import SymtopError
 from symtop.measure import datasets
 from symtop.report import archive, style
 from symtop.runner import run as runner
-from symtop.runner.study import Case, Picture, Study, Table
+from symtop.runner.study import Case, Picture, Study
+from tests.core.test_conventions import lacking
 
 
 def draw(data):
     """One figure."""
     figure, axes = style.panels(1, 1)
     axes[0, 0].plot(data["x"].values.ravel())
-    return [Picture("line", figure, "A line.", "A line.", lead="What opens")]
+    return [Picture("line", figure)]
 
 
 STUDY = Study(
     name="small",
     title="Small",
     question="Is it bundled?",
-    how_to_read="As it stands.",
     cases=lambda _: [Case("spheroid", "strang", {})],
     measure=lambda case: xr.Dataset({"x": ("step_size", [1.0, 2.0], {"long_name": "a number", "units": "rad"})},
                                     {"step_size": [0.1, 0.2]}),
     pictures=draw,
-    verdict=lambda data: ["It is."],
-    tables=lambda data: [Table("One table", ["a", "b"], [["1", "2"]])],
+    facts=lambda data: {"answer": "yes"},
+    tables=lambda data: {"one": pd.DataFrame({"a": [1], "b": [2.5]})},
 )  # fmt: skip
 
 
@@ -65,7 +66,9 @@ def bundled(results):
 def test_it_holds_what_the_report_is_made_of_and_no_more(bundled):
     assert bundled.keys() == {
         "README.md", "SHA256SUMS", "citations.bib", "machine.txt", "versions.txt", "results/small.nc",
-        "results/peers.json", "results/report.html", "results/report.md", "results/figures/small-line.png",
+        "results/peers.json", "results/report.html", "results/report.md", "results/reference.md",
+        "results/figures/small-line.png",
+        "results/tables/small-one.csv",
         "scenes/scenes.csv", "scenes/states.csv", "scenes/states.nc",
     }  # fmt: skip
 
@@ -91,6 +94,7 @@ def test_the_states_can_be_read_from_the_bundle(bundled, tmp_path):
     states = netcdf.read(tmp_path / "states.nc")
     assert list(states["scene"].values) == list(symtop.scenes())
     assert states["quaternion_lo"].dims == ("scene", "sample", "part")
+    assert lacking(states) == []
 
 
 def test_the_same_results_make_the_same_bundle(results, bundled, tmp_path):

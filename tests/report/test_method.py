@@ -1,23 +1,24 @@
-"""The section on how it was measured says what the package does: scenes, bounds, equations, glosses."""
+"""The pages on how it was measured say what the package does: scenes, bounds, equations."""
 
+import re
 from xml.etree import ElementTree as ET
 
 import pytest
 from latex2mathml.converter import convert
 
 import symtop
-from symtop.report import method
-from symtop.report.method import glossary
+from symtop.report import page
+from symtop.report.html import slug
 
 
-def blocks(name):
-    """The blocks of a part."""
-    (part,) = (part for part in method.parts() if part.name == name)
-    return part.blocks
+def lines(table):
+    """Cells of a table in Markdown, line by line, below its header."""
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()[2:]]
 
 
 def test_the_tables_of_scenes_give_every_scene_back_to_the_last_bit():
-    uses, starts = (block.rows for block in blocks("scenes") if block.rows)
+    known = page.scene_tables()
+    uses, starts = lines(known["uses"]), lines(known["starts"])
     assert [row[0] for row in uses] == [row[0] for row in starts] == list(symtop.scenes())
     for row, numbers in zip(uses, starts, strict=True):
         scene, values = symtop.scene(row[0]), [float(cell) for cell in numbers[1:]]
@@ -28,8 +29,11 @@ def test_the_tables_of_scenes_give_every_scene_back_to_the_last_bit():
         assert float(row[4]) == pytest.approx(bound, rel=0.05)
 
 
-def test_every_formula_is_shown_in_full():
-    formulas = [one for part in method.parts() for block in part.blocks for one in block.formulas]
+def test_every_formula_is_shown_in_full_and_links_lead_to_the_page():
+    text = (page.TEMPLATES / "equations.md").read_text(encoding="utf-8")
+    assert text.startswith(f"## {page.EQUATIONS}\n")
+    assert slug(page.EQUATIONS) == "the-equations-the-scenes-and-the-exact-motion"
+    formulas = re.findall(r"^\$\$(.+)\$\$$", text, re.MULTILINE)
     assert len(formulas) == 12
     for formula in formulas:
         tree = ET.fromstring(convert(formula))
@@ -37,11 +41,3 @@ def test_every_formula_is_shown_in_full():
         assert "=" in letters
         assert "\\" not in letters  # of a command that is not known
         assert len(tree.findall(".//{*}mfrac")) == formula.count("\\frac")
-
-
-def test_a_gloss_is_given_to_every_name_in_a_text_and_to_no_part_of_one():
-    named = dict(glossary("Begin with rk45-compiled[axis], then gauss-12[axis]."))
-    assert named.keys() == {"rk45-compiled", "gauss-12", "[axis]"}
-    assert glossary("the axis")[0][0] == "axis"
-    assert named["gauss-12"] == symtop.integrator("gauss-12").summary
-    assert glossary("Nothing is named here.") == []

@@ -170,14 +170,6 @@ def test_a_checkpoint_knows_a_method_by_what_it_holds_and_not_by_its_name():
     assert identity(dataclasses.replace(plain, summary="said otherwise")) == identity(plain)
 
 
-def test_a_checkpoint_does_not_depend_on_what_a_process_did_before():
-    h = WHERE.nutation_period / 100.37
-    before = longrun._identity(WHERE, symtop.integrator("midpoint"), h, 500, True)
-    for name in ("galerkin-simpson", "gauss-4", "stormer-verlet"):  # each builds another loop round shared functions
-        chart_of(symtop.integrator(name))[1].loop.plain.__wrapped__()
-    assert longrun._identity(WHERE, symtop.integrator("midpoint"), h, 500, True) == before
-
-
 def _root() -> str:
     return str(Path(symtop.__file__).resolve().parents[1])
 
@@ -252,9 +244,7 @@ def test_a_failed_run_shows_the_windows_it_had():
     ("integrator", "settings", "said"),
     [
         ("rk45", {"steps": 10, "step_size": 0.1}, "rk45 has no compiled loop of fixed steps"),
-        ("midpoint", {"steps": 0, "step_size": 0.1}, "steps must be a whole number of at least 1"),
         ("midpoint", {"steps": 10**12, "step_size": 0.1}, "steps must be at most"),
-        ("midpoint", {"steps": 10, "step_size": -0.1}, "step_size must be above zero"),
     ],
 )
 def test_bad_input_gets_one_sentence(integrator, settings, said):
@@ -281,6 +271,7 @@ def test_compensated_sums_drift_less_than_plain_ones(name):
     assert max(float(found["p_phi"]), float(found["p_psi"])) < 2e-14
 
 
+@pytest.mark.slow
 def test_a_small_correction_is_not_rounded_to_one_side():
     """This start lost 1.5e-14 of its energy in 5e7 steps while midpoint rounded its last correction by itself."""
     start = members(WHERE, 15)[14]
@@ -311,25 +302,23 @@ def test_the_command_runs_and_says_what_changed(tmp_path):
     assert bad.exit_code == 2
 
 
-def test_a_checkpoint_is_known_in_a_process_that_has_run_other_things():
+def test_a_checkpoint_does_not_depend_on_what_its_process_has_run():
+    """Told before and after other work by a new process, and by this one."""
     script = """
-import symtop, sys
+import symtop
 from symtop.run import long_run
-scene, method = symtop.scene("spheroid"), symtop.integrator("midpoint")
-before = long_run._identity(scene, method, 0.01, 1000, True)
-if sys.argv[1] == "first":
-    print(before)
-symtop.simulate(scene, "strang", step_size=0.01, samples=3)
-symtop.reference(scene, [1.0])
+def identity():
+    return long_run._identity(symtop.scene("spheroid"), symtop.integrator("midpoint"), 0.01, 1000, True)
+print(identity())
+symtop.simulate("spheroid", "strang", step_size=0.01, samples=3)
+symtop.reference("spheroid", [1.0])
 symtop.ensemble(symtop.population(40, seed=1), "midpoint", per_nutation=50, nutations=1, samples=3)
-if sys.argv[1] == "last":
-    print(long_run._identity(scene, method, 0.01, 1000, True))
+for name in ("galerkin-simpson", "gauss-4", "stormer-verlet"):  # each builds another loop round shared functions
+    long_run.chart_of(symtop.integrator(name))[1].loop.plain.__wrapped__()
+print(identity())
 """
     environment = {**os.environ, "PYTHONPATH": _root()}
-    told = [
-        subprocess.run(
-            [sys.executable, "-c", script, when], env=environment, capture_output=True, text=True, check=True
-        )
-        for when in ("first", "last")
-    ]
-    assert told[0].stdout == told[1].stdout != ""
+    command = [sys.executable, "-c", script]
+    told = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
+    here = longrun._identity(WHERE, symtop.integrator("midpoint"), 0.01, 1000, True)
+    assert told == [str(here)] * 2

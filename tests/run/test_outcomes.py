@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import symtop
+from symtop.model import charts
 from symtop.model.scenes import grazing, steady
 
 # ---- outcomes in the kernels -----------------------------------------------------------------------------------------
@@ -28,6 +29,7 @@ HUGE = symtop.Scene("huge", symtop.SymmetricTop(1.0, 1.0, 1e30), symtop.Angles(t
         ("spheroid", "rk45-compiled", {"tolerance": 1e-9, "budget": 100}, "out_of_budget"),
         ("spheroid", "dop853", {"tolerance": 1e-9, "budget": 100}, "out_of_budget"),
         ("spheroid", "taylor", {"budget": 3}, "out_of_budget"),
+        ("spheroid", "rk4[attitude]", {"step_size": 0.2}, "not_normalised"),
     ],
 )
 def test_every_outcome_is_produced_said_and_timed(scene, name, controls, outcome):
@@ -109,3 +111,79 @@ def test_absurd_runs_end_at_once_with_a_sentence(scene, name, controls):
 
 def _fine(name):
     return {} if name in ("taylor", "exact") else {"tolerance": 1e-3}
+
+
+@pytest.mark.parametrize(("name", "step_size"), [("rk4[attitude]", 0.2), ("series[attitude]", 0.5)])
+def test_a_quaternion_that_leaves_length_one_has_failed_alone_and_in_an_ensemble(name, step_size):
+    options = {"step_size": step_size, "horizon": 8.0, "samples": 41}
+    run = symtop.simulate("spheroid", name, **options, guard=False)
+    assert run.attrs["outcome"] == "not_normalised"
+    assert "0.1 %" in run.attrs["outcome_message"]
+    shown = np.isfinite(run["quaternion"].values).all(axis=1)
+    assert 0 < shown.sum() < shown.size
+    assert (np.diff(shown.astype(int)) <= 0).all()  # nothing after the failure
+    lengths = np.linalg.norm(run["quaternion"].values[shown], axis=1)
+    assert np.abs(lengths - 1.0).max() <= 1e-3
+    assert run.attrs["reached_time"] == run["time"].values[shown][-1]
+    assert np.isnan(run["p_phi"].values[~shown]).all()
+    assert np.nanmax(symtop.errors(run)["attitude"].values) <= np.pi
+    many = symtop.ensemble(["spheroid", "goldstein"], name, **options, observe="attitude", quiet=True).isel(member=0)
+    assert many["outcome"].item() == "not_normalised"
+    assert many["reached_time"].item() == run.attrs["reached_time"]
+    np.testing.assert_array_equal(many["quaternion"].values[: shown.size], run["quaternion"].values)
+
+
+def test_a_quaternion_that_keeps_its_length_has_not_failed():
+    run = symtop.simulate("spheroid", "strang[attitude]", step_size=0.5, guard=False)
+    assert run.attrs["outcome"] == "ok"
+    near = symtop.simulate("spheroid", "rk4[attitude]", step_size=0.05, guard=False)
+    assert near.attrs["outcome"] == "ok"
+    assert np.abs(np.linalg.norm(near["quaternion"].values, axis=1) - 1.0).max() > 5e-4
+    far = charts.attitude_distance(np.array([3e116, 0.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 0.0]))
+    assert far == np.pi
+
+
+# ---- a run that ends well shows finite numbers -----------------------------------------------------------------------
+
+DOUBTFUL = symtop.Scene(
+    "doubtful", symtop.SymmetricTop(0.1862, 0.2285, 0.1828), symtop.Angles(0.00337, psi_dot=-1.61), 87.0
+)
+
+
+def _says_so(data):
+    """Is every sample finite, or does the outcome say that it is not?"""
+    return data.attrs["outcome"] != "ok" or all(np.isfinite(values).all() for values in data.data_vars.values())
+
+
+def test_a_state_whose_squares_overflow_is_not_finite():
+    """L is finite, about 1e160; the energy is the square of it."""
+    run = symtop.simulate(DOUBTFUL, "rk4[axis]", step_size=43.5, horizon=130.5, guard=False)
+    assert np.isfinite(run["axis"].values).all()
+    assert not np.isfinite(run["energy"].values).all()
+    assert (run.attrs["outcome"], run.attrs["reached_time"]) == ("not_finite", 87.0)
+    both = symtop.ensemble([DOUBTFUL] * 2, "rk4[axis]", step_size=43.5, horizon=130.5, quiet=True)
+    assert both["outcome"].values.tolist() == ["not_finite"] * 2
+    assert both["reached_time"].values.tolist() == [87.0] * 2
+    good = symtop.simulate(DOUBTFUL, "rk4[axis]", step_size=0.5, guard=False)  # the control
+    assert good.attrs["outcome"] == "ok"
+
+
+def test_every_variant_shows_finite_numbers_or_says_that_it_does_not():
+    draw, ended = np.random.default_rng(50), set()
+    for row in (method.variant(chart) for method in symtop.integrators().values() for chart in method.charts()):
+        for _ in range(4):
+            I1, mgl, rate = 10.0 ** draw.uniform(-2.0, 2.0, 3)
+            top = symtop.SymmetricTop(I1, I1 * draw.uniform(0.05, 1.95), mgl * draw.choice([-1.0, 1.0]))
+            start = symtop.Angles(
+                draw.choice([1e-3, 1.0, 3.0]), theta_dot=rate, psi_dot=draw.choice([-1.0, 1.0]) * rate
+            )
+            h = 10.0 ** draw.uniform(0.0, 4.0) / rate
+            scene, control = symtop.Scene("drawn", top, start, 4.0 * h if row.fixed_step else 20.0 / rate), {}
+            if row.control == "step_size":
+                control = {"step_size": h}
+            elif row.control == "tolerance":
+                control = {"tolerance": max(10.0 ** draw.uniform(-6.0, -0.1), row.least_tolerance), "budget": 2000}
+            run = symtop.simulate(scene, row, **control, guard=False)
+            assert _says_so(run), (row.name, scene, control)
+            ended.add(run.attrs["outcome"])
+    assert {"ok", "not_finite", "left_chart"} <= ended

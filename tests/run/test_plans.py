@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 
 SCENE = symtop.scene("spheroid")
@@ -26,20 +25,6 @@ def test_a_plan_with_a_tolerance_has_no_steps():
     assert (plan.horizon, plan.marks.size, plan.tolerance, plan.most(5.0)) == (2.0, 0, 1e-6, 100.0)
     assert math.isnan(plan.step_size)
     assert Plan.until([1.0], 1e-6).most(5.0) == 5.0
-
-
-def test_a_step_back_undoes_a_step():
-    verlet = symtop.integrator("stormer-verlet")
-    there = solve(verlet, "angles", SCENE.top, SCENE.start, Plan.steps(0.01, [1])).states[0]
-    momenta = SCENE.top.momenta(SCENE.start)
-    phi_dot = (momenta.p_phi - momenta.p_psi * math.cos(there[0])) / (SCENE.top.I1 * math.sin(there[0]) ** 2)
-    psi_dot = momenta.p_psi / SCENE.top.I3 - phi_dot * math.cos(there[0])
-    after = symtop.Angles(there[0], there[2], there[3], there[1] / SCENE.top.I1, phi_dot, psi_dot)
-    plan = Plan.steps(-0.01, [1])
-    assert plan.horizon == plan.times[0] == -0.01
-    back = solve(verlet, "angles", SCENE.top, after, plan).states[0]
-    start = [SCENE.start.theta, SCENE.top.I1 * SCENE.start.theta_dot, SCENE.start.phi, SCENE.start.psi]
-    assert back == pytest.approx(start, abs=1e-13)
 
 
 def test_a_scene_has_a_time_scale_even_on_a_separatrix():

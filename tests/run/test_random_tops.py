@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-import symtop
 from symtop.core.netcdf import content_hash
 from symtop.model.exact.closed_form import NUMBERS, ClosedForms
 from symtop.run.ensemble import population as populations
@@ -116,12 +115,3 @@ def test_sine_and_cosine_by_series_are_those_of_the_library():
     angle = np.linspace(0.0, np.pi, 2001)
     for ours, theirs in zip(sine_cosine(angle), (np.sin(angle), np.cos(angle)), strict=True):
         np.testing.assert_allclose(ours, theirs, atol=2e-15)
-
-
-@pytest.mark.parametrize(
-    ("bad", "reason"),
-    [({"n": 0}, "at least 1"), ({"n": 2.5}, "whole"), ({"seed": -1}, "at least 0"), ({"kind": "fsat"}, "mean fast")],
-)
-def test_bad_input_is_refused(bad, reason):
-    with pytest.raises(symtop.SymtopError, match=reason):
-        symtop.population(**{"n": 3, **bad})

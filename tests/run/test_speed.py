@@ -68,13 +68,3 @@ def test_a_run_of_one_step_costs_less_than_a_hundred_and_fifty_steps():
     labels = [(one.name, chart) for one in methods for chart in one.charts()]
     for (name, chart), seconds in zip(labels, singles, strict=True):
         assert seconds / (base / 20_000) < (300.0 if name == "sofroniou-spaletta-10" else 150.0), (name, chart)
-
-
-def test_memory_and_results_do_not_depend_on_how_the_steps_are_batched(monkeypatch):
-    """A run that returns to Python every few steps gives the same bits as one that does not."""
-    from symtop.methods.framework import loop as drive
-
-    chosen = symtop.scene("spheroid")
-    whole = symtop.simulate(chosen, "midpoint", step_size=0.01, samples=11, guard=False)
-    monkeypatch.setattr(drive, "BLOCK", 7)
-    assert symtop.simulate(chosen, "midpoint", step_size=0.01, samples=11, guard=False).equals(whole)

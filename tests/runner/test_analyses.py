@@ -12,13 +12,12 @@ from click.testing import CliRunner
 import symtop
 from symtop.cli.main import main
 from symtop.core import files
-from symtop.core.errors import SymtopError
 from symtop.runner import manifest, run as runner, store
 from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool
 from symtop.runner.run import analyse_stored, drawing_digest
 from symtop.runner.study import Case
-from tests.commands import contents, leftovers
+from tests.commands import leftovers, same
 
 SCRIPT = """
 import os, signal
@@ -34,14 +33,14 @@ def cases(quick):
 def measure(case):
     return xr.Dataset({"letters": float(len(case.integrator))})
 
-def verdict(data):
+def facts(data):
     if NAME == "killed" and os.getpid() != int(os.environ["SYMTOP_TESTS_PARENT"]):
         os.kill(os.getpid(), signal.SIGKILL)
     if NAME == "silent":
         raise SymtopError("study silent has nothing to say")
-    return [str(float(data["letters"].sum())), f"said by {os.getpid()}"]
+    return {"letters": float(data["letters"].sum()), "said_by": os.getpid()}
 
-STUDY = Study(NAME, NAME, "Who?", "", cases, measure, lambda data: [], verdict)
+STUDY = Study(NAME, NAME, "Who?", cases, measure, facts)
 """
 
 
@@ -65,8 +64,7 @@ def studied(results, *files):
 
 
 def said_by(results, name):
-    (sentence,) = [one for one in json.loads((results / f"{name}.json").read_text())["verdict"] if "said by" in one]
-    return int(sentence.split()[-1])
+    return json.loads((results / f"{name}.json").read_text())["facts"]["said_by"]
 
 
 def test_each_of_several_is_concluded_by_another_process_to_the_same_files(script, tmp_path):
@@ -78,10 +76,7 @@ def test_each_of_several_is_concluded_by_another_process_to_the_same_files(scrip
     for file in files:
         assert studied(tmp_path / "alone", file)[0] == 0  # the control: one by itself has nothing to run beside
     assert {said_by(tmp_path / "alone", name) for name in ("first", "second")} == {os.getpid()}
-    one, other = contents(tmp_path / "together"), contents(tmp_path / "alone")
-    assert one.keys() == other.keys()
-    assert len(one) == 6
-    assert all(one[name].identical(other[name]) for name in one)
+    assert same(tmp_path / "together", tmp_path / "alone") == 6
     assert "0 of 2 cases computed" in studied(tmp_path / "together", *files)[1]
     assert not leftovers(tmp_path / "together")
 
@@ -121,27 +116,6 @@ def test_a_study_that_is_edited_before_it_is_concluded_is_drawn_again(script, tm
         assert manifest.is_current(tmp_path / "r", name, "made of") is (name == "second")
 
 
-def test_files_of_cases_are_not_read_where_they_are_handed_out(script, tmp_path, monkeypatch):
-    """Only who concludes reads them, unless a second round hangs on them (the control)."""
-    read, load = [], store.load_case
-
-    def counted(path):
-        data = load(path)
-        if data is not None:
-            read.append(path)
-        return data
-
-    monkeypatch.setattr(store, "load_case", counted)
-    first, second = runner.load(script("first")), runner.load(script("second"))
-    with Pool(2) as pool:
-        answer = runner.start(first, tmp_path / "r", pool, quiet=True, beside=True)
-        assert read == []
-        assert answer.result()["cases"] == 2
-        assert read == []
-        runner.start(replace(second, follow_up=lambda _: []), tmp_path / "r", pool, quiet=True)
-        assert len(read) == 2
-
-
 @pytest.mark.parametrize("bad", ["refused", "silent"])
 def test_what_stops_one_study_does_not_stop_the_others(script, tmp_path, bad):
     """A grid that is refused ends the command after those before it; of findings that fail the next go on."""
@@ -169,13 +143,6 @@ def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
     store.tidy(tmp_path, study)
     assert not any(file.is_file() for file in left)
     assert all(file.is_file() for file in others)
-
-
-def test_a_study_that_says_nothing_is_told_when_it_is_asked(script, tmp_path):
-    with Pool(2) as pool:
-        answer = runner.start(runner.load(script("silent")), tmp_path / "r", pool, quiet=True, beside=True)
-        with pytest.raises(SymtopError, match="study silent has nothing to say"):
-            answer.result()
 
 
 def test_timed_cases_wait_for_the_analysis_of_the_study_before(script, tmp_path):

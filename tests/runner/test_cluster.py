@@ -1,9 +1,6 @@
-"""The runner on a dask cluster of two processes on this machine: the same bits, and no harm if one is killed."""
+"""The runner on a dask cluster of two processes on this machine: the same bits (`tests.hostile` ends clusters)."""
 
-import os
-import signal
 import sys
-import time
 
 import pytest
 from click.testing import CliRunner
@@ -14,7 +11,7 @@ from symtop.run.ensemble import chunks
 from symtop.run.ensemble.ensemble import ensemble
 from symtop.run.ensemble.population import population
 from symtop.runner.pool import Pool
-from tests.commands import PROBE, contents, ended, leftovers, symtop
+from tests.commands import PROBE, ended, leftovers, same, symtop
 
 distributed = pytest.importorskip("distributed")
 pytestmark = [
@@ -25,28 +22,11 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def log(tmp_path_factory):
-    """Where the workers of the cluster write what they begin."""
-    return tmp_path_factory.mktemp("cluster") / "log"
-
-
-@pytest.fixture(scope="module")
-def cluster(log, processes_with_dask):
+def cluster(processes_with_dask):
     with distributed.LocalCluster(
-        n_workers=2,
-        threads_per_worker=1,
-        processes=True,
-        dashboard_address=None,
-        silence_logs=50,
-        env={"PROBE_LOG": str(log), "PROBE_PAUSE": "0.3"},
-    ) as found:
-        yield found
-
-
-def same(one, other):
-    one, other = contents(one), contents(other)
-    assert one.keys() == other.keys()
-    assert all(one[name].identical(other[name]) for name in one)
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+    ) as made:
+        yield made
 
 
 def test_the_same_bits_as_without_a_cluster(cluster, tmp_path):
@@ -58,25 +38,6 @@ def test_the_same_bits_as_without_a_cluster(cluster, tmp_path):
     assert ended(symtop("study", PROBE, "--results", tmp_path / "here", "--jobs", 1))[0] == 0
     same(tmp_path / "here", tmp_path / "there")
     assert not leftovers(tmp_path / "there")
-
-
-def test_a_worker_that_is_killed_midway(cluster, log, tmp_path):
-    log.unlink(missing_ok=True)
-    with distributed.Client(cluster, set_as_default=False) as client:
-        victim = next(iter(client.run(os.getpid).values()))
-        process = symtop("study", PROBE, "--results", tmp_path / "r", "--scheduler", cluster.scheduler_address)
-        while not (log.is_file() and len(log.read_text().split()) >= 3):
-            assert process.poll() is None
-            time.sleep(0.05)
-        os.kill(victim, signal.SIGKILL)
-        code, _, err = ended(process)
-    assert code == 0, err
-    names = log.read_text().split()
-    assert len(set(names)) == 12
-    assert len(names) - 12 <= 1  # what the killed one was computing
-    assert ended(symtop("study", PROBE, "--results", tmp_path / "here", "--jobs", 1))[0] == 0
-    same(tmp_path / "here", tmp_path / "r")
-    assert not leftovers(tmp_path / "r")
 
 
 def test_a_case_that_fails_there_is_recorded_here(cluster, tmp_path):
@@ -111,15 +72,6 @@ def test_a_scheduler_that_is_none_is_one_sentence(address, tmp_path, monkeypatch
     assert done.exit_code == 2, done.output
     assert "scheduler must be the address of a dask scheduler that answers and has workers" in done.output
     assert "Traceback" not in done.output
-
-
-def test_a_cluster_without_workers_is_one_sentence(monkeypatch):
-    monkeypatch.setattr("symtop.run.cluster.PATIENCE", 2)
-    with (
-        distributed.LocalCluster(n_workers=0, dashboard_address=None, silence_logs=50) as empty,
-        pytest.raises(SymtopError, match="has workers"),
-    ):
-        Pool(scheduler=empty.scheduler_address)
 
 
 def test_without_the_package_it_says_how_to_get_it(monkeypatch):

@@ -14,15 +14,7 @@ from symtop.measure.order import order
 from symtop.run import plugins
 
 registry = importlib.import_module("symtop.methods.framework.registry")
-scenes = importlib.import_module("symtop.model.scenes")
 EXAMPLE = Path(__file__).resolve().parents[2] / "studies" / "examples" / "my_methods.py"
-
-
-@pytest.fixture
-def clean_registry(monkeypatch):
-    monkeypatch.setattr(registry, "_registry", registry.integrators())
-    monkeypatch.setattr(scenes, "_added", {})
-    monkeypatch.setattr(plugins, "_loaded", {})
 
 
 @pytest.fixture

@@ -17,11 +17,11 @@ import xarray as xr
 from click.testing import CliRunner
 
 from symtop.cli.main import main
-from symtop.core import files, jit, netcdf
+from symtop.core import files, netcdf
 from symtop.core.errors import SymtopError
 from symtop.core.signals import at_most
 from symtop.runner import pool as work, run as runner, store
-from tests.commands import PROBE, contents, ended, leftovers, stop, symtop
+from tests.commands import PROBE, contents, ended, leftovers, same, stop, symtop
 from tests.kills import survive
 
 
@@ -93,42 +93,6 @@ def test_a_real_limit_on_the_size_of_files(tmp_path):
     assert not leftovers(tmp_path / "small")
 
 
-TWICE = "def twice(x):\n    return 2.0 * x\n"
-
-
-@pytest.fixture
-def kernel(tmp_path, monkeypatch):
-    """Compiles a small function, as a new process would, with a cache of its own."""
-    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "cache"))
-    (tmp_path / "twice.py").write_text(TWICE)
-    space = {"__name__": "twice", "__file__": str(tmp_path / "twice.py")}
-    exec(compile(TWICE, str(tmp_path / "twice.py"), "exec"), space)
-    return lambda: jit.compile_kernel(space["twice"])
-
-
-def test_a_full_disk_under_the_cache_of_kernels_costs_time_and_no_run(kernel, tmp_path, monkeypatch):
-    def full(*arguments):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(jit._Index, "_save_data", full)
-    assert kernel()(2.0) == 4.0
-    assert not list(tmp_path.rglob("*.nbc"))
-    monkeypatch.undo()
-    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "cache"))
-    assert kernel()(2.0) == 4.0
-    assert list(tmp_path.rglob("*.nbc"))
-
-
-@pytest.mark.parametrize("kind", ["*.nbc", "*.nbi"])
-def test_a_damaged_cache_of_kernels_costs_time_and_no_run(kernel, tmp_path, kind):
-    assert kernel()(2.0) == 4.0
-    (victim,) = tmp_path.rglob(kind)
-    victim.write_bytes(victim.read_bytes()[:40])
-    again = kernel()
-    assert again(2.0) == 4.0
-    assert not again.stats.cache_hits
-
-
 @pytest.mark.parametrize("place", ["quick", "quick/cases", "quick/cases/probe", "quick/figures"])
 def test_a_file_where_a_folder_should_be(tmp_path, place):
     (tmp_path / place).parent.mkdir(parents=True, exist_ok=True)
@@ -143,12 +107,6 @@ def test_results_that_are_a_file_or_cannot_be_made(tmp_path):
     assert code == 2
     assert "is a file" in output
     refused("/proc/nowhere", "/proc/nowhere")
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_that_is_read_only(tmp_path):
-    tmp_path.chmod(0o500)
-    refused(tmp_path, "Permission denied")
 
 
 def test_a_folder_refused_by_the_system(tmp_path, monkeypatch):
@@ -245,9 +203,7 @@ def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
     assert len(begun) == len(set(begun)) == 12
     code, _, err = ended(symtop("study", PROBE, "--results", tmp_path / "alone"))
     assert code == 0, err
-    shared, alone = contents(tmp_path / "shared"), contents(tmp_path / "alone")
-    assert shared.keys() == alone.keys()
-    assert all(shared[name].identical(alone[name]) for name in alone)
+    same(tmp_path / "shared", tmp_path / "alone")
     assert not leftovers(tmp_path / "shared")
 
 
@@ -283,14 +239,16 @@ def begun(log: Path, count: int, process) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "code", "says"), [(2, 130, "interrupted"), (15, 143, "terminated")])
+@pytest.mark.parametrize(
+    ("number", "code", "says"), [(2, 130, "interrupted"), (15, 143, "terminated"), (1, 143, "terminated")]
+)
 @pytest.mark.parametrize("quick", [True, False])
 def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quick):
     log = tmp_path / "log"
     words = ["study", PROBE, "--results", tmp_path / "r", "--jobs", 2, *(["--quick"] if quick else [])]
     process = symtop(*words, PROBE_LOG=log, PROBE_PAUSE=0.5)
     begun(log, 3 if quick else 5, process)
-    process.send_signal(number)
+    os.killpg(process.pid, number) if number == signal.SIGHUP else process.send_signal(number)  # as a terminal does
     start = time.monotonic()
     ended_with, _, err = ended(process)
     assert time.monotonic() - start < 10.0
@@ -307,8 +265,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quic
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("words", "longest", "kills"),
-    [([PROBE], 2.5, 10), (["convergence", "factors", "phase_diagram", "--quick"], 15.0, 6)],
+    ("words", "longest", "kills"), [([PROBE], 2.5, 10), (["convergence", "factors", "reduction", "--quick"], 15.0, 6)]
 )  # python -m tests.kills --all: 30
 def test_kill_9_at_random_moments(tmp_path, words, longest, kills):
     found = survive(words, tmp_path, longest, kills)
@@ -432,8 +389,7 @@ def test_a_clock_that_jumps(tmp_path, monkeypatch):
     monkeypatch.setattr(time, "time", lambda: draw.uniform(-1e9, 4e9))
     assert probe(tmp_path / "r")[0] == 0
     monkeypatch.undo()
-    calm, other = contents(tmp_path / "calm"), contents(tmp_path / "r")
-    assert all(calm[name].identical(other[name]) for name in calm)
+    same(tmp_path / "calm", tmp_path / "r")
 
 
 def test_paths_that_are_not_ascii(tmp_path):
@@ -462,7 +418,7 @@ def test_errors_of_the_place_are_not_errors_of_a_case(tmp_path):
     """Sources that changed under a running study end it: nothing else would do better."""
     study = runner.load(str(PROBE))
     case = study.cases(True)[0]
-    [path] = store.case_paths(tmp_path, study, [case])
+    path = store.case_path(tmp_path, study, case)
     task = work.Task(str(PROBE), case, path, (), 10.0)
     assert work.execute_case(task).state == "computed"
     assert work.execute_case(task).state == "found"

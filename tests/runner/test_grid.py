@@ -14,7 +14,6 @@ BUILT_IN = {
     "convergence": ["spheroid", "goldstein", "loop", "hairer-lubich-wanner"],
     "drift": ["spheroid", "goldstein"],
     "claims": ["spheroid"],
-    "work_precision": ["spheroid", "goldstein", "loop", "fast", "hairer-lubich-wanner", "bruls-cardona-arnold"],
 }
 
 

@@ -44,6 +44,24 @@ def test_a_tree_is_read_as_it_was_written(tmp_path):
     assert again["windows/energy"].attrs["long_name"] == "total energy"
 
 
+def test_single_precision_stays_and_is_stored_in_little_space(tmp_path):
+    """Ten bits of each number; the same in double precision, which is not compressed, for comparison."""
+    size, power = np.frexp(np.random.default_rng(1).lognormal(size=(3, 40_000)))
+    rounded = np.ldexp(np.rint(np.ldexp(size, 10)), power - 10)
+    sizes = {}
+    for kind in (np.float32, np.float64):
+        cases = [(Case("spheroid", name), xr.Dataset({"cost": ("member", row.astype(kind)[: 40_000 - (k == 2)])}))
+                 for k, (name, row) in enumerate(zip(("rk4", "strang", "midpoint"), rounded, strict=True))]  # fmt: skip
+        data = datasets.combine(cases)
+        path = netcdf.write(data, tmp_path / f"{kind.__name__}.nc")
+        again = netcdf.read(path)["cost"].sel(scene="spheroid")
+        assert again.dtype == kind
+        np.testing.assert_array_equal(again.values[:2], rounded[:2])
+        assert np.isnan(again.values[2, -1])  # what a shorter case does not fill
+        sizes[kind] = path.stat().st_size
+    assert sizes[np.float32] < 0.25 * sizes[np.float64]
+
+
 def test_a_check_names_the_group_that_differs():
     assert differences(tree(), tree()) == []
     (difference,) = differences(tree(), tree(PHASE + np.uint8(1)))
@@ -81,6 +99,6 @@ def test_cases_that_differ_in_their_group_alone_have_files_of_their_own(tmp_path
 
     study = load("drift")
     cases = [Case("spheroid", "strang", {"steps": 1}, group=group) for group in ("windows", "rounding")]
-    paths = store.case_paths(tmp_path, study, cases)
+    paths = [store.case_path(tmp_path, study, case) for case in cases]
     assert len({store.identity_of(path) for path in paths}) == 2
     assert len({store.digest_of(path) for path in paths}) == 2

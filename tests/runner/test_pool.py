@@ -26,7 +26,7 @@ def measure(case):
     time.sleep(0.2)
     return xr.Dataset({"begin": begin, "end": time.monotonic(), "process": float(os.getpid())})
 
-STUDY = Study("slept", "Slept", "When?", "", cases, measure, lambda data: [], lambda data: ["Slept."], timed=True)
+STUDY = Study("slept", "Slept", "When?", cases, measure, timed=True)
 """
 
 

@@ -1,14 +1,11 @@
 """Two rounds of cases: what is computed again if the second is incomplete, and timed cases in new workers."""
 
 import dataclasses
-import json
-import math
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
-from symtop_studies.work_precision.timing_rounds import TimedRun
 
 from symtop.runner import pool as pools, run as runner, store
 from symtop.runner.cases import StudyCases
@@ -18,7 +15,7 @@ ROUNDS = """
 import os
 import xarray as xr
 from symtop.runner.study import Case, Study
-from symtop_studies.stability.atlas import PoleEffect
+from symtop_studies.stability.atlas import Failure
 
 def cases(quick):
     return [Case("spheroid", name) for name in ("midpoint", "strang")]
@@ -26,15 +23,15 @@ def cases(quick):
 def measure(case):
     if not case.timed:
         return xr.Dataset({"steps": float(len(case.integrator))})
-    names, near = case.settings["integrators"], case.settings["effect"].near
-    later = {"later": ("variant", [near] * len(names)), "process": ("variant", [os.getpid()] * len(names))}
+    names, setting = case.settings["integrators"], case.settings["effect"].setting
+    later = {"later": ("variant", [setting] * len(names)), "process": ("variant", [os.getpid()] * len(names))}
     return xr.Dataset(later, coords={"variant": names})
 
 def follow_up(data):
     names = [str(name) for name in data["variant"].values]
-    return [Case("spheroid", "together", {"integrators": names, "effect": PoleEffect(2.0, True, 0.1)}, timed=True)]
+    return [Case("spheroid", "together", {"integrators": names, "effect": Failure(2.0, "left_chart")}, timed=True)]
 
-STUDY = Study("rounds", "Rounds", "Both?", "", cases, measure, lambda data: [], lambda data: ["It ran."],
+STUDY = Study("rounds", "Rounds", "Both?", cases, measure,
               follow_up=follow_up)
 """
 
@@ -46,33 +43,8 @@ def study(tmp_path):
     return runner.load(str(tmp_path / "rounds.py"))
 
 
-def manifest_of(results: Path) -> dict:
-    return json.loads((results / "cases" / "manifest.json").read_text())
-
-
 def cases_of(results: Path, timed: bool) -> list[Path]:
     return [path for path in (results / "cases" / "rounds").glob("*.npz") if ("--together--" in path.name) == timed]
-
-
-def test_a_case_that_is_missing_is_computed_again_whichever_its_round(study, tmp_path):
-    results = tmp_path / "r"
-
-    def computed():
-        return runner.run(study, results, quiet=True)["computed"]
-
-    assert computed() == 3
-    assert computed() == 0
-    first = manifest_of(results)
-    (later,) = cases_of(results, timed=True)
-    later.unlink()
-    assert computed() == 1
-    assert later.is_file()
-    assert manifest_of(results)["rounds"]["made_of"] == first["rounds"]["made_of"]
-    cases_of(results, timed=False)[0].unlink()
-    assert computed() == 1
-    later.write_bytes(later.read_bytes()[:100])
-    assert computed() == 1
-    assert computed() == 0
 
 
 def test_timed_cases_that_alone_are_missing_run_in_new_workers(study, tmp_path, monkeypatch):
@@ -91,63 +63,18 @@ def test_timed_cases_that_alone_are_missing_run_in_new_workers(study, tmp_path, 
     assert set(np.ravel(again["later"])) == {2.0}
 
 
-@pytest.fixture(scope="module")
-def timed(tmp_path_factory):
-    """The study that times methods, with two of them on one scene, and its results."""
-    whole, results = runner.load("work_precision"), tmp_path_factory.mktemp("timed")
-    few = [
-        one
-        for one in whole.cases(True)
-        if one.scene == "spheroid" and one.integrator in ("midpoint[angles]", "strang[axis]")
-    ]
-    said = {"pictures": lambda _: [], "tables": lambda _: [], "charts": lambda _: [], "verdict": lambda _: ["It ran."]}
-    small = dataclasses.replace(whole, cases=lambda _: few, opening=None, **said)
-    assert runner.run(small, results, quiet=True)["failures"] == []
-    return small, results
-
-
-def test_methods_are_timed_in_new_workers_when_nothing_else_is_missing(timed, monkeypatch):
-    study, results = timed
+@pytest.mark.slow
+def test_methods_are_timed_again_when_nothing_else_is_missing(tmp_path, monkeypatch):
+    """The study that times methods, with two of them, in workers."""
+    whole, names = runner.load("cost"), ["midpoint[angles]", "strang[axis]"]
+    few = [dataclasses.replace(one, settings={**one.settings, "integrators": names})
+           for one in whole.cases(True) if one.group == "prices"]  # fmt: skip
+    quiet = {"pictures": lambda _: [], "tables": lambda _: {}, "charts": lambda _: []}
+    small = dataclasses.replace(whole, cases=lambda _: few, facts=None, follow_up=None, **quiet)
+    assert runner.run(small, tmp_path, quiet=True)["failures"] == []
     monkeypatch.setattr(pools, "WORTH_WORKERS", 1)
-    for path, case in StudyCases.stored(study, results, quick=False, full=False).cases.items():
-        if study.is_timed(case):
-            path.unlink()
+    for path in StudyCases.stored(small, tmp_path, quick=False, full=False).cases:
+        path.unlink()
     with Pool(2) as pool:
-        done = runner.run(study, results, quiet=True, pool=pool)
-    assert done["computed"] > 0
-    assert done["failures"] == []
-
-
-def plain(value: object) -> bool:
-    """Is it made of what JSON has, so that no process needs a study's own classes to read it? A tuple is a list."""
-    if type(value) in (list, tuple):
-        return all(map(plain, value))
-    if type(value) is dict:
-        return all(type(key) is str and plain(one) for key, one in value.items())
-    return value is None or type(value) in (str, bool, int, float)
-
-
-def survives(settings: dict) -> bool:
-    """Are settings, written as JSON and read again, what they were? Compared as text, since NaN is not itself."""
-    text = json.dumps(settings)
-    return plain(settings) and json.dumps(json.loads(text)) == text
-
-
-def test_a_record_among_settings_is_noticed():
-    assert survives({"runs": [["midpoint", 0, 0.1, (1, 2)]], "longest": math.nan, "none": None})
-    assert not survives({"runs": [TimedRun("midpoint[angles]", 0, 0, 0.1, 100.0, 50.0, (1, 2))]})
-    assert not survives({"counts": {1: "one"}})
-
-
-@pytest.mark.parametrize("name", runner.names())
-def test_settings_of_the_first_round_are_values_of_json(name):
-    study = runner.load(name)
-    for case in [*study.grid(quick=True), *study.grid(), *study.grid(full=True)]:
-        assert survives(dict(case.settings)), case
-
-
-def test_settings_of_the_second_round_are_values_of_json(timed):
-    study, results = timed
-    later = [case for case in StudyCases.stored(study, results, quick=False, full=False).cases.values() if case.timed]
-    assert later
-    assert all(survives(dict(case.settings)) for case in later)
+        done = runner.run(small, tmp_path, quiet=True, pool=pool)
+    assert (done["computed"], done["failures"]) == (len(few), [])

@@ -46,16 +46,16 @@ def edited(place):
 
 def forget():
     fingerprint._known.clear()
-    fingerprint._code.cache_clear()
+    fingerprint.reached.cache_clear()
 
 
 def stale_after(place, study):
     """Integrators of a study's cases whose digest changes with an edit."""
     cases = study.cases(True)
-    before = fingerprint.digests(study, cases)
+    before = [fingerprint.digest(study, case) for case in cases]
     with edited(place):
-        after = fingerprint.digests(study, cases)
-    assert before == fingerprint.digests(study, cases)
+        after = [fingerprint.digest(study, case) for case in cases]
+    assert before == [fingerprint.digest(study, case) for case in cases]
     return {case.integrator for case, one, two in zip(cases, before, after, strict=True) if one != two}
 
 
@@ -79,7 +79,7 @@ METHODS = "symtop.methods"
         (f"{METHODS}.lagrangian.galerkin:increment", {"galerkin-simpson"}),
         (f"{METHODS}.lagrangian.discrete_lagrangian:increment", STRAIGHT),
         (f"{METHODS}.library.scipy_ivp:compiled_field", SCIPY),
-        (f"{METHODS}.runge_kutta.explicit:weighted", {"rk4", "rk45-compiled"}),
+        (f"{METHODS}.runge_kutta.explicit:weighted", {"rk4", "rk45-compiled", "tsit5", "dop853-compiled", "vern9"}),
         (f"{METHODS}.splitting.reversible:march", {"stormer-verlet-reversible"}),
         (f"{METHODS}.lie_group.generalised_alpha:turn", {"generalised-alpha"}),
         (f"{METHODS}.taylor.heyoka:propagate", {"taylor", "taylor-longdouble", "taylor-quad"}),
@@ -117,13 +117,13 @@ def test_measure_code_and_the_reference_make_the_cases_of_their_study_stale():
 @pytest.mark.parametrize(
     ("place", "again"),
     [
-        ("symtop_studies.work_precision.leads:winners", True), ("symtop_studies.work_precision.words:sentences", True),
+        ("symtop_studies.cost.cells:winners", True), ("symtop_studies.cost.facts:facts", True),
         ("symtop.measure.datasets:_dense", True), ("symtop.cli.common:as_text", False),
-        ("symtop_studies.drift.words:verdict", False),
+        ("symtop_studies.drift.facts:facts", False),
     ],
 )  # fmt: skip
 def test_findings_are_made_again_when_what_draws_or_judges_them_is_edited(place, again):
-    study = runner.load("work_precision")
+    study = runner.load("cost")
     before = drawing_digest(study, style.save)
     with edited(place):
         assert (drawing_digest(study, style.save) != before) is again
@@ -164,15 +164,17 @@ def test_a_case_depends_on_the_integrators_that_its_study_says_it_runs():
 
 def test_all_digests_of_all_studies_are_the_same_whatever_the_process_has_run():
     """Values that calls have left in modules are state and count for nothing."""
-    studies = [runner.load(name) for name in ("convergence", "population", "notebook")]
+    studies = [runner.load(name) for name in ("convergence", "cost", "notebook")]
     grids = [study.cases(True)[:20] for study in studies]
-    before = [fingerprint.digests(study, grid) for study, grid in zip(studies, grids, strict=True)]
+    before = [[fingerprint.digest(study, case) for case in grid] for study, grid in zip(studies, grids, strict=True)]
     symtop.simulate("spheroid", "strang", step_size=0.01)
     symtop.reference("cusp", [0.0, 1.0])
     symtop.ensemble(symtop.population(5, seed=1), "rk4", step_size=0.01, horizon=0.1, samples=3)
     studies[0].measure(grids[0][0])
     forget()
-    assert [fingerprint.digests(study, grid) for study, grid in zip(studies, grids, strict=True)] == before
+    assert [
+        [fingerprint.digest(study, case) for case in grid] for study, grid in zip(studies, grids, strict=True)
+    ] == before
 
 
 def test_a_function_counts_alike_before_and_after_a_kernel_registers_it():
@@ -216,29 +218,26 @@ def test_no_case_runs_an_integrator_that_it_is_not_said_to_depend_on(name, monke
 def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
     script = tmp_path / "counted.py"
     text = PROBE.read_text()
-    digests = set()
-    for version in (
-        text,
-        text.replace('"Energy."', '"Another caption."'),
-        text.replace("samples=51", "samples=STEPS").replace("METHODS = (", "STEPS = 51\nMETHODS = ("),
-        text.replace("samples=51", "samples=STEPS").replace("METHODS = (", "STEPS = 52\nMETHODS = ("),
-        text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(51)\n",
-        text.replace("samples=51", "samples=len(helper())") + "\n\ndef helper():\n    return range(53)\n",
-        text.replace("samples=51", "samples=cached()") + "\n\n@functools.cache\ndef cached():\n    return 51\n",
-        text.replace("samples=51", "samples=cached()") + "\n\n@functools.cache\ndef cached():\n    return 53\n",
-        text.replace("samples=51", "samples=Few().count()")
-        + "\n\nclass Few:\n    def count(self):\n        return 51\n",
-        text.replace("samples=51", "samples=Few().count()")
-        + "\n\nclass Few:\n    def count(self):\n        return 53\n",
+    versions = [text, text.replace("Is it whole?", "Is it?").replace("figsize=(2, 2)", "figsize=(3, 2)")]
+    for call, made in (
+        ("STEPS", "STEPS = {}"),
+        ("len(helper())", "def helper():\n    return range({})"),
+        ("cached()", "@functools.cache\ndef cached():\n    return {}"),
+        ("Few().count()", "class Few:\n    def count(self):\n        return {}"),
     ):
+        assert text.count("samples=51") == 1
+        versions += [f"{text.replace('samples=51', f'samples={call}')}\n\n{made.format(n)}\n" for n in (51, 53)]
+    digests = set()
+    for version in versions:
         script.write_text("import functools\n" + version)
         sys.modules.pop("symtop_study_counted", None)
         linecache.checkcache()
         importlib.invalidate_caches()
         shutil.rmtree(tmp_path / "__pycache__", ignore_errors=True)
         study = runner.load(str(script))
-        digests.add(fingerprint.digests(study, study.cases(True))[0])
-    assert len(digests) == 9  # the caption alone changes nothing
+        digests.add(fingerprint.digest(study, study.cases(True)[0]))
+    assert len({*versions}) == 10
+    assert len(digests) == 9  # what is asked and drawn changes nothing
 
 
 PLUGIN = """
@@ -271,7 +270,7 @@ def test_an_edit_of_each_family_is_named_by_status_and_is_all_that_is_computed(t
     edits = [
         (package / "methods/runge_kutta/gauss.py", "\n", "\n# a comment\n", None, set()),
         (tmp_path / "coeffs.py", "(0.0, 1.0)", "(0.5, 0.5)", "integrator bad-of-a-user", {"bad-of-a-user"}),
-        (package / "methods/runge_kutta/dormand_prince.py", "\n", "\n", None, set()),
+        (package / "methods/runge_kutta/pairs.py", "\n", "\n", None, set()),
         (tmp_path / "probe.py", "samples=51", "samples=53", "code probe.py", "all"),
     ]
     for file, before, after, why, stale in edits:

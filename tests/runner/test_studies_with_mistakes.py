@@ -17,7 +17,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 import symtop
-from symtop import Case, Picture, Study, Table
+import pandas as pd
+from symtop import Case, Picture, Study
 
 def cases(quick):
     return [Case("spheroid", name, {{"step_size": 0.1}}) for name in ("rk4", "strang")]
@@ -28,15 +29,18 @@ def measure(case):
 def pictures(data):
     figure = Figure()
     figure.subplots()
-    yield Picture("one", figure, "caption", "alt")
+    yield Picture("one", figure)
 
-def verdict(data):
-    return ["a sentence"]
+def facts(data):
+    return {{"worst": np.float64(0.25), "best": None}}
+
+def tables(data):
+    return {{"one": pd.DataFrame({{"a": [1.5]}})}}
 
 more = {{}}
 {change}
-STUDY = Study(name="mine", title="t", question="q", how_to_read="h", cases=cases, measure=measure, pictures=pictures,
-              verdict=verdict, **more)
+STUDY = Study(name="mine", title="t", question="q?", cases=cases, measure=measure, pictures=pictures, facts=facts,
+              tables=tables, **more)
 """
 
 
@@ -55,7 +59,7 @@ def test_the_study_itself_is_right(tmp_path):
     code, output = ran(tmp_path, "")
     assert code == 0, output
     assert "2 of 2 cases computed, 1 figure" in output
-    assert "  - a sentence\n" in output
+    assert "  worst: 0.25\n" in output
 
 
 @pytest.mark.parametrize(
@@ -83,21 +87,21 @@ def test_a_grid_that_is_none_is_refused(tmp_path, change, says, words):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ("verdict = lambda data: None", "verdict must return a list of sentences, not None"),
-        ("verdict = lambda data: 'one sentence'", "verdict must return a list of sentences, not 'one sentence'"),
-        ("verdict = lambda data: [1.0]", "verdict must return a list of sentences; an entry is a float"),
-        ("verdict = lambda data: data['no']", "verdict failed: KeyError"),
-        ("verdict = lambda data: [symtop.simulate('spheroid', 'rk4', step_size=np.nan).title]",
-         "verdict failed: step_size must be a finite number"),
+        ("facts = lambda data: None", "facts must return numbers by name, not None"),
+        ("facts = lambda data: {'a b': 1}", "the name of a fact must be a word of letters, digits and _, not 'a b'"),
+        ("facts = lambda data: {'a': [1.0]}", "fact a must be a number, text or None, not [1.0]"),
+        ("facts = lambda data: data['no']", "facts failed: KeyError"),
+        ("facts = lambda data: [symtop.simulate('spheroid', 'rk4', step_size=np.nan).title]",
+         "facts failed: step_size must be a finite number"),
         ("pictures = lambda data: None", "pictures must return or yield Pictures, not None"),
         ("pictures = lambda data: iter([Figure()])", "pictures must return or yield Pictures; an entry is a Figure"),
-        ("pictures = lambda data: [Picture('a', 'a.png', 'caption', 'alt')]", "must be one of matplotlib, not a str"),
-        ("pictures = lambda data: [Picture('a', Figure(), None, 'alt')]", "must have a caption that is text, not None"),
-        ("pictures = lambda data: [Picture('../a', Figure(), 'caption', 'alt')]", "name of a picture must be"),
+        ("pictures = lambda data: [Picture('a', 'a.png')]", "must be one of matplotlib, not a str"),
+        ("pictures = lambda data: [Picture('../a', Figure())]", "name of a picture must be"),
         ("pictures = lambda data: (1 / 0 for _ in 'x')", "pictures failed: ZeroDivisionError"),
-        ("more = {'tables': lambda data: Table('t', ['a'], [['b']])}", "tables must return a list of Table, not Table"),
+        ("tables = lambda data: pd.DataFrame()", "tables must return tables by name, not"),
+        ("tables = lambda data: {'a': [1.0]}", "table a must be a DataFrame, not a list"),
+        ("tables = lambda data: {'../a': pd.DataFrame()}", "name of a table must be"),
         ("more = {'charts': lambda data: None}", "charts must return a list of Chart, not None"),
-        ("more = {'opening': lambda data: None}", "opening must return an Opening, not None"),
         ("more = {'follow_up': lambda data: None}", "follow_up must return a list of Case, not None"),
     ],
 )  # fmt: skip
@@ -120,20 +124,14 @@ def test_a_step_that_is_nan_in_a_measure_is_no_option_of_the_command(tmp_path):
     assert "study mine: no case could be measured; rk4 on spheroid failed: step_size must be a finite" in output
 
 
-def test_measures_that_do_not_fit_together_are_told_of(tmp_path):
-    shape = "('k', [1.0]) if case.integrator == 'rk4' else 1.0"
-    code, output = ran(tmp_path, f"measure = lambda case: xr.Dataset({{'err': {shape}}})")
-    assert code in (0, 2), output  # what fits is the store's matter; a traceback it is not
-
-
-def test_sentences_may_come_in_any_order_of_things():
-    sentences = lambda verdict: list(each("mine", "verdict", verdict, str, "a list of sentences"))
-    assert sentences(lambda: ("a", "b")) == ["a", "b"]
-    assert sentences(lambda: iter(["a"])) == ["a"]
-    assert sentences(list) == []
+def test_an_answer_may_come_in_any_order_of_things():
+    names = lambda make: list(each("mine", "names", make, str, "a list of names"))
+    assert names(lambda: ("a", "b")) == ["a", "b"]
+    assert names(lambda: iter(["a"])) == ["a"]
+    assert names(list) == []
     for bad in ("a", b"a", {"a": 1}, 3, [None]):
-        with pytest.raises(StudyError, match="study mine: verdict must return a list of sentences"):
-            sentences(lambda bad=bad: bad)
+        with pytest.raises(StudyError, match="study mine: names must return a list of names"):
+            names(lambda bad=bad: bad)
 
 
 @pytest.mark.parametrize("settings", [{}, {"a": [1, 2.0, None, "x", {"b": True}]}, {"a": np.float64(0.1)}, {"a": (1,)}])
@@ -145,12 +143,33 @@ def test_settings_that_json_can_hold_are_right(settings):
 
 def test_what_python_raises_is_kept_as_the_cause(tmp_path):
     script = tmp_path / "mine.py"
-    script.write_text(SCRIPT.format(change="verdict = lambda data: 1 / 0"))
+    script.write_text(SCRIPT.format(change="facts = lambda data: 1 / 0"))
     sys.modules.pop("symtop_study_mine", None)
-    with pytest.raises(SymtopError, match="verdict failed: ZeroDivisionError") as caught:
+    with pytest.raises(SymtopError, match="facts failed: ZeroDivisionError") as caught:
         runner.run(runner.load(str(script)), tmp_path / "results", jobs=1, quiet=True)
     assert isinstance(caught.value.__cause__, ZeroDivisionError)
     assert xr.open_dataset(tmp_path / "results" / "mine.nc").sizes["variant"] == 2
+
+
+@pytest.mark.parametrize(
+    ("page", "says"),
+    [
+        ("{{ f.wrost | number }}", "page of mine: 'types.SimpleNamespace object' has no attribute 'wrost'"),
+        ("# Q\n{{ f.worst | numbr }}", "page of mine, line 2: No filter named 'numbr'"),
+        ("{% if f.worst %}", "page of mine, line 1: Unexpected end of template"),
+    ],
+)
+def test_a_page_that_is_wrong_is_told_of(tmp_path, page, says):
+    (tmp_path / "mine.md").write_text(page)
+    code, output = ran(tmp_path, "")
+    assert code == 2, output
+    assert says in output
+    (tmp_path / "mine.md").write_text("# {{ question }}\n\nThe worst is {{ f.worst | number }}.\n\n{{ table('one') }}")
+    code, output = ran(tmp_path, "")
+    assert code == 0, output
+    assert "0 of 2 cases computed" in output
+    assert "  The worst is 0.25.\n" in output
+    assert (tmp_path / "results" / "tables" / "mine-one.csv").read_text() == "a\n1.5\n"
 
 
 @pytest.mark.parametrize(
@@ -173,9 +192,9 @@ def test_a_study_without_findings_does_not_keep_the_next_from_theirs(tmp_path):
     """Both are computed; the second has its findings, and the first its sentence, last, and the exit code."""
     second = tmp_path / "other.py"
     second.write_text(SCRIPT.format(change="").replace('name="mine"', 'name="other"'))
-    code, output = ran(tmp_path, "verdict = lambda data: None", str(second))
+    code, output = ran(tmp_path, "facts = lambda data: None", str(second))
     assert code == 2, output
     assert "other: 2 of 2 cases computed, 1 figure" in output
-    assert output.splitlines()[-1].startswith("symtop: study mine: verdict must return")
+    assert output.splitlines()[-1].startswith("symtop: study mine: facts must return")
     assert (tmp_path / "results" / "other.json").is_file()
     assert not (tmp_path / "results" / "mine.json").exists()

@@ -1,16 +1,15 @@
-"""Outcome maps against single runs, and the sentences against maps whose content is known."""
+"""Outcome maps against single runs, and facts against maps whose content is known."""
 
 import dataclasses
 import math
-import re
 
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.stability import atlas, atlas_words, messages, outcome_maps, words
+from symtop_studies.stability import atlas, facts, mechanisms, outcome_maps, study
 from symtop_studies.stability.many_verdicts import JUDGED, VERDICTS
 from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, row_plan, spin_unit, with_spin
-from symtop_studies.stability.tables import Column, family_limits, map_table, sampling_table
+from symtop_studies.stability.tables import family_limits, map_table, sampling_table
 
 import symtop
 from symtop.core import netcdf
@@ -20,6 +19,7 @@ from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
 from symtop.runner.study import Case
+from tests.templates import checked
 
 STEPS = [0.011, 0.053, 0.17, 0.31, 0.83]
 
@@ -196,6 +196,8 @@ def hand_made(
             "parameter_value": ("parameter", np.asarray(parameter, float)),
             "control": ("setting", np.asarray(control, float)),
             "knob_name": knob_name,
+            "checks": 0.0,
+            "refuted": 0.0,
         }
     )
     return datasets.combine([(Case(scene_name, "midpoint"), data)])
@@ -204,29 +206,32 @@ def hand_made(
 A, B, L = "accurate", "bounded_but_wrong", "left_chart"
 
 
-def test_advice_reads_reach_and_failures_off_the_map():
+def test_reach_and_failures_are_read_off_the_map():
     data = hand_made([[A, B, L, L, L], [A, B, L, L, L], [A, A, L, L, L], [A, A, B, B, B]], (0.01, 0.1, 1.0, 1.5, 2.0))
-    line = atlas_words.advice(data, "cusp")["midpoint"]
-    assert re.findall(r"\d\.\d+", line.use) == ["0.1", "0.01"]  # on fast tops, and on slow ones
-    assert re.findall(r"h = (\S+)|(\d+)%", line.fails) == [("1", ""), ("", "75"), ("", "100"), ("", "25")]
+    one = atlas.maps(data, "cusp")["midpoint"]
+    assert one.usual_reach == {"fast": 0.1, "slow": 0.01}
+    assert one.failure == (1.0, "left_chart")
+    assert (one.accurate, one.early) == (6 / 20, 9 / 20)
+    row = facts.tables(data)["atlas"].iloc[0]
+    assert (row["accurate up to, fast tops"], row["fails from"], row["fails mostly by"]) == (0.1, 1.0, "left chart")
+    assert row["accurate (%)"] == pytest.approx(30.0)
 
 
 def failing(*shares, starts=20, word="drifting"):
-    """A map of which these shares of the starts fail, step by step."""
+    """From which step on a map fails of which these shares of the starts do, step by step."""
     columns = [[word] * round(share * starts) + [A] * (starts - round(share * starts)) for share in shares]
     data = hand_made(
         np.array(columns).T.tolist(), np.geomspace(0.01, 1.0, len(shares)), np.geomspace(0.1, 30.0, starts)
     )
-    return atlas_words.advice(data, "cusp")["midpoint"].fails
+    return atlas.maps(data, "cusp")["midpoint"].failure.setting
 
 
-def test_a_threshold_holds_at_every_larger_step_and_says_in_how_many_starts():
+def test_a_threshold_holds_at_every_larger_step():
     """Five steps from 0.01 to 1: 0.01, 0.032, 0.1, 0.32, 1."""
-    assert "h = 0.032 " in failing(0.0, 0.9, 0.6, 0.7, 1.0)
-    assert "60% of 20 starts" in failing(0.0, 0.9, 0.6, 0.7, 1.0)
-    assert "h = 0.1 " in failing(0.7, 0.4, 0.6, 0.7, 1.0)
+    assert failing(0.0, 0.9, 0.6, 0.7, 1.0) == pytest.approx(10.0**-1.5)
+    assert failing(0.7, 0.4, 0.6, 0.7, 1.0) == pytest.approx(0.1)
     for none in ((0.05, 0.0, 0.0), (0.6, 0.0, 0.2), (0.0, 0.1, 0.2, 0.4, 0.6), (0.0, 0.0, 0.0)):
-        assert "h = " not in failing(*none)
+        assert math.isnan(failing(*none))
 
 
 def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
@@ -244,23 +249,6 @@ def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
     assert shapes == {"strang": (2, 2), "midpoint": (3, 3)}
 
 
-def tolerances(*ladders):
-    """Maps of methods over tolerances: accurate up to 1e-4."""
-    names = ["rk45[axis]", "radau[axis]", "dop853[axis]", "lsoda[axis]"]
-    cells = []
-    for name, ladder in zip(names, ladders, strict=False):
-        cell = hand_made([[A if value < 2e-4 else B for value in ladder]] * 4, ladder, knob_name="tolerance")
-        cells.append((Case("cusp", name), cell.sel(scene="cusp", variant="midpoint", drop=True)))
-    return datasets.combine(cells)
-
-
-def test_shares_of_a_page_are_of_what_all_its_maps_have():
-    data = tolerances([1e-10, 1e-8, 1e-6, 1e-4, 1e-2], [1e-6, 1e-4, 1e-2])
-    shares = {name: one.shares[0] for name, one in atlas.common(atlas.maps(data, "cusp")).items()}
-    assert shares == pytest.approx({"rk45[axis]": 2 / 3, "radau[axis]": 2 / 3})
-    assert atlas.maps(data, "cusp")["rk45[axis]"].shares[0] == pytest.approx(4 / 5)
-
-
 def test_a_variant_without_an_inaccurate_run_has_no_share_of_them():
     cells = [(Case("cusp", name), hand_made(lines).sel(scene="cusp", variant="midpoint", drop=True))
              for name, lines in (("rk4[axis]", [[A, B, L]] * 4), ("strang[axis]", [[A, A, A]] * 4))]  # fmt: skip
@@ -272,40 +260,87 @@ def test_a_variant_without_an_inaccurate_run_has_no_share_of_them():
 def test_a_pole_that_halves_the_reach_is_told_from_one_that_does_not():
     gaps = (1e-6, 1e-5, 1e-2, 0.2)
     near = hand_made([[L, L, L], [L, L, L], [A, L, L], [A, A, L]], parameter=gaps, scene_name="grazing")
-    effect = atlas.pole_effect(atlas.maps(near, "grazing")["midpoint"])
-    assert effect.halves
-    assert effect.width == pytest.approx(0.011)
+    assert atlas.halved_by_pole(atlas.maps(near, "grazing")["midpoint"]) is True
     unspoiled = hand_made([[A, A, L]] * 4, parameter=gaps, scene_name="grazing")
-    assert not atlas.pole_effect(atlas.maps(unspoiled, "grazing")["midpoint"]).halves
+    assert atlas.halved_by_pole(atlas.maps(unspoiled, "grazing")["midpoint"]) is False
 
 
-def test_runs_that_outlast_the_law_of_the_separatrix_or_never_get_there_are_not_counted():
+def test_runs_that_outlast_the_law_of_the_separatrix_are_not_counted():
     columns = {
-        Column.EARLY_ERROR: (("variant", "setting"), [[1e-6, 1e-8], [1e-6, 1e-8]]),
-        Column.PREDICTED_HORIZON: (("variant", "setting"), [[29.0, 38.2], [29.0, 38.2]]),
-        Column.HORIZON: (("variant", "setting"), [[29.5, 38.4], [72.0, 71.0]]),
+        "early_error": (("variant", "setting"), [[1e-6, 1e-8], [1e-6, 1e-8]]),
+        "predicted_horizon": (("variant", "setting"), [[29.0, 38.2], [29.0, 38.2]]),
+        "horizon": (("variant", "setting"), [[29.5, 38.4], [72.0, 71.0]]),
     }
     part = xr.Dataset(columns, coords={"variant": ["rk4[axis]", "gauss-4[axis]"]})
-    assert words.outlasting(part) == ["gauss-4[axis]"]
-    assert words.misses(part) == pytest.approx([0.5, 0.2])
-    assert words.unreached(part) == {}
-    part[Column.HORIZON][0, 1] = math.nan
-    assert words.misses(part) == pytest.approx([0.5])
-    assert words.unreached(part) == {"rk4[axis]": 1}
+    assert mechanisms.outlasting(part) == ["gauss-4[axis]"]
+    assert mechanisms.misses(part) == pytest.approx([0.5, 0.2])
+    part["horizon"][0, 1] = math.nan
+    assert mechanisms.misses(part) == pytest.approx([0.5])
 
 
 def test_an_energy_error_that_no_sample_sees_is_no_ratio_of_a_floor():
-    columns = {Column.ENERGY_ONCE: ("variant", [0.0, 5e-9, 2e-5, 1e-16]),
-               Column.ENERGY_EVERY: ("variant", [4.2e-8, 2.5e-4, 3e-5, 1e-15])}  # fmt: skip
+    columns = {"energy_once": ("variant", [0.0, 5e-9, 2e-5, 1e-16]),
+               "energy_every": ("variant", [4.2e-8, 2.5e-4, 3e-5, 1e-15])}  # fmt: skip
     part = xr.Dataset(columns, coords={"variant": ["yoshida-4", "stormer-verlet", "rkmk-se3-2", "gauss-4"]})
-    assert messages.hidden_sampled(part) == ["yoshida-4"]
-    assert messages.worst_sampled(part) == "stormer-verlet"
+    hidden, ratios = mechanisms.sampled(part)
+    assert hidden == ["yoshida-4"]
+    assert ratios == pytest.approx({"stormer-verlet": 5e4, "rkmk-se3-2": 1.5})
+    answers = facts.sampling_facts(part)
+    assert (answers["sampled"], answers["hidden"], answers["small"]) == (3, 1, 1)
 
 
 def test_the_midpoint_rule_is_known_by_its_nodes_and_not_by_its_name():
     settings = {"steps": 20, "periods": 1, "step_size": 0.1, "tolerances": [1e-2, 1e-8], "solver_steps": 50}
     renamed = dataclasses.replace(integrator("midpoint"), name="my-rule")
     one, other = (sampling_table("goldstein", method, settings) for method in (integrator("midpoint"), renamed))
-    assert Column.TEXTBOOK_ENERGY in one
+    assert "plain_energy" in one
     xr.testing.assert_identical(one, other)
-    assert Column.TEXTBOOK_ENERGY not in sampling_table("goldstein", integrator("trapezoidal"), settings)
+    assert "plain_energy" not in sampling_table("goldstein", integrator("trapezoidal"), settings)
+
+
+# ---- the page --------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def measured():
+    """Some quick cases of two variants in all parts of the study, with fewer settings."""
+    names, smaller = ("stormer-verlet[angles]", "midpoint[angles]", "strang[axis]"), []
+    for case in study.cases(True):
+        if case.integrator in names:
+            settings = dict(case.settings)
+            if case.scene == study.FAMILY:
+                settings |= {key: settings[key][::4] for key in ("parameters", "ladder")}
+            smaller.append(dataclasses.replace(case, settings=settings))
+    return datasets.combine([(case, study.measure(case)) for case in smaller])
+
+
+def test_facts_are_those_of_the_mechanisms(measured):
+    answers = facts.facts(measured)
+    assert answers.keys() >= set(facts.NAMES)
+    assert {name for name in facts.NAMES if answers[name] is None} == {"cayley_sleeps"}
+    lost = mechanisms.resonant(measured.sel(scene="steady-fast"))
+    assert lost["stormer-verlet[angles]"] == pytest.approx(math.sqrt(3.0), abs=1e-4)
+    assert lost["midpoint[angles]"] == pytest.approx(2.0 * math.sqrt(3.0), abs=1e-4)
+    assert (answers["limit_variant"], answers["limit_least"]) == (
+        "stormer-verlet[angles]",
+        pytest.approx(2.0, abs=1e-6),
+    )
+    assert answers["sleep_miss"] < 1e-8 < abs(answers["strang_sleeps"] - 2.0)
+    assert answers["one_iteration"] > 10.0 * answers["solved"]
+    assert (answers["angles"], answers["others"], answers["others_halved"]) == (2, 1, 0)
+    shares = {name: one.accurate for name, one in atlas.maps(measured, study.FAMILY).items()}
+    table = facts.tables(measured)["atlas"]
+    assert dict(zip(table["variant"], table["accurate (%)"] / 100.0, strict=True)) == pytest.approx(shares)
+    assert table["accurate (%)"].is_monotonic_decreasing
+
+
+def test_what_was_not_measured_is_none_and_not_a_number():
+    answers = facts.facts(hand_made([[A, B, L]] * 4))
+    assert (answers["settled"], answers["cells"], answers["resonant"], answers["others"]) == (0.0, 12, None, None)
+    assert facts.tables(hand_made([[A, B, L]] * 4))["limits"].empty
+
+
+def test_the_page_says_what_was_measured(measured, tmp_path):
+    text = checked("stability", measured, tmp_path)
+    answers = facts.facts(measured)
+    assert f"{answers['angles_halved']} of 2 variants in Euler's angles" in text

@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.optimize import root
-from symtop_studies.reduction import commutation, words
+from symtop_studies.reduction import commutation, facts, figures, study
 from symtop_studies.reduction.commutation import gap, kernel_path, path, reduced_first
-from symtop_studies.reduction.tables import Column, commutation_table, unreduced_forms
+from symtop_studies.reduction.tables import commutation_table, unreduced_forms
 
 import symtop
+from symtop.measure import datasets
 from symtop.measure.order import power_law
 from symtop.methods.framework import registry
 from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, rule_of
 from tests.conftest import random_scenes
+from tests.templates import checked
 
 SCENES = ("spheroid", "goldstein")
 COUNTS = (100, 200, 400, 800)
@@ -29,7 +31,7 @@ def slope(scene_name, name):
     """The power of h with which the two orders approach each other over two nutations."""
     scene = symtop.scene(scene_name)
     table = commutation_table(scene, symtop.integrator(name), 2.0 * scene.nutation_period, COUNTS)
-    return power_law(table[Column.STEP], table[Column.GAP]).slope
+    return power_law(table["commutation_step_size"], table["commutation_gap"]).slope
 
 
 @pytest.mark.parametrize("scene_name", SCENES)
@@ -123,14 +125,50 @@ def test_a_method_that_has_no_reduced_twin_is_refused_in_one_sentence():
 def test_what_a_reduced_kernel_saves_is_split_into_iterations_and_the_time_of_one():
     dims = ("scene", "variant", "kernel", "twin_step")
     data = xr.Dataset(
-        {Column.SECONDS_A_STEP: (dims, [[[[1e-7, 1e-7], [2e-7, 3e-7]]]]),
-         Column.ITERATIONS_A_STEP: (dims, [[[[2.0, 1.5], [3.0, 4.5]]]]),
-         Column.COMPARED_STEP: (("scene", "variant", "twin_step"), [[[0.1, 0.01]]])},
+        {"seconds_per_step": (dims, [[[[1e-7, 1e-7], [2e-7, 3e-7]]]]),
+         "iterations_per_step": (dims, [[[[2.0, 1.5], [3.0, 4.5]]]]),
+         "twin_step_size": (("scene", "variant", "twin_step"), [[[0.1, 0.01]]])},
         coords={"scene": ["spheroid"], "variant": ["midpoint"], "kernel": ["reduced", "unreduced"]},
     )  # fmt: skip
-    first, second = words.savings(data)
-    assert (first.time, first.more, first.each) == pytest.approx((2.0, 1.5, 4.0 / 3.0))
-    assert (second.time, second.more, second.each) == pytest.approx((3.0, 3.0, 1.0))
+    answers, table = facts.facts(data), facts.tables(data)["kernels"]
+    assert list(table["time (ratio)"]) == pytest.approx([2.0, 3.0])
+    assert list(table["iterations (ratio)"]) == pytest.approx([1.5, 3.0])
+    assert list(table["time of an iteration (ratio)"]) == pytest.approx([4.0 / 3.0, 1.0])
+    assert (answers["step_least"], answers["step_most"]) == pytest.approx((2.0, 3.0))
+    assert (answers["commuting"], answers["charts"], answers["twins_gap"]) == (None, None, None)
+
+
+@pytest.fixture(scope="module")
+def measured():
+    """Every rule on one scene, and one method in its charts, all with short runs."""
+    small = {"counts": [50, 100, 200, 400], "batches": 1, "horizon": 2.0, "step_sizes": [0.1, 0.01]}
+    parts = []
+    for case in study.cases(True):
+        if case.scene == "spheroid" and (case.settings["part"] != "charts" or case.integrator == "euler-poincare"):
+            settings = {key: small.get(key, value) for key, value in case.settings.items()}
+            parts.append((case, study.measure(dataclasses.replace(case, settings=settings))))
+    return datasets.combine(parts)
+
+
+def test_facts_are_those_of_the_rules_and_charts(measured):
+    answers = facts.facts(measured)
+    assert answers["commuting"] == "midpoint"
+    assert answers["commuting_gap"] < 1e-13
+    assert answers["others"] == "trapezoidal, simpson-linear, galerkin-simpson"
+    assert (answers["power_least"], answers["power_most"]) == pytest.approx((2.0, 4.0), abs=0.2)
+    assert answers["rules"] == "midpoint, trapezoidal"
+    assert 0.0 < answers["twins_gap"] < 1e-11  # rounding over 10 000 steps without compensation
+    assert answers["charts"] == len(facts.tables(measured)["charts"])
+    two = measured.isel(commutation_step=slice(2))  # too few for an order, and no less apart
+    assert facts.facts(two)["others"] == answers["others"]
+    assert np.isnan(facts.facts(two)["power_least"])
+    assert len(figures.pictures(two)) == 1
+
+
+def test_the_page_says_what_was_measured(measured, tmp_path):
+    text = checked("reduction", measured, tmp_path)
+    assert "With midpoint it makes no difference" in text
+    assert "With trapezoidal, simpson-linear, galerkin-simpson it does." in text
 
 
 def test_a_kernel_is_known_under_any_name():

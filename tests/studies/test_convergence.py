@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from symtop_studies.convergence import study, tables, words
+from symtop_studies.convergence import facts, measures, study
 
 import symtop
 from symtop.judging.battery import CLAIMS
@@ -13,6 +13,7 @@ from symtop.measure import datasets
 from symtop.measure.order import BESIDE, order_verdict
 from symtop.methods.framework.registry import integrator, methods, split_name, variants
 from symtop.runner.study import Case
+from tests.templates import checked
 
 ROWS = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "strang[axis]", "strang[attitude]",
         "rk4[angles]", "rk4[axis]", "gauss-12[attitude]", "rk45[angles]", "rk45-compiled[angles]", "radau[angles]",
@@ -44,7 +45,7 @@ def test_every_row_shows_the_axis_and_the_attitude_where_its_chart_does(data):
 
 
 def test_verdicts_are_those_of_the_one_rule_and_no_interval_misses_the_order(data):
-    results = tables.judged(data)
+    results = measures.judged(data)
     assert {name for _, name in results} == {name for name in ROWS if integrator(name).fixed_step}
     for (_, name), (word, slopes) in results.items():
         declared, main = integrator(name).order, slopes["axis"]
@@ -56,12 +57,12 @@ def test_verdicts_are_those_of_the_one_rule_and_no_interval_misses_the_order(dat
 
 
 def test_a_wrong_declaration_is_refuted(data, monkeypatch):
-    monkeypatch.setattr(tables, "declared_order", lambda name: 3)
-    assert {tables.judged(data)["goldstein", name].verdict for name in ("strang[axis]", "rk4[axis]")} == {"refuted"}
+    monkeypatch.setattr(measures, "declared_order", lambda name: 3)
+    assert {measures.judged(data)["goldstein", name].verdict for name in ("strang[axis]", "rk4[axis]")} == {"refuted"}
 
 
 def test_rows_with_the_same_errors_are_drawn_as_one(data):
-    labels = tables.merged(tables.stepping(data), "axis")
+    labels = measures.merged(measures.stepping(data), "axis")
     assert labels["strang[axis]"] == "strang[axis, attitude]"
     assert "strang[attitude]" not in labels
     assert labels["rk4[angles]"] == "rk4[angles]"  # another chart, other errors
@@ -70,7 +71,7 @@ def test_rows_with_the_same_errors_are_drawn_as_one(data):
 
 def test_the_energy_over_time_is_that_of_the_run_that_it_names():
     scene = symtop.scene("spheroid")
-    verlet, taylor = (tables.energy_history(scene, integrator(name), 20.0) for name in ("stormer-verlet", "taylor"))
+    verlet, taylor = (measures.energy_history(scene, integrator(name), 20.0) for name in ("stormer-verlet", "taylor"))
     assert float(verlet["history_time"].max()) == pytest.approx(20.0)
     run = symtop.simulate(scene, "stormer-verlet", step_size=scene.nutation_period / 100.0,
                           horizon=20.0 * scene.nutation_period, samples=801, guard=False)  # fmt: skip
@@ -84,21 +85,21 @@ def test_the_energy_over_time_is_that_of_the_run_that_it_names():
 def test_the_work_of_an_error_constant_is_the_work_of_a_run_with_that_error(data):
     """error = C h^p: a target that some run met costs what that run cost; four times less error, twice the work."""
     cell = data.sel(scene="goldstein", variant="stormer-verlet[angles]")
-    fit = tables.fits(data, "axis")["goldstein", "stormer-verlet[angles]"]
+    fit = measures.fits(data, "axis")["goldstein", "stormer-verlet[angles]"]
     k = np.flatnonzero(fit.used)[-1]
-    error, work = float(cell["axis"][k]), float(tables.evaluations_a_nutation(cell, "goldstein")[k])
-    found = tables.efficiencies(data, error)["goldstein", "stormer-verlet[angles]"]
-    assert found.work == pytest.approx(work, rel=0.1)
-    assert not found.foreseen
-    beyond = tables.efficiencies(data, error / 4.0)["goldstein", "stormer-verlet[angles]"]
-    assert beyond.work == pytest.approx(2.0 * found.work, rel=1e-6)
-    assert tables.efficiencies(data, 1e-14)["goldstein", "stormer-verlet[angles]"].foreseen
-    assert ("goldstein", "rk45[angles]") not in tables.efficiencies(data, error)  # it has no step to choose
+    error, work = float(cell["axis"][k]), float(measures.evaluations_a_nutation(cell, "goldstein")[k])
+    answers = measures.efficiencies(data, error)["goldstein", "stormer-verlet[angles]"]
+    assert answers.work == pytest.approx(work, rel=0.1)
+    assert not answers.foreseen
+    beyond = measures.efficiencies(data, error / 4.0)["goldstein", "stormer-verlet[angles]"]
+    assert beyond.work == pytest.approx(2.0 * answers.work, rel=1e-6)
+    assert measures.efficiencies(data, 1e-14)["goldstein", "stormer-verlet[angles]"].foreseen
+    assert ("goldstein", "rk45[angles]") not in measures.efficiencies(data, error)  # it has no step to choose
 
 
 def test_work_is_counted_per_nutation(data):
     cell = data.sel(scene="goldstein", variant="stormer-verlet[angles]")
-    work = tables.evaluations_a_nutation(cell, "goldstein")
+    work = measures.evaluations_a_nutation(cell, "goldstein")
     period = symtop.scene("goldstein").nutation_period
     good = np.isfinite(work)
     assert work[good] == pytest.approx(period / cell["step_size"].values[good], rel=0.05)
@@ -114,7 +115,20 @@ def test_the_ledger_and_the_study_say_the_same_of_an_order():
 
 
 def test_errors_of_adaptive_methods_follow_their_tolerance(data):
-    fitted = tables.tolerance_fits(data)
+    fitted = measures.tolerance_fits(data)
     assert {name for _, name in fitted} == {name for name in ROWS if integrator(name).adaptive}
     assert fitted["goldstein", "rk45[angles]"].slope == pytest.approx(1.0, abs=0.15)
-    assert words.by_tolerance(tables.stepping(data)) == {}
+
+
+def test_facts_are_those_of_the_data(data):
+    answers = facts.facts(data)
+    assert answers["pairs"] == answers["confirmed"] + answers["refuted"] + answers["undecided"]
+    assert answers["ratio_most"] == max(float(values.max()) for values in measures.ratios(data).values() if values.size)
+    alone = facts.facts(data.sel(variant=["rk45[angles]"]))
+    assert alone["pairs"] is alone["best_work"] is None
+    assert alone["ratio_most"] == pytest.approx(float(measures.ratios(data)["rk45[angles]"].max()))
+
+
+def test_the_page_says_what_was_measured(data, tmp_path):
+    text = checked("convergence", data, tmp_path)
+    assert f"{facts.facts(data)['confirmed']} show the order" in text

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from symtop_studies.drift.growth import change_point, ensemble_growth, history, horizon, lost_at
+from symtop_studies.drift.growth import ensemble_growth, history, horizon, lost_at
 from symtop_studies.drift.phase_loss import phase_loss
 from symtop_studies.drift.runs import elapsed_steps, members
 
@@ -71,16 +71,6 @@ def test_the_mean_of_a_window_is_known_far_better_than_the_energy_has_digits(nam
         level = watch(one, method, h)(done.states, done.momenta)["modified_energy"].mean()
         found.append(level / one.energy_grain)  # relative to |E|, whose rounding it is
     assert np.sqrt(np.mean(np.square(found))) < 1.2e-17
-
-
-def test_a_change_of_law_is_found_where_it_is_and_not_where_it_is_not():
-    t = np.geomspace(1.0, 1e4, 40)
-    noise = np.exp(0.02 * np.sin(37.0 * np.arange(40)))
-    found = change_point(t, noise * (1e-9 + 1e-12 * t**2))
-    assert found is not None
-    assert found.time == pytest.approx(np.sqrt(1e3), rel=0.5)
-    assert (found.before, found.after) == pytest.approx((0.0, 2.0), abs=0.25)
-    assert change_point(t, noise * t) is None
 
 
 @pytest.mark.parametrize("bend", [0.0, 3e-9])

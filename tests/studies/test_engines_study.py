@@ -1,14 +1,16 @@
-"""The study of engines: errors against closed forms, orders and floors read off, sentences, and labels."""
+"""The study of engines: errors against closed forms, orders and floors read off, and what its page says."""
 
 import math
 
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.engines import listed, study, tables, words
+from symtop_studies.engines import facts, measures, study
 
 import symtop
 from symtop.methods.framework.registry import engines, integrator
+from symtop.report.template import PARTIAL
+from tests.templates import checked
 
 GOLDSTEIN = symtop.scene("goldstein")
 
@@ -20,13 +22,13 @@ def measured():
     settings = {"steps": 1e4, "long": 20.0}
     by_row = [
         xr.concat(
-            [study.measure(study.Case(scene, name, settings, group="tops")) for scene in tables.SCENES], "scene",
+            [study.measure(study.Case(scene, name, settings, group="tops")) for scene in measures.SCENES], "scene",
             join="outer",
         )
         for name in names
     ]  # fmt: skip
     many = [study.measure(study.Case("population", name, {"members": 20, "seed": 1}, group="pop")) for name in names]
-    tops = xr.concat(by_row, "variant", join="outer").assign_coords(scene=list(tables.SCENES), variant=list(names))
+    tops = xr.concat(by_row, "variant", join="outer").assign_coords(scene=list(measures.SCENES), variant=list(names))
     drawn = xr.concat(many, "variant").expand_dims("scene").assign_coords(scene=["population"], variant=list(names))
     return xr.DataTree.from_dict({"tops": tops, "population": drawn})
 
@@ -39,12 +41,12 @@ def test_every_map_of_an_engine_has_a_row_that_shows_the_axis():
 
 @pytest.mark.parametrize(("name", "value"), [("mujoco-euler[axis]", 0.61079), ("rkmk4[axis]", 8.1624e-6)])
 def test_the_error_of_a_run_is_the_reference_value(name, value):
-    made = tables.judged(GOLDSTEIN, integrator(name), 0.025, 10.0)
+    made = measures.judged(GOLDSTEIN, integrator(name), 0.025, 10.0)
     assert made["axis"] == pytest.approx(value, rel=1e-4)
 
 
 def test_energy_and_spin_are_those_of_simulate():
-    made = tables.judged(GOLDSTEIN, integrator("yade[axis]"), 0.025, 10.0)
+    made = measures.judged(GOLDSTEIN, integrator("yade[axis]"), 0.025, 10.0)
     run = symtop.simulate(GOLDSTEIN, "yade[axis]", step_size=0.025, horizon=10.0, guard=False, observe="axis")
     scale = abs(float(run["energy"][0])) + GOLDSTEIN.top.mgl
     assert made["energy"] == pytest.approx(float(run["energy"][-1] - run["energy"][0]) / scale, rel=1e-9)
@@ -53,18 +55,55 @@ def test_energy_and_spin_are_those_of_simulate():
 
 
 def test_a_run_that_ended_is_as_far_off_as_can_be():
-    made = tables.judged(symtop.scene("fast"), integrator("mujoco-euler[axis]"), 1.0 / 60.0, 100.0)
+    made = measures.judged(symtop.scene("fast"), integrator("mujoco-euler[axis]"), 1.0 / 60.0, 100.0)
     assert made["axis"] == math.pi
-    assert words.change(made["energy"]) == "a number that is not finite"
+    assert not math.isfinite(made["energy"])
 
 
 def test_orders_walls_and_floors_are_read_off(measured):
-    assert words.facts(measured, "mujoco-euler[axis]").order == pytest.approx(1.0, abs=0.15)
-    assert words.facts(measured, "strang[axis]").order == pytest.approx(2.0, abs=0.05)
-    wall = words.facts(measured, "no-gyro[axis]")
-    assert abs(wall.order) < 0.05
-    assert wall.best > 1.5
-    assert words.facts(measured, "rapier-float32[attitude]").best > 1e-3
+    """A method whose error is rounding alone has no order; one without the term is counted to order 0."""
+    known = facts.lines(measured)
+    assert known["order"]["mujoco-euler[axis]"] == pytest.approx(1.0, abs=0.15)
+    assert known["order"]["strang[axis]"] == pytest.approx(2.0, abs=0.05)
+    assert abs(known["order"]["no-gyro[axis]"]) < 0.05
+    assert dict(known["group"]) == {
+        "mujoco-euler[axis]": 1.0, "rapier-float32[attitude]": 1.0, "no-gyro[axis]": 0.0, "strang[axis]": 2.0,
+    }  # fmt: skip
+    tops = measured["tops"].to_dataset()
+    rounded = xr.DataTree.from_dict({"tops": tops.assign(axis=tops["axis"].where(tops["axis"].isnull(), 1e-15))})
+    assert facts.lines(rounded)["order"].isna().all()
+
+
+def test_facts_are_those_of_the_runs(measured):
+    """The wall of a map without the term, its distance from the spherical top, and the ends of the field."""
+    answers = facts.facts(measured)
+    tops = measured["tops"].to_dataset().sel(scene="goldstein")
+    assert answers["wall"] == float(tops["axis"].sel(variant="no-gyro[axis]").min()) > 1.5
+    usual = tops.sel(rate=240.0, horizon=10.0)
+    assert answers["spherical"] == float(usual["frame_spherical"].sel(variant="no-gyro[axis]")) < 0.01
+    assert float(usual["frame_spherical"].sel(variant="mujoco-euler[axis]")) > 0.1
+    assert answers["best"] == answers["worst"] == float(usual["frame_axis"].sel(variant="mujoco-euler[axis]"))
+    assert answers["level_fast_variant"] == "no-gyro[axis]"
+    assert (answers["maps"], answers["turned"], answers["singles"], answers["members"]) == (2, 1, 1, 20)
+    assert answers["lost"] == 1  # mujoco-euler flies apart on the fast top
+    assert answers["single_best"] > 1e-3
+
+
+def test_what_was_not_measured_is_none(measured):
+    """On the fast top alone there is no error against steps; on the population no scene."""
+    fast = xr.DataTree.from_dict({"tops": measured["tops"].to_dataset().sel(scene=["fast"])})
+    answers = facts.facts(fast)
+    assert answers["members"] is answers["energy_lost"] is None
+    assert np.isnan([answers["wall"], answers["share_most"]]).all()
+    assert answers["lost"] == 1
+    assert [one.name for one in study.STUDY.pictures(fast)] == ["cost"]
+    alone = xr.DataTree.from_dict({"tops": measured["tops"].to_dataset().sel(variant=["no-gyro[axis]"])})
+    for one, most in ((measured, 5), (alone, 1)):  # entries of the key: what is drawn, and no more
+        error = next(iter(study.STUDY.pictures(one))).figure
+        assert len(error.legends[0].get_texts()) == most
+    many = xr.DataTree.from_dict({"population": measured["population"].to_dataset()})
+    assert facts.facts(many)["share_most"] == facts.facts(measured)["share_most"]
+    assert list(study.STUDY.pictures(many)) == []
 
 
 @pytest.mark.parametrize("rate", [2.5, -0.7])
@@ -72,8 +111,8 @@ def test_the_azimuth_is_counted_over_whole_turns_and_in_both_directions(rate):
     time = np.linspace(0.0, 40.0, 400)
     tilt = 0.6 + 0.1 * np.sin(3.0 * time)
     e = np.stack([np.sin(tilt) * np.cos(rate * time), np.sin(tilt) * np.sin(rate * time), np.cos(tilt)], axis=1)
-    assert tables.azimuth(e) == pytest.approx(40.0 * rate, rel=1e-12)
-    assert math.isnan(tables.azimuth(np.vstack([e, np.full(3, np.nan)])))
+    assert measures.azimuth(e) == pytest.approx(40.0 * rate, rel=1e-12)
+    assert math.isnan(measures.azimuth(np.vstack([e, np.full(3, np.nan)])))
 
 
 def test_a_fast_top_without_the_gyroscopic_term_precesses_at_the_rate_of_a_spherical_one():
@@ -81,7 +120,7 @@ def test_a_fast_top_without_the_gyroscopic_term_precesses_at_the_rate_of_a_spher
     fast = symtop.scene("fast")
     ratio = fast.top.I3 / fast.top.I1 - 1.0
     off = {
-        name: tables.judged(fast, integrator(f"{name}[axis]"), 1e-3, 10.0)["precession"]
+        name: measures.judged(fast, integrator(f"{name}[axis]"), 1e-3, 10.0)["precession"]
         for name in ("no-gyro", "strang")
     }
     assert off["no-gyro"] == pytest.approx(ratio, abs=2e-3)
@@ -89,8 +128,8 @@ def test_a_fast_top_without_the_gyroscopic_term_precesses_at_the_rate_of_a_spher
 
 
 def test_at_the_same_cost_a_method_of_four_evaluations_takes_a_quarter_of_the_steps():
-    made = tables.frames(GOLDSTEIN, integrator("rkmk4[axis]"), (10.0, 11.0))
-    alone = tables.frames(GOLDSTEIN, integrator("mujoco-implicit[axis]"), (10.0, 11.0))
+    made = measures.frames(GOLDSTEIN, integrator("rkmk4[axis]"), (10.0, 11.0))
+    alone = measures.frames(GOLDSTEIN, integrator("mujoco-implicit[axis]"), (10.0, 11.0))
     assert float(made["forces_a_step"]) == 4.0
     assert float(made["level_axis"].sel(rate=240.0, horizon=10.0)) == float(
         made["frame_axis"].sel(rate=60.0, horizon=10.0)
@@ -99,21 +138,19 @@ def test_at_the_same_cost_a_method_of_four_evaluations_takes_a_quarter_of_the_st
     assert alone["level_axis"].values.tolist() == alone["frame_axis"].values.tolist()
 
 
-def test_without_the_term_the_spherical_top_is_followed_by_order_h_and_with_it_not_at_all(measured):
-    (table,) = listed.spherical(measured)
-    assert [line[0] for line in table.rows] == ["no-gyro[axis]"]
-    off = [
-        [words.frame(measured, row, "spherical", rate) for rate in tables.FREQUENCIES] for row in words.rows(measured)
-    ]
-    near = {row for row, values in zip(words.rows(measured), off, strict=True) if max(values) < 0.01}
-    assert near == {"no-gyro[axis]"}
-
-
-def test_maps_are_ordered_in_double_precision_and_none_without_the_gyroscopic_term(measured):
-    assert words.by_order(measured) == {0: ["no-gyro[axis]"], 1: ["mujoco-euler[axis]"]}
+def test_orders_are_tabled_in_double_precision(measured):
+    tables = facts.tables(measured)
+    assert list(tables["orders"]["order"]) == [0.0, 1.0]
+    assert list(tables["orders"]["maps"]) == [1, 1]
+    assert tables["maps"]["variant"].iloc[0] == "strang[axis]"
 
 
 def test_shares_count_tops_within_five_degrees(measured):
     off = measured["population"]["off"].sel(scene="population", variant="strang[axis]").values
-    assert words.share(measured, "strang[axis]") == np.mean(np.degrees(off) <= 5.0)
-    assert words.share(measured, "strang[axis]") > words.share(measured, "no-gyro[axis]")
+    share = facts.lines(measured)["share"]
+    assert share["strang[axis]"] == np.mean(np.degrees(off) <= 5.0)
+    assert share["strang[axis]"] > share["no-gyro[axis]"]
+
+
+def test_the_page_is_rendered_with_numbers_and_without(measured, tmp_path):
+    assert PARTIAL not in checked("engines", measured, tmp_path)

@@ -50,8 +50,8 @@ def padded(values):
         ("stormer-verlet", "angles", 0.1, "bounded_but_wrong"),
         ("rk4", "axis", 0.1, "drifting"),
         ("rk4", "axis", 0.5, "wrong_regime"),
-        ("rk4", "attitude", 0.08, "drifting"),
-        ("rk4", "attitude", 0.1, "wrong_regime"),
+        ("rk4", "attitude", 0.03, "accurate"),
+        ("commutator-free-4", "attitude", 0.3, "wrong_regime"),
         ("rk4", "angles", 0.15, "drifting"),
     ],
 )
@@ -67,6 +67,19 @@ def test_one_pass_says_what_judgement_says(name, chart, step, word):
     assert early == word
     assert some <= largest
     assert (some <= 1e-2) == (word == "accurate")
+
+
+@pytest.mark.parametrize("step", [0.08, 0.1])
+def test_a_quaternion_that_leaves_length_one_has_failed_in_one_pass_as_alone(step):
+    cusp = scene("cusp")
+    times, run, _, _ = run_of(cusp, "rk4", "attitude", step, 400)
+    assert run.outcome == "not_normalised"
+    plan = Plan.steps(step * cusp.nutation_period, np.arange(0, 401, 10))
+    bare = integrator("rk4").solvers["attitude"](cusp.top, cusp.start, plan)  # it says nothing of it
+    assert bare.outcome == "ok"
+    word, error = one_pass(cusp, times, bare.states, np.stack([bare.p_phi, bare.p_psi], axis=-1))
+    assert word == "not_normalised"
+    assert math.isnan(error)
 
 
 @pytest.mark.parametrize("name", ["rk4", "commutator-free-4", "rkmk-se3-4"])

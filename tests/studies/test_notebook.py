@@ -6,28 +6,29 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.notebook import solid, words as notebook_words
+from symtop_studies.notebook import facts
 from symtop_studies.notebook.derivations import easy_way, energies, hard_way, notebook_top, nutation_cubic, with_alpha
 from symtop_studies.notebook.long_energy import better_from
-from symtop_studies.notebook.tables import (
+from symtop_studies.notebook.measures import (
     SOLVER,
     SOLVER_TOLERANCE,
-    Column,
     both_derivations,
     discrete_methods,
     modified_energy_table,
     residual_history,
 )
-from symtop_studies.notebook.words import long_table
+from symtop_studies.notebook.study import STUDY, cases, measure
 
 import symtop
 from symtop.core.errors import SymtopError
+from symtop.measure import datasets
 from symtop.measure.order import power_law
 from symtop.methods.framework.angles import accelerations, momenta
 from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian.discrete_lagrangian import RULES
-from symtop.model import charts
 from symtop.run.modified_energy import modified_energy
+from symtop.runner.study import Case
+from tests.templates import checked
 
 FIRST = symtop.scene("spheroid").top
 NUMBERS = (FIRST.I1, FIRST.I3, FIRST.mgl)
@@ -166,8 +167,8 @@ def test_the_hard_way_and_the_easy_way_agree(name):
         kernel = accelerations(top.I1, top.I3, top.mgl, theta, theta_dot, phi_dot, psi_dot)
         assert hard[[4, 3, 5]] == pytest.approx(kernel, rel=1e-11, abs=1e-10)
     both = both_derivations(scene)
-    assert float(both[Column.DERIVATIONS_GAP].max()) < 1e-10
-    assert float(both[Column.HARD_GAP].max()) < 1e-10
+    assert float(both["ways_gap"].max()) < 1e-10
+    assert float(both["hard_gap"].max()) < 1e-10
 
 
 def test_the_two_energies_are_reconciled():
@@ -198,8 +199,8 @@ def test_alpha_contradicts_a_release_at_rest():
 def test_the_modified_energy_is_kept_to_fourth_order(method):
     scene = symtop.scene("spheroid")
     table = modified_energy_table(scene, method, [scene.nutation_period / (60.3 * 2.0**k) for k in range(5)])
-    assert power_law(table[Column.MODIFIED_STEP], table[Column.ENERGY_CHANGE]).slope == pytest.approx(2.0, abs=0.03)
-    assert power_law(table[Column.MODIFIED_STEP], table[Column.MODIFIED_CHANGE]).slope == pytest.approx(4.0, abs=0.06)
+    assert power_law(table["shadow_step_size"], table["energy_swing"]).slope == pytest.approx(2.0, abs=0.03)
+    assert power_law(table["shadow_step_size"], table["modified_swing"]).slope == pytest.approx(4.0, abs=0.06)
 
 
 def test_the_modified_energy_of_another_method_is_not_conserved():
@@ -219,12 +220,37 @@ def test_discrete_methods_keep_the_momenta_and_27_or_more_are_in_the_study():
         assert max(float(run[f"{p}_largest"]) for p in ("p_phi", "p_psi")) < 1e-13
 
 
-def test_body_axes_are_those_of_the_charts():
-    q = charts.quaternion_from_angles(*np.random.default_rng(1).uniform(0.2, 2.8, (3, 5)))
-    frames = solid.columns_of(q)
-    assert np.max(np.abs(frames[:, 2] - charts.axis_from_quaternion(q))) < 1e-15
-    assert np.max(np.abs(frames[:, 0] - solid.transverse_from_quaternion(q))) < 1e-15
-    assert np.max(np.abs(np.cross(frames[:, 0], frames[:, 1]) - frames[:, 2])) < 1e-15
+@pytest.fixture(scope="module")
+def data():
+    """The quick grid, with shorter long runs."""
+    asked = [Case(case.scene, case.integrator, case.settings | {"long": 100.0}) for case in cases(True)]
+    return datasets.combine([(case, measure(case)) for case in asked])
+
+
+def test_the_page_says_what_the_notebook_and_the_discrete_methods_keep(data, tmp_path):
+    answers = facts.facts(data)
+    text = checked("notebook", data, tmp_path)
+    assert "mgl = 26.8658" in text
+    assert (answers["compared"], answers["discrete"], answers["momenta_kept"]) == (5, 5, 5)
+    assert answers["momenta"] < 1e-14
+    assert answers["solver_momenta"] > 1e-7  # the control
+    assert max(answers["ways"], answers["energies"]) < 1e-10
+    assert answers["followed"] > 1e-6
+    assert (answers["first_turned"], answers["second_turned"]) == pytest.approx((90.0, 90.0), abs=0.1)
+    assert (answers["alpha_at_rest"], answers["alpha_rate"]) == pytest.approx((1.4981443962885, 0.31914824723237937))
+    assert (answers["power_least"], answers["modified_most"]) == pytest.approx((2.0, 4.0), abs=0.06)
+    assert answers["first_behind"] == 5
+    assert (answers["second_behind"], answers["second_ahead"]) == (2, 3)  # the other two get ahead after 100 s
+
+
+@pytest.mark.parametrize("name", ["midpoint[angles]", "strang[axis]", SOLVER])
+def test_one_method_alone_has_the_facts_and_figures_that_are_its_own(data, name, tmp_path):
+    alone = data.sel(variant=[name])
+    answers = facts.facts(alone)
+    assert answers.keys() == facts.facts(data).keys()
+    assert (answers["momenta"] is None) is (answers["ways"] is not None) is (name == SOLVER)
+    assert [one.name for one in STUDY.pictures(alone)] == ["energy", "modified-energy"][: 1 + (name[0] == "m")]
+    assert len(facts.tables(alone)["kept"]) == 2
 
 
 def long_runs(level, slope):
@@ -232,18 +258,16 @@ def long_runs(level, slope):
     time = np.geomspace(1.0, 1000.0, 301)
     coords = {"scene": ["spheroid"], "variant": ["midpoint[angles]", SOLVER]}
     return xr.Dataset({
-        Column.LONG_TIME: (("scene", "variant", "long"), [[time, time]]),
-        Column.LONG_ENERGY: (("scene", "variant", "long"), [[np.full(301, level), slope * time]]),
+        "long_time": (("scene", "variant", "long"), [[time, time]]),
+        "long_energy": (("scene", "variant", "long"), [[np.full(301, level), slope * time]]),
         "energy_largest": (("scene", "variant"), [[level, slope * 8.0]]),
-        Column.SAMPLE_TIME: (("scene", "variant", "sample"), np.full((1, 2, 1), 8.0)),
+        "sample_time": (("scene", "variant", "sample"), np.full((1, 2, 1), 8.0)),
     }, coords=coords)  # fmt: skip
 
 
 def test_the_notebooks_question_is_answered_and_the_time_from_which_its_hope_is_true_is_measured():
     late = long_runs(3e-5, 1e-7)
     assert better_from(late, "spheroid", "midpoint[angles]") == pytest.approx(300.0, rel=0.03)
-    table = long_table(late, ["midpoint[angles]"])
-    assert list(table.rows[-1]) == ["spheroid", "midpoint[angles]", "8", "3e-05", "3e-05", "302"]
     never, always = long_runs(3e-5, 1e-9), long_runs(1e-9, 1e-7)
     assert better_from(never, "spheroid", "midpoint[angles]") == math.inf
     assert better_from(always, "spheroid", "midpoint[angles]") == 0.0
@@ -251,10 +275,10 @@ def test_the_notebooks_question_is_answered_and_the_time_from_which_its_hope_is_
 
 def test_the_notebooks_path_is_turned_by_a_quarter_about_the_vertical():
     phi = np.linspace(0.1, 1.0, 5)
-    angles = {Column.SOLVER_THETA: 0.5 + phi, Column.SOLVER_PHI: phi, Column.TRUE_THETA: 0.5 + phi,
-              Column.TRUE_PHI: phi}  # fmt: skip
+    angles = {"hard_theta": 0.5 + phi, "hard_phi": phi, "true_theta": 0.5 + phi,
+              "true_phi": phi}  # fmt: skip
     data = xr.Dataset(
         {name: (("scene", "variant", "path"), values[None, None]) for name, values in angles.items()},
         coords={"scene": ["spheroid"], "variant": [SOLVER]},
     )
-    assert notebook_words.turned(data, "spheroid") == pytest.approx(90.0)
+    assert facts.turned(data, "spheroid") == pytest.approx(90.0)

@@ -6,7 +6,9 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from symtop_studies.oscillators import facts, figures, study
 from symtop_studies.oscillators.damped_top import Friction, damped_run, damped_truth
+from symtop_studies.oscillators.measures import convergence, damped_top_table, decay, notebook_history
 from symtop_studies.oscillators.oscillator import (
     ONE_SIDED,
     Oscillator,
@@ -15,10 +17,13 @@ from symtop_studies.oscillators.oscillator import (
     notebook_positions,
     rule_sums,
 )
-from symtop_studies.oscillators.tables import Column, convergence, damped_top_table, decay, notebook_history
+from symtop_studies.oscillators.quartic_measures import QUARTICS
 
 import symtop
+from symtop.measure import datasets
 from symtop.measure.order import power_law
+from symtop.runner.study import Case
+from tests.templates import checked
 
 
 def step_matrix(oscillator, rule, h):
@@ -49,13 +54,13 @@ def test_the_exact_motion_is_the_matrix_exponential(damping):
 @pytest.mark.parametrize("damping", DAMPINGS)
 def test_both_rules_have_order_two_in_every_regime(damping, method):
     table = convergence(Oscillator(damping=damping), method, STEPS, 25.0)
-    assert power_law(table[Column.STEP], table[Column.POSITION_ERROR]).slope == pytest.approx(2.0, abs=0.02)
+    assert power_law(table["step_size"], table["position_error"]).slope == pytest.approx(2.0, abs=0.02)
 
 
 @pytest.mark.parametrize("damping", DAMPINGS[1:])
 def test_the_whole_force_at_one_end_costs_an_order(damping):
     table = convergence(Oscillator(damping=damping), ONE_SIDED, STEPS[4:], 25.0)
-    assert power_law(table[Column.STEP], table[Column.POSITION_ERROR]).slope == pytest.approx(1.0, abs=0.05)
+    assert power_law(table["step_size"], table["position_error"]).slope == pytest.approx(1.0, abs=0.05)
 
 
 def test_only_the_midpoint_rule_leaves_critical_damping_in_place():
@@ -97,10 +102,10 @@ def test_undamped_steps_are_symplectic_and_damped_ones_contract():
 def test_the_notebooks_update_is_the_midpoint_rule_and_its_guess_is_not():
     for damping, h in itertools.product(DAMPINGS, (1.0, 0.1, 0.01)):
         data = notebook_history(Oscillator(damping=damping), h, 25.0)
-        assert float(data[Column.UPDATE_GAP].max()) < 5e-16 * (25.0 / h) ** 1.5
-        gap = float(np.abs(data[Column.GUESS] - data[Column.UPDATE]).max())
+        assert float(data["update_gap"].max()) < 5e-16 * (25.0 / h) ** 1.5
+        gap = float(np.abs(data["seed_guess"] - data["seed_update"]).max())
         assert gap < 1e-12 if damping == 0.0 else gap > 0.5 * damping
-    late = notebook_history(Oscillator(damping=1.0), 0.1, 25.0)[Column.GUESS].values[-70:]
+    late = notebook_history(Oscillator(damping=1.0), 0.1, 25.0)["seed_guess"].values[-70:]
     assert late.mean() == pytest.approx(1.0, abs=0.1)  # about x = b
     assert np.ptp(late) > 0.9  # and no smaller than at the start
 
@@ -114,13 +119,13 @@ def test_one_wrong_coefficient_of_the_update_would_be_seen():
 
 def test_the_midpoint_rule_conserves_the_undamped_energy_the_trapezoidal_bounds_it_and_rk45_drifts():
     free = Oscillator()
-    kept, error = (np.abs(decay(free, rule, 0.1, 1e4)[Column.ENERGY_ERROR]) for rule in ("midpoint", "trapezoidal"))
+    kept, error = (np.abs(decay(free, rule, 0.1, 1e4)["energy_error"]) for rule in ("midpoint", "trapezoidal"))
     assert kept.max() < 1e-11  # a quadratic invariant is kept
     assert 1e-3 < error.max() < 3e-3  # bounded by h^2/4
     assert error[error.size // 2 :].max() < 1.01 * error[: error.size // 2].max()
     rk45 = decay(free, "rk45", 0.05, 250.0)
-    assert float(rk45[Column.EVALUATIONS]) == pytest.approx(5000, rel=0.15)
-    loss = np.abs(rk45[Column.ENERGY_ERROR].values)
+    assert float(rk45["evaluations"]) == pytest.approx(5000, rel=0.15)
+    loss = np.abs(rk45["energy_error"].values)
     assert loss[-1] > 5.0 * loss[loss.size // 10]  # a drift
 
 
@@ -160,13 +165,13 @@ def test_without_friction_it_is_the_unreduced_kernel():
 @pytest.mark.parametrize("method", ["midpoint", "trapezoidal"])
 def test_the_damped_top_has_order_two_and_both_integrations_of_its_truth_agree(method):
     table = damped_top_table(symtop.scene("goldstein"), method, [500, 1000, 2000, 4000], 20.0)
-    assert power_law(table[Column.TOP_STEP], table[Column.THETA_ERROR]).slope == pytest.approx(2.0, abs=0.02)
-    assert float(table[Column.TOP_BOUND]) < 1e-10
+    assert power_law(table["top_step_size"], table["theta_error"]).slope == pytest.approx(2.0, abs=0.02)
+    assert float(table["top_bound"]) < 1e-10
 
 
 def test_runge_kutta_does_not_keep_the_balance():
     table = damped_top_table(symtop.scene("goldstein"), "rk45", [500], 20.0)
-    assert float(np.abs(table[Column.BALANCE_PHI]).max()) > 1e-8
+    assert float(np.abs(table["balance_phi"]).max()) > 1e-8
 
 
 def test_the_power_of_the_friction_is_what_the_energy_loses():
@@ -179,3 +184,34 @@ def test_the_power_of_the_friction_is_what_the_energy_loses():
     assert np.subtract(*(scene.top.energy(symtop.Angles(*truth[:, k])) for k in (0, -1))) == pytest.approx(
         spent, rel=1e-4
     )
+
+
+@pytest.fixture(scope="module")
+def data():
+    """The quick grid with fewer steps."""
+    fewer = {"steps": [10.0 ** (-k / 2.0) for k in range(2, 6)], "counts": [4000, 8000, 16000], "long_step": 0.25}
+    asked = [Case(case.scene, case.integrator, case.settings | fewer) if case.scene not in QUARTICS else case
+             for case in study.cases(True)]  # fmt: skip
+    return datasets.combine([(case, study.measure(case)) for case in asked])
+
+
+def test_the_page_says_what_friction_does_and_what_is_exact(data, tmp_path):
+    checked("oscillators", data, tmp_path)
+    answers = facts.facts(data)
+    assert None not in answers.values()
+    assert (answers["order_least"], answers["order_most"]) == pytest.approx((2.0, 2.0), abs=0.05)
+    assert answers["one_sided_least"] == pytest.approx(1.0, abs=0.1)
+    assert (answers["rate_midpoint"], answers["rate_trapezoidal"]) == pytest.approx((2.0, 1.0), abs=0.1)
+    assert answers["rate_force_at_one_end"] == pytest.approx(0.5, abs=0.1)
+    assert answers["balance"] < 1e-11
+    assert answers["undamped_midpoint"] < 1e-11
+    assert answers["damped_midpoint"] > 1e-3
+    assert max(answers["exact"], answers["update_gap"]) < 1e-11
+    assert (answers["top_order_least"], answers["map_order_least"]) == pytest.approx((2.0, 2.0), abs=0.05)
+
+
+@pytest.mark.parametrize(("name", "drawn"), [("midpoint", 2), ("rk45", 0), ("exact-discrete", 1)])
+def test_one_method_alone_has_the_facts_and_figures_that_are_its_own(data, name, drawn):
+    answers = facts.facts(data.sel(variant=[name]))
+    assert answers.keys() == facts.facts(data).keys()
+    assert len(figures.pictures(data.sel(variant=[name]))) == drawn

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-import xarray as xr
 from symtop_studies.oscillators.quartic import (
     Map,
     Quartic,
@@ -15,17 +14,7 @@ from symtop_studies.oscillators.quartic import (
     of_top,
     true_path,
 )
-from symtop_studies.oscillators.quartic_tables import (
-    CURVE_AHEAD,
-    CURVE_HERE,
-    MAPS,
-    ORBIT,
-    PLAIN,
-    QUARTICS,
-    off_curve,
-    oscillator_of,
-    quartic_table,
-)
+from symtop_studies.oscillators.quartic_measures import MAPS, PLAIN, QUARTICS, oscillator_of, quartic_table
 
 import symtop
 from symtop.measure.order import power_law
@@ -142,27 +131,3 @@ def test_a_map_that_leaves_the_oscillator_ends():
     table = quartic_table("planar-hardening", "exact-discrete", (40.0, 2.1), 1.0)
     assert float(table["quartic_error"].max()) < 1e-14
     assert Map(0.0, 0.0, 1.0, 0.0).kick(3.0) == 0.0
-
-
-@pytest.fixture
-def orbits():
-    """A square as the curve of the motion; one orbit on it and one a tenth outside."""
-    corners = np.array([0.0, 1.0, 1.0, 0.0, 0.0])
-    ahead = np.array([0.0, 0.0, 1.0, 1.0, 0.0])
-    squares = {"exact-discrete": [0.0, 0.5, 0.0], "midpoint": [-0.1, 0.5, -0.1]}
-    return xr.Dataset(
-        {
-            CURVE_HERE: (("scene", "variant", "quartic_shown", "curve"), np.tile(corners, (1, 2, 1, 1))),
-            CURVE_AHEAD: (("scene", "variant", "quartic_shown", "curve"), np.tile(ahead, (1, 2, 1, 1))),
-            ORBIT: (
-                ("scene", "variant", "quartic_shown", "quartic_point"),
-                np.array([list(squares.values())])[:, :, None],
-            ),
-        },
-        coords={"scene": ["planar"], "variant": list(squares)},
-    )
-
-
-def test_distances_are_those_from_the_curve_not_from_its_nearest_corner(orbits):
-    assert off_curve(orbits, "planar", "exact-discrete") == 0.0
-    assert off_curve(orbits, "planar", "midpoint") == pytest.approx(0.1)

@@ -13,8 +13,8 @@ from symtop.core import netcdf
 from symtop.methods.framework.registry import integrators, methods, split_name
 
 STUDIES = (
-    "population", "truth", "convergence", "work_precision", "factors", "drift", "stability", "reduction", "claims",
-    "notebook", "oscillators", "engines", "phase_diagram",
+    "cost", "truth", "convergence", "factors", "drift", "stability", "reduction", "claims", "notebook", "oscillators",
+    "engines",
 )  # fmt: skip
 
 

@@ -12,9 +12,9 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.peers import common
 from benchmarks.peers.common import Inner, Library, Motion
+from symtop.methods.framework.angles import LEAST_TOLERANCE
 from symtop.methods.framework.plan import Array, Plan
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.runge_kutta.dormand_prince import LEAST_TOLERANCE
 from symtop.model.top import Angles, SymmetricTop
 
 PACKAGE = "scipy"

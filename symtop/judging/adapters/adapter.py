@@ -43,11 +43,25 @@ class Stepper:
     implementation = "python"  # or compiled: how much it is run
     adaptive: Solver | None = None  # its solver at a tolerance, where it chooses its steps
     own_loop = False  # is a run of many steps a loop of its own?
+    takes_field = False  # is it given a right-hand side (`along`)?
+    since = 0.0  # the time at which runs begin
     wrote = False  # has it changed its input?
+
+    def renew(self) -> None:
+        """Forget whatever it may keep, where that is possible."""
 
     def march(self, top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state after marks[0], marks[1], ... steps of h from y."""
-        raise NotImplementedError
+        raise NotImplementedError  # each kind of foreign code has its own
+
+    def from_start(self, top: SymmetricTop, start: Angles, h: float) -> tuple[Array, Callable[..., Array]]:
+        """The state of a start, and a function (state, *marks) -> the states after so many steps of h."""
+        par, state = self.form.prepare(top, start)
+
+        def run(y: Array, *marks: int) -> Array:
+            return self.march(top, par, y.copy(), h, np.array(marks)).states
+
+        return np.array(state, dtype=float), run
 
 
 def repeat(once: Callable[[int, Any], Any], y: Any, marks: Marks, show: Callable[[Any], Array] = np.asarray) -> Array:

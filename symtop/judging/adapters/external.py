@@ -20,12 +20,14 @@ depend: that is tried once, before all else.
 
 *diffrax*: a solver such as ``diffrax.Tsit5()``, its formula with fixed steps, asked for one step after another in a
 compiled loop, as by `diffrax.diffeqsolve` with a constant step; its own memory (a last slope, a second state) goes with
-it through a run. An implicit solver needs a root finder with tolerances of its own: there is no step control. A library
-is imported when something of it is judged, and computes in double precision.
+it through a run. The stages of an implicit solver are solved by Newton's iteration to `SAME`, whatever its root finder:
+there is no step control to take tolerances from. A library is imported when something of it is judged, and computes in
+double precision.
 """
 
 import contextlib
 import ctypes
+import dataclasses
 import functools
 import importlib
 import os
@@ -42,7 +44,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, at_home
 from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat, label_of, repeat
-from symtop.judging.adapters.python_step import state_like
+from symtop.judging.adapters.python_step import MOST_NEWTON, state_like
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
 from symtop.model.top import SymmetricTop
@@ -198,7 +200,9 @@ class BatchStep(Stepper):
             batch = self._array(np.stack([y, np.concatenate([y[:-3], OTHER * y[-3:]])]))
             if not self._tried:
                 self._try(step, y, batch, h)
-            states = repeat(lambda k, rows: _once(step, k * h, rows, h), batch, marks, lambda rows: np.asarray(rows[0]))
+            states = repeat(
+                lambda k, rows: _once(step, self.since + k * h, rows, h), batch, marks, lambda rows: np.asarray(rows[0])
+            )
             return March(states, 0)
 
     def _array(self, values: Array) -> Any:
@@ -287,14 +291,11 @@ class DiffraxSolver(Stepper):
                 f"{type(solver).__name__} steps a system in two parts; form diffrax has one, y' = f(y): "
                 "judge it as a function, with form separable"
             )
+        if hasattr(solver, "root_finder"):
+            newton = importlib.import_module("optimistix").Newton(rtol=SAME, atol=SAME)
+            solver = dataclasses.replace(solver, root_finder=newton, root_find_max_steps=MOST_NEWTON)
         self.solver, self.chart, self.form = solver, chart, FORMULATIONS[chart]
         self.name = label_of(name or solver)
-        finder = getattr(solver, "root_finder", None)
-        if finder is not None and not isinstance(getattr(finder, "rtol", 0.0), (int, float)):
-            raise SymtopError(
-                f"{type(solver).__name__} must have a root finder with tolerances of its own, such as "
-                "root_finder=diffrax.VeryChord(rtol=1e-12, atol=1e-12): a fixed step has none"
-            )
         self._begin, self._run = self._compiled()
         self._fresh = True  # nothing is compiled yet
 
@@ -310,7 +311,7 @@ class DiffraxSolver(Stepper):
                 while done < mark:
                     some = min(MOST, int(mark) - done)
                     with heartbeat.call(h, more):
-                        at, memory = self._run(par, at, memory, done * h, h, some)
+                        at, memory = self._run(par, at, memory, self.since + done * h, h, some)
                         self.jax.block_until_ready(at)
                     self._fresh, more, done = False, 0.0, done + some
                 states[place] = np.asarray(at)

@@ -10,7 +10,8 @@ changes its input in place, and returns it, works.
 
 q = (w, x, y, z) turns body vectors into space vectors, w is the angular velocity, inertia holds the three principal
 moments (I1, I1, I3) about the pivot, and torque(q) is that of gravity. L in space is R(q) inertia w, R(q) with q at
-length one; a q that loses its length shows it as an axis that is not a unit vector.
+length one; a q that loses its length shows it as an axis that is not a unit vector. A step that returns a matrix of
+shape (3, 3) in place of q is given R, body to space, and torque(R); one that ceases to be a rotation shows it likewise.
 
 *separable*, ``step(state, h, dT, dV) -> state`` for the nutation alone, whose Hamiltonian separates:
 
@@ -21,13 +22,19 @@ and dV the slope of V, both of one number. The chart ends at theta = 0 and pi.
 
 *scipy*, a class derived from ``scipy.integrate.OdeSolver``: max_step = first_step = h with tolerances that accept any
 error make steps of h, so that the formula is judged and not its step control; the end of the interval lies beyond the
-last step, which is never cut short. With a tolerance, rtol = atol, the class chooses its steps, as for ``solve_ivp``.
+last step, which is never cut short. The stages of an implicit class are solved nevertheless: the tolerances of Newton's
+iteration, which SciPy's classes and others like them keep in `newton_tol`, `kappa` and `tiny_err`, are set to `SOLVED`,
+and it may take `MOST_NEWTON` rounds. With a tolerance, rtol = atol, the class chooses its steps, as for ``solve_ivp``.
 """
 
-from collections.abc import Callable
+import contextlib
+import math
+import sys
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat, label_of, repeat
@@ -40,7 +47,10 @@ from symtop.model.charts import space_momenta
 from symtop.model.top import Angles, SymmetricTop, effective_force
 
 Field = Callable[[float, Array], Array]
+PROBE = 1e-3  # step of the call that shows whether a rotation is a matrix
 ANY = 1e300  # a tolerance that every step meets; infinity times a component of zero would be no number
+LOOSE = 1e8  # one that every step meets, and beside which an update of Newton's iteration can be seen
+SOLVED, MOST_NEWTON, NEWTON = 1e-14, 50, "NEWTON_MAXITER"  # of a stage, absolute; rounds, and what modules call them
 SAME = 1e-9  # of a step: one that is this near to h has its length
 
 
@@ -99,6 +109,8 @@ class FunctionStep(Stepper):
 class PythonStep(FunctionStep):
     """A stepper around a function ``step(f, t, y, h) -> y``."""
 
+    takes_field = True
+
     def __init__(self, function: Callable[..., Any], chart: str, name: str = "") -> None:
         super().__init__(function, name)
         self.chart, self.form = chart, FORMULATIONS[chart]
@@ -106,7 +118,7 @@ class PythonStep(FunctionStep):
     def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks."""
         f = Equations(self.chart, par)
-        states = self.along(f, 0.0, y, h, marks)
+        states = self.along(f, self.since, y, h, marks)
         return March(states, f.calls)
 
     def along(self, f: Field, t: float, y: Array, h: float, marks: Marks) -> Array:
@@ -116,6 +128,8 @@ class PythonStep(FunctionStep):
 
 class ScipySolver(PythonStep):
     """A stepper around a class of SciPy's kind; with `adaptive`, it chooses its steps by a tolerance."""
+
+    own_loop = True  # it may remember what it likes in a run
 
     def __init__(self, kind: type, chart: str, *, adaptive: bool = False) -> None:
         if not callable(getattr(kind, "step", None)):
@@ -127,12 +141,17 @@ class ScipySolver(PythonStep):
         """The states at the marks for any right-hand side, from a time t on; SymtopError for steps that are not h."""
         end, size = t + (int(marks[-1]) + 2) * h, abs(h)
         with heartbeat.call(h):
-            made: Any = self.function(f, t, y, end, max_step=size, first_step=size, rtol=ANY, atol=ANY)
+            options = {"max_step": size, "first_step": size}
+            made: Any = self.function(f, t, y, end, **options, rtol=ANY, atol=ANY)
+            if hasattr(made, "newton_tol") or hasattr(made, "kappa"):
+                made = self.function(f, t, y, end, **options, rtol=LOOSE, atol=LOOSE)
+                for name in ("newton_tol", "kappa", "tiny_err"):
+                    setattr(made, name, SOLVED / LOOSE)
 
         def once(k: int, y: Array) -> Array:
             if made.status != "running" or not np.isfinite(y).all():
                 return np.full(y.shape, np.nan)
-            with heartbeat.call(h):
+            with heartbeat.call(h), self._patient():
                 made.step()
             if abs(made.t - (t + (k + 1) * h)) > SAME * size * (k + 1):
                 raise SymtopError(
@@ -142,6 +161,20 @@ class ScipySolver(PythonStep):
             return state_like(y, made.y, "a solver")
 
         return repeat(once, state_like(y, made.y, "a solver"), marks)
+
+    @contextlib.contextmanager
+    def _patient(self) -> Iterator[None]:
+        """Newton's iteration goes on until it is solved."""
+        kinds = self.function.__mro__  # type: ignore[attr-defined]
+        modules = filter(None, {sys.modules.get(kind.__module__) for kind in kinds})
+        counts = {module: vars(module)[NEWTON] for module in modules if NEWTON in vars(module)}
+        try:
+            for module in counts:
+                setattr(module, NEWTON, MOST_NEWTON)
+            yield
+        finally:
+            for module, count in counts.items():
+                setattr(module, NEWTON, count)
 
 
 class Body(NamedTuple):
@@ -161,6 +194,12 @@ def to_space(q: Any, vector: Any) -> Any:
 def to_body(q: Any, vector: Any) -> Any:
     """R(q)^T vector."""
     return to_space(q * np.array([1.0, -1.0, -1.0, -1.0]), vector)
+
+
+def _up_in_body(w: float, x: float, y: float, z: float) -> tuple[float, float]:
+    """The first two components of R(q)^T e_z for q of any length."""
+    size = w * w + x * x + y * y + z * z or math.nan
+    return 2.0 * (x * z - w * y) / size, 2.0 * (y * z + w * x) / size
 
 
 def _body_of(top: SymmetricTop, at: Angles) -> tuple[Body, tuple[float, ...]]:
@@ -184,26 +223,59 @@ def _body_momenta(body: Body, states: Array) -> tuple[Array, Array]:
 ROTATION = FORMULATIONS["attitude"]._replace(prepare=_body_of, present=_body_shown, momenta=_body_momenta)
 
 
+def _matrix_of(top: SymmetricTop, at: Angles) -> tuple[Body, tuple[float, ...]]:
+    """The body and the state (R, w) of a start, R row by row."""
+    body, state = _body_of(top, at)
+    return body, (*to_space(np.array(state[:4]), np.eye(3)).T.ravel().tolist(), *state[4:])
+
+
+def _with_quaternions(states: Array) -> Array:
+    """States (q, w) of states (R, w): q of the nearest rotation, |q|^2 the length of R's third column; NaN if none."""
+    shown = np.full((len(states), 7), np.nan)
+    for k, state in enumerate(states):
+        if np.isfinite(state).all() and np.linalg.det(state[:9].reshape(3, 3)) > 0.0:
+            matrix = state[:9].reshape(3, 3)
+            x, y, z, w = Rotation.from_matrix(matrix).as_quat()
+            shown[k] = *(np.sqrt(np.linalg.norm(matrix[:, 2])) * np.array([w, x, y, z])), *state[9:]
+    return shown
+
+
+MATRIX = ROTATION._replace(
+    prepare=_matrix_of, present=lambda body, times, states: _body_shown(body, times, _with_quaternions(states)),
+    momenta=lambda body, states: _body_momenta(body, _with_quaternions(states)),
+)  # fmt: skip
+
+
 class RotationStep(FunctionStep):
     """A stepper around the function of a rigid body; the torques that it asks for are its force evaluations."""
 
     chart, form = "attitude", ROTATION
 
+    def __init__(self, function: Callable[..., Any], name: str = "") -> None:
+        super().__init__(function, name)
+        with contextlib.suppress(Exception), heartbeat.call(PROBE):
+            first = function(
+                np.eye(3), np.array([0.1, 0.2, 0.3]), PROBE, np.array([1.0, 1.0, 0.5]), lambda _: np.zeros(3)
+            )
+            self.form = MATRIX if np.shape(first[0]) == (3, 3) and np.size(first[1]) == 3 else ROTATION
+
     def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks."""
-        calls, down = 0, np.array([0.0, 0.0, -par.mgl])
+        calls, shape = 0, (3, 3) if self.form is MATRIX else (4,)
 
         def torque(q: Any) -> Array:
             nonlocal calls
             calls += 1
-            moment: Array = np.cross([0.0, 0.0, 1.0], to_body(np.asarray(q, dtype=float), down))
-            return moment
+            at = np.asarray(q, dtype=float)
+            up = at[2] if shape == (3, 3) else _up_in_body(*at.tolist())
+            return np.array([par.mgl * up[1], -par.mgl * up[0], 0.0])
 
         def once(_: float, y: Array) -> Array:
-            after = self.function(y[:4].copy(), y[4:].copy(), h, par.inertia.copy(), torque)
+            q = y[:-3].reshape(shape)
+            after = self.function(q.copy(), y[-3:].copy(), h, par.inertia.copy(), torque)
             if not isinstance(after, (tuple, list)) or len(after) != 2:
-                raise SymtopError(f"step must return q and w, a pair, not {type(after).__name__}")
-            return np.concatenate([state_like(y[:4], after[0]), state_like(y[4:], after[1])])
+                raise SymtopError(f"step must return q = (w, x, y, z) and w, a pair, not {type(after).__name__}")
+            return np.concatenate([state_like(q, after[0]).ravel(), state_like(y[-3:], after[1])])
 
         states = self.steps(once, 0.0, y, h, marks)
         return March(states, calls)
@@ -219,13 +291,18 @@ def _plane_of(top: SymmetricTop, at: Angles) -> tuple[Any, tuple[float, ...]]:
     return par, state[:2]
 
 
+def _plane_shown(_par: Any, _times: Array, states: Array) -> Array:
+    """States in angles, whose phi and psi, which the reduced motion has not, stand still."""
+    return np.pad(states, ((0, 0), (0, 2)))
+
+
 def _plane_momenta(par: Any, states: Array) -> tuple[Array, Array]:
     """p_phi and p_psi, which are parameters of the reduced motion."""
     p_phi = 0.5 * (par.north + par.south)
     return np.full(len(states), p_phi), np.full(len(states), par.p_psi)
 
 
-REDUCED = Formulation(_no_field, lambda y: chart_outcome(y[0]), _no_field, _plane_of, None, _plane_momenta)
+REDUCED = Formulation(_no_field, lambda y: chart_outcome(y[0]), _no_field, _plane_of, _plane_shown, _plane_momenta)
 
 
 class SeparableStep(FunctionStep):

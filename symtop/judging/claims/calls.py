@@ -3,7 +3,9 @@
 A one-step method is a function of its arguments. A call is repeated, then repeated after a step somewhere else: one
 that differs keeps something, such as the last force, and its runs depend on the runs before. Where the loop over steps
 is somebody else's, a run of n + m steps is compared with a run of n and one of m: a loop that sums its time and stops
-too late or too soon is a step away, a method of several steps less.
+too late or too soon is a step away, a method of several steps less. The same is done after many steps, n and m drawn at
+random, the m steps from a state whose last bit is changed, once in a new process: what a step remembers of a state, or
+of the steps that it has made, is not there. Then the first call is repeated.
 """
 
 import contextlib
@@ -24,12 +26,16 @@ from symtop.model.top import Angles
 
 SHARE = 0.0137  # of a nutation: the step that is called
 SAME = 1e-13  # relative: what threads may leave between two calls
+AGAIN = 8  # pairs of calls that tell noise from what is kept
 REPEATS, SECONDS = 250, 0.3  # calls with the same arguments, or as many as there is time for
 NOTHING, STANDS = 1e-8, 1e-6  # a step of so little moves a state by less than this, relative
 FAR = 200.0  # times the step: one that most methods do not survive
 PARTS = ((20, 20), (64, 64), (100, 157), (311, 500), (1000, 1000))  # runs that are cut in two
 REMEMBERED = 1e-9  # of a step: a last slope that is kept, and not computed anew, makes 1e-10 in 2000 steps
 MISSED = 0.2  # of a step: a method of several steps starts anew with less
+LATE = {False: (100_000, 6.0), True: (20_000, 0.5)}  # quick: steps before a late one, or as many as there are seconds
+# late runs, steps after each, and what may be missed where our loop remembers nothing
+LATER, AFTER, RECALLED = 4, 64, 1e-6
 ELSEWHERE = 0.3  # rad and units of the rates, from the start that is called
 
 
@@ -48,9 +54,10 @@ def _calls(subject: Subject) -> Finding:
     h, start = SHARE * scene.time_scale(), generic_start(scene)
 
     def once(at: Angles, step: float) -> Any:
-        par, state = stepper.form.prepare(scene.top, at)
-        return stepper.march(scene.top, par, np.array(state), step, np.array([1])).states[0]
+        state, run = stepper.from_start(scene.top, at, step)
+        return run(state, 1)[0]
 
+    stepper.renew()  # the step has been timed
     other = Angles(*(getattr(start, name) * (1.0 - ELSEWHERE) for name in Angles.__slots__))
     first = once(start, h)
     if not np.isfinite(first).all():
@@ -68,11 +75,8 @@ def _calls(subject: Subject) -> Finding:
         why = why if np.isfinite(twice) else "of calls with the same arguments one returns NaN and another does not"
         return _refuted("not repeatable", why, twice)
     if max(later, differs) > SAME:
-        how, gap = "after a step elsewhere the same call", later
-        if not later > SAME:
-            how, gap = f"call {count} with the same arguments", differs
-        return _refuted("keeps state", f"it keeps something between calls: {how} differs by {gap:.1e}", gap)
-    still = np.array(stepper.form.prepare(scene.top, other)[1])
+        return _kept(later, count, differs, lambda: _apart(once(start, h), once(start, h)))
+    still = stepper.from_start(scene.top, other, h)[0]
     moved = _apart(still, _alike(stepper.chart, still, once(other, NOTHING * h)))
     if moved > STANDS:
         why = f"it keeps something of its first start: from another one, a step of {NOTHING * h:.0e} moves by "
@@ -80,11 +84,16 @@ def _calls(subject: Subject) -> Finding:
     traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # in two words, and in a clause
     single = {"single precision": "its numbers are those of single precision"}
     traits |= single if (first == first.astype(np.float32)).all() else {}
-    if stepper.own_loop:
-        missed, why = _steps_missed(stepper, scene, h / 10.0)
-        if missed > MISSED:
-            return _refuted("miscounts steps", why, missed, MISSED)
-        traits |= {"remembers": why} if missed > REMEMBERED else {}
+    missed, why = _steps_missed(stepper, scene, h / 10.0) if stepper.own_loop else (0.0, "")
+    if missed > MISSED:
+        return _refuted("miscounts steps", why, missed, MISSED)
+    traits |= {"remembers": why} if missed > REMEMBERED else {}
+    missed, why = _late(subject, h / 1.6)
+    if missed > (most := MISSED if stepper.own_loop else RECALLED):
+        return _refuted("keeps state", f"it keeps something between calls: {why}", missed, most)
+    if (gap := _apart(first, once(start, h))) > SAME:
+        why = f"it keeps something between calls: the first one, repeated, differs by {gap:.1e}"
+        return _refuted("keeps state", why, gap)
     try:
         once(start, -h)
     except SymtopError as error:
@@ -101,20 +110,51 @@ def _repeated(call: Callable[[], Any], state: Any) -> tuple[int, float]:
     return count, gap
 
 
+def _kept(later: float, count: int, differs: float, noise: Callable[[], float]) -> Finding:
+    """The finding on a call that differs from the same one before: it kept some, or calls in a row differ, too."""
+    how, gap = "after a step elsewhere the same call", later
+    if not later > SAME:
+        how, gap = f"call {count} with the same arguments", differs
+    if (now := max(noise() for _ in range(AGAIN))) > 0.1 * gap:
+        return _refuted("not repeatable", f"calls with the same arguments differ by {now:.1e}", now)
+    return _refuted("keeps state", f"it keeps something between calls: {how} differs by {gap:.1e}", gap)
+
+
 def _steps_missed(stepper: Stepper, scene: Scene, h: float) -> tuple[float, str]:
     """How far a run is from two runs of as many steps, in steps, and a clause; the largest of `PARTS`."""
-    par, state = stepper.form.prepare(scene.top, generic_start(scene))
-    start = np.array(state)
-
-    def run(y: Any, steps: int) -> Any:
-        return stepper.march(scene.top, par, y.copy(), h, np.array([steps])).states[0]
-
-    a_step = float(np.max(np.abs(run(start, 1) - start)))
+    start, run = stepper.from_start(scene.top, generic_start(scene), h)
+    a_step = _gap(run(start, 1)[0], start)
     if a_step == 0.0:  # it stands still, which is not to count wrongly
         return 0.0, ""
-    gaps = {(n, m): float(np.max(np.abs(run(start, n + m) - run(run(start, n), m)))) / a_step for n, m in PARTS}
+    gaps = {(n, m): _gap(run(start, n + m)[0], run(run(start, n)[0], m)[0]) / a_step for n, m in PARTS}
     n, m = max(PARTS, key=lambda parts: gaps[parts])
     return gaps[n, m], f"a run of {n + m} steps is {gaps[n, m]:.2g} steps from one of {n} and one of {m}"
+
+
+def _late(subject: Subject, h: float) -> tuple[float, str]:
+    """How far the last steps of a run are from the same steps asked again, in steps, and a clause; the largest of some.
+
+    Runs end with the longest, so that a call after them comes after many steps of one process.
+    """
+    stepper, scene, draw = subject.stepper, subject.scene, np.random.default_rng(subject.seed)
+    start, run = stepper.from_start(scene.top, generic_start(scene), h)
+    most, seconds = LATE[subject.quick]
+    longest = max(min(most, seconds / max(subject.seconds_a_step, 1e-9)), AFTER)
+    a_step = _gap(run(start, 1)[0], start) or 1.0
+    worst, words = 0.0, "after few steps"
+    for k, share in enumerate((*np.sort(draw.uniform(0.2, 1.0, LATER - 1)).tolist(), 1.0)):
+        n, m = round(longest**share * draw.uniform(1.0, 1.1)), int(draw.integers(1, AFTER))
+        middle, end = run(start, n, n + m)
+        if stepper.own_loop:
+            end = run(start, n + m)[0]
+        elif k == 0:
+            stepper.renew()
+        gap = _gap(end, run(np.nextafter(middle, np.inf), m)[0]) / a_step
+        words = words if np.isfinite(gap) else "after a run that fails"
+        if gap > worst:
+            worst = gap
+            words = f"after {n} steps (seed {subject.seed}) the next {m} are {gap:.1e} of a step from those asked again"
+    return worst, words
 
 
 def _alike(chart: str, guide: Any, state: Any) -> Any:
@@ -126,8 +166,12 @@ def _alike(chart: str, guide: Any, state: Any) -> Any:
     return state
 
 
+def _gap(first: Any, second: Any) -> float:
+    """Largest difference."""
+    return float(np.max(np.abs(first - second)))
+
+
 def _apart(first: Any, second: Any) -> float:
-    """Largest difference, relative to the largest number."""
-    size = float(np.max(np.abs(first)))
-    apart = float(np.max(np.abs(first - second))) / max(size, 1e-300)
+    """Largest difference, relative to the largest number; infinite where it is none."""
+    apart = _gap(first, second) / max(float(np.max(np.abs(first))), 1e-300)
     return apart if np.isfinite(apart) else math.inf

@@ -18,16 +18,18 @@ one constant of a map of (theta, p_theta) is the energy at the p_phi and p_psi o
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from symtop.core.errors import SymtopError
+from symtop.judging.adapters.adapter import AdapterSolver
 from symtop.judging.claims.subject import CONSTANTS, PLANE, Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
 from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, residuals, tops
+from symtop.measure.step_map import one_step
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import NOT_FINITE, OK, OUTCOMES, Array, Plan, Run, sentence
+from symtop.methods.framework.plan import Array, Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import space_momenta
 from symtop.model.scenes import Scene
@@ -53,6 +55,7 @@ OF_A_RUN = (*CONSTANTS, "reported", "invariant", "explicit", "work")
 KINDS = ("kept", "bounded", "random walk", "growing", "drift")  # from best to worst
 OWN = "its states'"  # what every run says of the momenta that it reports
 BADNESS = ("inapplicable", "measured", "confirmed", "undecided", "refuted")
+CUTS, SAME_RUN, OF_RUN = 8, 1e-9, "state"  # runs that are compared with parts of longer ones, and within what
 WINDOWS = 160  # of a long run, evenly spaced in the logarithm of time: what a figure shows of it
 
 Rows = dict[str, Array]  # by the names of constants
@@ -85,6 +88,14 @@ class Constant(NamedTuple):
             return None if self.kind == "unknown" else False
         least = self.changed.exponent - self.changed.exponent_interval
         return True if self.kind == "drift" or least > BOUNDED else None
+
+    def verdict(self, claimed: str) -> str:
+        """Of the claim that it is kept or bounded; "measured" where neither is claimed."""
+        if self.kind == "unknown" or (claimed == "bounded" and self.grows is None):
+            return "undecided"
+        within = self.kind == "kept" or (self.kind == "bounded" and self.changed.largest <= self.floor)
+        true = {"kept": within, "bounded": not self.grows}.get(claimed)
+        return "measured" if true is None else "confirmed" if true else "refuted"
 
 
 class LongRun(NamedTuple):
@@ -132,67 +143,60 @@ def _run(
 
 
 def long_run(
-    method: Integrator, scene: Scene, chart: str, *, quick: bool = False, most: float | None = None
+    method: Integrator, scene: Scene, chart: str, *, quick: bool = False, most: float | None = None, seed: int = 0
 ) -> LongRun:
     """A million steps of a compiled method in one of its charts, or `most`; fewer where that would take minutes."""
+    inside, unit = "angles" if chart == PLANE else chart, scene.time_scale()
     for finer in FINER:  # a motion that passes close to a pole needs shorter steps
-        step = scene.time_scale() / (STEPS_A_NUTATION * finer)
-        pilot, first, _ = _run(method, scene, chart, PILOT, step, PILOT + 1)
+        step = unit / (STEPS_A_NUTATION * finer)
+        pilot, first, _ = _run(method, scene, inside, PILOT, step, PILOT + 1)
         steps = float(PILOT)  # of a formula, which has no steps: nothing adds up
         if method.control is not None:
             cost = max(first.force_evaluations / PILOT, 1.0)
             share = QUICK_SHARE if quick else 1.0
             limit = share * EVALUATIONS[method.implementation] / cost if most is None else most
             steps = max(min(QUICK_STEPS if quick else STEPS, limit) * method.speed, PILOT)
-        shown, run, plan = _run(method, scene, chart, steps, step, SAMPLES)
+        shown, run, plan = _run(method, scene, inside, steps, step, SAMPLES)
         if run.outcome == "ok" or not method.fixed_step:
             break
-    _, other, _ = _run(method, scene, chart, PILOT, 0.21 * step, PILOT + 1)
-    if chart == "angles":
-        reported = from_increments(method, scene, plan) if method.fixed_step else None
-    else:
-        reported = _difference(scene, shown, run)
+    _, other, _ = _run(method, scene, inside, PILOT, 0.21 * step, PILOT + 1)
     steady = len({one.force_evaluations / max(one.steps, 1) for one in (first, other)}) == 1
-    return found_in(run, scene, chart, plan.times, constants(scene, shown), constants(scene, pilot), steady, reported)
+    reported = None
+    if inside != "angles":
+        reported = _difference(scene, shown, run)
+    elif chart != PLANE and method.fixed_step:
+        reported = from_increments(method, scene, plan)
+    if method.fixed_step and not isinstance(method.solvers[inside], AdapterSolver):
+        reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
+    changes, every_step = (
+        {name: values for name, values in constants(scene, one).items() if chart != PLANE or name == "energy"}
+        for one in (shown, pilot)
+    )
+    made, grains = max(run.steps, 1), {"energy": scene.energy_grain}
+    kept = {
+        name: change_of(plan.times, changes[name], every_step[name], made, grains.get(name, 1.0)) for name in changes
+    }
+    message, nutations = sentence(run.outcome, run.reached, float(plan.times[-1])), run.reached / unit
+    costs = run.force_evaluations / made, run.newton_iterations / made, steady
+    energy = windows(plan.times / unit, changes["energy"])
+    return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *costs, reported, energy)
 
 
-def found_in(
-    run: Run, scene: Scene, chart: str, times: Array, changes: Rows, pilot: Rows, steady: bool, apart: Difference | None
-) -> LongRun:
-    """What a run showed: relative `changes` at `times`, and in each step of its `pilot`."""
-    made, unit = max(run.steps, 1), scene.time_scale()
-    grains = {"energy": scene.energy_grain}
-    kept = {name: change_of(times, changes[name], pilot[name], made, grains.get(name, 1.0)) for name in changes}
-    message, nutations = sentence(run.outcome, run.reached, float(times[-1])), run.reached / unit
-    cost = run.force_evaluations / made, run.newton_iterations / made, steady
-    energy = windows(times / unit, changes["energy"])
-    return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *cost, apart, energy)
-
-
-def run_in_plane(subject: Subject) -> LongRun:
-    """The energy of a map of (theta, p_theta) over many steps, and in each of the first."""
-    stepper, scene = subject.stepper, subject.scene
-    steps = round(min(subject.long_steps or STEPS, QUICK_STEPS if subject.quick else STEPS))
-    par, state = stepper.form.prepare(scene.top, scene.start)
-    p_phi, p_psi = (float(value[0]) for value in stepper.form.momenta(par, np.array([state])))
-
-    def change(marks: Array, h: float) -> tuple[dict[str, Array], int]:
-        """The change of the energy since the start, as a share of the nutation's, and the forces."""
-        states, forces = stepper.march(scene.top, par, np.array(state), h, marks.astype(np.int64))
-        with np.errstate(all="ignore"):
-            energy = scene.top.reduced_energy(states[:, 0], states[:, 1], p_phi, p_psi)
-        return {"energy": (energy - energy[0]) / scene.energy_scale}, forces
-
-    h, first = scene.time_scale() / STEPS_A_NUTATION, np.arange(PILOT + 1.0)
-    marks = np.unique(np.rint(np.linspace(0, max(steps, PILOT), SAMPLES)))
-    values, forces = change(marks, h)
-    every, few = change(first, h)
-    _, other = change(first, 0.21 * h)
-    good = np.isfinite(values["energy"])
-    made, outcome = int(marks[good][-1]), OUTCOMES[OK if good.all() else NOT_FINITE]
-    nothing = np.empty(0)  # neither states nor momenta are shown
-    run = Run(nothing, nothing, nothing, made, forces, 0, outcome, made * h)
-    return found_in(run, scene, PLANE, marks * h, values, every, few == other, None)
+def _contradiction(
+    method: Integrator, scene: Scene, chart: str, long: tuple[Run, Plan], pilot: Run, h: float, seed: int
+) -> Difference | None:
+    """How far a run of n steps, n drawn at random, is from the first n of a longer one: a step knows nothing of it."""
+    draw, step = np.random.default_rng(seed), one_step(method, chart, scene, h)
+    for k in range(CUTS):
+        run, marks = (long[0], long[1].marks) if k % 2 else (pilot, np.arange(pilot.states.shape[0]))
+        i = min(int(marks.size ** draw.uniform(0.0, 1.0)), marks.size - 1)
+        state = step.scaled(run.states[i], run.p_phi[i], run.p_psi[i])
+        if marks[i] > 0 and np.isfinite(state).all():
+            gap = step.gap(step.shown(step.run(scene.start, h, int(marks[i]))), state)
+            if gap > SAME_RUN:
+                how = f"in a run of {marks[i]} steps from the first of one of {marks[-1]} (seed {seed})"
+                return Difference(OF_RUN, gap, SAME_RUN, how)
+    return None
 
 
 def windows(nutations: Array, change: Array) -> tuple[Array, Array]:
@@ -250,15 +254,11 @@ def change_of(time: Array, values: Array, every_step: Array, steps: int, grain: 
 def measure(subject: Subject) -> list[Finding]:
     """Everything that one long run in each chart shows; the worst chart decides, and the finding names it."""
     method, runs, by_chart = subject.method, [], []
-    if subject.in_plane:
-        run = run_in_plane(subject)
-        subject.traces.update(run.traces())
-        return of_run(method, run)
-    for chart in method.charts():
+    options: dict[str, Any] = {"quick": subject.quick, "most": subject.long_steps, "seed": subject.seed}
+    for chart in (PLANE,) if subject.in_plane else method.charts():
         try:
-            run = long_run(method, subject.scene, chart, quick=subject.quick, most=subject.long_steps)
-            runs.append(run)
-            findings = of_run(method, run)
+            runs.append(long_run(method, subject.scene, chart, **options))
+            findings = of_run(method, runs[-1])
         except SymtopError as error:
             findings = [undecided(claim, declared(method, claim), str(error)) for claim in OF_A_RUN]
         by_chart.append([_named(one, chart) for one in findings])
@@ -297,18 +297,16 @@ def _constant(claim: str, claimed: str, run: LongRun, constant: Constant | None)
             why += f", drifting by {changed.rise / max(run.steps, 1):.1e} a step"
     # an error that returns with the nutation cannot exceed the largest change of a step, all one way
     most = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
-    if run.outcome not in ("ok", "not_finite") or (kind in ("kept", "bounded") and run.outcome != "ok"):
+    steady = kind in ("kept", "bounded")
+    if run.outcome not in ("ok", "not_finite", "not_normalised") or (steady and run.outcome != "ok"):
         why += f"; but the run {run.message}"
     elif kind == "unknown":
         why = f"the run {run.message}" if run.outcome != "ok" else f"{why}: no exponent to judge it by"
     elif claimed == "bounded" and constant.grows is None and changed.largest > most:
         verdict, why = "refuted", f"{why}, more than the steps of a nutation can add up to: it does not come back"
-    elif claimed == "bounded" and constant.grows is None:
-        why += ", which leaves open whether it grows"
     else:
-        within = kind == "kept" or (kind == "bounded" and changed.largest <= constant.floor)
-        true = {"kept": within, "bounded": not constant.grows}.get(claimed)
-        verdict = "measured" if true is None else "confirmed" if true else "refuted"
+        verdict = constant.verdict(claimed)
+        why += ", which leaves open whether it grows" if verdict == "undecided" else ""
     return Finding(claim, claimed, measured, verdict, why, changed.largest, constant.floor)
 
 
@@ -320,6 +318,11 @@ def _reported(run: LongRun) -> Finding:
     if other.size <= other.floor:
         why = f"they differ from those of the states by {other.size:.1e} at most"
         return Finding("reported", "", Measured(OWN), "measured", why, other.size, other.floor)
+    if other.name == OF_RUN:
+        why = (
+            f"a run contradicts itself, as if the method knew of it: the state differs by {other.size:.1e} {other.how}"
+        )
+        return Finding("reported", OWN, Measured("another run", other.size), "refuted", why, other.size, other.floor)
     why = f"it reports other momenta than its states have: {other.name} differs by {other.size:.1e} {other.how}"
     return Finding("reported", OWN, Measured("others", other.size), "refuted", why, other.size, other.floor)
 

@@ -18,7 +18,7 @@ slope does, but not what a run carries from step to step.
 d (w h)^k to a step, w = 2 pi/nutation, beside d' (w h)^(p+1), which a method of order p has anyway: a slope shows it
 below w h = (d/d')^(1/(p + 1 - k)), often a step that is so small that rounding is larger.
 
-A map of (theta, p_theta) is judged by its distance from the true point, p_theta in units of the larger momentum.
+A map of (theta, p_theta) is judged by its error of theta.
 
 *Time.* The top's equations are autonomous: a method whose f is called at wrong times, the nodes c of its tableau, is
 right on them. In a frame that turns about a horizontal axis at a rate w, z = R(t)^T y moves by
@@ -38,14 +38,14 @@ import numpy as np
 
 from symtop.core.errors import SymtopError
 from symtop.judging.claims.structure import ONE_MAP, map_of
-from symtop.judging.claims.subject import FEWEST, FINEST, PLANE, Subject
+from symtop.judging.claims.subject import FINEST, Subject
 from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, yes_no
 from symtop.measure.accuracy import error_table
-from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order as order_of, order_verdict
+from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order_verdict
 from symtop.measure.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
-from symtop.measure.step_map import generic_start, restart_gap
+from symtop.measure.step_map import StepMap, aligned, generic_start, one_step, restart_gap
 from symtop.measure.step_series import AGREES, SURE, Series, compared, step_series
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.loop import FixedStep
@@ -62,14 +62,16 @@ from symtop.run.simulation import integrate
 
 NUTATIONS = 1.37  # length of the runs that the slope is fitted to
 FALLBACK, LONGER = "goldstein", (8.37, 40.0)
-COARSEST, RUNS = 17, 13  # in the plane: steps of the shortest run, and how many runs
-BOUND = 1e-14  # of the closed form at the end of such a run
 QUICK_SHARE = 0.25  # of these; no verdict on a method of the package changes
 LARGEST_EXACT = 2.37  # steps a nutation that a method with exact steps is tried at, beside the ladder
 SHARE = 0.37  # of a nutation: length of the runs that are extrapolated to h = 0
 STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the coarsest of them; 200 beyond order 6
 TRUE_LIMIT = 1e-11  # a limit as close as this is the true motion
 SHOWN = 24  # settings of the order that are kept
+DRAWS, DRAWING = (96, 32), (10.0, 3.0)  # starts at which the order of one step is looked at, and seconds for them
+HALVINGS, SHORT = 10, 80.0  # steps that are tried from each, and how many of a short one make a nutation
+LOWER, JUMP = 0.6, 3.0  # an order is lower by so much, or jumps by so much
+LARGE, SEEN = 1e-3, 1e-11  # a miss beyond the first is of no power, below the second rounding
 TURNS = 0.7  # of the frame in a nutation
 BEGIN = 0.23  # of a nutation: t0
 CLEAR = 1e-9  # noise of the h^1 term: a step that is rounded to single precision leaves 1e-8
@@ -89,7 +91,67 @@ def measure(subject: Subject) -> list[Finding]:
         if table.order < min(power, len(table.defect)):
             words, verdict = words + _visible_from(table, power, subject.scene), "refuted"
         finding = finding._replace(verdict=verdict, why=f"{words}; {finding.why}")
+    if method.order is not None and finding.verdict == "confirmed":
+        lower = _elsewhere(subject, method.order)
+        if lower is not None:
+            measured = Measured("order", lower[0], text=f"{lower[0]:.1f} elsewhere")
+            finding = Finding("order", finding.declared, measured, "refuted", lower[1], lower[0], LOWER)
     return [finding]
+
+
+def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
+    """The order of one step, and a sentence, where it is lower than `power`; starts, tops, times and steps are drawn.
+
+    Steps of h, h/2, h/4 ... err by d(h) ~ h^(order + 1). Steps that are too long do neither of two things: have a lower
+    order at the finest pairs, which are short, or jump, with an order far above `power` below one that is lower.
+    """
+    if subject.in_plane or not subject.method.fixed_step or subject.method.exact_steps:
+        return None
+    draw, stepper = np.random.default_rng(subject.seed), subject.stepper
+    for k, (name, scene) in enumerate(subject.elsewhere(DRAWS, DRAWING)):
+        since = scene.time_scale() * 10.0 ** draw.uniform(0.0, 3.0) * (k % 2)
+        scale = scene.time_scale() * math.sin(scene.start.theta)
+        sizes: Array = scale / draw.uniform(9.0, 18.0) / 2.0 ** np.arange(float(HALVINGS))
+        if stepper is not None:
+            stepper.since = since
+        for chart in subject.charts:
+            with contextlib.suppress(SymtopError):
+                step = one_step(subject.method, chart, scene, float(sizes[0]))
+                if restart_gap(step, scene.start) > ONE_MAP:
+                    continue
+                order, h = _lower(sizes, _misses(step, scene, sizes), power, scale / SHORT)
+                if order < power:
+                    at = f"{name}, t = {since:.3g}" if stepper is not None and since else name
+                    if stepper is not None:
+                        stepper.since = 0.0
+                    return order, f"a step of h = {h:.2g} from {at} has order {order:.1f}, in the {chart} chart"
+        if stepper is not None:
+            stepper.since = 0.0
+    return None
+
+
+def _misses(step: StepMap, scene: Scene, sizes: Array) -> Array:
+    """How far steps of these sizes end from the motion; NaN where a step fails."""
+    exact, z, before, misses = closed_form(scene)(sizes), step.point(scene.start), step.at(scene.start), []
+    for h, *angles in zip(sizes.tolist(), *(values.tolist() for values in exact), strict=True):
+        true = aligned(step.chart, step.at(Angles(*angles)), before)
+        try:
+            misses.append(step.gap(aligned(step.chart, step.image(z, h), before), true))
+        except SymtopError:
+            misses.append(math.nan)
+    return np.array(misses)
+
+
+def _lower(sizes: Array, misses: Array, power: int, short: float) -> tuple[float, float]:
+    """The order where it is lower than `power`, and the step; infinity where it is not."""
+    with np.errstate(all="ignore"):
+        orders = np.log2(misses[:-1] / misses[1:]) - 1.0
+    clear = (misses[:-1] < LARGE) & (misses[1:] > SEEN)
+    fine = np.flatnonzero(clear & (sizes[:-1] <= short))[-2:]
+    if fine.size == 2 and (orders[fine] < power - LOWER).all():
+        return float(orders[fine].max()), float(sizes[fine[0]])
+    jumps = np.flatnonzero(clear[1:] & clear[:-1] & (orders[1:] > power + JUMP) & (orders[:-1] < power - LOWER))
+    return (float(orders[jumps[0]]), float(sizes[jumps[0]])) if jumps.size else (math.inf, math.nan)
 
 
 class ChartSeries(NamedTuple):
@@ -162,8 +224,10 @@ class Order(NamedTuple):
         return Measured("slope", fit.slope, text=str(fit)) if math.isfinite(fit.slope) else NOTHING
 
 
-def measured_order(method: Integrator, scene: Scene, *, quick: bool = False, finest: float | None = None) -> Order:
-    """Slopes of the errors of attitude, theta and energy, where they can be judged; `finest`: most steps of a run."""
+def measured_order(
+    method: Integrator, scene: Scene, *, quick: bool = False, finest: float | None = None, main: str = ""
+) -> Order:
+    """Slopes of the errors of attitude (or axis, or `main`), theta and energy; `finest`: most steps of a run."""
     if method.control is None:
         raise SymtopError(f"{method.name} has neither a step nor a tolerance")
     runs = [(scene, NUTATIONS)]
@@ -172,19 +236,19 @@ def measured_order(method: Integrator, scene: Scene, *, quick: bool = False, fin
     if not (quick or not method.fixed_step or method.order is None or method.implementation == "python"):
         runs += [(find_scene(FALLBACK), nutations) for nutations in LONGER]
     tried: list[Order] = []
-    for where, nutations in runs:
-        tried.append(_slopes(method, where, nutations, quick, finest))
+    for chosen, nutations in runs:
+        tried.append(_slopes(method, chosen, nutations, quick, finest, main or observable(method)))
         if math.isfinite(tried[-1].main.slope):
             return tried[-1]
     return tried[0]
 
 
-def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool, finest: float | None) -> Order:
+def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool, finest: float | None, main: str) -> Order:
     horizon = nutations * scene.time_scale()
     count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # steps that are chosen scatter
     most = FINEST[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
-    main, settings = observable(method), ladder(method, scene, horizon, count, most)
-    table = order_table(scene, method, settings, horizon, main, dense=finest is None)
+    settings = ladder(method, scene, horizon, count, most)
+    table = order_table(scene, method, settings, horizon, observable(method), dense=finest is None)
     step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
     fits = {name: order_fit(scene, method, table, name, horizon) for name in (main, "theta", "energy")}
     error, bound = table[main].values, table[f"{main}_bound"].values
@@ -193,20 +257,15 @@ def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool, fin
 
 def _by_steps(subject: Subject) -> Finding:
     """What steps and runs show of the order."""
-    method, scene, quick, finest = subject.method, subject.scene, subject.quick, subject.finest
+    method, scene, finest = subject.method, subject.scene, subject.finest
     series, claim = series_of(subject), method.order
-    fitted = _in_plane(subject) if subject.in_plane else measured_order(method, scene, quick=quick, finest=finest)
-    if (
-        series
-        and not subject.in_plane
-        and not fitted.measured
-        and series.series.is_exact
-        and series.order < (claim or 0)
-    ):
+    options: dict[str, Any] = {"quick": subject.quick, "finest": finest, "main": "theta" if subject.in_plane else ""}
+    fitted = measured_order(method, scene, **options)
+    if series and not fitted.measured and series.series.is_exact and series.order < (claim or 0):
         # a method of high order is tried at long steps, whose errors fall as no power where the order is low, and the
         # limit of its runs is extrapolated by a power that they do not have: it looks wrong
         method = replace(method, order=max(series.order, 1))
-        fitted = measured_order(method, scene, quick=quick, finest=finest)
+        fitted = measured_order(method, scene, **options)
     rank = np.argsort(fitted.step_size)[:SHOWN]
     columns = {"step_size": fitted.step_size, "error": fitted.error, "fitted": fitted.main.used.astype(float)}
     padded = np.full(SHOWN - rank.size, math.nan)
@@ -227,25 +286,6 @@ def _by_steps(subject: Subject) -> Finding:
             verdict = "measured" if claim is None else "refuted"
             return Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)
     return weighed(claim, fitted, series, slopes)
-
-
-def _in_plane(subject: Subject) -> Order:
-    """The slope of the errors at the end of runs of a map of (theta, p_theta)."""
-    method, scene, stepper = subject.method, subject.scene, subject.stepper
-    horizon = NUTATIONS * scene.time_scale()
-    finest = max(subject.finest or FEWEST, 4 * COARSEST)
-    counts = np.unique(np.rint(np.geomspace(COARSEST, finest, RUNS)).astype(np.int64))
-    truth = closed_form(scene)(np.array([horizon]))
-    end = np.array([float(truth.theta[0]), scene.top.I1 * float(truth.theta_dot[0])])
-    par, state = stepper.form.prepare(scene.top, scene.start)
-    errors, unit = [], np.array([1.0, scene.momentum_scale])
-    for count in counts:
-        done = stepper.march(scene.top, par, np.array(state), horizon / count, np.array([count]))
-        errors.append(float(np.linalg.norm((done.states[0] - end) / unit)))
-    step_size, error, bound = horizon / counts, np.array(errors), np.full(counts.size, BOUND)
-    omega = 2.0 * math.pi / scene.time_scale()
-    fit = order_of(step_size, error, bound, omega, method.order, symmetric=method.symmetric)
-    return Order(scene.name, step_size, error, bound, {PLANE: fit}, PLANE, True)
 
 
 def weighed(claim: int | None, fitted: Order, series: ChartSeries | None, slopes: str) -> Finding:
@@ -377,20 +417,31 @@ def _visible_from(table: Conditions, power: int, scene: Scene) -> str:
 
 def time_order(subject: Subject) -> list[Finding]:
     """The finding on the order in a frame that turns."""
-    if not subject.method.fixed_step or not hasattr(subject.stepper, "along"):
+    if not subject.method.fixed_step or not subject.stepper.takes_field:
         return [inapplicable("time", "it takes no right-hand side")]
+    if subject.autonomous:
+        return [inapplicable("time", "it was written for f(y)")]
+    return [_in_frame(subject)]
+
+
+def _in_frame(subject: Subject) -> Finding:
     order, rate = subject.method.order, 2.0 * math.pi * TURNS / subject.scene.time_scale()
     turning, calls = series_in_frame(subject, rate)
     if not calls:
-        return [inapplicable("time", "it asks for no right-hand side")]
+        return inapplicable("time", "it asks for no right-hand side")
     if turning.order < 0:
-        return [inapplicable("time", "a step of no length moves a state that is not of its chart")]
+        return inapplicable("time", "a step of no length moves a state that is not of its chart")
     series, power = turning.series, turning.order if order is None else order
     shown = min(turning.order, power)
     declared, measured, verdict = yes_no(order), Measured("order", shown, text=str(shown)), "measured"
     if turning.order >= min(power, series.resolved):
-        verdict = "measured" if order is None else "confirmed"
+        if turning.order < power:  # no higher term is resolved
+            measured, verdict = Measured("order", shown, text=f"{shown} or more"), "undecided"
+        elif order is not None:
+            verdict = "confirmed"
         why = f"where f depends on t, {turning.words(power)}"
+    elif subject.knows_top:
+        return inapplicable("time", "it knows equations of the top beside f, which depend on no time")
     elif calls == {BEGIN * subject.scene.time_scale()}:  # a step for f(y): no fault on a top
         declared, measured = "", Measured("f(y) only", shown, text=f"f(y) only, {shown}")
         why = "f is asked at the start of a step alone, which is right for f(y); where f depends on t, "
@@ -399,7 +450,28 @@ def time_order(subject: Subject) -> list[Finding]:
         declared, why = "", f"{turning.wrong_term()}, as for f(y)"
     else:
         verdict, why = "refuted", f"where f depends on t, {turning.wrong_term()}: f is asked at wrong times"
-    return [Finding("time", declared, measured, verdict, why, *turning.term(power))]
+    return Finding("time", declared, measured, verdict, why, *turning.term(min(power, turning.order + 1)))
+
+
+class TurningField:
+    """y' = f(t, y) on the axis in a frame that turns about x at a rate; it keeps the times it sees."""
+
+    def __init__(self, par: Any, rate: float) -> None:
+        self.par, self.rate, self.times = par, rate, set[float]()
+
+    def turned(self, t: float, y: Array, sign: float) -> Array:
+        """R(t) y for sign 1, R(t)^T y for -1."""
+        c, s = math.cos(self.rate * t), sign * math.sin(self.rate * t)
+        x, v, w, lx, lv, lw = y
+        return np.array([x, c * v - s * w, s * v + c * w, lx, c * lv - s * lw, s * lv + c * lw])
+
+    def __call__(self, t: float, z: Any) -> Array:
+        """z'."""
+        z = np.asarray(z, dtype=float)
+        swept = self.rate * np.array([0.0, -z[2], z[1], 0.0, -z[5], z[4]])
+        self.times.add(t)
+        rates = FORMULATIONS["axis"].field(self.par, self.turned(t, z, 1.0).tolist())
+        return self.turned(t, np.array(rates), -1.0) - swept
 
 
 def series_in_frame(subject: Subject, rate: float) -> tuple[ChartSeries, set[float]]:
@@ -407,29 +479,15 @@ def series_in_frame(subject: Subject, rate: float) -> tuple[ChartSeries, set[flo
     scene, start = subject.scene, generic_start(subject.scene)
     begin, unit = BEGIN * scene.time_scale(), np.repeat([1.0, scene.momentum_scale], 3)
     form, exact = FORMULATIONS["axis"], closed_form(Scene("start", scene.top, start, 1.0))
-    par, _ = form.prepare(scene.top, start)
-    times: set[float] = set()
-
-    def turned(t: float, y: Array, sign: float) -> Array:
-        """R(t) y for sign 1, R(t)^T y for -1; the frame turns about x."""
-        c, s = math.cos(rate * t), sign * math.sin(rate * t)
-        x, v, w, lx, lv, lw = y
-        return np.array([x, c * v - s * w, s * v + c * w, lx, c * lv - s * lw, s * lv + c * lw])
-
-    def f(t: float, z: Any) -> Array:
-        z = np.asarray(z, dtype=float)
-        swept = rate * np.array([0.0, -z[2], z[1], 0.0, -z[5], z[4]])
-        times.add(t)
-        rates: Array = turned(t, np.array(form.field(par, turned(t, z, 1.0).tolist())), -1.0) - swept
-        return rates
+    f = TurningField(form.prepare(scene.top, start)[0], rate)
 
     def motion(h: float) -> Any:
         at = Angles(*(float(value[0]) for value in exact(np.array([h]))))
-        return turned(begin + h, charts.space_state("axis", scene.top, at), -1.0) / unit
+        return f.turned(begin + h, charts.space_state("axis", scene.top, at), -1.0) / unit
 
     def image(h: float) -> Any:
         return subject.stepper.along(f, begin, first.copy(), h, np.array([1]))[0] / unit
 
     first = motion(0.0) * unit
 
-    return ChartSeries("turning", compared(image, motion, scene.time_scale())), times
+    return ChartSeries("turning", compared(image, motion, scene.time_scale())), f.times

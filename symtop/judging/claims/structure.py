@@ -11,20 +11,19 @@ A map of (theta, p_theta) is symplectic if it keeps the area, {theta, p_theta} =
 momentum.
 """
 
+import contextlib
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.adapters.adapter import AdapterSolver
-from symtop.judging.adapters.python_step import SeparableStep
 from symtop.judging.claims.subject import Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, undecided, yes_no
 from symtop.measure import step_map as maps
 from symtop.measure.errors import errors
-from symtop.methods.framework.plan import Array, Run
+from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
@@ -36,6 +35,7 @@ STANDS = 0.2  # the raw defect of a symplectic map falls to 1/256 over the width
 RETURNED = 1e-10  # a return as close as this is exact
 MISSED = 1e-8
 ONE_MAP = 1e-9  # two steps are twice one step within this
+DRAWS, DRAWING = (8, 4), (10.0, 2.0)  # starts that are drawn, and seconds for them; the second with --quick
 POLE_STEPS = 400
 POLE_RIGHT = 1e-7  # rad: right, whatever the step
 # the axis passes theta = 0 exactly: I1 = I3 = mgl = 1, w3 = 1, p_phi = p_psi, theta' = -1.2 at theta = 1
@@ -57,6 +57,8 @@ def measure(subject: Subject) -> list[Finding]:
             answers.append(_bracket(chart, defect, gap))
             subject.traces.update(defect_width=defect.widths, bracket_defect=defect.raw)
             answers.append(_returned(maps.return_miss(step, start), gap))
+            if subject.method.fixed_step and not subject.in_plane:
+                answers = _elsewhere(subject, step, answers)
         except SymtopError as error:
             answers += [(None, math.nan, math.nan, undecided("", "", str(error)).why)] * (2 - len(answers))
         names = ("symplectic", "symmetric")
@@ -66,31 +68,13 @@ def measure(subject: Subject) -> list[Finding]:
 
 @dataclass(frozen=True)
 class Plane(maps.StepMap):
-    """The map of a step in the plane; z and Y are (theta, p_theta) alike."""
+    """The map of a step in the plane, of which the angles chart shows theta and p_theta: these are z and Y alike."""
 
-    stepper: SeparableStep
     momenta: Momenta
-
-    def run(self, start: Angles, h: float, steps: int = 1) -> Run:
-        """So many steps, shown at their end."""
-        done: Run = self.onward(self.top, start, (h,) * steps)
-        if not np.isfinite(done.states).all():
-            raise SymtopError(f"a step of {h:.3g} is not finite")
-        return done
-
-    @property
-    def onward(self) -> Any:
-        """Steps of given lengths, each from the state where the last one ended."""
-        return AdapterSolver(self.stepper).onward
-
-    @property
-    def there_and_back(self) -> Any:
-        """A step, and one from its end with p_theta reversed."""
-        return AdapterSolver(self.stepper).there_and_back
 
     def scaled(self, state: Array, _phi: float, _psi: float) -> Array:
         """A state as Y."""
-        return np.asarray(state / np.array([1.0, self.unit]))
+        return np.asarray(state[:2] / np.array([1.0, self.unit]))
 
     def angles(self, z: Array) -> Angles:
         """The start that a point stands for, phi and psi zero."""
@@ -101,17 +85,9 @@ class Plane(maps.StepMap):
         """z of a start."""
         return np.array([start.theta, self.top.I1 * start.theta_dot / self.unit])
 
-    def at(self, start: Angles) -> Array:
-        """Y of a start."""
-        return self.point(start)
-
-    def restart(self, y: Array) -> Angles:
-        """The start that a Y stands for."""
-        return self.angles(y)
-
-    def length(self, _: Array) -> float:
-        """A state of the plane has no length to keep."""
-        return 1.0
+    def gap(self, first: Array, second: Array) -> float:
+        """Largest difference of two Y."""
+        return float(np.max(np.abs(first - second)))
 
 
 def map_of(subject: Subject, chart: str) -> tuple[maps.StepMap, Angles]:
@@ -120,8 +96,7 @@ def map_of(subject: Subject, chart: str) -> tuple[maps.StepMap, Angles]:
         return maps.step_map(subject.method, chart, subject.scene)
     scene, start = subject.scene, maps.generic_start(subject.scene)
     h, momenta = maps.SHARE * scene.time_scale(), scene.top.momenta(start)
-    trial = Plane(subject.method, chart, scene.top, scene.momentum_scale, h, subject.stepper, momenta)
-    return maps.coarsest(trial, start), start
+    return maps.coarsest(Plane(subject.method, "angles", scene.top, scene.momentum_scale, h, momenta), start), start
 
 
 def _in_chart(chart: str, method: Integrator, claim: str, answer: Answer) -> Finding:
@@ -156,6 +131,22 @@ def _returned(miss: float, gap: float) -> Answer:
         return None, miss, RETURNED, f"two steps differ from twice one step by {gap:.0e}: no one map"
     why = f"a step forth and back misses the start by {miss:.1e}"
     return True if miss <= RETURNED else False if miss > MISSED else None, miss, RETURNED, why
+
+
+def _elsewhere(subject: Subject, step: maps.StepMap, answers: list[Answer]) -> list[Answer]:
+    """The answers, or a no that a step gives at a start, on a top, that is drawn at random."""
+    for name, scene in subject.elsewhere(DRAWS, DRAWING):
+        with contextlib.suppress(SymtopError):
+            other = maps.moved(step, scene)
+            gap = maps.restart_gap(other, scene.start)
+            pair = (
+                _bracket(step.chart, maps.symplectic_defect(other, scene.start), gap),
+                _returned(maps.return_miss(other, scene.start), gap),
+            )
+            for i, (yes, value, resolution, why) in enumerate(pair):
+                if yes is False and answers[i][0]:
+                    answers[i] = yes, value, resolution, f"{why} ({name})"
+    return answers
 
 
 class Passage(NamedTuple):
@@ -202,7 +193,7 @@ def pole(subject: Subject) -> list[Finding]:
     words = ["passes" if one.passes else "wrong" if one.outcome == "ok" else "ends there" for one in judged]
     if not claim:
         verdict = "measured"
-    elif any(one.outcome not in ("ok", "left_chart", "not_finite") for one in judged):
+    elif any(one.outcome not in ("ok", "left_chart", "not_finite", "not_normalised") for one in judged):
         verdict = "undecided"
     else:
         verdict = "confirmed" if all(one.passes for one in judged) else "refuted"

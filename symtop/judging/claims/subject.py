@@ -7,12 +7,14 @@ implementation is given by default.
 A bare step is given as a function, a class, a solver, a file or a command; its adapter is chosen by what it is.
 """
 
+import functools
 import inspect
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,10 +22,10 @@ from symtop.core.errors import SymtopError, foreign_code, one_of
 from symtop.core.files import execute, python_file
 from symtop.judging.adapters.adapter import Stepper, integrator
 from symtop.judging.adapters.external import BatchStep, DiffraxSolver, Program, SharedObject, is_solver
-from symtop.judging.adapters.python_step import PythonStep, RotationStep, ScipySolver, SeparableStep
+from symtop.judging.adapters.python_step import REDUCED, PythonStep, RotationStep, ScipySolver, SeparableStep
 from symtop.judging.findings import yes_no
 from symtop.measure.conservation import CONSTANTS as MOTION
-from symtop.measure.step_map import generic_start
+from symtop.measure.step_map import drawn, generic_start
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import CHARTS
 from symtop.model.scenes import Scene
@@ -39,7 +41,13 @@ SAMPLES = 4000  # intervals of a long run: a program that writes every so many s
 FINEST = {"compiled": 2e5, "python": 1e4}  # most steps of a run of the order
 FEWEST = 300  # steps of the longest run of the order, however slow
 LADDER = 2.5  # times the steps of the longest run: what all of them take
+ENOUGH_STEPS, AT_REST = 50.0, 1e-9  # steps a nutation with a right-hand side of zero, and how far they may go
 ENOUGH = 0.03  # seconds after which the time of a step is known
+
+
+def rest(_: float, y: Any) -> Any:
+    """y' = 0, as a right-hand side."""
+    return np.zeros(np.shape(y))
 
 
 @dataclass(frozen=True)
@@ -51,12 +59,36 @@ class Subject:
     quick: bool = False
     stepper: Any = None  # a `Stepper`, of a bare step
     seconds_a_step: float = 0.0
+    seed: int = 0  # of the starts, times and steps that are drawn
+    autonomous: bool = False  # was a step written for f(y)?
     traces: dict[str, Any] = field(default_factory=dict)
 
     @property
     def in_plane(self) -> bool:
         """Is it a map of (theta, p_theta)?"""
-        return isinstance(self.stepper, SeparableStep)
+        return self.stepper is not None and self.stepper.form is REDUCED
+
+    @functools.cached_property
+    def knows_top(self) -> bool:
+        """Does it move a state where f is zero? A method for y' = f(t, y) alone does not: this one knows the top."""
+        if self.stepper is None or not self.stepper.takes_field or self.method.adaptive:
+            return False
+        h = self.scene.time_scale() / ENOUGH_STEPS
+        y, _ = self.stepper.from_start(self.scene.top, self.scene.start, h)
+        try:
+            end = self.stepper.along(rest, h, y.copy(), h, np.array([1]))[0]
+        except SymtopError:  # it divides by f
+            return True
+        return not np.max(np.abs(end - y)) <= AT_REST * np.max(np.abs(y))
+
+    def elsewhere(self, draws: tuple[int, int], seconds: tuple[float, float]) -> Iterator[tuple[str, Scene]]:
+        """Starts that are drawn, with a name for each, while there are draws and seconds; the second with --quick."""
+        began = time.monotonic()
+        scenes = drawn(self.scene, draws[self.quick], self.seed, same_top=self.knows_top)
+        for k, scene in enumerate(scenes, start=1):
+            if time.monotonic() - began > seconds[self.quick]:  # a program that takes long to start
+                return
+            yield f"start {k} of seed {self.seed}", scene
 
     @property
     def charts(self) -> tuple[str, ...]:
@@ -80,41 +112,20 @@ class Subject:
         return max(steps, FEWEST)
 
 
-class Request(NamedTuple):
-    """A bare step as it was given, and the claims that are made for it."""
-
-    target: Any
-    form: str | None
-    chart: str
-    adaptive: bool
-    scene: Scene
-    quick: bool
-    claims: dict[str, Any]
-
-    def claimed(self) -> Integrator:
-        """The claims as a record without a step, checked before anything is loaded; SymtopError for nonsense."""
-
-        def refuse(*_: Any) -> Any:
-            raise SymtopError("these are claims alone, without a step to run")
-
-        return Integrator("claims", "other", "", {self.chart: refuse}, **self.claims)
-
-    def open(self) -> Subject:
-        """Load the step and time it; SymtopError if it cannot be loaded or makes no step."""
-        stepper = open_target(self.target, self.form, self.chart, adaptive=self.adaptive)
-        method = integrator(stepper, **self.claims)
-        seconds = seconds_a_step(stepper, self.scene) if method.fixed_step else 0.0
-        return Subject(method, self.scene, self.quick, stepper, seconds)
+def timed(stepper: Stepper, scene: Scene, claims: dict[str, Any], **options: Any) -> Subject:
+    """A bare step and what it claims, after its steps have been timed; SymtopError if it makes none."""
+    method = integrator(stepper, **claims)
+    seconds = seconds_a_step(stepper, scene) if method.fixed_step else 0.0
+    return Subject(method, scene, stepper=stepper, seconds_a_step=seconds, **options)
 
 
 def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
     """Seconds a step, from runs of more and more steps; what a run costs at its start is left out."""
-    par, state = stepper.form.prepare(scene.top, generic_start(scene))
-    h, start = scene.time_scale() / 1000.0, np.array(state)
+    start, run = stepper.from_start(scene.top, generic_start(scene), scene.time_scale() / 1000.0)
 
     def seconds(steps: int) -> float:
         began = time.perf_counter()
-        stepper.march(scene.top, par, start.copy(), h, np.array([steps]))
+        run(start, steps)
         return time.perf_counter() - began
 
     first, steps = min(seconds(1), seconds(1)), 1
@@ -122,6 +133,7 @@ def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
         steps *= 4
         taken = seconds(steps)
         if taken - first > max(ENOUGH, first) or steps > 1e7:  # what a start costs scatters as much as it costs
+            taken = min(taken, seconds(steps), seconds(steps))  # others may have been at work
             return max(taken - first, 1e-9) / steps
 
 
@@ -146,18 +158,20 @@ def declared(method: Integrator, claim: str) -> str:
 
 
 def form_of(target: Any) -> str:
-    """The form of what is given, where it shows: a class, a function, FILE.py:NAME, a library, or else a program."""
+    """The form of what is given, where it shows: a class, a function, FILE.py:NAME or a library."""
     if isinstance(target, type):
         return "scipy"
     if callable(target) or is_solver(target):
         return "diffrax" if is_solver(target) else "ode"
-    path = "" if " " in str(target).strip() else str(target).partition(":")[0]
-    return "ode" if path.endswith(".py") else "shared" if path.endswith(LIBRARIES) else "program"
+    path = str(target).partition(":")[0]
+    if path.endswith(".py") or path.endswith(LIBRARIES):
+        return "ode" if path.endswith(".py") else "shared"
+    raise SymtopError(f"a step must be FILE.py:NAME or FILE.so, or a command with form program, not {str(target)!r}")
 
 
 def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = False) -> Stepper:
     """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else."""
-    kind = one_of("form", form or form_of(target), FORMS)
+    kind = one_of("form", form_of(target) if form is None else form, FORMS)
     one_of("chart", chart, CHARTS)
     if kind == "program":
         return Program(str(target), chart)
@@ -178,7 +192,10 @@ def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = F
         pass
     except TypeError:
         signature = inspect.signature(thing)
-        raise SymtopError(f"a step of the form {kind} must take {arguments}, not {signature}") from None
+        hint = (
+            "; a rotation, q = (w, x, y, z), takes (q, w, h, inertia, torque): form rotation" if kind == "ode" else ""
+        )
+        raise SymtopError(f"a step of the form {kind} must take {arguments}, not {signature}{hint}") from None
     if kind in ("torch", "jax"):
         return BatchStep(thing, chart, kind, name)
     if kind == "ode":
@@ -189,7 +206,7 @@ def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = F
 def _from_file(target: str | Path) -> tuple[Any, str]:
     """What FILE.py:NAME names, and its name; without a name the function ``step``."""
     path, _, name = str(target).partition(":")
-    file = python_file(path, "a step", "FILE.py:NAME with a file that is there")
+    file = python_file(path, "a step", "FILE.py:NAME with a file that is there (a command needs form program)")
     with foreign_code(f"the file {file.name}"):
         sys.path.insert(0, str(file.parent))  # what stands beside it, as Python has it for a script
         module = execute(f"symtop_judged_{Path(file).stem}", file)

@@ -530,13 +530,13 @@ march_no_squish = kernel_loop(no_carry, _increment_no_squish, observe_attitude)
 def _entry(
     name: str, loops: dict[str, Loop], order: int | None, summary: str, reference: str, keeps: str = "", *,
     carried: Mapping[str, Carried] = VELOCITY, rule: Any = None, forces: int = 1, symplectic: bool = False,
-    energy_error: str | None = None, precision: str = "double",
+    energy_error: str | None = None, precision: str = "double", needs: str = "group",
 ) -> Integrator:  # fmt: skip
     """The record of a map from its loops, by chart; `keeps` names the momenta that it conserves."""
     return Integrator(
         name=name, family=ENGINE, summary=summary, reference=reference, order=order, explicit=True,
         symplectic=symplectic, symmetric=symplectic, conserves=frozenset(keeps.split()), energy_error=energy_error,
-        precision=precision,
+        precision=precision, needs=needs, general=True,
         solvers={
             chart: FixedStep(loop, rule or Substeps(), carried[chart].prepare, forces, implicit=False)
             for chart, loop in loops.items()
@@ -593,7 +593,7 @@ def built_in() -> list[Integrator]:
         _engine("lammps-rigid", richardson, 2, "LAMMPS fix rigid: half kicks around an extrapolated rotation",
                 "lammps", "p_phi", carried=ANGULAR_MOMENTUM),
         _entry("no-squish", {"attitude": march_no_squish}, 2, "LAMMPS fix rigid/nve: turns about the body's axes",
-               "miller-2002 lammps", "p_phi", carried=ANGULAR_MOMENTUM, symplectic=True),
+               "miller-2002 lammps", "p_phi", carried=ANGULAR_MOMENTUM, symplectic=True, needs="kicks"),
         _engine("yade", _leapfrog(published=False), 1, "YADE: rotational leapfrog with the axes of the start of a step",
                 "yade", "p_phi", carried=ANGULAR_MOMENTUM),
         _engine("fincham", _leapfrog(published=True), 2, "the rotational leapfrog as published", "fincham-1992",

@@ -12,7 +12,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, foreign_code
 from symtop.core.signals import at_most
-from symtop.methods.framework.plan import OUTCOMES, Array, Plan, Run
+from symtop.methods.framework.plan import OUTCOMES, Array, Plan, Run, off_length
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import DIMENSIONS
 from symtop.model.top import Angles, SymmetricTop, flat
@@ -37,7 +37,8 @@ def solve(method: Integrator, chart: str, top: SymmetricTop, start: Angles, plan
             run = solver(top, start, given)
         if not own:
             _restore(method, top, start, before)
-        return _checked(method, (plan.times.size, DIMENSIONS[chart]), plan, run, copy=not own)
+        checked = _checked(method, (plan.times.size, DIMENSIONS[chart]), plan, run, copy=not own)
+        return _of_length_one(plan, checked, chart)
 
 
 def _restore(method: Integrator, top: SymmetricTop, start: Angles, before: tuple[float, ...]) -> None:
@@ -67,10 +68,18 @@ def _checked(method: Integrator, shape: tuple[int, int], plan: Plan, run: Any, *
             raise SymtopError(f"{must} a number of {name}, not {type(getattr(run, name)).__name__}")
     checked = Run(states, p_phi, p_psi, *run[3:])
     if checked.outcome == "ok" and not np.isfinite(states).all():
-        whole: Any = np.isfinite(states).all(axis=1)
-        reached = float(plan.times[int(np.argmin(whole)) - 1]) if whole[0] else 0.0
-        return checked._replace(outcome="not_finite", reached=reached)
+        return checked._replace(outcome="not_finite", reached=plan.last_of(np.isfinite(states).all(axis=1)))
     return checked
+
+
+def _of_length_one(plan: Plan, run: Run, chart: str) -> Run:
+    """The run, which ends where its quaternion has left length one."""
+    with np.errstate(all="ignore"):
+        lost = off_length(chart, run.states)
+    if not lost.any():
+        return run
+    states, p_phi, p_psi = np.where(lost[:, None], np.nan, run.states), *np.where(lost, np.nan, run[1:3])
+    return Run(states, p_phi, p_psi, *run[3:6], "not_normalised", plan.last_of(~lost))
 
 
 def _real(values: object, *, copy: bool) -> Array | None:

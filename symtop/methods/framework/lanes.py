@@ -157,8 +157,8 @@ def preparing(lanes: Lanes, begin: Any, enter: Any, kind: Any, numbers: Any, sca
             for q in range(len(carry)):
                 carries[i, q] = carry[q]
             if marks[m, 0] == 0:
-                begun = conserved(top, start)
-                momenta[m, 0, 0], momenta[m, 0, 1] = begun.p_phi, begun.p_psi
+                constants = conserved(top, start)
+                momenta[m, 0, 0], momenta[m, 0, 1] = constants.p_phi, constants.p_psi
 
     return compile_kernel(prepare)
 

@@ -30,14 +30,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.core.jit import compile_kernel, register_jitable, set_item
+from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.parallel import heed
 from symtop.methods.framework import lanes as many, preparation
 from symtop.methods.framework.lanes import Blocks, Lanes, Many, Whole
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan, Run
 from symtop.methods.framework.preparation import Body, Preparation, Shown, Start, as_it_steps, conserved
 from symtop.methods.framework.registry import Solver
-from symtop.methods.vectors import accumulate, accumulate_plainly
+from symtop.methods.vectors import accumulate, accumulate_plainly, zero
 from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop, flat
 
@@ -180,14 +180,13 @@ def kernel_loop(  # noqa: C901  (one loop, read in one piece)
             par, state = numbers(top, at)
             rule = scale(kind(coefficients), top, at, h)
             state = enter(par, rule, state, h)
-            low = state
-            for i in range(len(state)):
-                low = set_item(low, i, 0.0)
             if marks[0] == 0:
-                begun = conserved(top, at)
-                momenta[0, 0], momenta[1, 0] = begun.p_phi, begun.p_psi
+                constants = conserved(top, at)
+                momenta[0, 0], momenta[1, 0] = constants.p_phi, constants.p_psi
             carry, stop = begin(par, rule, state, h), marks[-1]
-            _, _, _, k, j, work, outcome = march(par, rule, state, low, carry, h, 0, 0, stop, marks, states, momenta)
+            _, _, _, k, j, work, outcome = march(
+                par, rule, state, zero(state), carry, h, 0, 0, stop, marks, states, momenta
+            )
             states[j:] = np.nan
             momenta[:, max(j, int(marks[0] == 0)) :] = np.nan
             return k, work, outcome

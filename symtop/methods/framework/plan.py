@@ -1,7 +1,7 @@
 """What a solver is asked for, a `Plan`, what it returns, a `Run`, and how a run can end."""
 
 import math
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,6 +40,10 @@ class Plan(NamedTuple):
         samples = np.asarray(times, dtype=float)
         return cls(samples, float(samples[-1]), math.nan, np.empty(0, dtype=np.int64), tolerance, budget)
 
+    def last_of(self, whole: Any) -> float:
+        """The time of the last sample before the first one that is not `whole`, (samples,)."""
+        return float(self.times[int(np.argmin(whole)) - 1]) if whole[0] else 0.0
+
     def most(self, limit: float) -> float:
         """The budget, or a method's own limit where nobody gave one."""
         return limit if self.budget is None else self.budget
@@ -67,16 +71,31 @@ class Run(NamedTuple):
     reached: float
 
 
-OUTCOMES = ("ok", "left_chart", "not_converged", "not_finite", "step_too_small", "out_of_budget")
-OK, LEFT_CHART, NOT_CONVERGED, NOT_FINITE, STEP_TOO_SMALL, OUT_OF_BUDGET = range(len(OUTCOMES))
+OUTCOMES = ("ok", "left_chart", "not_converged", "not_finite", "step_too_small", "out_of_budget", "not_normalised")
+OK, LEFT_CHART, NOT_CONVERGED, NOT_FINITE, STEP_TOO_SMALL, OUT_OF_BUDGET, NOT_NORMALISED = range(len(OUTCOMES))
 
 _CAUSES = {
     "left_chart": "theta left (0, pi), where the angles chart ends; take a smaller step or an integrator without poles",
     "not_converged": "the implicit equation of the step was not solved; take a smaller step",
     "not_finite": "the state became infinite or not a number; take a smaller step or a tighter tolerance",
     "step_too_small": "the step size fell below the spacing of the numbers; loosen the tolerance",
+    "not_normalised": "the quaternion's length left one by more than 0.1 %; take a smaller step or a tighter tolerance",
     "out_of_budget": "the limit on the work of one run was reached; shorten the horizon or loosen the tolerance",
 }
+
+
+LENGTH = 1e-3  # how far from one the length of a quaternion may be
+
+
+def off_length(chart: str, states: Array) -> NDArray[np.bool_]:
+    """At which samples, states (..., samples, dimension), has the quaternion left length one? From the first on.
+
+    A state that is not finite says nothing.
+    """
+    if chart != "attitude":
+        return np.zeros(states.shape[:-1], dtype=bool)
+    length = np.sqrt((states[..., :4] ** 2).sum(axis=-1))
+    return np.logical_or.accumulate(np.isfinite(length) & (np.abs(length - 1.0) > LENGTH), axis=-1)
 
 
 def sentence(outcome: str, reached: float, horizon: float) -> str:

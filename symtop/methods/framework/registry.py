@@ -42,9 +42,20 @@ FAMILIES = (
 )  # fmt: skip
 IMPLEMENTATIONS = ("compiled", "python")
 ENERGY_ERRORS = ("kept", "bounded", None)
+NEEDS = {  # the weakest thing that suffices for a method, whatever its kernel makes use of
+    "derivative": "f(t, y) at any state",
+    "expression": "f as a formula",
+    "lagrangian": "the Lagrangian of coordinates and velocities",
+    "kicks": "the torque at an attitude, and the free motion",
+    "group": "the torque, the inertia and the group of rotations",
+    "this-top": "the equations or constants of this very top",
+    "solution": "the motion itself",
+}
+INNER_LOOPS = ("scalar", "vector registers", "heyoka", "Python", None)
 ALLOWED: dict[str, tuple[Any, ...]] = {
     **dict.fromkeys(("explicit", "symplectic", "symmetric"), (True, False, None)), "exact_steps": (True, False),
     "control": ("step_size", "tolerance", None), "energy_error": ENERGY_ERRORS,
+    "needs": (*NEEDS, None), "general": (True, False, None), "inner_loop": INNER_LOOPS,
     "precision": ("single", "double", "longdouble", "quad"),
 }  # fmt: skip
 KINDS: dict[str, tuple[Any, str]] = {
@@ -88,8 +99,9 @@ class Integrator:
 
     `solvers` maps a chart (angles, axis, attitude) to a function. `control` is what a user turns: ``step_size``,
     ``tolerance`` or nothing. `implementation` says what executes the inner loop, so that languages are never ranked
-    against each other unsaid. `summary` is a line about it, `about` a paragraph; the built-in ones have theirs from
-    `about.md`. Raises SymtopError for a field that makes no sense.
+    against each other unsaid, and `inner_loop` how. `needs` is one of `NEEDS`; `general` says whether the method exists
+    for a body without symmetry; None where nobody has said so. `summary` is a line about it, `about` a paragraph; the
+    built-in ones have theirs from `about.md`. Raises SymtopError for a field that makes no sense.
     """
 
     name: str
@@ -113,6 +125,9 @@ class Integrator:
     same_steps_as: str | None = None  # a compiled integrator that takes the same steps
     precision: str = "double"  # of its arithmetic: "single", "double", "longdouble" (80 bits) or "quad" (128)
     speed: float = 1.0  # of a step, in units of others of its implementation: 0.002 for arithmetic in software
+    needs: str | None = field(default=None, metadata={"words": True})
+    general: bool | None = field(default=None, metadata={"words": True})
+    inner_loop: str | None = field(default=None, metadata={"words": True})
     about: str = field(default="", repr=False, compare=False, metadata={"words": True})  # a paragraph: what it is, when
 
     def __post_init__(self) -> None:
@@ -134,8 +149,9 @@ class Integrator:
         if self.exact_steps and (self.order is not None or not self.fixed_step):
             raise SymtopError("exact_steps must be False for a method that has an order or no step_size")
         if self.conserves is not None:
-            if isinstance(self.conserves, str) or not isinstance(self.conserves, Collection):
-                raise SymtopError(f"conserves must be a set of names, not {self.conserves!r}")
+            some = isinstance(self.conserves, Collection) and getattr(self.conserves, "shape", None) != ()
+            if isinstance(self.conserves, str) or not some:
+                raise SymtopError(f"conserves must be a set of names, not {shown(self.conserves)}")
             names = frozenset(one_of("an entry of conserves", name, CONSERVED) for name in self.conserves)
             object.__setattr__(self, "conserves", names)
 
@@ -210,9 +226,12 @@ class Integrator:
             "order": "unknown" if self.order is None else str(self.order),
             **{trait: _CLAIM[getattr(self, trait)] for trait in ("explicit", "symplectic", "symmetric")},
             "conserves": "unknown" if self.conserves is None else ", ".join(sorted(self.conserves)) or "nothing",
+            "needs": self.needs or "unknown",
+            "general": _CLAIM[self.general],
             "charts": ", ".join(self.charts()),
             "control": self.control or "none",
             "implementation": self.implementation,
+            "inner loop": self.inner_loop or "unknown",
             "summary": self.summary,
         }
 
@@ -220,9 +239,10 @@ class Integrator:
 _BUILT_IN = (
     "lagrangian.discrete_lagrangian", "lagrangian.unreduced", "lagrangian.galerkin", "lagrangian.exact_discrete",
     "lie_group.variational", "splitting.composition", "splitting.reversible", "runge_kutta.explicit",
-    "runge_kutta.dormand_prince", "runge_kutta.gauss", "runge_kutta.kahan", "lie_group.runge_kutta",
-    "lie_group.energy_momentum", "lie_group.generalised_alpha", "runge_kutta.collective_gauss", "library.scipy_ivp",
-    "taylor.heyoka", "taylor.series", "library.exact", "engines.engines",
+    "runge_kutta.pairs", "runge_kutta.extrapolation", "runge_kutta.nystrom", "runge_kutta.adams", "runge_kutta.gauss",
+    "runge_kutta.kahan", "lie_group.runge_kutta", "lie_group.energy_momentum", "lie_group.generalised_alpha",
+    "runge_kutta.collective_gauss", "library.scipy_ivp", "taylor.heyoka", "taylor.series", "taylor.series_general",
+    "library.exact", "engines.engines",
 )  # fmt: skip
 ENTRY_POINTS = "symtop.integrators"  # an Integrator, or a function that returns several
 
@@ -241,8 +261,8 @@ def _load() -> None:
             module = importlib.import_module(f"symtop.methods.{_BUILT_IN[len(_loaded)]}")
             _loaded.append(module.__name__)
             for entry in module.built_in():
-                described = replace(entry, about=entry.about or paragraphs().get(entry.name, ""))
-                _registry.setdefault(entry.name, described)
+                about, inner = entry.about or paragraphs().get(entry.name, ""), entry.inner_loop or "scalar"
+                _registry.setdefault(entry.name, replace(entry, about=about, inner_loop=inner))
                 _shipped.add(entry.name)
             if hasattr(module, "missing"):
                 _missing.update(module.missing())

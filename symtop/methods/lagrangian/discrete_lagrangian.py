@@ -368,7 +368,7 @@ def discrete_lagrangian(
         summary=summary or f"discrete Lagrangian with nodes {rule.nodes} and weights {rule.weights}",
         solvers={"angles": FixedStep(march, rule, on_angles, fresh, implicit=True, each_step=at_start)},
         order=order, explicit=False, symplectic=True, symmetric=symmetric, conserves=frozenset({"p_phi", "p_psi"}),
-        reference=reference,
+        reference=reference, needs="lagrangian", general=True,
     )  # fmt: skip
     return replace(method, modified_energy=midpoint_energy) if is_midpoint(method) else method
 

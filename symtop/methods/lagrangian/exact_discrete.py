@@ -277,7 +277,7 @@ def built_in() -> list[Integrator]:
             },
             explicit=True, symplectic=True, symmetric=True,
             conserves=frozenset({"energy", "p_phi", "p_psi", "axis_length"}),
-            exact_steps=True,
+            exact_steps=True, needs="this-top", general=False,
             reference="kuznetsov-petrera-ragnisco-2004 marsden-west-2001 bobenko-suris-1999",
         )
     ]  # fmt: skip

@@ -292,6 +292,6 @@ def built_in() -> list[Integrator]:
             solvers={"angles": FixedStep(march, Iteration(), on_angles, 2, implicit=True, each_step=1)},
             order=4, explicit=False, symplectic=True, symmetric=True,
             conserves=frozenset({"p_phi", "p_psi"}),
-            reference="marsden-west-2001",
+            reference="marsden-west-2001", needs="lagrangian", general=True,
         )
     ]  # fmt: skip

@@ -24,6 +24,6 @@ def built_in() -> list[Integrator]:
             solvers={"attitude": solve},
             control=None, explicit=True, symplectic=True, symmetric=True,
             conserves=frozenset({"energy", "p_phi", "p_psi"}),
-            reference="klein-sommerfeld-1910",
+            reference="klein-sommerfeld-1910", needs="solution", general=False,
         )
     ]  # fmt: skip

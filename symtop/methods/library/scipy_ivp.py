@@ -146,6 +146,9 @@ def scipy_method(name: str, *, compiled: bool = False) -> Integrator:
         conserves=frozenset(),
         least_tolerance=LEAST_TOLERANCE,
         reference=reference,
+        needs="derivative",
+        general=True,
+        inner_loop="Python",
         same_steps_as="rk45-compiled" if name == "RK45" else None,
     )
 

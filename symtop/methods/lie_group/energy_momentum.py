@@ -105,6 +105,6 @@ def built_in() -> list[Integrator]:
             summary="Simo and Wong's midpoint rule on the rotation group: the energy and p_phi exactly",
             conserves=frozenset({"energy", "p_phi", "axis_length"}),
             solvers=in_both_charts(march, Midpoint(), SPUN, 1, implicit=True),
-            reference="simo-wong-1991 gonzalez-1996",
+            reference="simo-wong-1991 gonzalez-1996", needs="group", general=True,
         )
     ]  # fmt: skip

@@ -196,7 +196,7 @@ def generalised_alpha(name: str, spectral_radius: float, *, summary: str = "") -
         summary=summary or f"Lie-group generalised-alpha method of spectral radius {r:g}",
         conserves=frozenset({"p_psi", "axis_length"}),
         solvers=in_both_charts(march, rule, SPUN, 1, implicit=True),
-        reference="bruls-cardona-arnold-2012 chung-hulbert-1993",
+        reference="bruls-cardona-arnold-2012 chung-hulbert-1993", needs="group", general=True,
     )  # fmt: skip
 
 

@@ -244,7 +244,7 @@ def lie_runge_kutta(
     return Integrator(
         name=name, family="lie-group", summary=summary, reference=reference, order=order, explicit=True,
         symplectic=False, symmetric=False, conserves=frozenset({"p_psi", "axis_length"}),
-        solvers=in_both_charts(march, rule, UNSPUN, 1, implicit=False),
+        solvers=in_both_charts(march, rule, UNSPUN, 1, implicit=False), needs="group", general=True,
     )  # fmt: skip
 
 

@@ -129,6 +129,8 @@ def collective_gauss(stages: int) -> Integrator:
         symmetric=True,
         conserves=frozenset({"p_phi", "p_psi", "axis_length"}),
         reference="ohsawa-2019 mclachlan-modin-verdier-2014",
+        needs="group",
+        general=True,
     )
 
 

@@ -26,16 +26,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError, row
-from symtop.core.jit import register_jitable, set_item
+from symtop.core.jit import combined, register_jitable, set_item
 from symtop.methods.framework.angles import BareTop
 from symtop.methods.framework.equations import FORMULATIONS, Formulation
-from symtop.methods.framework.lanes import Lanes, W, column, put
+from symtop.methods.framework.lanes import Lanes, W, column, put, reading
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop
 from symtop.methods.simd import wide_vectors
-from symtop.methods.vectors import accumulate
+from symtop.methods.vectors import accumulate, zero
 
 
 def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
@@ -47,54 +47,59 @@ def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
         numbers[weights + i] = h * rule.b[i]
 
 
-def _sum(add: Callable[..., Any], terms: int, weights: int) -> Callable[..., Any]:
-    """``(place, slopes, table, j)`` to place + w_1 k_1 + ... of so many terms, whose weights begin at this number."""
-    if terms == 0:
+def written_out(count: int, stage: Callable[[int], Callable[..., Any]]) -> Callable[..., Any]:
+    """``(par, state, first, at, h)`` to so many slopes, a tuple of tuples.
 
-        def added(place, slopes, table, j):  # type: ignore[no-untyped-def]
-            return place
-    else:
-        before, last, weight = _sum(add, terms - 1, weights), terms - 1, weights + terms - 1
-
-        def added(place, slopes, table, j):  # type: ignore[no-untyped-def]
-            return add(before(place, slopes, table, j), slopes[last], table[weight * W + j])
-
-    return register_jitable(added)
-
-
-def _stages(field: Callable[..., Any], add: Callable[..., Any], count: int, tops: int) -> Callable[..., Any]:
-    """``(par, state, table, j)`` to the first `count` slopes, a tuple of tuples."""
+    Those after the first are ``stage(i)(par, state, made, at, h)``, i = 1, 2, ..., of the slopes that are made.
+    """
     if count == 1:
 
-        def slopes(par, state, table, j):  # type: ignore[no-untyped-def]
-            return (field(par, state),)
+        def slopes(par, state, first, at, h):  # type: ignore[no-untyped-def]
+            return (first,)
     else:
-        before = _stages(field, add, count - 1, tops)
-        place = _sum(add, count - 1, tops + (count - 1) * (count - 2) // 2)
+        before, last = written_out(count - 1, stage), register_jitable(stage(count - 1))
 
-        def slopes(par, state, table, j):  # type: ignore[no-untyped-def]
-            made = before(par, state, table, j)
-            return (*made, field(par, place(state, made, table, j)))
+        def slopes(par, state, first, at, h):  # type: ignore[no-untyped-def]
+            made = before(par, state, first, at, h)
+            return (*made, last(par, state, made, at, h))
 
     return register_jitable(slopes)
 
 
+def _sum(terms: int, first: int) -> Callable[..., Any]:
+    """``(place, slopes, table, j)`` to place + w_1 k_1 + ... of so many terms, whose weights begin at this number."""
+    weights = reading(terms)
+
+    def added(place, slopes, table, j):  # type: ignore[no-untyped-def]
+        return combined(place, slopes, weights(table, first, j), 1.0)
+
+    return register_jitable(added)
+
+
 def explicit_in_lanes(
-    field: Callable[..., Any], add: Callable[..., Any], ended: Callable[..., Any], *, top: Any, dimension: int
+    field: Callable[..., Any], ended: Callable[..., Any], *, top: Any, dimension: int
 ) -> Callable[[Any], Lanes]:
-    """Explicit tableaux in lanes: ``add(place, slope, weight)`` is a term, ``ended(state, step)`` a step's outcome."""
+    """Explicit tableaux in lanes; ``ended(state, step)`` is a step's outcome."""
     d, zeros, numbers = dimension, (0.0,) * dimension, (0.0,) * len(top._fields)
     tops, step_at, flag = len(numbers), 2 * d, 3 * d
 
+    def stage(i: int) -> Callable[..., Any]:
+        place = _sum(i, tops + i * (i - 1) // 2)
+
+        def slope(par, state, made, table, j):  # type: ignore[no-untyped-def]
+            return field(par, place(state, made, table, j))
+
+        return slope
+
     @functools.cache
     def lanes(count: int) -> Lanes:
-        stages, total = _stages(field, add, count, tops), _sum(add, count, tops + count * (count - 1) // 2)
+        stages, total = written_out(count, stage), _sum(count, tops + count * (count - 1) // 2)
 
         def step(block, table):  # type: ignore[no-untyped-def]
             wide_vectors()
             for j in range(W):
                 state, par = column(block, 0, j, zeros), top(*column(table, 0, j, numbers))
-                step = total(zeros, stages(par, state, table, j), table, j)
+                step = total(zeros, stages(par, state, field(par, state), table, j), table, j)
                 block[flag * W + j] = block[flag * W + j] if ended(state, step) == OK else 1.0
                 moved, low = accumulate(state, column(block, d, j, zeros), step)
                 put(block, 0, j, moved)
@@ -128,7 +133,7 @@ def store(slopes: Any, i: int, slope: Any) -> None:
 
 
 @register_jitable
-def _row(slopes: Any, i: int, like: Any) -> Any:
+def row_of(slopes: Any, i: int, like: Any) -> Any:
     """Row i as a tuple as long as `like`."""
     for m in range(len(like)):
         like = set_item(like, m, slopes[i, m])
@@ -159,7 +164,7 @@ def later_stages(field: Any, par: Any, a: Any, stages: int, state: Any, slopes: 
     for i in range(1, stages):
         place = state
         for j in range(i):
-            place = add(place, _row(slopes, j, place), h * a[row + j])
+            place = add(place, row_of(slopes, j, place), h * a[row + j])
         row += i
         store(slopes, i, field(par, place))
 
@@ -167,11 +172,9 @@ def later_stages(field: Any, par: Any, a: Any, stages: int, state: Any, slopes: 
 @register_jitable
 def weighted(weights: Any, state: Any, slopes: Any, h: float) -> Any:
     """h sum_i weights_i slopes_i, a tuple as long as the state."""
-    step = state
-    for m in range(len(state)):
-        step = set_item(step, m, 0.0)
+    step = zero(state)
     for i in range(len(weights)):
-        step = add(step, _row(slopes, i, step), h * weights[i])
+        step = add(step, row_of(slopes, i, step), h * weights[i])
     return step
 
 
@@ -194,7 +197,7 @@ def _loop(form: Formulation, top: Any, dimension: int) -> Loop:
         step = weighted(rule.b, state, carry, h)
         return step, carry, len(rule.b), ended(state, step)
 
-    lanes = explicit_in_lanes(field, add, ended, top=top, dimension=dimension)
+    lanes = explicit_in_lanes(field, ended, top=top, dimension=dimension)
     return kernel_loop(begin, increment, form.observe, lanes=lanes)
 
 
@@ -254,7 +257,7 @@ def runge_kutta(
             for chart, form in FORMULATIONS.items()
         },
         order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
-        reference=reference,
+        reference=reference, needs="derivative", general=True,
     )  # fmt: skip
 
 

@@ -50,7 +50,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable, set_item
-from symtop.core.multiprecision import context
+from symtop.core.numbers import context
 from symtop.methods.framework import space
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
@@ -59,7 +59,7 @@ from symtop.methods.framework.preparation import Later
 from symtop.methods.framework.registry import Array, Integrator
 from symtop.methods.framework.space import SpaceTop, field_axis, field_frame, observe_axis
 from symtop.methods.simd import wide_vectors
-from symtop.methods.vectors import accumulate
+from symtop.methods.vectors import accumulate, zero
 
 ENOUGH = 1e-9  # a correction in units of |e| = 1, whose square is below rounding
 NEAR = 0.1  # a correction after which the solution is followed to a longer step
@@ -221,30 +221,18 @@ def packed(rule: GaussRule) -> tuple[Callable[[Any], GaussRule], Array]:
 
 
 def _antiderivative(roots: list[Any], x: Any) -> Any:
-    """int_0^x prod (t - root) dt in multiprecision."""
-    coefficients = [1]  # lowest power first
-    for root in roots:
-        shifted, scaled = [0, *coefficients], [*(-root * value for value in coefficients), 0]
-        coefficients = [up + down for up, down in zip(shifted, scaled, strict=True)]
-    return sum(value * x ** (k + 1) / (k + 1) for k, value in enumerate(coefficients))
-
-
-def _legendre_zero(degree: int, near: Any) -> Any:
-    """The zero of the Legendre polynomial next to a good guess, by Newton's method, in multiprecision."""
-    x = near
-    for _ in range(8):  # from two digits, doubled each time
-        last, value = x * 0, x**0
-        for k in range(degree):
-            last, value = value, ((2 * k + 1) * x * value - k * last) / (k + 1)
-        x -= value * (x * x - 1) / (degree * (x * value - last))
-    return x
+    """int_0^x prod (t - root) dt, in the arithmetic of its arguments."""
+    polynomial = np.atleast_1d(np.poly(np.array(roots, dtype=object)) * x**0)  # no integer is divided by another
+    return np.polyval(np.polyint(polynomial), x)
 
 
 @functools.lru_cache(maxsize=len(STAGES))
 def gauss_rule(stages: int) -> GaussRule:
     """Coefficients of the method with that many stages, from `DIGITS` digits."""
     mp = context(DIGITS)
-    c = [(1 + _legendre_zero(stages, mp.cos(mp.pi * (k - 0.25) / (stages + 0.5)))) / 2 for k in range(stages, 0, -1)]
+    guesses = [mp.cos(mp.pi * (k - 0.25) / (stages + 0.5)) for k in range(stages, 0, -1)]
+    roots = [mp.findroot(functools.partial(mp.legendre, stages), (x, x + 0.001)) for x in guesses]
+    c = [(1 + root) / 2 for root in roots]
     others = [[node for k, node in enumerate(c) if k != j] for j in range(stages)]
     tops = [mp.fprod(c[j] - node for node in others[j]) for j in range(stages)]
     b = [_antiderivative(others[j], mp.one) / tops[j] for j in range(stages)]
@@ -314,9 +302,7 @@ def gauss_step(field: Any, par: Any, state: Any, work: Any) -> Any:  # noqa: C90
     is kept for L and for the unit vectors, not for each component, for which there are not registers enough.
     """
     stages, dimension = len(work) // 7, len(state)
-    nothing = state
-    for m in range(dimension):
-        nothing = set_item(nothing, m, 0.0)
+    nothing = zero(state)
     for i in range(stages):  # the last step's polynomial, evaluated at this step's nodes
         ahead = nothing
         for j in range(stages):
@@ -560,6 +546,8 @@ def gauss(stages: int) -> Integrator:
         symmetric=True,
         conserves=frozenset({"energy", "p_phi", "p_psi", "axis_length"}),
         reference="butcher-1964 hairer-mclachlan-razakarivony-2008",
+        needs="derivative",
+        general=True,
     )
 
 

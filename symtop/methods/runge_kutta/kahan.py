@@ -111,7 +111,7 @@ def built_in() -> list[Integrator]:
         Integrator(
             name="kahan", family="runge-kutta", order=2, explicit=False, symplectic=False, symmetric=True,
             summary="Kahan's method on the quadratic equations of the axis: linearly implicit, no iteration",
-            conserves=frozenset({"p_phi"}), energy_error="bounded",
+            conserves=frozenset({"p_phi"}), energy_error="bounded", needs="expression", general=True,
             solvers={
                 "axis": Onward(march_axis, (1.0,), on_axis, 1, implicit=True),
                 "attitude": Onward(march_frame, (1.0,), on_frame, 1, implicit=True, present=Shown(_attitude_shown, 7)),

@@ -86,6 +86,8 @@ METHODS = {
         BLANES_MOAN_11, "blanes-moan-2002",
         "Runge-Kutta-Nystrom splitting of the reduced Hamiltonian, 11 forces", "angles"),
     "strang": Splitting(STRANG, "touma-wisdom-1994", "free top and gravity kicks, one force"),
+    "strang-drift-first": Splitting(
+        drift_first(2, (), ()), "touma-wisdom-1994", "gravity kick between two halves of the free top, one force"),
     "cayley": Splitting(
         STRANG, "bobenko-suris-1999",
         "Cayley rotation and gravity kicks, an integrable map, one force", rotation="cayley"),

@@ -77,7 +77,8 @@ def composition(
         },
         order=order, explicit=True, symplectic=True, symmetric=all(numbers == numbers[::-1] for numbers in rule[:3]),
         conserves=frozenset({"p_phi", "p_psi"} | ({"cayley_energy"} if one_drift and rotation != "exact" else set())),
-        reference=reference,
+        reference=reference, needs="this-top" if table.turn == TUNED else "kicks",
+        general=chart == "space" and rotation == "exact" and not boost,  # reduced angles, a turn about L, a processor
         modified_energy=modified,
         sleeps_from=sleeps,
     )  # fmt: skip

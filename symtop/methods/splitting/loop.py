@@ -24,12 +24,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.core.jit import register_jitable, set_item, to_fixed_tuple
+from symtop.core.jit import register_jitable, to_fixed_tuple
 from symtop.methods.framework.lanes import Lanes, W, column, put
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.preparation import as_fields
 from symtop.methods.simd import times, wide_vectors, with_item
-from symtop.methods.vectors import accumulate
+from symtop.methods.vectors import accumulate, zero
 
 SHORT = 2  # drifts
 
@@ -126,11 +126,7 @@ def closed(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[flo
 @register_jitable
 def compose(force: Any, kick: Any, drift: Any, par: Any, rule: Any, state: Any, at_start: Any) -> Any:
     """Increment of one step and the force at its end. A force nobody kicks with is not evaluated."""
-    step = state
-    for i in range(len(state)):
-        step = set_item(step, i, 0.0)
-    now = at_start
-    n = len(rule.drift)
+    step, now, n = zero(state), at_start, len(rule.drift)
     for i in range(n):
         if rule.kick[i] != 0.0:
             step = kick(par, now, step, rule.kick[i], rule.bend[i])

@@ -66,8 +66,8 @@ def march(par, k, eps, turn, times, budget, seen, place, states, momenta):  # ty
         steps += 1 if part != 0.0 else 0
         outcome = chart_outcome(there[0])
         if outcome == OK and sampled:
-            kept = observe(par, rule, state, step, part) if part != 0.0 else (par.north + par.p_psi, par.p_psi)
-            momenta[0, seen], momenta[1, seen] = kept
+            pair = observe(par, rule, state, step, part) if part != 0.0 else (par.north + par.p_psi, par.p_psi)
+            momenta[0, seen], momenta[1, seen] = pair
             states[seen, 0], states[seen, 1], states[seen, 2], states[seen, 3] = there
             seen += 1
         elif outcome == OK:
@@ -115,5 +115,6 @@ def built_in() -> list[Integrator]:
         name="stormer-verlet-reversible", family="splitting", order=2, explicit=True, symplectic=False,
         symmetric=True, conserves=frozenset({"p_phi", "p_psi"}), energy_error="bounded",
         summary="Stormer-Verlet with reversible steps that shrink towards a pole, eps sin(theta)",
-        solvers={"angles": Reversible()}, reference="hairer-soderlind-2005 huang-leimkuhler-1997",
+        needs="kicks", general=False, solvers={"angles": Reversible()},
+        reference="hairer-soderlind-2005 huang-leimkuhler-1997",
     )]  # fmt: skip

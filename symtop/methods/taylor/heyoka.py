@@ -21,8 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.multiprecision import context
-from symtop.core.numbers import EPSILON
+from symtop.core.numbers import EPSILON, context
 from symtop.methods.framework.plan import Plan, Run
 from symtop.methods.framework.registry import Array, Integrator, Solver
 from symtop.model import charts
@@ -202,7 +201,8 @@ def built_in() -> list[Integrator]:
             control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
             least_tolerance=arithmetic(precision).epsilon / 1000.0,
             default_tolerance=arithmetic(precision).epsilon / 100.0,
-            reference="biscani-izzo-2021", precision=precision, speed=0.002 if precision == "quad" else 1.0,
+            reference="biscani-izzo-2021", needs="expression", general=True, inner_loop="heyoka", precision=precision,
+            speed=0.002 if precision == "quad" else 1.0,
         )
         for precision in ("double", *wide, *quad)
     ]  # fmt: skip

@@ -70,7 +70,7 @@ from symtop.methods.framework.preparation import Body, Scaled, Start
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, with_spin
 from symtop.methods.simd import Components, Vectors
-from symtop.methods.vectors import accumulate
+from symtop.methods.vectors import accumulate, zero
 
 
 class Scale(NamedTuple):
@@ -347,10 +347,7 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
     def run(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]  # noqa: C901
         body = Body(*numbers[:3])
         par, state = prepare(body, Start(*numbers[3:]))
-        low = state
-        for i in range(size):
-            low = set_item(low, i, 0.0)
-        t = rest = 0.0
+        low, t, rest = zero(state), 0.0, 0.0
         turn = (state[size - 3] ** 2 + state[size - 2] ** 2 + state[size - 1] ** 2) / body.I1**2
         h = 1.0 / math.sqrt(turn + 4.0 * abs(body.mgl) / body.I1 + 1.0 / times[-1] ** 2)
         if seen >= 0:
@@ -422,7 +419,7 @@ def series(name: str, order: int = DEFAULT_ORDER) -> Integrator:
             "attitude": FixedStep(march_attitude(order), rule, space.on_attitude, order, implicit=False),
         },
         order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi"}),
-        reference="biscani-izzo-2021",
+        reference="biscani-izzo-2021", needs="this-top", general=False, inner_loop="vector registers",
     )  # fmt: skip
 
 
@@ -434,6 +431,6 @@ def built_in() -> list[Integrator]:
         solvers={chart: solver(chart) for chart in CHARTS},
         control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi"}),
         least_tolerance=EPSILON / 1000.0, default_tolerance=EPSILON / 10.0,
-        reference="biscani-izzo-2021",
+        reference="biscani-izzo-2021", needs="this-top", general=False, inner_loop="vector registers",
     )  # fmt: skip
     return [series("series"), adaptive]

@@ -34,13 +34,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symtop.core.errors import SymtopError
-from symtop.core.lazy_kernel import LazyKernel
 from symtop.core.numbers import real_numbers
-from symtop.model import charts
 from symtop.model.charts import Array
 from symtop.model.exact import layout as at, samples
 from symtop.model.exact.constants import DONE, OUT_OF_RANGE, UNMET, UNRESOLVED, all_constants
 from symtop.model.exact.digits import Motion
+from symtop.model.lazy_kernel import LazyKernel
 from symtop.model.top import LARGEST, NUMBERS, Angles, SymmetricTop, flat
 
 ARITHMETIC = ("double", "double-double", "quad-double", "40 digits")  # by `layout.EXACTLY`, `layout.DOUBLE_DOUBLE`, ...
@@ -88,7 +87,7 @@ class _Form:
     precession_rate = _constant(at.PHI_LINE, "Mean of phi' over a nutation, radians per unit time.")
 
     def _view(self, times: ArrayLike, view: int) -> Array:
-        raise NotImplementedError
+        raise NotImplementedError  # one motion and many have their own
 
     def quaternion(self, times: ArrayLike) -> Array:
         """Attitude (w, x, y, z), body to space, shape (..., 4); continuous in time, through poles as well."""
@@ -217,10 +216,12 @@ def fill(constants: Array, times: Array, view: int) -> Array:
 
 def distances(constants: Array, times: Array, axes: Array) -> Array:
     """Angles (n, samples) between axes (n, samples, 3) and those of n tops, rad; times as in `fill`."""
-    if not _compare.ready(SAMPLE_SECONDS * axes.size / 3):
-        return charts.axis_distance(axes, fill(constants, times, samples.AXIS))
     out = np.empty(axes.shape[:2])
-    _within_range(times, _compare.compiled(constants, times, axes, out))
+    if _compare.ready(SAMPLE_SECONDS * axes.size / 3):
+        bad = _compare.compiled(constants, times, axes, out)
+    else:
+        bad = samples.all_gaps(constants.tolist(), times.tolist(), axes, out)
+    _within_range(times, bad)
     return out
 
 

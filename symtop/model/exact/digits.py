@@ -380,7 +380,7 @@ _EVEN_SINES = ((0, 0, 0, 0), (2, 0, 0, 0), (0, 4, 0, 0), (-2, 0, 8, 0))
 def precise_constants(top: SymmetricTop, start: Angles, form: PreciseForm | None = None) -> Array:
     """The array of constants, from a form that there is or from one of `DIGITS` digits.
 
-    Raises `SymtopError` if the axis comes within 1e-145 of a pole that it does not meet.
+    Raises `SymtopError` if the axis comes within 1e-145 of a pole that it does not meet, or stays there.
     """
     form, out = form or PreciseForm(top, start, digits=DIGITS), np.zeros(at.SIZE)
     ctx, curve = form.ctx, form.curve
@@ -392,8 +392,8 @@ def precise_constants(top: SymmetricTop, start: Angles, form: PreciseForm | None
     if form.climbs:
         out[at.KIND], out[at.SCALE], out[at.FLOOR_SIGN] = at.CLIMBS, float(form.Omega), float(form.floor_sign)
     elif curve.swing:
-        if any(0 < gap < 1e-290 for gap in (curve.floor.low, curve.crown.high, curve.m1)):
-            words = "the axis must meet a pole or miss it by 1e-145 (PreciseForm takes less)"
+        if any(0 < gap < 1e-290 for gap in (*curve.floor[1:], *curve.crown[1:], curve.m1)):
+            words = "the axis must meet a pole or miss it by 1e-145, and leave it by as much (PreciseForm takes less)"
             raise SymtopError(f"{words}, not as {start!r}")
         _expand(form, out)
     else:

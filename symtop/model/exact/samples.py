@@ -272,7 +272,7 @@ def all_gaps(constants: Any, times: Any, axes: Any, out: Any) -> int:
             if not abs(row[j]) <= LONGEST_TIME:
                 return place * len(row) + j
             x, y, z = _axis(c, row[j])
-            a, b, d = axes[i, j, 0], axes[i, j, 1], axes[i, j, 2]
+            a, b, d = float(axes[i, j, 0]), float(axes[i, j, 1]), float(axes[i, j, 2])
             u, v, w = a - x, b - y, d - z
             left, back, lift = v * z - w * y, w * x - u * z, u * y - v * x
             out[i, j] = math.atan2(math.sqrt(left * left + back * back + lift * lift), a * x + b * y + d * z)

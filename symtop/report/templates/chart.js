@@ -32,29 +32,46 @@
     return `10${raised}`;
   };
 
+  const WIDE = 700; // pixels
+  const MOST = 30; // methods that are chosen one by one
+
   function start(root) {
     const chart = JSON.parse(root.querySelector("script").textContent);
-    const choices = Object.keys(chart.panels);
+    const panels = Object.keys(chart.panels), titles = chart.choices ?? ["Show"];
     const controls = html("div", root, "", "controls");
-    let panel = choices[0];
-    if (choices.length > 1) {
-      const label = html("label", controls, "Show ");
-      const select = html("select", label);
-      for (const choice of choices) html("option", select, choice).value = choice;
-      select.addEventListener("change", () => { panel = select.value; draw(); });
+    const choose = (title, options, changed) => { // a menu, where there is something to choose
+      if (options.length < 2) return;
+      const select = html("select", html("label", controls, `${title} `));
+      select.name = title;
+      for (const option of options) html("option", select, option).value = option;
+      select.addEventListener("change", () => { changed(select.value); draw(); });
+    };
+    const parts = panels[0].split(" | ");
+    if (titles.length !== parts.length) parts.splice(0, parts.length, panels[0]);
+    titles.forEach((title, place) => {
+      const options = [...new Set(panels.map((one) => (titles.length > 1 ? one.split(" | ")[place] : one)))];
+      choose(title, options, (value) => { parts[place] = value; });
+    });
+    const axes = {}; // the name of each axis and its place in a point
+    for (const [key, place] of [["x", 0], ["y", 1]]) {
+      const columns = typeof chart[key] === "string" ? { [chart[key]]: place } : chart[key];
+      const set = (name) => { axes[key] = [name, columns[name]]; };
+      set(Object.keys(columns)[0]);
+      choose(key === "x" ? "Cost" : "Error", Object.keys(columns), set);
     }
-    const families = [...new Set(choices.flatMap((choice) => chart.panels[choice].map((one) => one.family)))];
-    const shown = new Set(families);
-    const filter = html("fieldset", controls);
-    html("legend", filter, "Families");
-    for (const family of families) {
+    const every = panels.flatMap((one) => chart.panels[one]), named = new Set(every.map((one) => one.name)).size <= MOST;
+    const kind = (one) => (named ? one.name.split("[")[0] : one.family); // few methods are chosen one by one, many by family
+    const kinds = [...new Set(every.map(kind))], shown = new Set(kinds);
+    const fold = html("details", controls), filter = (html("summary", fold, named ? "Methods" : "Families"), html("fieldset", fold));
+    html("legend", filter, "Drawn");
+    for (const one of kinds) {
       const label = html("label", filter);
       const box = html("input", label);
       box.type = "checkbox";
       box.checked = true;
-      box.value = family;
-      label.append(` ${family}`);
-      box.addEventListener("change", () => { if (box.checked) shown.add(family); else shown.delete(family); draw(); });
+      box.value = one;
+      label.append(` ${one}`);
+      box.addEventListener("change", () => { if (box.checked) shown.add(one); else shown.delete(one); draw(); });
     }
     const frame = html("div", root, "", "frame");
     const tip = html("div", frame, "", "tip");
@@ -65,19 +82,25 @@
     function draw() {
       frame.querySelector("svg")?.remove();
       tip.hidden = true;
-      const series = chart.panels[panel].filter((one) => shown.has(one.family) && one.points.length);
-      const width = Math.max(280, frame.clientWidth), height = Math.max(320, Math.min(560, 0.62 * width));
-      const [left, right, top, bottom] = [58, 12, 12, 46];
+      const panel = parts.join(" | "), [xName, xAt] = axes.x, [yName, yAt] = axes.y;
+      const there = (point) => point[xAt] > 0 && point[yAt] > 0;
+      const series = chart.panels[panel].filter((one) => shown.has(kind(one)))
+        .map((one) => ({ ...one, points: one.points.filter(there).map((point) => [point[xAt], point[yAt], point.at(-1)]) }))
+        .filter((one) => one.points.length);
+      const first = xAt === 0 && yAt === (typeof chart.y === "string" ? 1 : Object.values(chart.y)[0]);
+      const mark = first ? chart.marks?.[panel] : undefined;
+      const width = Math.max(280, frame.clientWidth), height = Math.max(320, Math.min(390, 0.5 * width));
+      const [left, right, top, bottom] = [58, named && width > WIDE ? 170 : 12, 12, 46]; // names stand at the right, if there is room
       const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, tabindex: 0, role: "group",
-        "aria-roledescription": "chart", "aria-label": `${chart.title}: ${panel}; arrow keys go from point to point` }, frame);
+        "aria-roledescription": "chart", "aria-label": `${chart.title}: ${panel}, ${yName} against ${xName}; arrow keys go from point to point` }, frame);
       places = [];
       const all = series.flatMap((one) => one.points);
       if (!all.length) {
-        make("text", { x: width / 2, y: height / 2, "text-anchor": "middle" }, svg, "no method of these families has a point here");
+        make("text", { x: width / 2, y: height / 2, "text-anchor": "middle" }, svg, "no method that is chosen has a point here");
         return;
       }
       const range = (k) => {
-        const logs = all.map((point) => Math.log10(point[k]));
+        const logs = [...all.map((point) => Math.log10(point[k])), ...(mark ? [Math.log10(mark[k])] : [])];
         return [Math.floor(Math.min(...logs)), Math.max(Math.floor(Math.min(...logs)) + 1, Math.ceil(Math.max(...logs)))];
       };
       const [x0, x1] = range(0), [y0, y1] = range(1);
@@ -92,8 +115,15 @@
         make("line", { x1: left, x2: width - right, y1: py(10 ** k), y2: py(10 ** k), class: "grid" }, svg);
         make("text", { x: left - 6, y: py(10 ** k) + 4, "text-anchor": "end" }, svg, power(k));
       }
-      make("text", { x: (left + width - right) / 2, y: height - 8, "text-anchor": "middle" }, svg, chart.x);
-      make("text", { transform: `translate(13 ${(top + height - bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, svg, chart.y);
+      make("text", { x: (left + width - right) / 2, y: height - 8, "text-anchor": "middle" }, svg, xName);
+      make("text", { transform: `translate(13 ${(top + height - bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, svg, yName);
+      if (mark) {
+        const low = Math.min(py(mark[1]), height - bottom);
+        make("rect", { x: left, width: width - left - right, y: low, height: height - bottom - low, class: "below" }, svg);
+        make("text", { x: width - right - 4, y: height - bottom - 5, "text-anchor": "end" }, svg, "below the bound of the truth");
+        make("line", { x1: px(mark[0]), x2: px(mark[0]), y1: top, y2: height - bottom, class: "exact" }, svg);
+        make("text", { transform: `translate(${px(mark[0]) - 4} ${height - bottom - 24}) rotate(-90)` }, svg, "exact motion, no integrator");
+      }
       for (const one of series) {
         const path = one.points.map(([x, y], k) => `${k ? "L" : "M"}${px(x).toFixed(1)} ${py(y).toFixed(1)}`).join("");
         make("path", { d: path, fill: "none", stroke: one.color, "stroke-width": 1.4, ...(one.dashed ? { "stroke-dasharray": "5 3" } : {}) }, svg);
@@ -103,6 +133,17 @@
             fill: one.marker === "x" ? "none" : one.color, stroke: one.color, "stroke-width": 0.3, class: "mark",
           }, svg);
           places.push([px(x), py(y), one, words]);
+        }
+      }
+      if (right > 12) {
+        const ends = series.map((one) => ({ one, x: px(one.points.at(-1)[0]), y: py(one.points.at(-1)[1]) })).sort((a, b) => a.y - b.y);
+        const gap = Math.min(15, (height - top - bottom) / Math.max(ends.length, 1));
+        let place = top;
+        for (const end of ends) end.at = place = Math.max(place + gap, end.y);
+        for (let k = ends.length - 1, most = height - bottom; k >= 0; k -= 1, most -= gap) ends[k].at = Math.min(ends[k].at, most);
+        for (const { one, x, y, at } of ends) {
+          make("path", { d: `M${x} ${y}L${width - right} ${at}`, stroke: one.color, "stroke-width": 0.5, fill: "none" }, svg);
+          make("text", { x: width - right + 4, y: at + 4 }, svg, one.name);
         }
       }
       const ring = make("circle", { r: 8, fill: "none", stroke: "#1b1f24", "stroke-width": 1.5, visibility: "hidden" }, svg);
@@ -141,6 +182,11 @@
       svg.addEventListener("pointermove", point);
       svg.addEventListener("pointerdown", point);
       svg.addEventListener("pointerleave", () => show(null));
+    }
+    const figure = root.previousElementSibling; // the same runs as a picture, for print and without this script
+    if (figure?.localName === "figure") {
+      figure.querySelector(".scroll").classList.add("repeated");
+      figure.querySelector("figcaption").before(root);
     }
     draw();
     let last = frame.clientWidth;

@@ -1,5 +1,5 @@
-// The page around the findings: its scheme of colours, contents that follow the reader, tables to search and download.
-// Without it every word, table and figure is still there.
+// The page around the findings: its scheme of colours, contents that follow the reader, tables to search, sort and download.
+// Without it every word and figure is still there, and every table is a CSV beside the page.
 "use strict";
 (() => {
   const root = document.documentElement;
@@ -28,7 +28,7 @@
   const follow = () => {
     const read = sections.filter((section) => section.getBoundingClientRect().top < 0.25 * innerHeight);
     const ended = innerHeight + scrollY >= root.scrollHeight - 2;
-    const id = (ended ? sections.at(-1) : read.at(-1) ?? sections[0]).id;
+    const id = (scrollY < 2 ? sections[0] : ended ? sections.at(-1) : read.at(-1) ?? sections[0]).id;
     if (id === current) return;
     links.get(current)?.removeAttribute("aria-current");
     const link = links.get(current = id), list = contents.parentElement;
@@ -64,35 +64,86 @@
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   }
-  const FEW = 14; // rows that are found by looking
-  for (const table of document.querySelectorAll("table[data-name]")) {
-    const region = table.parentElement, rows = [...table.tBodies[0].rows];
-    const bar = document.createElement("div");
-    bar.className = "controls tools";
-    if (rows.length > FEW) {
-      const search = document.createElement("input"), count = document.createElement("span");
-      search.type = "search";
-      search.placeholder = "rows with all these words";
-      search.setAttribute("aria-label", `Rows of ${region.getAttribute("aria-label")} with all these words`);
-      count.setAttribute("role", "status");
-      search.addEventListener("input", () => {
-        const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
-        let shown = 0;
-        for (const row of rows) {
-          const text = row.textContent.toLowerCase();
-          row.hidden = !words.every((word) => text.includes(word));
-          shown += !row.hidden;
-        }
-        count.textContent = words.length ? `${shown} of ${rows.length} rows` : "";
+  function sortable(table) {
+    const body = table.tBodies[0];
+    [...table.tHead.rows[0].cells].forEach((head, column) => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.className = "sort";
+      button.append(...head.childNodes);
+      head.append(button);
+      button.addEventListener("click", () => {
+        const down = head.getAttribute("aria-sort") === "ascending", sign = down ? -1 : 1;
+        for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
+        head.setAttribute("aria-sort", down ? "descending" : "ascending");
+        const text = (row) => row.cells[column].textContent.trim(), number = (row) => Number(text(row).replaceAll(",", ""));
+        const rows = [...body.rows], numeric = rows.every((row) => !Number.isNaN(number(row)));
+        const order = numeric ? (a, b) => number(a) - number(b) : (a, b) => text(a).localeCompare(text(b));
+        rows.sort((a, b) => (!text(a) - !text(b)) || sign * order(a, b)); // what is empty stands last
+        body.append(...rows);
       });
-      bar.append(search, count);
-    }
+    });
+  }
+  function tools(region, table) {
+    const rows = [...table.tBodies[0].rows], bar = document.createElement("div");
+    bar.className = "controls tools";
+    const search = document.createElement("input"), count = document.createElement("span");
+    search.type = "search";
+    search.placeholder = "rows with all these words";
+    search.setAttribute("aria-label", `Rows of ${region.getAttribute("aria-label")} with all these words`);
+    count.setAttribute("role", "status");
+    search.addEventListener("input", () => {
+      const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+      let shown = 0;
+      for (const row of rows) {
+        const text = row.textContent.toLowerCase();
+        row.hidden = !words.every((word) => text.includes(word));
+        shown += !row.hidden;
+      }
+      count.textContent = words.length ? `${shown} of ${rows.length} rows` : "";
+    });
     const save = document.createElement("button");
     save.type = "button";
     save.textContent = "CSV";
     save.setAttribute("aria-label", `Download ${region.getAttribute("aria-label")} as CSV`);
     save.addEventListener("click", () => download(table));
-    bar.append(save);
-    if (rows.length > FEW) region.before(bar); else region.after(bar);
+    bar.append(search, count, save);
+    region.before(bar);
+    sortable(table);
+  }
+  function build(fold) { // a table in full, from its data, when it is first opened
+    const { header, rows } = JSON.parse(fold.querySelector("script").textContent), name = fold.dataset.table;
+    const region = document.createElement("div"), table = document.createElement("table");
+    region.className = "scroll";
+    region.tabIndex = 0;
+    region.setAttribute("role", "region");
+    region.setAttribute("aria-label", `All rows of ${name}`);
+    table.dataset.name = name;
+    const head = table.createTHead().insertRow();
+    for (const text of header) {
+      const cell = document.createElement("th");
+      cell.scope = "col";
+      cell.textContent = text;
+      head.append(cell);
+    }
+    const body = table.createTBody();
+    for (const row of rows) {
+      const line = body.insertRow();
+      for (const text of row) {
+        const cell = line.insertCell();
+        cell.textContent = text;
+        if (text.length > 42) cell.className = "words";
+      }
+    }
+    region.append(table);
+    fold.append(region);
+    tools(region, table);
+  }
+  for (const fold of document.querySelectorAll("details.whole")) {
+    fold.addEventListener("toggle", () => { if (fold.open && !fold.querySelector("table")) build(fold); });
+  }
+  const FEW = 15; // rows that are found by looking
+  for (const table of document.querySelectorAll("table[data-name]")) {
+    if (table.tBodies[0].rows.length > FEW) tools(table.parentElement, table);
   }
 })();

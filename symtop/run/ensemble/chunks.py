@@ -29,7 +29,7 @@ from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.lanes import Many, W, column, members_of, put
 from symtop.methods.framework.loop import FixedStep
-from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, OUTCOMES, Plan
+from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, off_length
 from symtop.methods.framework.preparation import Body, Start
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
@@ -47,6 +47,7 @@ Whole = NDArray[np.int64]
 CHUNK = 65_536  # values of one column in a chunk: half a megabyte, which stays in a core's cache
 CHUNK_STEPS = 5_000_000  # in a chunk: a hundredth of a second in lanes, to a second
 SHARES, LEAST_STEPS = 16, 200_000  # threads share even a small ensemble, in chunks of a millisecond or more
+HARMLESS = 1e100  # states and momenta below it have a finite energy: no inertia is below 1e-40
 UNKNOWN_STEPS = 1000  # what a member counts for that chooses its steps, or makes none
 RAISED = "raised"  # outcome of a member on which a solver raised an exception
 ENDS = (*OUTCOMES, RAISED)
@@ -170,8 +171,8 @@ def _lay_out() -> Any:  # noqa: C901  (one loop, read in one piece)
                         for k in range(counts[i]):
                             times[i, k] = marks[i, k] * h[i]
                     times[i, counts[i] :] = np.nan
-                    asked = row == 0 and long_enough
-                    if not asked or unseen(times[i, : counts[i]], period[i], phases[: counts[i]]) < WIDEST_GAP:
+                    judged = row == 0 and long_enough
+                    if not judged or unseen(times[i, : counts[i]], period[i], phases[: counts[i]]) < WIDEST_GAP:
                         break
 
     return compile_kernel(lay_out)
@@ -263,8 +264,12 @@ class Job:
         period = nutation_periods(self.numbers) if self.period is None else self.period
         plan = schedule(period, self.horizon, self.samples, self.steps)
         with np.errstate(all="ignore"):  # a run may blow up, and that is a result
-            runs = _whole(self._runs(plan), plan)
-            columns = self._observables(runs, plan.times)
+            runs = _of_length_one(self._runs(plan), plan, self.chart)
+            columns = {name: self.numbers[:, k : k + 1] for k, name in enumerate(("I1", "I3", "mgl"))}
+            top: Any = SimpleNamespace(**columns)
+            top.reduced_energy = functools.partial(SymmetricTop.reduced_energy, top)  # of all tops at once
+            view = View(self.chart, top, runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
+            runs, columns = _whole(runs, view, plan), self._observables(view, plan.times)
         each: tuple[Any, ...] = (
             np.array(ENDS)[runs.outcome], runs.steps, runs.force_evaluations, runs.newton_iterations, runs.reached,
             plan.step_size, self.horizon, plan.dithered,
@@ -326,11 +331,8 @@ class Job:
         tolerance = np.nan if self.tolerance is None else float(self.tolerance[i])
         return Plan.until(plan.times[i, :count], tolerance, self.budget)
 
-    def _observables(self, runs: _Runs, times: Array) -> dict[str, Array]:
+    def _observables(self, view: View, times: Array) -> dict[str, Array]:
         """Of what a `Trajectory` shows of one run, what is asked for, of all."""
-        top: Any = SimpleNamespace(**{name: self.numbers[:, k : k + 1] for k, name in enumerate(("I1", "I3", "mgl"))})
-        top.reduced_energy = functools.partial(SymmetricTop.reduced_energy, top)  # of all tops at once
-        view = View(self.chart, top, runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
         columns = {name: getattr(view, name) for name in self.shown}
         turned = [name for name in ("phi", "psi") if name in self.shown and self.chart != "angles"]
         truth = ClosedForms(self.numbers)(np.nan_to_num(times)) if turned else None
@@ -359,11 +361,11 @@ def sampled(solver: FixedStep, numbers: Array, plan: Schedule) -> Many:
     return done
 
 
-def _whole(runs: _Runs, plan: Schedule) -> _Runs:
-    """A run that shows a state that is not finite, and reports nothing of it, ends there, as in `simulate`."""
-    if np.isfinite(runs.states.sum()):  # a tenth of the time
+def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
+    """A run whose states or energy are not finite, and that reports nothing of it, ends there, as in `simulate`."""
+    if all(values.min() > -HARMLESS and values.max() < HARMLESS for values in runs[:2]):  # a tenth of the time
         return runs
-    finite = np.isfinite(runs.states).all(axis=2) | np.isnan(plan.times)
+    finite = np.isfinite(runs.states).all(axis=2) & np.isfinite(view.energy + view.p_phi) | np.isnan(plan.times)
     bad = np.flatnonzero((runs.outcome == OK) & ~finite.all(axis=1))
     if not bad.size:
         return runs
@@ -371,6 +373,19 @@ def _whole(runs: _Runs, plan: Schedule) -> _Runs:
     first = finite[bad].argmin(axis=1)
     outcome[bad], reached[bad] = NOT_FINITE, np.where(first > 0, plan.times[bad, first - 1], 0.0)
     return runs._replace(outcome=outcome, reached=reached)
+
+
+def _of_length_one(runs: _Runs, plan: Schedule, chart: str) -> _Runs:
+    """Runs end where their quaternions have left length one, as in `simulate`."""
+    lost = off_length(chart, runs.states)
+    bad = lost.any(axis=1)
+    if not bad.any():
+        return runs
+    reached = plan.times[np.arange(len(runs.steps)), np.maximum(lost.argmax(axis=1) - 1, 0)]
+    return runs._replace(
+        states=np.where(lost[..., None], np.nan, runs.states), momenta=np.where(lost[..., None], np.nan, runs.momenta),
+        outcome=np.where(bad, NOT_NORMALISED, runs.outcome), reached=np.where(bad, reached, runs.reached),
+    )  # fmt: skip
 
 
 def same_times(times: Any, row: Any) -> bool:

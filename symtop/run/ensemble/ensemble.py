@@ -311,7 +311,7 @@ class Stream:
 
     def finish(self, chunks: list[slice]) -> xr.Dataset:
         """Put the chunks together; the dataset reads from the file what it is asked for."""
-        with self._writing(), netcdf.alone(), netcdf.replacing(self.path) as partial:
+        with self._writing(), netcdf.one_thread, netcdf.replacing(self.path) as partial:
             first = self._columns(chunks[0])
             shared = all(same_times(self._columns(chunk, "time")["time"], first["time"][0]) for chunk in chunks)
             labels = {name: values[: chunks[0].stop] for name, values in self.labels.items()}

@@ -29,6 +29,7 @@ made of sums, products, quotients and square roots, sine and cosine of theta inc
 """
 
 import math
+import os
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -37,12 +38,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.core import netcdf
-from symtop.core.errors import one_of, whole
+from symtop.core.errors import SymtopError, one_of, whole
 from symtop.model.top import NUMBERS
 
 Array = NDArray[np.float64]
 
 MOST = 1e9  # members
+BYTES = 400  # of memory that a member takes
 DRAWS = 16  # uniform numbers a member: a new quantity must not move those that are there
 BLOCK = 1 << 16  # members drawn at a time
 
@@ -204,6 +206,19 @@ def _fill(columns: dict[str, Any], draw: Array, kind: str) -> None:
     columns["stratum"][:] = np.array(names)[strata]
 
 
+def memory() -> float:
+    """Bytes of memory of this machine; infinite where the system does not say."""
+    known = hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names
+    return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")) if known else math.inf
+
+
+def check_memory(name: str, members: int) -> None:
+    """Refuse more members than the memory holds; `name` is that of their number."""
+    if members * BYTES > memory():
+        limit = f"{memory() / BYTES:.2g} in the {memory() / 2**30:.3g} GiB of this machine ({BYTES} bytes a member)"
+        raise SymtopError(f"{name} must be at most {limit}, not {members}", name)
+
+
 def population(n: int, *, seed: int = 0, kind: str = "all") -> xr.Dataset:
     """Draw n tops and starts: a dataset over ``member``, ready for `symtop.ensemble`.
 
@@ -214,6 +229,7 @@ def population(n: int, *, seed: int = 0, kind: str = "all") -> xr.Dataset:
     Raises SymtopError for arguments that make no sense.
     """
     count = whole("n", n, 1, MOST)
+    check_memory("n", count)
     chosen, start = one_of("kind", kind, KINDS), whole("seed", seed, 0)
     generator = np.random.Philox(start)
     columns: dict[str, Any] = {name: np.empty(count) for name in NUMBERS}

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError, foreign_code
-from symtop.core.multiprecision import context
+from symtop.core.numbers import context
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
 from symtop.methods.taylor import heyoka

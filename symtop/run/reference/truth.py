@@ -47,7 +47,7 @@ from numpy.typing import ArrayLike
 
 from symtop.core import code_hash, netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, one_of
-from symtop.core.files import cache_root, prune, touch
+from symtop.core.files import cache_root, make_private, prune, touch
 from symtop.core.numbers import EPSILON, TINY, real_numbers
 from symtop.methods.taylor import heyoka
 from symtop.model import charts
@@ -407,10 +407,11 @@ def cached(path: Path, compute: Callable[[], xr.Dataset], depth: int | None) -> 
             warnings.warn(sentence, SymtopWarning, stacklevel=depth)
     data = compute()
     try:
+        make_private(path.parent)
         netcdf.write(data.assign_attrs(content=netcdf.content_hash(data)), path)
         if next(_written) % OFTEN == 0:
             prune(path.parent, MOST_BYTES)
-    except SymtopError as error:
+    except (SymtopError, OSError) as error:
         if depth is not None:
             warnings.warn(f"the reference is not kept: {error}", SymtopWarning, stacklevel=depth)
     return data

@@ -1,10 +1,157 @@
-"""More methods that are what they claim: odd in how they are written, and right."""
+"""Methods that are what they claim, as people write them, some of them odd; `CLAIMS` has what is true and options.
+
+A name that is not defined here is a class of `scipy.integrate`.
+"""
 
 import math
 import time
 
 import numpy as np
 from scipy.integrate import RK45, OdeSolver
+
+
+def explicit(a, b, c):
+    """A Runge-Kutta step from its tableau."""
+
+    def step(f, t, y, h):
+        k = []
+        for row, node in zip(a, c, strict=True):
+            k.append(f(t + node * h, y + h * sum((x * v for x, v in zip(row, k, strict=False)), 0.0 * y)))
+        return y + h * sum(w * v for w, v in zip(b, k, strict=True))
+
+    return step
+
+
+def euler(f, t, y, h):
+    return y + h * f(t, y)
+
+
+def midpoint(f, t, y, h):
+    return y + h * f(t + h / 2, y + h / 2 * f(t, y))
+
+
+def heun(f, t, y, h):
+    k = f(t, y)
+    return y + h / 2 * (k + f(t + h, y + h * k))
+
+
+kutta_3 = explicit(((), (0.5,), (-1.0, 2.0)), (1 / 6, 2 / 3, 1 / 6), (0.0, 0.5, 1.0))
+
+
+ssp_3 = explicit(((), (1.0,), (0.25, 0.25)), (1 / 6, 1 / 6, 2 / 3), (0.0, 1.0, 0.5))
+
+
+def rk4(f, t, y, h):
+    k1 = f(t, y)
+    k2 = f(t + h / 2, y + h / 2 * k1)
+    k3 = f(t + h / 2, y + h / 2 * k2)
+    k4 = f(t + h, y + h * k3)
+    return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+
+three_eighths = explicit(
+    ((), (1 / 3,), (-1 / 3, 1.0), (1.0, -1.0, 1.0)), (1 / 8, 3 / 8, 3 / 8, 1 / 8), (0.0, 1 / 3, 2 / 3, 1.0)
+)
+
+
+dormand_prince = explicit(
+    (
+        (), (1 / 5,), (3 / 40, 9 / 40), (44 / 45, -56 / 15, 32 / 9),
+        (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729),
+        (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
+    ),
+    (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+    (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0),
+)  # fmt: skip
+
+
+ralston = explicit(((), (2 / 3,)), (1 / 4, 3 / 4), (0.0, 2 / 3))
+
+
+def solved(function, guess, tolerance=4e-16):
+    """The fixed point, iterated until it stands still."""
+    for _ in range(200):
+        after = function(guess)
+        if np.max(np.abs(after - guess)) <= tolerance * np.max(np.abs(after)):
+            return after
+        guess = after
+    return guess
+
+
+def implicit_midpoint(f, t, y, h):
+    return y + h * solved(lambda k: f(t + h / 2, y + h / 2 * k), f(t, y))
+
+
+def trapezoidal(f, t, y, h):
+    k = f(t, y)
+    return y + h / 2 * (k + solved(lambda late: f(t + h, y + h / 2 * (k + late)), k))
+
+
+def implicit_euler(f, t, y, h):
+    return y + h * solved(lambda k: f(t + h, y + h * k), f(t, y))
+
+
+ROOT = 3**0.5 / 6
+
+
+def gauss_4(f, t, y, h, root=ROOT, tolerance=4e-16):
+    def slopes(k):
+        first = f(t + (0.5 - root) * h, y + h * (k[0] / 4 + (1 / 4 - root) * k[1]))
+        return np.array([first, f(t + (0.5 + root) * h, y + h * ((1 / 4 + root) * k[0] + k[1] / 4))])
+
+    k = solved(slopes, np.array([f(t, y)] * 2), tolerance)
+    return y + h / 2 * (k[0] + k[1])
+
+
+def triple_jump(f, t, y, h, outer=1 / (2 - 2 ** (1 / 3))):
+    for share in (outer, 1 - 2 * outer, outer):
+        y, t = implicit_midpoint(f, t, y, share * h), t + share * h
+    return y
+
+
+def extrapolated(f, t, y, h):
+    """Two half steps and one whole of Heun's second-order method, h^2 eliminated: order 3."""
+    halves = heun(f, t + h / 2, heun(f, t, y, h / 2), h / 2)
+    return (4 * halves - heun(f, t, y, h)) / 3
+
+
+def in_place(f, t, y, h):
+    """Heun's method, which works on the array that it was given."""
+    k = f(t, y)
+    late = f(t + h, y + h * k)
+    y += h / 2 * (k + late)
+    return y
+
+
+class HeunSolver(OdeSolver):
+    """Heun's method with fixed steps, as SciPy's documentation tells one to write a solver."""
+
+    def __init__(self, fun, t0, y0, t_bound, max_step=np.inf, vectorized=False, **_):
+        super().__init__(fun, t0, y0, t_bound, vectorized)
+        self.max_step = max_step
+
+    def _step_impl(self):
+        h = self.direction * min(self.max_step, abs(self.t_bound - self.t))
+        self.y = heun(self.fun, self.t, self.y, h)
+        self.t += h
+        return True, None
+
+
+class AdamsBashforth(HeunSolver):
+    """The two-step method of order 2, started with Heun's: it remembers the last slope within a run."""
+
+    slope = None
+
+    def _step_impl(self):
+        h = self.direction * min(self.max_step, abs(self.t_bound - self.t))
+        now = self.fun(self.t, self.y)
+        if self.slope is None:
+            self.y = heun(self.fun, self.t, self.y, h)
+        else:
+            self.y = self.y + h / 2 * (3 * now - self.slope)
+        self.slope = now
+        self.t += h
+        return True, None
 
 
 def radau_iia(f, t, y, h):
@@ -42,13 +189,11 @@ NODES = [0.5 + 0.5 * x for x in (-(0.6**0.5), 0.0, 0.6**0.5)]
 
 def averaged_field(f, t, y, h):
     """The mean of f along the chord, by Gauss's three points: symmetric, and no symplectic method."""
-    after = y + h * f(t, y)
-    for _ in range(200):
-        mean = sum(w * f(t + x * h, y + x * (after - y)) for w, x in zip((5, 8, 5), NODES, strict=True)) / 18
-        last, after = after, y + h * mean
-        if np.max(np.abs(after - last)) < 3e-16:
-            break
-    return after
+
+    def end(after):
+        return y + h * sum(w * f(t + x * h, y + x * (after - y)) for w, x in zip((5, 8, 5), NODES, strict=True)) / 18
+
+    return solved(end, y + h * f(t, y))
 
 
 _guess = {}
@@ -57,13 +202,8 @@ _guess = {}
 def warm(f, t, y, h):
     """The implicit midpoint rule, whose iteration starts from what the last step ended with."""
     k = _guess.get("slope", f(t, y))
-    k = k if np.isfinite(k).all() else f(t, y)
-    for _ in range(300):
-        last, k = k, f(t + h / 2, y + h / 2 * k)
-        if np.max(np.abs(k - last)) <= 4e-16 * np.max(np.abs(k)):
-            break
-    _guess["slope"] = k
-    return y + h * k
+    _guess["slope"] = solved(lambda k: f(t + h / 2, y + h / 2 * k), k if np.isfinite(k).all() else f(t, y))
+    return y + h * _guess["slope"]
 
 
 def long_double(f, t, y, h):
@@ -103,19 +243,15 @@ class Midpoints:
 halves = Midpoints()
 
 
-class Leaping(OdeSolver):
+class Leaping(HeunSolver):
     """The leapfrog of two steps, y_(n+1) = y_(n-1) + 2 h f(y_n), started by the midpoint rule."""
 
     before = None
 
-    def __init__(self, fun, t0, y0, t_bound, max_step=np.inf, vectorized=False, **_):
-        super().__init__(fun, t0, y0, t_bound, vectorized)
-        self.max_step = max_step
-
     def _step_impl(self):
         h = self.direction * self.max_step
         if self.before is None:
-            after = self.y + h * self.fun(self.t + h / 2, self.y + h / 2 * self.fun(self.t, self.y))
+            after = midpoint(self.fun, self.t, self.y, h)
         else:
             after = self.before + 2 * h * self.fun(self.t, self.y)
         self.before, self.y, self.t = self.y, after, self.t + h
@@ -126,13 +262,77 @@ class AtTolerance(RK45):
     """SciPy's own, to be judged at a tolerance."""
 
 
+def tr_bdf2(f, t, y, h):
+    """Trapezoidal rule to t + g h, then BDF2; g = 2 - sqrt 2. Bank and others, IEEE Trans. CAD 4 (1985) 436."""
+    g = 2.0 - math.sqrt(2.0)
+    first = f(t, y)
+    base = y + g * h / 2 * first
+    middle = solved(lambda state: base + g * h / 2 * f(t + g * h, state), y + g * h * first)
+    rest = middle / (g * (2.0 - g)) - y * (1.0 - g) ** 2 / (g * (2.0 - g))
+    return solved(lambda state: rest + (1.0 - g) / (2.0 - g) * h * f(t + h, state), middle)
+
+
+def newmark(f, t, y, h):
+    """beta = 1/4, gamma = 1/2, in angles: q'' = a(q, q'). Newmark, J. Eng. Mech. 85 (1959) 67."""
+    q, v, before = y[:3], y[3:], f(t, y)[3:]
+    after = before
+    for _ in range(80):
+        place, rate = q + h * v + h * h / 4 * (before + after), v + h / 2 * (before + after)
+        after, last = f(t + h, np.concatenate([place, rate]))[3:], after
+        if np.abs(after - last).max() <= 4e-16 * np.abs(after).max():
+            break
+    return np.concatenate([place, rate])
+
+
+def own_drift(f, t, y, h):
+    """Kick at t and t + h, and a free rotation of its own: of e about L, at the rate that f shows at the start."""
+    e, L = y[:3], y[3:] + h / 2 * f(t, y)[3:]
+    size = np.linalg.norm(L)
+    angle, n = h * size / INERTIA, L / size
+    e = e * math.cos(angle) + np.cross(n, e) * math.sin(angle) + n * (n @ e) * (1.0 - math.cos(angle))
+    return np.concatenate([e, L + h / 2 * f(t + h, np.concatenate([e, L]))[3:]])
+
+
+INERTIA = 0.0  # of the top, set by who imports this
+
+
 def product(a, b):
+    """Of two quaternions (w, x, y, z)."""
     return np.array([a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
 
 
 def turn(v):
-    angle = math.sqrt(v @ v)
-    return np.array([math.cos(angle / 2), *(0.5 * np.sinc(angle / (2 * math.pi)) * v)])
+    """The quaternion of a rotation by the vector v."""
+    half = 0.5 * np.sqrt(v @ v)
+    return np.array([np.cos(half), *(0.5 * np.sinc(half / np.pi) * v)])
+
+
+def rotation_rk4(q, w, h, inertia, torque):
+    def rates(q, w):
+        return 0.5 * product(q, np.array([0.0, *w])), (np.cross(inertia * w, w) + torque(q)) / inertia
+
+    a1, b1 = rates(q, w)
+    a2, b2 = rates(q + h / 2 * a1, w + h / 2 * b1)
+    a3, b3 = rates(q + h / 2 * a2, w + h / 2 * b2)
+    a4, b4 = rates(q + h * a3, w + h * b3)
+    return q + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4), w + h / 6 * (b1 + 2 * b2 + 2 * b3 + b4)
+
+
+def free_top(q, w, h, inertia):
+    """The exact motion of a free symmetric body: L stands still in space, the body turns about its axis besides."""
+    spin = (1.0 / inertia[2] - 1.0 / inertia[0]) * inertia[2] * w[2]
+    q = product(q, turn(h * inertia * w / inertia[0]))
+    angle = -h * spin  # of L as the body sees it, about the axis
+    x, y = inertia[0] * w[0], inertia[0] * w[1]
+    q = product(q, turn(np.array([0.0, 0.0, -angle])))
+    c, s = np.cos(angle), np.sin(angle)
+    return q, np.array([(c * x - s * y) / inertia[0], (s * x + c * y) / inertia[0], w[2]])
+
+
+def rotation_strang(q, w, h, inertia, torque):
+    w = w + h / 2 * torque(q) / inertia
+    q, w = free_top(q, w, h, inertia)
+    return q, w + h / 2 * torque(q) / inertia
 
 
 def rotation_lie_midpoint(q, w, h, inertia, torque):
@@ -182,25 +382,56 @@ def separable_heun(state, h, dT, dV):
     return theta + h / 2 * (a + dT(p + h * b)), p + h / 2 * (b - dV(theta + h * a))
 
 
+ALL = ("energy", "p_phi", "p_psi", "axis_length")
+
+
+ROTATION, SEPARABLE = {"form": "rotation"}, {"form": "separable"}
 CLAIMS = {  # name: claims, and options of judge
+    "euler": ({"order": 1, "explicit": True}, {}),
+    "midpoint": ({"order": 2, "symplectic": False, "symmetric": False}, {}),
+    "heun": ({"order": 2, "conserves": ["p_phi"]}, {}),
+    "ralston": ({"order": 2}, {}),
+    "kutta_3": ({"order": 3}, {}),
+    "ssp_3": ({"order": 3, "explicit": True}, {}),
+    "rk4": ({"order": 4, "symplectic": False, "conserves": ["p_phi"]}, {}),
+    "three_eighths": ({"order": 4}, {}),
+    "dormand_prince": ({"order": 5}, {}),
+    "extrapolated": ({"order": 3}, {}),
+    "in_place": ({"order": 2}, {}),
+    "implicit_midpoint": ({"order": 2, "symmetric": True, "conserves": ALL}, {}),
+    "trapezoidal": ({"order": 2, "symmetric": True, "energy": "bounded"}, {}),
+    "implicit_euler": ({"order": 1, "symmetric": False}, {}),
+    "gauss_4": ({"order": 4, "symmetric": True, "conserves": ALL}, {}),
+    "triple_jump": ({"order": 4, "symmetric": True, "conserves": ALL}, {}),
+    "HeunSolver": ({"order": 2}, {}),
+    "AdamsBashforth": ({"order": 2}, {}),
+    "Leaping": ({"order": 2, "explicit": True}, {}),
+    "RK23": ({"order": 3}, {}),
+    "RK45": ({"order": 5, "symplectic": False}, {}),
+    "DOP853": ({"order": 8, "explicit": True}, {}),
+    "BDF": ({}, {"adaptive": True}),
+    "LSODA": ({}, {"adaptive": True}),
+    "AtTolerance": ({"symplectic": False, "symmetric": False}, {"adaptive": True}),
     "radau_iia": ({"order": 3, "symplectic": False, "symmetric": False}, {}),
     "as_a_list": ({"order": 3, "explicit": True}, {}),
     "linearised": ({"order": 2, "symplectic": False}, {}),
     "averaged_field": ({"order": 2, "symmetric": True, "symplectic": False, "conserves": ["p_phi"]}, {}),
-    "warm": ({"order": 2, "symmetric": True, "conserves": ["energy", "p_phi", "p_psi", "axis_length"]}, {}),
+    "warm": ({"order": 2, "symmetric": True, "conserves": ALL}, {}),
     "long_double": ({"order": 2, "symplectic": False}, {"chart": "attitude"}),
     "slow": ({"order": 2, "symplectic": False, "symmetric": False}, {}),
     "wrapped": ({"order": 2, "symplectic": False, "symmetric": False}, {"chart": "angles"}),
     "halves": ({"order": 2, "conserves": ["p_phi"]}, {"chart": "attitude"}),
-    "Leaping": ({"order": 2, "explicit": True}, {}),
-    "AtTolerance": ({"symplectic": False, "symmetric": False}, {"adaptive": True}),
-    "rotation_lie_midpoint": ({"order": 2, "symplectic": False, "conserves": ["axis_length"]}, {"form": "rotation"}),
-    "rotation_negated": ({"order": 2, "symplectic": False, "conserves": ["axis_length"]}, {"form": "rotation"}),
-    "separable_forest_ruth": (
-        {"order": 4, "symplectic": True, "symmetric": True, "explicit": True}, {"form": "separable"}
-    ),
+    "tr_bdf2": ({"order": 2, "symplectic": False, "explicit": False}, {}),
+    "newmark": ({"order": 2}, {"chart": "angles"}),
+    "own_drift": ({"order": 2, "symplectic": True, "symmetric": True, "conserves": ["p_phi", "p_psi"]}, {}),
+    "rotation_rk4": ({"order": 4, "symplectic": False}, ROTATION),
+    "rotation_strang": ({"order": 2, "symplectic": True, "symmetric": True, "conserves": ["p_phi", "p_psi"]}, ROTATION),
+    "rotation_lie_midpoint": ({"order": 2, "symplectic": False, "conserves": ["axis_length"]}, ROTATION),
+    "rotation_negated": ({"order": 2, "symplectic": False, "conserves": ["axis_length"]}, ROTATION),
+    "separable_forest_ruth": ({"order": 4, "symplectic": True, "symmetric": True, "explicit": True}, SEPARABLE),
     "separable_implicit_midpoint": (
-        {"order": 2, "symplectic": True, "symmetric": True, "energy": "bounded"}, {"form": "separable"}
+        {"order": 2, "symplectic": True, "symmetric": True, "energy": "bounded"},
+        SEPARABLE,
     ),
-    "separable_heun": ({"order": 2, "symplectic": False, "symmetric": False}, {"form": "separable"}),
-}  # fmt: skip
+    "separable_heun": ({"order": 2, "symplectic": False, "symmetric": False}, SEPARABLE),
+}

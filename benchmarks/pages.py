@@ -1,0 +1,50 @@
+"""Findings of a benchmark as the report takes them: a page of sentences, pictures with captions, and short tables.
+
+A benchmark is measured on a quiet machine, and what it says is stored with its numbers; sentences of a study stand in a
+template, since it is measured again and again.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from symtop.report.formats import table
+
+ROWS, TABLES = 5, 4  # that the page shows; the rest stands in what the command prints
+
+
+class Table(NamedTuple):
+    """A table of a benchmark; cells are shown as they are."""
+
+    title: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+def findings(
+    name: str, title: str, question: str, sentences: Sequence[str], how_to_read: str, tables: Sequence[Table], *,
+    further: Sequence[str] = (), captions: Mapping[str, tuple[str, str]] | None = None, **others: Any,
+) -> dict[str, Any]:  # fmt: skip
+    """What NAME.json holds; `captions` are caption and text for the blind of each figure.
+
+    From "How to read it" on the page is for reference: the `further` sentences and the tables.
+    """
+    figures = [
+        f'{{% call figure("{figure}", title={title!r}, alt={alt!r}) %}}{_raw(caption)}{{% endcall %}}'
+        for figure, (caption, alt) in (captions or {}).items()
+    ]
+    shown = [_raw(f"**{one.title}**{_count(one)}\n\n{table(one.header, one.rows[:ROWS])}") for one in tables[:TABLES]]
+    listed, more = (_raw("\n".join(f"- {one}" for one in said)) for said in (sentences, further))
+    reading = _raw(f"**How to read it.** {how_to_read}")
+    page = "\n\n".join(["# {{ question }}", listed, *figures, reading, *([more] if further else []), *shown])
+    return {
+        "study": name, "title": title, "question": question, "facts": {}, "tables": [], "charts": [], "pictures": [],
+        "failures": [], "quick": False, "page": page, **others,
+    }  # fmt: skip
+
+
+def _count(one: Table) -> str:
+    return f" (the first {ROWS} of {len(one.rows)} rows)" if len(one.rows) > ROWS else ""
+
+
+def _raw(text: str) -> str:
+    return f"{{% raw %}}{text}{{% endraw %}}"

@@ -1,0 +1,73 @@
+"""Facts and the table of the study: every finding in a line, how many there are of each verdict, and the long runs."""
+
+from collections import Counter
+from typing import Any
+
+import pandas as pd
+import xarray as xr
+
+from symtop.judging.battery import CLAIMS, SCENE
+from symtop.judging.findings import VERDICTS, claim_name
+from symtop.methods.framework.registry import integrators
+
+from .planted import LIES
+
+FIRST = ("refuted", "undecided", "confirmed", "measured", "inapplicable")  # of the verdicts
+
+
+def parts(data: xr.Dataset) -> tuple[xr.Dataset, pd.DataFrame]:
+    """What was measured of integrators, and the findings on those that make planted false claims."""
+    false = data["variant"].isin(list(LIES))
+    return data.isel(variant=~false), ledger(data.isel(variant=false))
+
+
+def caught(entries: pd.DataFrame) -> pd.Series:
+    """Of each planted integrator, by its name: is its false claim refuted?"""
+    lies = entries[entries["claim"] == entries["integrator"].map(LIES)]
+    return lies.set_index("integrator")["verdict"] == "refuted"
+
+
+def ledger(data: xr.Dataset) -> pd.DataFrame:
+    """A line a finding, the refuted ones first; an integrator that is no longer registered is of the family "other"."""
+    names = ["scene", "variant", "claim", "declared", "measured", "verdict", "value", "resolution", "why"]
+    frame = data[names[3:]].to_dataframe().reset_index()[names]
+    frame = frame[frame["verdict"].isin(VERDICTS)].rename(columns={"variant": "integrator"})
+    families = {name: method.family for name, method in integrators().items()}
+    frame.insert(2, "family", frame["integrator"].map(families).fillna("other"))
+    ranks = {"verdict": FIRST.index, "claim": CLAIMS.index}
+    return frame.sort_values(list(ranks), key=lambda column: column.map(ranks[str(column.name)]), kind="stable")
+
+
+def facts(data: xr.Dataset) -> dict[str, Any]:
+    """How many claims have each verdict, how many lies are caught, and how many steps the long runs have."""
+    data, false = parts(data)
+    told = caught(false)
+    entries = ledger(data)
+    count = Counter(entries["verdict"])
+    made = data["steps_run"].isel(scene=0).to_series()
+    made = made[made > 0].astype(int)
+    undecided = Counter(entries["claim"][entries["verdict"] == "undecided"].map(claim_name))
+    ((open_claim, open_most),) = undecided.most_common(1) or [(None, None)]
+    ((usual, usual_runs),) = Counter(made).most_common(1) or [(None, None)]
+    return {
+        "integrators": entries["integrator"].nunique() or None,
+        "scene": SCENE,
+        "declared": count["confirmed"] + count["refuted"] or None,  # and judged
+        "held": count["confirmed"],
+        **{word: count[word] for word in ("refuted", "undecided")},
+        "planted": len(told) or None,  # integrators that make a false claim
+        "caught": int(told.sum()),
+        "open_claim": open_claim,  # that most of the undecided findings are on
+        "open_most": open_most,
+        "runs": len(made) or None,
+        "usual": usual,  # steps of a long run
+        "usual_runs": usual_runs,
+    }
+
+
+def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
+    """Every finding, and what is found of the false claims."""
+    data, false = parts(data)
+    lies = false[false["claim"] == false["integrator"].map(LIES)]
+    named = {"ledger": ledger(data), "planted": lies.drop(columns=["scene", "family"])}
+    return {name: part.assign(claim=part["claim"].map(claim_name)) for name, part in named.items() if len(part)}

@@ -1,0 +1,64 @@
+"""Integrators that make one false claim each: the plug-ins in `liars`, each judged by a fresh process as any other is.
+
+A battery that finds every claim true shows little by itself. Beside the claims that hold stand these, which it must
+refute, for what each of them gets wrong.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from symtop.core.code_hash import file_hash
+from symtop.judging.battery import SCENE, judge
+from symtop.judging.findings import Finding
+from symtop.methods.framework.registry import integrator
+from symtop.model.scenes import scene
+from symtop.run import plugins
+from symtop.runner.study import Case
+
+LIARS = Path(__file__).with_name("liars")
+PREFIX = "planted-"  # of their names in the study, so that no plug-in of a user is taken for one of them
+FALSE = {  # file: the claim that is false first of all
+    "wrong-start": "order", "symplectic-rk4": "symplectic", "coefficients-swapped": "order", "hidden-kick": "symmetric",
+    "one-newton": "energy", "coefficient-off": "order", "verlet-swapped": "order", "leaking-momentum": "p_phi",
+    "leaking-chart": "p_phi", "reported-leak": "reported", "copied-momenta": "p_psi", "copied-in-angles": "reported",
+    "rounded-triple": "order", "adaptive-implicit": "explicit",
+}  # fmt: skip
+LIES = {PREFIX + name: claim for name, claim in FALSE.items()}
+QUICK = tuple(PREFIX + name for name in ("symplectic-rk4", "hidden-kick", "coefficients-swapped", "reported-leak"))
+START = "from symtop.runner import scripts; scripts.install(); from symtop_studies.claims import planted; planted.{}()"
+
+
+def file_of(name: str) -> Path:
+    """The plug-in that registers one of `LIES`."""
+    return LIARS / f"{name.removeprefix(PREFIX).replace('-', '_')}.py"
+
+
+def cases(quick: bool) -> list[Case]:
+    """One case an integrator."""
+    return [
+        Case(SCENE, name, {"quick": quick, "code": file_hash(file_of(name))}) for name in (QUICK if quick else LIES)
+    ]
+
+
+def answer() -> None:
+    """What a fresh process does: a name and whether to be quick on standard input, the findings on standard output."""
+    name, quick = json.load(sys.stdin)
+    (registered,) = plugins.load(file_of(name))
+    ledger = judge(integrator(registered), scene(SCENE), quick=quick)
+    print(json.dumps([finding.plain() for finding in ledger.findings]))  # noqa: T201
+
+
+def measured(case: Case) -> xr.Dataset:
+    """The findings on one of them. A fresh process loads it, so that no other case of this one meets it."""
+    command = [sys.executable, "-c", START.format(answer.__name__)]  # named, so that a case depends on its code
+    question = json.dumps([case.integrator, case.settings["quick"]])
+    done = subprocess.run(command, input=question, stdout=subprocess.PIPE, text=True, check=True)  # noqa: S603
+    findings = json.loads(done.stdout.splitlines()[-1])
+    columns = {name: [np.nan if one[name] is None else one[name] for one in findings] for name in Finding._fields}
+    claims = columns.pop("claim")
+    return xr.Dataset({name: ("claim", values) for name, values in columns.items()}, coords={"claim": claims})

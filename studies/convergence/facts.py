@@ -1,0 +1,100 @@
+"""Facts and tables of the study."""
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from symtop.measure.order import BESIDE
+
+from .measures import (
+    MAIN,
+    OTHERS,
+    TARGET,
+    adaptive,
+    declared_order,
+    efficiencies,
+    fits,
+    judged,
+    merged,
+    named_variants,
+    ratios,
+    stepping,
+    tolerance_fits,
+)
+
+
+def facts(data: xr.Dataset) -> dict[str, Any]:
+    """How many orders are confirmed, what the named methods and the best of each order pay, how tolerances are met."""
+    words = [one.verdict for one in judged(data).values()]
+    part, _ = named_variants(data)
+    every = cheapest(data)
+    best, second = (first(part) for part in (every, every[every["order"] == 2]))
+    spans = every.groupby("order")["work"].agg(lambda works: works.max() / works.min())
+    met = {name: values for name, values in ratios(data).items() if values.size}
+    together = np.concatenate([np.full(1, np.nan), *met.values()])
+    return {
+        "scenes": ", ".join(map(str, data["scene"].values)),
+        "scene": str(part["scene"].values),
+        "target": TARGET,  # rad
+        "beside": BESIDE,
+        "pairs": len(words) or None,  # of a variant and a scene
+        **{word: words.count(word) if words else None for word in ("confirmed", "refuted", "undecided")},
+        "best_variant": best[0],
+        "best_work": best[1],
+        "second_variant": second[0],
+        "second_work": second[1],
+        "span": float(spans.max()) if len(spans) else None,  # most work over least within an order
+        "span_order": int(spans.idxmax()) if len(spans) else None,
+        "ratio_middle": float(np.nanmedian(together)) if met else None,  # error over tolerance
+        "ratio_most": float(np.nanmax(together)) if met else None,
+        "ratio_most_variant": max(met, key=lambda name: met[name].max(), default=None),
+    }
+
+
+def first(costs: pd.DataFrame) -> tuple[str | None, float | None]:
+    """Variant and work of the first line, if there is one."""
+    return (None, None) if costs.empty else (str(costs.iloc[0]["variant"]), float(costs.iloc[0]["work"]))
+
+
+def cheapest(data: xr.Dataset) -> pd.DataFrame:
+    """Force evaluations a nutation a variant with a step pays for `TARGET`, over the scenes; the least first."""
+    works = efficiencies(data, TARGET)
+    rows = []
+    for name, label in merged(stepping(data), MAIN).items():
+        known = [one.work for (_, variant), one in works.items() if variant == name]
+        if known:
+            rows.append([label, declared_order(name), float(np.median(known)), min(known), max(known)])
+    return pd.DataFrame(rows, columns=["variant", "order", "work", "least", "most"]).sort_values("work", kind="stable")
+
+
+def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
+    """What an error costs by variant; every order; every adaptive variant on every scene."""
+    costs = cheapest(data).rename(columns={"work": "force evaluations a nutation, median over scenes"})
+    ends, rows = fits(data, MAIN, at_end=True), []
+    for pair, (word, slopes) in judged(data).items():
+        measured = [part for name in (MAIN, *OTHERS) for part in _order(slopes.get(name))]
+        rows.append([*pair, declared_order(pair[1]), word, *measured, ends[pair].constant])
+    names = [part for name in (MAIN, *OTHERS) for part in (f"order in {name}", f"+- in {name}")]
+    orders = pd.DataFrame(rows, columns=["scene", "variant", "declared", "verdict", *names, "C at the end (rad/s^p)"])
+    rank = {"refuted": 0, "undecided": 1}
+    orders = orders.sort_values("verdict", key=lambda column: column.map(lambda word: rank.get(word, 2)), kind="stable")
+    return {"costs": costs, "orders": orders, "tolerances": tolerances(data)}
+
+
+def _order(fit: Any) -> tuple[float, float]:
+    return (np.nan, np.nan) if fit is None else (float(fit.slope), float(fit.interval))
+
+
+def tolerances(data: xr.Dataset) -> pd.DataFrame:
+    """How the axis error follows the tolerance: the power, and the error over the tolerance, by variant and scene."""
+    fitted, part, rows = tolerance_fits(data), adaptive(data), []
+    for name, scene in product(map(str, part["variant"].values), map(str, part["scene"].values)):
+        fit, cell = fitted[scene, name], part.sel(scene=scene, variant=name)
+        ratio = (cell[MAIN] / cell["tolerance"]).values[fit.used]
+        span = (float(ratio.min()), float(ratio.max())) if ratio.size else (np.nan, np.nan)
+        rows.append([name, scene, float(fit.slope), *span, float(cell[MAIN].min())])
+    header = ["variant", "scene", "power of the tolerance", "error / tolerance, least", "most", "least error (rad)"]
+    return pd.DataFrame(rows, columns=header)

@@ -1,0 +1,239 @@
+"""What the study's dataset says: costs of all variants on all tops, contests, safe settings, silent failures.
+
+The dataset is a tree. Groups "short" and "long" hold the variants over the two horizons (see `ladder`), "tops" what is
+known of the tops, "prices" the seconds of an evaluation and of a call (see `prices`), "far" and "checks" the phase
+diagram (see `far`). A cost is in seconds, force evaluations x price at the tolerance that meets the error + call, or
+in force evaluations. Variants are compared where they show the same quantity: the axis in every chart but the attitude
+chart of a method that has the axis chart, which steps the same axis, and the attitude in the charts that show it.
+
+Each contest is between the variants of one class of `needs`, or of all that exist for a body without symmetry
+(`Integrator.general`). A method of this very top, by its equations or its constants, is in a class of its own.
+"""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+from symtop_studies.memoize import of_one_dataset
+
+from symtop.methods.framework.registry import NEEDS
+from symtop.model.charts import Array
+from symtop.run.ensemble.population import STRATA
+from symtop.run.guard import EXPECTED
+
+from .ladder import KEPT, WRONG
+from .prices import prices
+from .ranking import Contest, Ladder, Safe, hindsight, safe
+from .tops import KINDS, NATURAL, SCENE
+
+HORIZONS = ("short", "long")
+POPULATIONS = {"strata": tuple(STRATA), NATURAL: (NATURAL,)}  # kinds of tops in each
+GENERAL = "any body"  # whatever a method needs, if it exists for a body without symmetry
+CLASSES = (*(name for name in NEEDS if name != "solution"), GENERAL)
+SECONDS, EVALUATIONS = "seconds", "evaluations"
+WITHIN = 2.5  # times the least cost of a class over ten nutations: who comes as close runs over a thousand
+OFTEN = 0.1  # of the tops
+FINE = 50.0  # steps a nutation that look like enough
+
+
+class Cell(NamedTuple):
+    """A question: who reaches a target of a quantity over a horizon, on the tops of a population or a kind."""
+
+    horizon: str
+    quantity: str
+    target: float
+    tops: str  # a population or a kind
+    needs: str = GENERAL
+
+
+class Costs(NamedTuple):
+    """Costs of variants on the tops of a cell, and relative errors of their prices."""
+
+    names: list[str]
+    values: Array  # (variants, tops), inf where a variant does not reach the target
+    errors: Array
+
+
+def horizons(data: xr.DataTree) -> list[str]:
+    """The groups of variants that are there."""
+    return [name for name in HORIZONS if name in data.children]
+
+
+def nutations(data: xr.DataTree, horizon: str) -> float:
+    """The length of a horizon."""
+    return float(np.nanmax(data[horizon]["nutations"].values))
+
+
+def targets(data: xr.DataTree) -> list[float]:
+    """The targets."""
+    return [float(value) for value in data["short"]["target"].values]
+
+
+@of_one_dataset
+def kinds_of(data: xr.DataTree, horizon: str) -> NDArray[np.int64]:
+    """The place of each top's kind in `KINDS`, of the tops of a horizon."""
+    places = data["tops"].to_dataset()["kind_place"].sel(scene=horizon).values.ravel()
+    return np.asarray(places[np.isfinite(places)], dtype=np.int64)
+
+
+def members(data: xr.DataTree, horizon: str) -> int:
+    """How many tops of both populations a horizon has."""
+    return int((kinds_of(data, horizon) != KINDS.index(SCENE)).sum())
+
+
+def chosen(data: xr.DataTree, horizon: str, tops: str) -> NDArray[np.bool_]:
+    """Which tops belong to a population or a kind."""
+    return np.isin(kinds_of(data, horizon), [KINDS.index(kind) for kind in POPULATIONS.get(tops, (tops,))])
+
+
+def of_class(needs: str, general: bool, wanted: str) -> bool:
+    """Does a method with these traits take part in the contests of a class?"""
+    return needs == wanted or (wanted == GENERAL and general and needs != "")
+
+
+@of_one_dataset
+def costs(data: xr.DataTree, cell: Cell, unit: str = SECONDS) -> Costs:
+    """Costs of the variants of a class that show a cell's quantity, on the tops that are asked."""
+    group = data[cell.horizon].to_dataset()[["cost", "met_at", "needs", "general", "control"]].isel(scene=0)
+    traits = zip(group["needs"].values, group["general"].values > 0.0, strict=True)
+    part = [of_class(str(needs), bool(general), cell.needs) for needs, general in traits]
+    asked = group.sel(quantity=cell.quantity, target=cell.target).isel(variant=np.flatnonzero(part))
+    among = chosen(data, cell.horizon, cell.tops)
+    values = asked["cost"].transpose("variant", "member").values[:, : among.size][:, among].astype(float)
+    rows, tops = ~np.isnan(values).all(axis=1), ~np.isnan(values).all(axis=0)
+    names = [str(name) for name in asked["variant"].values[rows]]
+    values = np.where(np.isnan(values), np.inf, values)[np.ix_(rows, tops)]
+    if unit == EVALUATIONS:
+        return Costs(names, values, np.zeros(len(names)))
+    met = asked["met_at"].transpose("variant", "member").values[:, : among.size][:, among][np.ix_(rows, tops)]
+    fixed = asked["control"].values[rows] == "step_size"
+    known = prices(data)
+    for row, name in enumerate(names):
+        price, call = known.at(name, np.full(met.shape[1], np.nan) if fixed[row] else met[row])
+        values[row] = values[row] * price + call
+    return Costs(names, values, known.error[[known.names.index(name) for name in names]])
+
+
+@of_one_dataset
+def contest(data: xr.DataTree, cell: Cell, unit: str = SECONDS) -> Contest:
+    """The contest of a cell in hindsight."""
+    taken = costs(data, cell, unit)
+    return hindsight(taken.names, taken.values, taken.errors, prices(data).marked if unit == SECONDS else ())
+
+
+@of_one_dataset
+def safest(data: xr.DataTree, cell: Cell) -> tuple[list[Safe], bool]:
+    """The safe choices of a cell, cheapest first, and whether the lead is called."""
+    group = data[cell.horizon].to_dataset().isel(scene=0)
+    among, known = chosen(data, cell.horizon, cell.tops), prices(data)
+    wide = asked_tops(data, cell)
+    weights = np.array([float(wide[kinds_of(data, cell.horizon)[among] == place].sum()) for place in range(len(KINDS))])
+    ladders = []
+    for name in costs(data, cell).names:
+        one = group.sel(variant=name)
+        met = one["met_at"].sel(quantity=cell.quantity, target=cell.target).values[: among.size].astype(float)
+        settings, fixed = one["setting"].values, str(one["control"].values) == "step_size"
+        price, call = known.at(name, np.full(settings.size, np.nan) if fixed else settings)
+        work = one["work"].transpose("level", "kind").values
+        work = (np.where(weights > 0.0, work, 0.0) * weights).sum(axis=1) / max(weights.sum(), 1.0)
+        error = float(known.error[known.names.index(name)])
+        ladders.append(Ladder(name, met[among][wide], settings, work * price + call, fixed, error))
+    return safe(ladders, known.marked)
+
+
+def asked_tops(data: xr.DataTree, cell: Cell) -> NDArray[np.bool_]:
+    """Which tops of a cell are asked: those of whose variants some was."""
+    group = data[cell.horizon].to_dataset()["cost"].isel(scene=0).sel(quantity=cell.quantity, target=cell.target)
+    among = chosen(data, cell.horizon, cell.tops)
+    values = group.transpose("variant", "member").values[:, : among.size][:, among]
+    return np.asarray(~np.isnan(values).all(axis=0))
+
+
+def contenders(data: xr.DataTree) -> list[str]:
+    """The variants that come within `WITHIN` of the cheapest of their class on `OFTEN` of the tops, at some target."""
+    names: set[str] = set()
+    for quantity in ("axis", "attitude"):
+        for target in targets(data):
+            for tops in POPULATIONS:
+                for needs in CLASSES[:-1] if quantity == "axis" else (GENERAL, "this-top"):
+                    taken = costs(data, Cell("short", quantity, target, tops, needs))
+                    best = taken.values.min(axis=0, initial=np.inf)
+                    near = (taken.values <= WITHIN * best) & np.isfinite(taken.values)
+                    enough = near.sum(axis=1) > OFTEN * max(best.size, 1)
+                    names |= {name for name, one in zip(taken.names, enough, strict=True) if one}
+    return [str(name) for name in data["short"]["variant"].values if str(name) in names]
+
+
+# ---- winners ---------------------------------------------------------------------------------------------------------
+
+
+def cells(data: xr.DataTree, quantity: str = "axis", tops: str = NATURAL, needs: str = GENERAL) -> Iterator[Cell]:
+    """The cells of a quantity, by horizon and target."""
+    for horizon in horizons(data):
+        for target in targets(data):
+            yield Cell(horizon, quantity, target, tops, needs)
+
+
+def winners(data: xr.DataTree) -> list[dict[str, Any]]:
+    """Every cell of the axis: population, class, horizon, target; the safe choice and the contest in hindsight."""
+    return [
+        winner(data, cell) for tops in POPULATIONS for needs in CLASSES for cell in cells(data, "axis", tops, needs)
+    ]
+
+
+def winner(data: xr.DataTree, cell: Cell) -> dict[str, Any]:
+    """One cell in both protocols."""
+    choices, called = safest(data, cell)
+    judged = contest(data, cell)
+    best = choices[0] if choices and np.isfinite(choices[0].seconds) else None
+    return {
+        "quantity": cell.quantity, "tops": cell.tops, "needs": cell.needs,
+        "nutations": nutations(data, cell.horizon), "target": cell.target,
+        "asked": int(asked_tops(data, cell).sum()), "safe": best,
+        "safe_called": called, "hindsight": judged.first, "hindsight_called": judged.called,
+        "solved": judged.solved,
+    }  # fmt: skip
+
+
+# ---- silent failures and the guard -----------------------------------------------------------------------------------
+
+
+class Health(NamedTuple):
+    """Of one variant over ten nutations, by setting and kind of top: numbers of tops, (settings, kinds)."""
+
+    setting: Array  # steps a nutation, or tolerances
+    drawn: Array  # (kinds,)
+    wrong: Array
+    silent: Array
+    dropped: Array  # not run any more: the budget of a run would have been exceeded
+
+
+def health(data: xr.DataTree, name: str) -> Health:
+    """Wrong runs, silent failures and tops that were dropped."""
+    group = data["short"].to_dataset().isel(scene=0).sel(variant=name)
+    there = np.isfinite(group["setting"].values)
+    drawn = group["drawn"].values
+    runs, wrong, silent = (group[key].transpose("level", "kind").values[there] for key in ("runs", "wrong", "silent"))
+    return Health(group["setting"].values[there], drawn, wrong, silent,
+                  drawn - runs)  # fmt: skip
+
+
+def guard_counts(data: xr.DataTree) -> pd.DataFrame:
+    """What the guard says of runs, by chart and whether its trial covers the run whole: warned of wrong and of others.
+
+    ``between`` are runs off by more than `EXPECTED`, at which it warns, and less than `WRONG`.
+    """
+    group = data["short"].to_dataset().isel(scene=0)[["foretold", "measured", "watched", "whole", "chart", "control"]]
+    runs = group.to_dataframe().dropna(subset=["foretold"])
+    runs = runs[(runs["control"] == "tolerance") | (runs["chart"] != "attitude")]
+    kinds = {"wrong": runs["measured"] > WRONG, "right": runs["measured"] <= EXPECTED}
+    kinds["between"] = ~kinds["wrong"] & ~kinds["right"]
+    warned = {f"{name}_warned": one & (runs["foretold"] > EXPECTED) for name, one in kinds.items()}
+    counted = pd.DataFrame({**kinds, **warned, "wrong_seen": kinds["wrong"] & (runs["watched"] > KEPT)})
+    adaptive = np.where(runs["control"] == "tolerance", "adaptive", "fixed step, " + runs["chart"])
+    return (
+        counted.assign(variants=adaptive, whole=runs["whole"] > 0.0).groupby(["variants", "whole"]).sum().reset_index()
+    )

@@ -1,0 +1,262 @@
+"""Facts and tables of the study."""
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from symtop.judging.claims.subject import declared
+from symtop.methods.framework.registry import integrator
+from symtop.report.formats import duration, number
+
+from . import cells, far
+from .cells import CLASSES, EVALUATIONS, Cell
+from .ladder import KEPT, WRONG
+from .prices import NOISY, PROCESSES, TOLERANCE, prices
+from .ranking import SAFE, TIE
+from .tops import KINDS, NATURAL
+
+LEFT_OUT = {  # methods, by the reason, which the page states
+    "the same maps in three coordinates": ("midpoint-unreduced", "trapezoidal-unreduced"),
+    "the same steps as taylor in slower arithmetic": ("taylor-longdouble", "taylor-quad"),
+    "a step of any size is the motion itself": ("exact-discrete",),
+}  # fmt: skip
+NOTHING = "none within the budget"
+HAVE = {  # what each class needs, in a table
+    "derivative": "f(t, y)", "expression": "f as a formula", "lagrangian": "a Lagrangian",
+    "kicks": "torque, free motion", "group": "torque, inertia", "this-top": "this top's equations",
+}  # fmt: skip
+STEPS = (4.37, 17.48, 69.92)  # a nutation, of the table of silent failures
+QUOTED, FINE = "rk4[axis]", 69.92  # whose wrong runs the page quotes, at so many steps a nutation
+KNOWN = (
+    QUOTED, "dop853-compiled-fixed[axis]", "gauss-4[axis]", "strang[axis]", "takahashi-imada[axis]", "srkn-14-6[axis]",
+    "midpoint[angles]", "stormer-verlet[angles]",
+)  # fmt: skip
+AT = 1e-6  # rad, the error at which classes are quoted
+US = 1e6  # microseconds in a second
+
+
+def decades(target: float) -> int:
+    """The 6 of 1e-6."""
+    return round(-np.log10(target))
+
+
+def short_name(name: str) -> str:
+    """A variant, without its chart if that is the axis."""
+    return name.removesuffix("[axis]")
+
+
+def titled(name: str) -> str:
+    """The same in a table of classes, with the word for what exists for symmetric bodies alone."""
+    method = integrator(name)
+    return short_name(name) + ("" if method.general or method.needs == "this-top" else " (symmetric)")
+
+
+def setting_words(name: str, value: float) -> str:
+    """A setting in a table: steps a nutation, or a tolerance."""
+    return f"{value:.3g} steps" if integrator(name).fixed_step else f"tolerance {number(value, 1)}"
+
+
+def facts(data: xr.DataTree) -> dict[str, Any]:
+    """What is safe, and the fastest in hindsight; what is wrong unseen; the guard; the map; the prices; the effort."""
+    known, group, spans = prices(data), data["short"].to_dataset(), cells.horizons(data)
+    return {
+        "safe": SAFE, "tie": TIE, "wrong": WRONG, "kept": KEPT, "near": far.TIE, "processes": PROCESSES,
+        "noisy": NOISY, "at": AT,
+        **winners_facts(data), **{f"{part}_{span}": value for span in cells.HORIZONS
+                                  for part, value in span_facts(data, span).items()},
+        **silent_facts(data), **guard_facts(data), **far_facts(data),
+        "variants": group.sizes["variant"],
+        "marked": len(known.marked),
+        "dense": known.sampled,  # price with dense output over heyoka's own
+        "runs": sum(float(np.nansum(data[span]["made"].values)) for span in spans),
+    }  # fmt: skip
+
+
+def span_facts(data: xr.DataTree, span: str) -> dict[str, float | None]:
+    """The length of a horizon in nutations, its tops, and the budget of a run in force evaluations a nutation."""
+    if span not in cells.horizons(data):
+        return dict.fromkeys(("nutations", "natural", "strata", "budget", "rows"))
+    nutations = cells.nutations(data, span)
+    return {
+        "nutations": nutations,
+        **{tops: int(cells.chosen(data, span, tops).sum()) for tops in cells.POPULATIONS},
+        "budget": float(np.nanmax(data[span]["budget"].values)) / nutations,
+        "rows": data[span].sizes["variant"],
+    }
+
+
+def winners_facts(data: xr.DataTree) -> dict[str, Any]:
+    """The safe choices for any body and of each class, who takes the fewest evaluations, where both protocols agree."""
+    named: dict[str, Any] = {"safe_called": 0}
+    for target in cells.targets(data):
+        cell, place = Cell("short", "axis", target, NATURAL), decades(target)
+        one, fewest = cells.winner(data, cell), cells.contest(data, cell, EVALUATIONS).first
+        named["safe_called"] += bool(one["safe"] and one["safe_called"])
+        named |= _safe(f"safe_{place}", data, cell)
+        named |= {
+            f"fewest_{place}": fewest and short_name(fewest.name),
+            f"fewest_{place}_share": fewest and fewest.share,
+        }
+    for needs in CLASSES[:-1]:
+        named |= _safe(needs.replace("-", "_"), data, Cell("short", "axis", AT, NATURAL, needs))
+    both = [one for one in cells.winners(data) if one["needs"] != "this-top" and one["safe"] and one["hindsight"]]
+    named["cells"] = len(both) or None
+    named["same"] = sum(one["safe"].name == one["hindsight"].name for one in both) if both else None
+    return named
+
+
+def _safe(key: str, data: xr.DataTree, cell: Cell) -> dict[str, Any]:
+    best = cells.winner(data, cell)["safe"]
+    name = short_name(best.name) if best else NOTHING if cells.costs(data, cell).names else None
+    return {key: name, f"{key}_seconds": best and best.seconds}
+
+
+def silent_facts(data: xr.DataTree) -> dict[str, Any]:
+    """Wrong and silent runs of `QUOTED` at `FINE` steps a nutation, on natural tops and on the kind with the most."""
+    names = "quoted_steps", "natural_wrong", "natural_silent", "worst_kind", "worst_wrong", "worst_silent"
+    if QUOTED not in data["short"]["variant"].values:
+        return dict.fromkeys(names)
+    one = cells.health(data, QUOTED)
+    at = int(np.argmin(np.abs(one.setting - FINE)))
+    wrong, silent = (part[at] / np.maximum(one.drawn, 1.0) for part in (one.wrong, one.silent))
+    natural, worst = KINDS.index(NATURAL), int(np.argmax(wrong[:-1]))
+    values = one.setting[at], wrong[natural], silent[natural], KINDS[worst], wrong[worst], silent[worst]
+    return dict(zip(names, values, strict=True))
+
+
+def guard_facts(data: xr.DataTree) -> dict[str, int]:
+    """Runs that the guard was asked about and warned of: wrong ones that are longer than its trial, and right ones."""
+    rows = cells.guard_counts(data)
+    parts = {"piece": ("wrong", rows[~rows["whole"]]), "right": ("right", rows)}
+    return {f"guard_{name}{end}": int(part[f"{key}{end}"].sum())
+            for name, (key, part) in parts.items() for end in ("", "_warned")}  # fmt: skip
+
+
+def far_facts(data: xr.DataTree) -> dict[str, Any]:
+    """The map: who has the most cells, how many were predicted, and what the checks of those say."""
+    names = [f"map_{quantity}{end}" for quantity in far.QUANTITIES for end in ("", "_share")]
+    names += ["map_tops", "predicted", "checks", "checks_held", "checks_longest"]
+    names += ["checks_low", "checks_middle", "checks_high"]  # error of a run, measured over predicted
+    named: dict[str, Any] = dict.fromkeys(names)
+    if "far" not in data.children:
+        return named
+    reached = predicted = 0
+    for quantity in far.QUANTITIES:
+        panel = far.diagram(data, quantity)
+        there = panel.winner >= 0
+        reached, predicted = reached + int(there.sum()), predicted + int((panel.predicted & there).sum())
+        for place, count in Counter(panel.winner[there].tolist()).most_common(1):
+            named |= {f"map_{quantity}": short_name(panel.names[place]), f"map_{quantity}_share": count / there.sum()}
+    named |= {"map_tops": data["far"].sizes["member"], "predicted": predicted / reached if reached else None}
+    checks = far.checks(data)
+    ran = checks.drop_duplicates(["quantity", "target", "horizon"])
+    named |= dict(zip(names[-3:], checks["ratio"].quantile([0.1, 0.5, 0.9]), strict=True))
+    return named | {"checks": len(ran) or None, "checks_held": int(ran["holds"].sum()),
+                    "checks_longest": ran["horizon"].max()}  # fmt: skip
+
+
+# ---- tables ----------------------------------------------------------------------------------------------------------
+
+
+def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
+    """What to use; winners in both protocols; by kind of top; other quantities; prices; silent runs; guard."""
+    kinds = [Cell("short", "axis", target, kind) for kind in KINDS[:-1] for target in cells.targets(data)]
+    others = [cell for quantity in ("attitude", "energy") for cell in cells.cells(data, quantity)]
+    return {
+        "use": use(data), "winners": winners(data, cells.winners(data)),
+        "kinds": winners(data, [cells.winner(data, cell) for cell in kinds]),
+        "quantities": winners(data, [cells.winner(data, cell) for cell in others]),
+        "prices": price_list(data), "silent": silent(data), "guard": cells.guard_counts(data), "checks": checked(data),
+    }  # fmt: skip
+
+
+def use(data: xr.DataTree) -> pd.DataFrame:
+    """The safe choice of each class at each error, over the shorter runs, and what that at `AT` keeps."""
+    rows = []
+    for needs in CLASSES[:-1]:
+        line = {"you can supply": HAVE[needs]}
+        kept = ""
+        for target in cells.targets(data):
+            one = cells.winner(data, Cell("short", "axis", target, NATURAL, needs))
+            best, mark = one["safe"], "" if one["safe_called"] else "~ "
+            words = NOTHING if one["asked"] else "not asked"
+            if best is not None:
+                words = f"{mark}{titled(best.name)}, {setting_words(best.name, best.setting)}, {duration(best.seconds)}"
+                kept = keeps(best.name) if target == AT else kept
+            line[f"1e-{decades(target)} rad"] = words
+        rows.append(line | {f"keeps, at 1e-{decades(AT)} rad": kept})
+    return pd.DataFrame(rows)
+
+
+def keeps(name: str) -> str:
+    """Which constants of the motion a method says it keeps, in a table."""
+    words = {claim: declared(integrator(name), claim) for claim in ("energy", "p_phi", "p_psi")}
+    momenta = "momenta" if words["p_phi"] == words["p_psi"] == "kept" else ""
+    energy = {"kept": "energy", "bounded": "energy bounded"}.get(words["energy"], "")
+    return ", ".join(filter(None, (momenta, energy))) or "nothing exactly"
+
+
+def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:
+    """Cells, one a row: the safe choice with its time, and the winner in hindsight with its share."""
+    marked, rows = prices(data).marked, []
+    for one in each:
+        safe, best = one["safe"], one["hindsight"]
+        row = {
+            **({"quantity": one["quantity"]} if one["quantity"] != "axis" else {}),
+            "tops": one["tops"], "needs": one["needs"], "nutations": one["nutations"], "error": one["target"],
+            "asked (tops)": one["asked"], "solved (tops)": one["solved"],
+            "safe": short_name(safe.name) if safe else NOTHING if one["asked"] else "not asked",
+            "setting": setting_words(safe.name, safe.setting) if safe else "",
+        }  # fmt: skip
+        row |= {f"{key} (us)": US * value if np.isfinite(value) else np.nan for key, value in
+                zip(("time", "low", "high"), safe[2:5] if safe else (np.nan,) * 3, strict=True)}  # fmt: skip
+        row |= {"safe lead": lead(one["safe_called"], safe, marked),
+                "hindsight": short_name(best.name) if best else NOTHING if one["asked"] else "not asked"}  # fmt: skip
+        row |= dict(zip(("share", "share low", "share high", "level", "meets"),
+                        best[1:6] if best else (np.nan,) * 5, strict=True))  # fmt: skip
+        rows.append(row | {"hindsight lead": lead(one["hindsight_called"], best, marked)})
+    return pd.DataFrame(rows)
+
+
+def lead(called: bool, best: Any, marked: list[str]) -> str:
+    """Is the lead beyond the intervals?"""
+    return "" if best is None else "called" if called else "price too noisy" if best.name in marked else "none"
+
+
+def price_list(data: xr.DataTree) -> pd.DataFrame:
+    """Price of an evaluation and of a call, the spread between processes, and what runs in the inner loop."""
+    known, rows = prices(data), []
+    for place, name in enumerate(known.names):
+        price, call = (float(part[0]) for part in known.at(name, np.array([TOLERANCE])))
+        width, method = 1.96 * known.error[place], integrator(name)
+        rows.append([name, method.needs or "", method.general, method.inner_loop or "", 1e9 * price,
+                     1e9 * price * np.exp(-width), 1e9 * price * np.exp(width), US * call, known.spread[place],
+                     name not in known.marked])  # fmt: skip
+    header = ["variant", "needs", "for any body", "inner loop", "price (ns)", "low (ns)", "high (ns)", "call (us)",
+              "spread", "ranked"]  # fmt: skip
+    return pd.DataFrame(rows, columns=header)
+
+
+def silent(data: xr.DataTree) -> pd.DataFrame:
+    """Shares of all tops of a kind that are wrong, silent and dropped, of methods that people know."""
+    rows = []
+    for name in (name for name in KNOWN if name in data["short"]["variant"].values):
+        one = cells.health(data, name)
+        for at in (int(np.argmin(np.abs(one.setting - steps))) for steps in STEPS):
+            for k, kind in enumerate(KINDS[:-1]):
+                shares = (part[at, k] / max(one.drawn[k], 1.0) for part in (one.wrong, one.silent, one.dropped))
+                rows.append([name, one.setting[at], kind, int(one.drawn[k]), *shares])
+    header = ["variant", "steps a nutation", "kind of top", "tops", "wrong", "silent", "dropped"]
+    return pd.DataFrame(rows, columns=header)
+
+
+def checked(data: xr.DataTree) -> pd.DataFrame:
+    """The predicted cells of the map that were run, with the ratio of measured to predicted errors."""
+    runs = far.checks(data)
+    table = runs.groupby(list(runs.columns[:-1]), sort=False)["ratio"].agg(["min", "median", "max"]).reset_index()
+    table[["winner", "next"]] = table[["winner", "next"]].map(short_name)
+    return table.rename(columns={"target": "error", "horizon": "nutations", "holds": "meets the error",
+                                 "min": "measured / predicted error, least", "max": "most"})  # fmt: skip

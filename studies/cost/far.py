@@ -1,0 +1,436 @@
+"""Runs of up to a hundred million nutations: errors at all horizons, measured within a budget and predicted beyond it.
+
+A horizon H ends a stretch of the run in which `SAMPLES` whole steps are looked at, golden fractions apart, so that no
+two fall on the same phase of the nutation. The error up to H is the largest so far:
+
+    axis     angle between the axes at the same time, rad
+    energy   |E - E0| / (E0 - p_psi^2/2 I3 - min V)
+    shape    distance of (u, u'/omega), u = cos(theta), from the true orbit u'^2 = f(u), to first order in it:
+             |u'^2 - f(u)| / |grad|,  grad = (f'(u), 2 omega u'),  f = (1 - u^2)(alpha - beta u) - (b - a u)^2
+
+The last has no time in it: neither a phase nor a turn about the vertical changes it (`symtop.measure.phase` measures
+the same by a search for the nearest time). Steps are cut to 24 bits, so that step number times step is exact.
+
+The phase diagram is a view of these runs, by the study's model of cost and its interpolation between settings: for a
+target and a horizon the variant with the least median cost over the tops. A cell is predicted if for most tops one of
+the two settings of the winner was not run as far as the horizon. Predictions are checked on the same kind of tops:
+cells at the horizons of `CHECKED_AT` are run in full by the winner and the next variant at the settings on both sides.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+from symtop_studies.memoize import of_one_dataset
+
+from symtop.core.numbers import EPSILON, GOLDEN
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import Integrator, integrator, variants
+from symtop.model import charts
+from symtop.model.charts import Array, axis_of, space_energy
+from symtop.model.top import effective_potential
+
+from . import laws
+from .ladder import in_turn, stepped, stored
+from .prices import prices
+from .ranking import cost_to_reach
+from .tops import FIRST as FEWEST_STEPS, Body, Tops, natural
+
+QUANTITIES = ("axis", "energy", "shape")
+MOST = {"axis": 2.0, "energy": 1.0, "shape": 1.0}  # the largest power of the horizon (see `laws`)
+PER_DECADE = 4  # stretches; every other end is a column of the picture
+FIRST, LAST = 1.0, 8.0  # decades of the horizon, in nutations
+SAMPLES = 12  # of a stretch
+CANDIDATES = (  # what can win on any body: the cheapest variants of each family over ten and a thousand nutations.
+    # Adams' method is not among them: an evaluation with its history costs six times that of vern9.
+    "midpoint[angles]", "strang-drift-first[axis]", "chin-4a[axis]", "srkn-6-4[axis]", "aba-10-4[axis]",
+    "srkn-14-6[axis]", "srkn-19-8[axis]", "kahan-li-8[axis]", "sofroniou-spaletta-10[axis]", "gauss-4[axis]",
+    "gauss-8[axis]", "gauss-12[axis]", "rk4[axis]", "tsit5-fixed[axis]", "dop853-compiled[axis]",
+    "dop853-compiled-fixed[axis]", "vern9-fixed[axis]", "extrapolation[axis]",
+    "series-general-adaptive[axis]", "taylor[axis]",
+)  # fmt: skip
+TARGETS = tuple(float(target) for target in np.logspace(-2, -12, 21))
+TIE = 1.25  # of medians
+CHECKED_TARGETS, CHECKED_AT = (1e-3, 1e-6, 1e-9), (1e5, 3.16e5, 1e6)
+COARSEST = 2.0 * FEWEST_STEPS  # steps a nutation; halved from setting to setting
+LOOSEST = 1e-2  # tolerance; divided by ten
+LEAST_STEPS = 4.0  # a nutation, of what energy and shape are asked: longer steps may keep them and miss the motion
+DONE = 3e-13  # an error at ten nutations that no finer setting is asked to improve
+BITS = 24  # of a step
+CHECKED_TOPS = 4
+
+
+def drifts_of(variant: Integrator) -> bool:
+    """Is it known that the energy of a variant drifts: neither symplectic nor kept by construction?"""
+    return not variant.symplectic and "energy" not in (variant.conserves or ())
+
+
+class Shown(NamedTuple):
+    """What runs have shown, (n, samples), and their force evaluations (n,)."""
+
+    states: Array
+    momenta: Array
+    evaluations: Array
+    ended: Array  # (n,) well
+
+
+def horizons() -> Array:
+    """Ends of all stretches, in nutations."""
+    return np.logspace(FIRST, LAST, round((LAST - FIRST) * PER_DECADE) + 1)
+
+
+def tops_of(members: int, seed: int) -> Tops:
+    """The first members of the natural population."""
+    return Tops(natural(members, seed), 10.0)
+
+
+def candidates() -> list[str]:
+    """The variants of `CANDIDATES` that this machine has: heyoka's Taylor series may be missing."""
+    there = {variant.name for variant in variants()}
+    return [name for name in CANDIDATES if name in there]
+
+
+def steps_of(tops: Tops, per_nutation: float) -> Array:
+    """Steps (n,), cut to `BITS` bits."""
+    size, power = np.frexp(tops.period / per_nutation)
+    return np.asarray(np.ldexp(np.rint(np.ldexp(size, BITS)), power - BITS))
+
+
+def places(ends: Array) -> Array:
+    """Where samples lie, (horizons, samples), in nutations: golden fractions of the last fifth before each end."""
+    fractions = np.sort(np.mod(GOLDEN * np.arange(1, SAMPLES), 1.0))
+    return np.asarray(ends[:, np.newaxis] * np.append(0.8 + 0.2 * fractions, 1.0))
+
+
+def setting_of(variant: Integrator, level: int) -> float:
+    """Steps a nutation, or the tolerance; NaN below the least that the variant has."""
+    if variant.fixed_step:
+        return COARSEST * 2.0**level
+    tolerance = LOOSEST * 10.0**-level
+    return tolerance if tolerance >= variant.least_tolerance else math.nan
+
+
+class Asked(NamedTuple):
+    """Runs of all tops with one setting: steps a nutation or a tolerance, and the ends of the stretches to look at."""
+
+    setting: float
+    ends: Array
+    budget: float  # force evaluations
+
+
+def run(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Shown, Array]]:
+    """The runs of all tops with each setting, and the times (n, samples) of what they show.
+
+    Those of a fixed step go side by side, the settings too, in one call.
+    """
+    if variant.fixed_step:
+        return together(variant, tops, wanted)
+    made = []
+    for setting, ends, budget in wanted:
+        times = places(ends).ravel() * tops.period[:, np.newaxis]
+        done = in_turn(variant, tops.numbers, [Plan.until(one, setting, budget) for one in times])
+        made.append((Shown(done.states, done.momenta, done.work, done.outcome == 0), times))
+    return made
+
+
+def together(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Shown, Array]]:
+    """The runs of a fixed step. A call wants as many samples of all; those that nobody asked for are dropped."""
+    marks = []
+    for setting, ends, _ in wanted:
+        whole = np.maximum(np.rint(places(ends).ravel() * setting), 1).astype(np.int64)
+        marks.append(np.maximum.accumulate(whole))
+    each, n = [np.unique(one) for one in marks], len(tops.period)
+    most = max((one.size for one in each), default=0)
+    if any(one[-1] < most for one in each):  # a run with fewer steps than another has samples
+        return [made for asked in wanted for made in together(variant, tops, [asked])]
+    if not wanted:
+        return []
+    shown = np.stack([filled(one, most) for one in each])
+    h = np.stack([steps_of(tops, asked.setting) for asked in wanted])
+    done = stepped(variant, np.tile(tops.numbers, (len(wanted), 1)), h.ravel(), np.repeat(shown, n, axis=0))
+    made = []
+    for k, (one, seen) in enumerate(zip(marks, shown, strict=True)):
+        rows, columns = slice(k * n, (k + 1) * n), np.searchsorted(seen, one)
+        parts = Shown(done.states[rows, columns], done.momenta[rows, columns], done.work[rows], done.outcome[rows] == 0)
+        made.append((parts, one * h[k][:, np.newaxis]))
+    return made
+
+
+def filled(marks: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Marks, and the first steps that are none, `count` in all; the last of them stays the last."""
+    free = np.setdiff1d(np.arange(1, count + 1), marks)[: count - marks.size]
+    return np.union1d(marks, free)
+
+
+def errors(chart: str, tops: Tops, shown: Shown, times: Array) -> dict[str, Array]:
+    """Each quantity at each sample, (n, samples); inf where a run has failed."""
+    states, body = shown.states, Body(*tops.body)
+    p_phi, p_psi = shown.momenta[..., 0], shown.momenta[..., 1]
+    with np.errstate(all="ignore"):
+        axis = axis_of(chart, states)
+        if chart == "angles":
+            place = effective_potential(states[..., 0], p_phi - p_psi, p_phi + p_psi, body.I1, body.mgl)
+            energy = states[..., 1] ** 2 / (2.0 * body.I1) + p_psi**2 / (2.0 * body.I3) + place
+            rate = -np.sin(states[..., 0]) * states[..., 1] / body.I1
+        else:
+            momentum = states[..., -3:]
+            energy = space_energy(body, axis, momentum, p_psi)  # type: ignore[arg-type]
+            rate = (momentum[..., 0] * axis[..., 1] - momentum[..., 1] * axis[..., 0]) / body.I1
+        each = {
+            "axis": charts.axis_distance(axis, tops.forms.axis(times)),
+            "energy": np.abs(energy - tops.energy[:, np.newaxis]) / tops.energy_scale[:, np.newaxis],
+            "shape": shape(tops, axis[..., 2], rate),
+        }
+    return {name: np.where(np.isfinite(values), values, np.inf) for name, values in each.items()}
+
+
+def shape(tops: Tops, u: Array, rate: Array) -> Array:
+    """Distance of heights and their rates (n, samples) from the true orbits, in units of the axis's length."""
+    I1, I3, mgl = tops.body
+    p_phi, p_psi = (part[:, np.newaxis] for part in tops.momenta[:2])
+    a, b, beta = p_psi / I1, p_phi / I1, 2.0 * mgl / I1
+    alpha = (2.0 * tops.energy[:, np.newaxis] - p_psi**2 / I3) / I1
+    omega = 2.0 * math.pi / tops.period[:, np.newaxis]
+    off = rate**2 - (1.0 - u * u) * (alpha - beta * u) + (b - a * u) ** 2
+    slope = 2.0 * a * (b - a * u) - 2.0 * u * (alpha - beta * u) - beta * (1.0 - u * u)
+    return np.asarray(np.abs(off) / np.hypot(slope, 2.0 * omega * rate))
+
+
+def measured(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Array, Array]]:
+    """For each setting, the largest errors (quantities, horizons, n) of the stretches, inf after a failure, and
+    evaluations a nutation.
+    """
+    (chart,), made = variant.charts(), []
+    for (setting, ends, _), (shown, times) in zip(wanted, run(variant, tops, wanted), strict=True):
+        each = errors(chart, tops, shown, times)
+        largest = np.stack([each[name].reshape(len(times), len(ends), SAMPLES).max(axis=2).T for name in QUANTITIES])
+        if variant.fixed_step and setting < LEAST_STEPS:
+            largest[1:] = np.inf
+        made.append((largest, np.where(shown.ended, shown.evaluations / ends[-1], np.nan)))
+    return made
+
+
+def ladder(variant: Integrator, tops: Tops, levels: int, steps: float, budget: float) -> xr.Dataset:
+    """All settings of a variant, measured as far as `steps` and `budget` (evaluations of a run) go, then foretold.
+
+    Over `quantity`, `setting`, `horizon`, `member`: ``error``, the largest up to the horizon, and of its law the
+    leading ``power`` and the free exponent ``slope`` with its ``interval``. ``setting_value`` is the steps a nutation
+    or the tolerance; ``reach`` the last horizon that was measured; ``work`` the force evaluations a nutation; ``walk``
+    the w of `laws`.
+    """
+    far, n = horizons(), len(tops.period)
+    seen, work = np.full((len(QUANTITIES), levels, far.size, n), np.nan), np.full((levels, n), np.nan)
+    reach, values = np.full(levels, np.nan), np.full(levels, np.nan)
+    wanted: dict[int, Asked] = {}
+    for level in range(levels):
+        setting = setting_of(variant, level)
+        if math.isnan(setting):
+            break
+        ((tried, first),) = measured(
+            variant, tops, [Asked(setting, far[:1], math.inf if variant.fixed_step else budget)]
+        )
+        taken = float(np.nanmedian(first)) if np.isfinite(first).any() else math.nan
+        if math.isnan(taken):
+            values[level], reach[level], seen[:, level, 0] = setting, far[0], np.inf
+            continue
+        longest = min(budget / taken, steps / setting if variant.fixed_step else math.inf, 1.0001e6)
+        if longest < far[laws.FEWEST]:
+            break
+        wanted[level] = Asked(setting, far[far <= longest], 10.0 * budget)
+        if np.median(tried[:, 0], axis=1).max() < DONE:
+            break
+    for (level, asked), shown in zip(wanted.items(), measured(variant, tops, list(wanted.values())), strict=True):
+        values[level], reach[level] = asked.setting, asked.ends[-1]
+        seen[:, level, : asked.ends.size], work[level] = shown
+    grain = grain_of(tops)
+    return predicted(seen, work, far, grain, drifts=drifts_of(variant)).assign(
+        setting_value=("setting", values), reach=("setting", reach), chart=((), variant.charts()[0]),
+        conserves_energy=((), float("energy" in (variant.conserves or ()))),
+    )  # fmt: skip
+
+
+def grain_of(tops: Tops) -> Array:
+    """The rounding of the energy in one evaluation, over its scale, (n,)."""
+    size = (np.abs(tops.energy) + np.abs(tops.numbers[:, 2])) / tops.energy_scale
+    return np.asarray(EPSILON * np.maximum(size, 1.0))
+
+
+def predicted(seen: Array, work: Array, far: Array, grain: Array, *, drifts: bool) -> xr.Dataset:
+    """Errors at all horizons from the largest in the measured stretches (quantities, settings, horizons, n).
+
+    `grain` (n,) is the rounding of the energy in one evaluation: no walk has longer steps.
+    """
+    w = np.minimum(laws.walk(seen[1], work[:, np.newaxis] * far[:, np.newaxis]), grain)
+    evaluations = np.swapaxes(work[:, np.newaxis] * far[:, np.newaxis], 1, 2)  # settings, n, horizons
+    error, columns = np.empty_like(seen), {name: np.full(seen.shape[:2] + seen.shape[3:], np.nan) for name in LAW}
+    for s in range(seen.shape[1]):
+        for q, name in enumerate(QUANTITIES):
+            runs = seen[q, s].T
+            law = laws.fit(far, runs, MOST[name], drifts=drifts)
+            noise = laws.rounding(name, w[:, np.newaxis], far, evaluations[s])
+            noise *= laws.least(runs, law.at(far), noise)[:, np.newaxis]
+            beyond = np.hypot(law.at(far), noise)
+            beyond = np.where(np.isinf(runs).any(axis=1, keepdims=True), np.inf, beyond)
+            error[q, s] = np.maximum.accumulate(np.where(np.isnan(runs), beyond, runs), axis=1).T
+            for key, value in zip(LAW, (law.leading, law.slope, law.interval), strict=True):
+                columns[key][q, s] = value
+    data: dict[str, Any] = {
+        "error": (("quantity", "setting", "horizon", "member"), stored(error[:, :, ::2])),
+        **{key: (("quantity", "setting", "member"), stored(value)) for key, value in columns.items()},
+        "work": (("setting", "member"), work),
+        "walk": ("member", w),
+    }
+    return xr.Dataset(data, coords={"quantity": list(QUANTITIES), "horizon": far[::2]})
+
+
+LAW = ("power", "slope", "interval")
+
+
+# ---- the phase diagram -----------------------------------------------------------------------------------------------
+
+
+class Diagram(NamedTuple):
+    """One panel: arrays over targets and horizons, `costs` over variants before them."""
+
+    names: list[str]
+    horizons: Array
+    costs: Array  # seconds a nutation, inf where not reached
+    winner: NDArray[np.int64]  # -1 where nobody reaches the target
+    second: NDArray[np.int64]
+    ratio: Array  # cost of the second over that of the winner
+    predicted: NDArray[np.bool_]
+    levels: list[Array]  # by variant: the finer of the two settings of a cell (targets, horizons, n)
+
+    def place(self, target: float, horizon: float) -> tuple[int, int]:
+        """Indices of a cell."""
+        return int(np.argmin(np.abs(np.log(np.array(TARGETS) / target)))), int(
+            np.argmin(np.abs(np.log(self.horizons / horizon)))
+        )
+
+
+def runs_of(data: xr.DataTree, name: str) -> xr.Dataset:
+    """What was measured of a variant: without padding, with errors of runs that failed or have no law infinite."""
+    one = data["far"].to_dataset().isel(scene=0).sel(variant=name)
+    one = one.isel(setting=np.flatnonzero(np.isfinite(one["setting_value"].values)))
+    dead = np.isnan(one["work"]).all("member")  # it failed within ten nutations: there is nothing more to measure
+    return one.assign(error=one["error"].fillna(np.inf), reach=one["reach"].where(~dead, np.inf))
+
+
+def variants_of(data: xr.DataTree, quantity: str) -> list[str]:
+    """Variants of a panel: those that conserve the energy by construction keep it and the shape at any step."""
+    group = data["far"].to_dataset().isel(scene=0)
+    return [
+        str(name) for name in group["variant"].values
+        if quantity == "axis" or float(group["conserves_energy"].sel(variant=name)) != 1.0
+    ]  # fmt: skip
+
+
+def price_of(data: xr.DataTree, name: str, settings: Array) -> Array:
+    """Seconds of a force evaluation at each setting; the call has no part in runs of many nutations."""
+    return prices(data).at(name, np.where(integrator(name).fixed_step, np.nan, settings))[0]
+
+
+@of_one_dataset
+def diagram(data: xr.DataTree, quantity: str) -> Diagram:
+    """The panel of a quantity."""
+    names, costs, unseen, levels = variants_of(data, quantity), [], [], []
+    for name in names:
+        one = runs_of(data, name)
+        errors = one["error"].sel(quantity=quantity).transpose("setting", "horizon", "member").values.astype(float)
+        work = one["work"].transpose("setting", "member").values
+        work = np.where(np.isfinite(work), work, 1.0)  # of a run that failed: its infinite error answers nothing
+        work = work * price_of(data, name, one["setting_value"].values)[:, np.newaxis]
+        seconds = np.stack([cost_to_reach(work, errors[:, k], TARGETS) for k in range(errors.shape[1])], axis=1)
+        places = np.arange(len(work))[:, np.newaxis, np.newaxis]
+        level = np.stack([np.where(errors <= target, -1, places).max(axis=0) for target in TARGETS]) + 1
+        costs.append(np.median(seconds, axis=2))
+        levels.append(level)
+        reach, far = one["reach"].values, one["horizon"].values
+        fine = np.minimum(level, len(reach) - 1)
+        shorter = np.minimum(reach[fine], reach[np.maximum(level - 1, 0)])
+        unseen.append((shorter < 0.999 * far[:, np.newaxis]).mean(axis=2) > 0.5)
+    table = np.array(costs)
+    order = np.argsort(table, axis=0, kind="stable")
+    best = np.take_along_axis(table, order, axis=0)
+    second = best[1] if len(best) > 1 else np.full_like(best[0], np.inf)
+    with np.errstate(invalid="ignore"):
+        ratio = second / best[0]
+    predicted = np.take_along_axis(np.array(unseen), order[:1], axis=0)[0] & np.isfinite(best[0])
+    far = data["far"].to_dataset()["horizon"].values
+    return Diagram(
+        names, far, table, np.where(np.isfinite(best[0]), order[0], -1), order[1 % len(order)], ratio, predicted, levels
+    )
+
+
+def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
+    """Settings of the checks: predicted cells at some targets and horizons, runs of at most `limit` evaluations."""
+    asked: list[dict[str, Any]] = []
+    for quantity in QUANTITIES[:2]:
+        panel = diagram(data, quantity)
+        for target in CHECKED_TARGETS:
+            for horizon in CHECKED_AT:
+                at = panel.place(target, horizon)
+                if not panel.predicted[at] or not np.isfinite(panel.ratio[at]):
+                    continue
+                pair, settings, dearest = (int(panel.winner[at]), int(panel.second[at])), [], 0.0
+                for row in pair:
+                    one = runs_of(data, panel.names[row])
+                    fine = min(int(np.median(panel.levels[row][at])), one.sizes["setting"] - 1)
+                    settings.append(one["setting_value"].values[[max(fine - 1, 0), fine]].tolist())
+                    dearest = max(dearest, float(np.nanmax(one["work"].values[fine])) * horizon)
+                runs = [[panel.names[row] for row in pair], settings]
+                if dearest <= limit and all([one["integrators"], one["settings"]] != runs for one in asked):
+                    asked.append({
+                        "integrators": [panel.names[row] for row in pair], "quantity": quantity, "target": target,
+                        "horizon": horizon, "settings": settings, "seed": data["far"].attrs.get("seed", 1),
+                    })  # fmt: skip
+    return asked
+
+
+def check(asked: Any) -> xr.Dataset:
+    """Largest ``errors`` of the first `CHECKED_TOPS` natural tops in the runs that decide a cell, over ``rank`` (the
+    winner and the next variant), ``side`` (the coarser and the finer setting) and ``member``.
+    """
+    tops, far = tops_of(CHECKED_TOPS, asked["seed"]), horizons()
+    ends = far[far <= 1.0001 * asked["horizon"]]
+    place = QUANTITIES.index(asked["quantity"])
+    errors = np.full((2, 2, CHECKED_TOPS), np.nan)
+    for rank, (name, pair) in enumerate(zip(asked["integrators"], asked["settings"], strict=True)):
+        runs = measured(integrator(name), tops, [Asked(setting, ends, np.inf) for setting in pair])
+        errors[rank] = [one[place].max(axis=0) for one, _ in runs]
+    return xr.Dataset(
+        {
+            "errors": (("rank", "side", "member"), errors),
+            "setting_value": (("rank", "side"), np.array(asked["settings"])),
+            "contender": ("rank", list(asked["integrators"])),
+            "quantity": ((), asked["quantity"]),
+            "target": ((), asked["target"]),
+            "checked_horizon": ((), asked["horizon"]),
+        }
+    )
+
+
+def checks(data: xr.DataTree) -> pd.DataFrame:
+    """The predicted cells that were run in full, a line a run and top.
+
+    ``ratio`` is the error over the predicted one, of errors below 1 alone; a cell ``holds`` if the finer setting of the
+    winner meets the target on most tops.
+    """
+    names, rows = ["quantity", "target", "horizon", "winner", "next", "holds", "ratio"], []
+    group = data["checks"].to_dataset().isel(scene=0) if "checks" in data.children else None
+    for name in () if group is None else group["variant"].values:
+        one = group.sel(variant=name)
+        quantity, target, horizon = str(one["quantity"].values), float(one["target"]), float(one["checked_horizon"])
+        pair, errors = list(map(str, one["contender"].values)), one["errors"].transpose("rank", "side", "member").values
+        cell = [quantity, target, horizon, *pair, bool((errors[0, 1] <= target).mean() >= 0.5)]
+        for rank, side in np.ndindex(2, 2):
+            runs, setting = runs_of(data, pair[rank]), float(one["setting_value"][rank, side])
+            level = int(np.argmin(np.abs(np.log(runs["setting_value"].values / setting))))
+            told = runs["error"].sel(quantity=quantity).isel(setting=level).sel(horizon=horizon, method="nearest")
+            for error, foretold in zip(errors[rank, side].tolist(), told.values.tolist(), strict=False):
+                rows.append([*cell, error / foretold if max(error, foretold) < 1.0 else math.nan])
+    return pd.DataFrame(rows, columns=names).astype({"ratio": float})

@@ -1,0 +1,298 @@
+"""One variant on all tops: runs from coarse to fine settings, and what they cost and hide.
+
+Steps are halved from setting to setting, tolerances divided by ten. A member leaves the ladder
+
+    when every quantity has reached the finest target that is asked of it,
+    before a run that is foreseen to take more force evaluations than the budget,
+    when no target that is left can be reached within the budget: the error falls with the declared order or, if that is
+    more, as from the last setting to this, and a tenth of the target's distance is forgiven,
+    when two settings below `NEAR_ROUNDING` have the same error: rounding.
+
+The energy is asked from `LEAST_STEPS` a nutation on, because longer steps may keep it and miss the motion. A run is
+*wrong* if its axis is off by more than `WRONG`; it is a *silent failure* if nothing warns of it: it ended `ok` and kept
+the energy and both momenta to `KEPT`. A member that left with an accurate run is right at all finer settings.
+
+Variables over `quantity`, `target`, `member`, `level`, `kind` (of tops), `guarded`, `named` (scenes):
+
+    cost(quantity, target, member)   force evaluations, inf if it was not reached, NaN if it was not asked
+    met_at(quantity, target, member) steps a nutation or the tolerance that reaches it, interpolated as the cost is
+    setting(level)                   steps a nutation, or the tolerance
+    work(level, kind)                force evaluations of the median top of a kind
+    runs, wrong, ended, silent (level, kind)       numbers of members: judged, wrong, ended `ok`, silent failures
+    drawn(kind)                                    members with a nutation; at a level the rest of `runs` was dropped
+    foretold, measured (level, guarded)            axis error, rad: of the guard's forecast, and of the run
+    watched(level, guarded)                        the larger error of energy and momenta, infinite if it ended badly
+    whole(level, guarded)                          1 if the guard's trial was the whole run, and nothing was foretold
+    scene_error, scene_work (level, named)         axis error and force evaluations on the named scenes
+    made, evaluated                                runs of the ladder, and their force evaluations
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from symtop.measure.settings import FLAT, LEAST_STEPS, NEAR_ROUNDING, TARGETS
+from symtop.methods.framework.adaptive import Adaptive
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.lanes import members_of
+from symtop.methods.framework.loop import inside
+from symtop.methods.framework.plan import OUTCOMES, Plan
+from symtop.methods.framework.registry import Integrator
+from symtop.model.charts import DIMENSIONS, Array
+from symtop.model.scenes import Scene
+from symtop.model.top import Angles, SymmetricTop
+from symtop.run.guard import forecast
+
+from .ranking import cost_to_reach
+from .tops import ASKED, FIRST, KINDS, MOMENTA, NATURAL, SCENE, Tops
+
+LEVELS = 15  # settings at most
+WRONG = 0.1  # rad
+KEPT = 0.01  # of the energy of the nutation, of the larger momentum
+ASYMPTOTIC = 1e-2  # rad; an error below this falls as the order says
+FORGIVEN = 10.0
+BLOCK = 256  # members of an adaptive variant that climb together: as many starts as heyoka's conversion remembers
+DIGITS = 10  # bits of a cost that are stored, 0.1 %
+Members = NDArray[np.int64]  # places of members
+
+GUARDED_LEVELS = 10  # of them are shown to the guard: up to 559 steps a nutation
+
+
+class Level(NamedTuple):
+    """The runs of some members with one setting."""
+
+    states: Array
+    momenta: Array
+    work: Array  # force evaluations
+    outcome: NDArray[np.int64]
+
+
+class Climb(NamedTuple):
+    """Work (LEVELS, n), errors (LEVELS, n) by quantity, NaN where a member was not run; and how runs ended."""
+
+    work: Array
+    errors: dict[str, Array]
+    ended: NDArray[np.bool_]
+    settled: NDArray[np.bool_]  # (n,): left with an accurate run
+
+
+def quantities_of(variant: Integrator, twin: bool) -> tuple[str, ...]:
+    """What a variant is judged by: the attitude alone where the axis chart has the same axis (`twin`).
+
+    The energy is not asked of a variant that claims to conserve it: any step would do.
+    """
+    (chart,) = variant.charts()
+    left = {"energy"} if "energy" in (variant.conserves or ()) else set()
+    left |= {"attitude"} if chart == "axis" else {"axis", "energy"} if twin else set()
+    return tuple(name for name in ASKED if name not in left)
+
+
+def setting_of(variant: Integrator, level: int) -> float:
+    """Steps a nutation, or the tolerance; NaN below the least that the variant has."""
+    if variant.fixed_step:
+        return FIRST * 2.0**level
+    tolerance = 10.0 ** (-2 - level)
+    return tolerance if tolerance >= variant.least_tolerance else math.nan
+
+
+def run_level(variant: Integrator, tops: Tops, chosen: Members, level: int, budget: float) -> Level:
+    """Run the chosen members with one setting."""
+    if variant.fixed_step:
+        h = tops.period[chosen] / FIRST * 0.5**level
+        marks = np.broadcast_to(tops.marks << level, (len(chosen), tops.marks.size))
+        return stepped(variant, tops.numbers[chosen], h, marks)
+    tolerance, solver = setting_of(variant, level), variant.solvers[variant.charts()[0]]
+    times = tops.times[chosen]
+    if isinstance(solver, Adaptive):
+        n, samples = times.shape
+        done, _ = solver.many(tops.numbers[chosen], np.full(n, tolerance), times, np.full(n, samples), budget)
+        return Level(done.states, done.momenta, done.work.astype(float), done.outcome)
+    plans = [Plan.until(row_times, tolerance, budget) for row_times in times]
+    return one_by_one(variant, tops.members(chosen), plans)
+
+
+def stepped(variant: Integrator, numbers: Array, h: Array, marks: NDArray[np.int64]) -> Level:
+    """Runs of steps `h` (n,), sampled at `marks` (n, samples): in one call where the variant has a loop to share."""
+    solver = inside(variant.solvers[variant.charts()[0]])
+    if solver is None:
+        return in_turn(variant, numbers, [Plan.steps(float(step), ends) for step, ends in zip(h, marks, strict=True)])
+    many = solver.many(numbers, h, marks)
+    work = np.asarray(solver.counts(many.steps, many.work)[0], dtype=float)
+    return Level(many.states, many.momenta, work, many.outcome)
+
+
+def in_turn(variant: Integrator, numbers: Array, plans: Sequence[Plan]) -> Level:
+    """Runs of tops in rows of nine numbers one after another, with equally many samples each."""
+    return one_by_one(variant, members_of(numbers), plans)
+
+
+def one_by_one(variant: Integrator, members: Iterable[tuple[SymmetricTop, Angles]], plans: Sequence[Plan]) -> Level:
+    """The same of tops and starts."""
+    (chart,), shape = variant.charts(), (len(plans), plans[0].times.size)
+    states, momenta = np.full((*shape, DIMENSIONS[chart]), np.nan), np.full((*shape, 2), np.nan)
+    work, outcome = np.empty(len(plans)), np.empty(len(plans), dtype=np.int64)
+    for k, ((top, start), plan) in enumerate(zip(members, plans, strict=True)):
+        run = solve(variant, chart, top, start, plan)
+        states[k], momenta[k, :, 0], momenta[k, :, 1] = run.states, run.p_phi, run.p_psi
+        work[k], outcome[k] = run.force_evaluations, OUTCOMES.index(run.outcome)
+    return Level(states, momenta, work, outcome)
+
+
+def climb(variant: Integrator, tops: Tops, asked: dict[str, NDArray[np.bool_]], budget: float) -> Climb:
+    """All runs of a variant; `asked` (targets, n) by quantity."""
+    n, (chart,) = len(tops.period), variant.charts()
+    names = (*asked, *(name for name in ("axis", "energy", MOMENTA) if name not in asked))
+    blank = np.full((LEVELS, n), np.nan)
+    done = Climb(blank.copy(), {name: blank.copy() for name in names}, np.zeros((LEVELS, n), bool), np.zeros(n, bool))
+    everyone = np.flatnonzero(tops.known)
+    for block in [everyone] if variant.fixed_step else np.array_split(everyone, -(-everyone.size // BLOCK) or 1):
+        live = block
+        for level in range(LEVELS):
+            if not live.size or math.isnan(setting_of(variant, level)):
+                break
+            runs = run_level(variant, tops, live, level, budget)
+            shown = tops.errors(chart, runs, live)
+            good = (runs.outcome == 0) & np.isfinite(shown["axis"])
+            done.work[level, live], done.ended[level, live] = runs.work, good
+            for name, values in done.errors.items():
+                values[level, live] = np.where(good, shown[name], np.inf)
+            stay, settled = _stay(variant, done, asked, live, level, budget)
+            done.settled[live] = settled
+            live = live[stay]
+    return done
+
+
+def _stay(
+    variant: Integrator, done: Climb, asked: dict[str, NDArray[np.bool_]], live: Members, level: int, budget: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:  # fmt: skip
+    """Which of the live members go on to the next setting, and which have an accurate run."""
+    work, good = done.work[level, live], done.ended[level, live]
+    typical = float(np.max(work[good], initial=1.0))  # a run that failed early has not shown what the next one costs
+    work = np.where(good, work, typical)
+    ratio, falls = growth_of_work(variant), 2.0 ** float(variant.order or 1) if variant.fixed_step else 10.0
+    left = np.floor(np.log(budget / np.maximum(work, 1.0)) / math.log(ratio))
+    settled = done.errors["axis"][level, live] <= ASYMPTOTIC
+    worth = ~settled
+    for name, targets in asked.items():
+        error = np.maximum(done.errors[name][level, live], 1e-300)
+        before = done.errors[name][level - 1, live] if level else np.full(live.size, np.inf)
+        open_targets = targets[:, live] & (error > np.asarray(TARGETS)[:, np.newaxis])
+        following = np.max(np.where(open_targets, np.asarray(TARGETS)[:, np.newaxis], 0.0), axis=0)
+        with np.errstate(all="ignore"):
+            gain = np.clip(before / error, falls, 1e4)
+            gain = np.where(np.isfinite(before), gain, 1e4)
+            foreseen = error * gain**-left / FORGIVEN
+        stuck = (error < NEAR_ROUNDING) & (error > before / FLAT)
+        worth |= (following > 0.0) & ~stuck & ((foreseen <= following) | (error > ASYMPTOTIC))
+    return worth & (left >= 1.0), settled
+
+
+def stored(values: Array) -> Array:
+    """Positive numbers with `DIGITS` bits, in single precision, which a file holds in a tenth of the space."""
+    size, power = np.frexp(values)
+    with np.errstate(over="ignore"):  # an error above 1e38 is infinite
+        return np.ldexp(np.rint(np.ldexp(size, DIGITS)), power - DIGITS).astype(np.float32)
+
+
+def table(variant: Integrator, tops: Tops, budget: float, *, twin: bool, guarded: int) -> xr.Dataset:
+    """The dataset of one variant over one horizon."""
+    asked = {name: mask for name, mask in tops.asked(TARGETS).items() if name in quantities_of(variant, twin)}
+    done = climb(variant, tops, asked, budget)
+    settings = np.array([setting_of(variant, level) for level in range(LEVELS)])
+    set_to = np.where(np.isfinite(done.work), settings[:, np.newaxis], np.nan)
+    costs, met = (np.full((len(ASKED), len(TARGETS), len(tops.period)), np.nan, np.float32) for _ in range(2))
+    for place, name in enumerate(ASKED):
+        if name in asked:
+            first = round(math.log2(LEAST_STEPS / FIRST)) if variant.fixed_step and name == "energy" else 0
+            for into, values in ((costs, done.work), (met, set_to)):
+                reached = cost_to_reach(values[first:], done.errors[name][first:], TARGETS)
+                into[place] = np.where(asked[name], stored(reached), np.nan)
+    scenes = tops.kinds == KINDS.index(SCENE)
+    data: dict[str, Any] = {
+        "cost": (("quantity", "target", "member"), costs),
+        "met_at": (("quantity", "target", "member"), met),
+        "setting": ("level", settings),
+        "work": (("level", "kind"), typical_work(variant, done, tops)),
+        **{name: (("level", "kind"), values) for name, values in _healthy(done, tops).items()},
+        "drawn": ("kind", [float((tops.known & (tops.kinds == kind)).sum()) for kind in range(len(KINDS))]),
+        "scene_error": (("level", "named"), stored(done.errors["axis"][:, scenes])),
+        "scene_work": (("level", "named"), done.work[:, scenes]),
+        "chart": ((), variant.charts()[0]),
+        "control": ((), variant.control or ""),
+        "needs": ((), variant.needs or ""),
+        "general": ((), float(variant.general or False)),
+        "budget": ((), budget),
+        "made": ((), float(np.isfinite(done.work).sum())),
+        "evaluated": ((), float(np.nansum(done.work))),
+    }
+    if guarded:
+        data |= {
+            name: (("level", "guarded"), stored(values))
+            for name, values in guarded_runs(variant, tops, done, guarded).items()
+        }
+    return xr.Dataset(data, coords={"quantity": list(ASKED), "target": list(TARGETS), "kind": list(KINDS)})
+
+
+def typical_work(variant: Integrator, done: Climb, tops: Tops) -> Array:
+    """Force evaluations of the median top of each kind, (LEVELS, kinds); NaN where a level was run on less than half.
+
+    A top that left takes as much more at a finer setting as the tops that stayed.
+    """
+    work = done.work.copy()
+    for level in range(1, LEVELS):
+        left = np.isnan(work[level])
+        with np.errstate(all="ignore"):
+            both = ~left & np.isfinite(work[level - 1])
+            ratio = np.median(work[level, both] / work[level - 1, both]) if both.any() else growth_of_work(variant)
+        work[level, left] = ratio * work[level - 1, left]
+    limit = [np.isfinite(setting_of(variant, level)) for level in range(LEVELS)]
+    kinds = [tops.known & (tops.kinds == kind) for kind in range(len(KINDS))]
+    each = [np.median(work[:, chosen], axis=1) if chosen.any() else np.full(LEVELS, np.nan) for chosen in kinds]
+    return np.where(np.array(limit)[:, np.newaxis], np.stack(each, axis=1), np.nan)
+
+
+def growth_of_work(variant: Integrator) -> float:
+    """By how much the work grows from one level to the next, if nothing is measured."""
+    return 2.0 if variant.fixed_step else 10.0 ** (1.0 / (variant.order or 20))
+
+
+def _healthy(done: Climb, tops: Tops) -> dict[str, Array]:
+    """Numbers of members judged, wrong, ended `ok` and silent failures, (LEVELS, kinds)."""
+    ran, error = np.isfinite(done.work), done.errors["axis"]
+    right_later = done.settled & ~ran & tops.known  # left before with an accurate run
+    wrong = ran & ~(error <= WRONG)
+    silent = wrong & done.ended & (done.errors["energy"] <= KEPT) & (done.errors[MOMENTA] <= KEPT)
+    counted = {"runs": ran | right_later, "wrong": wrong, "ended": done.ended | right_later, "silent": silent}
+    return {
+        name: np.stack([mask[:, tops.kinds == kind].sum(axis=1) for kind in range(len(KINDS))], axis=1).astype(float)
+        for name, mask in counted.items()
+    }
+
+
+def guarded_runs(variant: Integrator, tops: Tops, done: Climb, guarded: int) -> dict[str, Array]:
+    """What the guard foretells, what is watched and what is measured, for the first members; (LEVELS, guarded)."""
+    (chart,) = variant.charts()
+    seen = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured", "whole")}
+    each = [
+        np.flatnonzero(tops.known & part)
+        for part in (tops.kinds < KINDS.index(NATURAL), tops.kinds == KINDS.index(NATURAL))
+    ]
+    chosen = np.concatenate([each[0][: guarded // 2], each[1][: guarded // 2]])
+    for place, (top, start) in enumerate(tops.members(chosen)):
+        member = chosen[place]
+        scene = Scene(f"member-{member}", top, start, horizon=float(tops.times[member, -1]))
+        for level in range(GUARDED_LEVELS):
+            if math.isfinite(done.work[level, member]):
+                if variant.fixed_step:
+                    plan = Plan.steps(float(tops.period[member]) / FIRST * 0.5**level, tops.marks << level)
+                else:
+                    plan = Plan.until(tops.times[member], setting_of(variant, level))
+                expected = forecast(scene, variant, chart, plan)
+                seen["foretold"][level, place], seen["whole"][level, place] = expected.axis_error, expected.whole
+                seen["watched"][level, place] = max(done.errors[name][level, member] for name in ("energy", MOMENTA))
+                seen["measured"][level, place] = done.errors["axis"][level, member]
+    return seen

@@ -1,0 +1,135 @@
+"""Facts and tables of the study of engines: what each map does on two tops and on the population."""
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from symtop.methods.framework.registry import integrator, split_name
+from symtop.model.scenes import scene
+
+from .measures import HORIZON, SCENES
+
+SLOW, FAST = SCENES
+BETWEEN = (400.0, 3000.0)  # steps a nutation that the measured order is taken between
+NEAR = 5.0  # degrees: a top of the population is followed
+USUAL = 240.0  # steps a second that are quoted
+KEPT = 0.01  # relative change of the energy or the spin in the long run, beyond which it is not kept
+ROUNDING = 1e-12  # rad: below, rounding rules
+LOST = 1.0  # rad: the axis is anywhere
+WORSE = 1.5  # times the least error, beyond which the shortest step is worse than a longer one
+BESIDE = "strang[axis]"  # quoted beside the maps of engines
+
+
+def read(data: xr.DataTree, group: str, variable: str, **at: Any) -> np.ndarray:
+    """Values at some coordinates; NaN where none were measured."""
+    try:
+        return np.asarray(data[group][variable].sel(at).values)
+    except KeyError:
+        return np.array(math.nan)
+
+
+def curve(data: xr.DataTree, variant: str) -> tuple[np.ndarray, np.ndarray]:
+    """Steps a nutation on the slow top, and the axis error (rad) there."""
+    error = read(data, "tops", "axis", scene=SLOW, variant=variant)
+    good = np.isfinite(error)
+    return (data["tops"]["per_nutation"].values[good], error[good]) if good.any() else (np.empty(0), np.empty(0))
+
+
+def slope(count: np.ndarray, error: np.ndarray) -> float:
+    """The power of the step that an error follows; NaN from fewer than two."""
+    return -float(np.polyfit(np.log(count), np.log(error), 1)[0]) if np.size(error) > 1 else math.nan
+
+
+def long_time(data: xr.DataTree) -> float:
+    """The longer of the two horizons (s)."""
+    return float(np.max(data["tops"]["horizon"].values)) if "tops" in data.children else math.nan
+
+
+def frame(data: xr.DataTree, variable: str, variant: str, scene: str = SLOW, *, long: bool = False) -> float:
+    """A number at the usual step, or with the usual evaluations a second, after the short time or the long one."""
+    horizon = long_time(data) if long else HORIZON
+    return float(read(data, "tops", variable, scene=scene, variant=variant, rate=USUAL, horizon=horizon))
+
+
+def lines(data: xr.DataTree) -> pd.DataFrame:
+    """A line a variant, by name; errors are rad, `share` that of the population, `group` the order of its map."""
+    names = dict.fromkeys(str(name) for group in data.children.values() for name in group["variant"].values)
+    return pd.DataFrame(_lines(data, names)).set_index("variant", drop=False)
+
+
+def _lines(data: xr.DataTree, names: dict[str, None]) -> Iterator[dict[str, Any]]:
+    for name in names:
+        entry, (count, error) = integrator(name), curve(data, name)
+        part = (count > BETWEEN[0]) & (count < BETWEEN[1]) & (error > ROUNDING)
+        order, least = slope(count[part], error[part]), int(np.argmin(error)) if error.size else None
+        single, term = entry.precision == "single", not split_name(name)[0].startswith("no-gyro")
+        off = np.degrees(read(data, "population", "off", scene="population", variant=name))
+        yield {
+            "variant": name, "summary": entry.summary, "engine": entry.family == "engine", "single": single,
+            "term": term, "order": order, "group": 0.0 if not term else 1.0 if single else max(1.0, np.round(order)),
+            "best": math.nan if least is None else error[least],
+            "best_count": math.nan if least is None else count[least],
+            "last": math.nan if least is None else error[-1],
+            "slow": frame(data, "frame_axis", name), "fast": frame(data, "frame_axis", name, FAST),
+            "slow_level": frame(data, "level_axis", name), "fast_level": frame(data, "level_axis", name, FAST),
+            "energy": frame(data, "frame_energy", name, long=True), "spin": frame(data, "frame_spin", name, long=True),
+            "spherical": frame(data, "frame_spherical", name),
+            "share": math.nan if np.isnan(off).any() else np.mean(off <= NEAR),
+        }  # fmt: skip
+
+
+def facts(data: xr.DataTree) -> dict[str, Any]:
+    """The two ends of the field, at equal steps and equal cost, and what decides. Errors are rad."""
+    every = lines(data)
+    maps = every[every["engine"] & ~every["single"]]
+    turned, without = maps[maps["term"]], maps[~maps["term"]]
+    floors = every[every["single"] & every["term"]]["best"]
+    beside = every.loc[BESIDE] if BESIDE in every.index else dict.fromkeys(every.columns)
+    members = read(data, "population", "steps_a_nutation")
+    long = {name: maps[name].abs()[maps["slow"].notna()] for name in ("energy", "spin")}
+    answers: dict[str, Any] = {
+        "slow": SLOW, "fast": FAST, "fast_nutation": scene(FAST).nutation_period,  # s
+        "beside": BESIDE, "beside_fast_level": beside["fast_level"], "beside_share": beside["share"],
+        "near": NEAR, "usual": USUAL, "short": HORIZON, "long": long_time(data),  # s
+        "maps": len(maps) or None,  # of engines, in double precision
+        "members": members.shape[-1] if members.ndim else None,
+        "wall": without["best"].min(),  # without the term, at any step
+        "spherical": without["spherical"].max(),  # from the spherical top, which they follow
+        "share_least": maps["share"].min(), "share_most": maps["share"].max(),
+        "singles": floors.count() or None, "single_best": floors.min(),
+        "lost": int((turned["fast_level"] > LOST).sum()) if turned["fast_level"].notna().any() else None,
+        "turned": len(turned) or None,  # maps with the term
+        "limit": LOST, "kept": KEPT,
+        # a run that ended early has no energy or spin
+        **{f"{name}_lost": int((~(sizes <= KEPT)).sum()) if len(sizes) else None for name, sizes in long.items()},
+    }  # fmt: skip
+    for name, values, pick in (("best", turned["slow"], "min"), ("worst", turned["slow"], "max"),
+                               ("level_fast", maps["fast_level"], "min")):  # fmt: skip
+        known = values.dropna()
+        answers |= {
+            name: getattr(known, pick)(),
+            f"{name}_variant": getattr(known, f"idx{pick}")() if len(known) else None,
+        }
+    return answers
+
+
+def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
+    """What the order decides; every map at the usual step."""
+    every = lines(data).sort_values("slow", kind="stable")
+    groups = every[every["engine"] & ~every["single"]].groupby("group")
+    columns = {"slow": f"error on {SLOW} (rad)", "fast": f"error on {FAST} (rad)", "share": "share of tops followed"}
+    ranges = groups[list(columns)].agg(["min", "max"])
+    ranges.columns = pd.Index([f"{columns[name]}, {'least' if pick == 'min' else 'most'}" for name, pick in ranges])
+    orders = ranges.assign(maps=groups.size()).rename_axis("order").reset_index()
+    names = {
+        "variant": "variant", "summary": "what it is", "order": "order", "slow": columns["slow"],
+        "fast": columns["fast"], "share": columns["share"], "best": "least error (rad)",
+        "best_count": "at steps a nutation", "last": "error at the most steps (rad)",
+        "energy": f"energy, {long_time(data):g} s", "spin": f"spin, {long_time(data):g} s",
+        "spherical": "off the spherical top (rad)",
+    }  # fmt: skip
+    return {"orders": orders[["order", "maps", *ranges.columns]], "maps": every[list(names)].rename(columns=names)}

@@ -1,0 +1,154 @@
+"""Settings of equal accuracy, and their times.
+
+Dimensions: variant (such as ``rk45-numba[axis]``, see `cells`), horizon (nutation periods), target (of the axis
+error, rad), call, process. A time is the median over processes that are started for it, one after another, of the least
+sample of each: where memory and code lie differs from process to process and stays the same within one.
+"""
+
+import json
+import math
+import pickle
+import subprocess
+import sys
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from symtop.measure import settings
+from symtop.measure.timing import first_call, quartile_spread, timings
+from symtop.model.charts import Array
+from symtop.model.scenes import Scene
+
+from .cells import CALLS, COMPILED, NUMPY, SCIPY_NUMBA, SCIPY_PYTHON, Cell, caller, cells  # fmt: skip
+
+LEAST = 0.7  # of the target: the search ends with an error from here to the target, if nine runs suffice
+PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
+FINER = 1e-3  # of the target: the tolerance that a second search begins with
+NOISY, TRIES = 0.25, 3  # the distance of the quartiles over the median of a time that is taken again; how often
+ENOUGH = 0.08  # seconds of a function's samples in one process; those that are longer have two
+START = (
+    "from symtop.runner import scripts; scripts.install(); from symtop_studies.factors import measures; measures.{}()"
+)
+
+
+class Goal(NamedTuple):
+    """An accuracy over a horizon, and what takes part."""
+
+    nutations: float
+    target: float
+    languages: tuple[str, ...]
+    calls: tuple[str, ...]
+
+
+def settle(scene: Scene, grid: Sequence[Cell], goal: Goal) -> dict[Cell, settings.Met | str]:
+    """A setting of every cell that meets the goal, or the reason why there is none.
+
+    One search for each scheme and chart, in its first language; the others take the same setting, and their error is
+    measured again.
+    """
+    horizon = goal.nutations * scene.nutation_period
+    leaders: dict[tuple[str, str], settings.Met | str] = {}
+    settled: dict[Cell, settings.Met | str] = {}
+    for cell in grid:
+        pair, patience = (cell.scheme, cell.chart), PATIENCE[cell.language]
+        leader = leaders.get(pair)
+        if leader is None:
+            plan = {"patience": patience, "least": LEAST}
+            met = settings.search(scene, cell.method, goal.target, "axis", horizon, **plan)
+            if met == settings.STOPPED:  # the error of an adaptive method need not fall with every finer tolerance
+                met = settings.search(scene, cell.method, goal.target, "axis", horizon, FINER * goal.target, **plan)
+            settled[cell] = leaders[pair] = met
+        elif isinstance(leader, str):
+            settled[cell] = leader
+        elif leader.evaluations > patience:
+            settled[cell] = settings.BUDGET
+        else:
+            settled[cell] = settings.attempt(scene, cell.method, leader.setting, horizon, "axis")
+    return settled
+
+
+class Runs(NamedTuple):
+    """What a fresh process times on a scene: (variant, call, setting, horizon) of each run, in so many rounds."""
+
+    scene: Scene
+    runs: list[tuple[str, str, float, float]]
+    rounds: int
+    batch: float  # seconds
+
+
+def answer() -> None:
+    """What a fresh process does: `Runs` pickled on standard input, the least time of each as JSON on the other."""
+    asked: Runs = pickle.load(sys.stdin.buffer)  # noqa: S301  (of the process that started this one)
+    known = {cell.name: cell for cell in cells()}
+    functions: Any = [caller(asked.scene, known[name], *run) for name, *run in asked.runs]
+    for function in functions:
+        first_call(function)
+    taken = timings(functions, asked.rounds, asked.batch, warm=True, patience=ENOUGH)
+    print(json.dumps([timing.best for timing in taken]))  # noqa: T201
+
+
+def timed(asked: Runs, processes: int) -> Array:
+    """The least time of every run in each of some fresh processes, (runs, processes)."""
+    command = [sys.executable, "-c", START.format(answer.__name__)]  # named, so that a case depends on its code
+    answers = []
+    for _ in range(processes):
+        done = subprocess.run(command, input=pickle.dumps(asked), stdout=subprocess.PIPE, check=True)  # noqa: S603
+        answers.append(json.loads(done.stdout.splitlines()[-1]))
+    return np.array(answers).T
+
+
+def settled_times(asked: Runs, processes: int) -> Array:
+    """As `timed`, with those that are noisy taken again."""
+    taken = timed(asked, processes)
+    for _ in range(TRIES - 1):
+        loud = np.flatnonzero(quartile_spread(taken) > NOISY)
+        if not loud.size:
+            break
+        again = timed(asked._replace(runs=[asked.runs[i] for i in loud]), processes)
+        closer = quartile_spread(again) < quartile_spread(taken[loud])
+        taken[loud[closer]] = again[closer]
+    return taken
+
+
+def factorial(
+    scene: Scene, schemes: Sequence[str] | None, goals: Sequence[Goal], rounds: int, batch: float, processes: int
+) -> Any:
+    """The factorial of one scene: settings, errors and times of all cells for all goals."""
+    grid = cells(schemes)
+    horizons, targets = sorted({goal.nutations for goal in goals}), sorted({goal.target for goal in goals})[::-1]
+    shape = len(grid), len(horizons), len(targets)
+    names = "setting", "axis", "axis_bound", "force_evaluations"
+    numbers = {name: np.full(shape, math.nan) for name in names}
+    reasons = np.full(shape, "", dtype=object)
+    samples = np.full((*shape, len(CALLS), processes), math.nan)
+    spread = np.full((*shape, len(CALLS)), math.nan)
+    places, runs = [], []
+    for goal in goals:
+        part = [cell for cell in grid if cell.language in goal.languages]
+        settled = settle(scene, part, goal)
+        at = horizons.index(goal.nutations), targets.index(goal.target)
+        for cell, met in settled.items():
+            if isinstance(met, str):
+                reasons[(grid.index(cell), *at)] = met
+                continue
+            for name, value in zip(names, (met.setting, met.error, met.bound, met.evaluations), strict=True):
+                numbers[name][(grid.index(cell), *at)] = value
+            for call in goal.calls:
+                if caller(scene, cell, call, met.setting, met.horizon) is not None:
+                    places.append((grid.index(cell), *at, CALLS.index(call)))
+                    runs.append((cell.name, call, met.setting, met.horizon))
+    times = settled_times(Runs(scene, runs, rounds, batch), processes)
+    for place, taken, wide in zip(places, times, quartile_spread(times), strict=True):
+        samples[place], spread[place] = taken, wide
+    dims = ("variant", "horizon", "target")
+    table = xr.Dataset(
+        {name: (dims, values) for name, values in numbers.items()}
+        | {"reason": (dims, reasons.astype(str)), "seconds_samples": ((*dims, "call", "process"), samples)},
+        coords={
+            "variant": [cell.name for cell in grid], "horizon": horizons, "target": targets, "call": list(CALLS),
+        },
+    )  # fmt: skip
+    dims = (*dims, "call")
+    return table.assign({"seconds": (dims, np.median(samples, -1)), "spread": (dims, spread)})

@@ -1,1 +1,0 @@
-"""Does the verdict hold for tops that nobody picked?"""

@@ -1,0 +1,91 @@
+"""Facts and tables of the reduction study, from its dataset."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from .tables import CHART_PERIODS, COMMUTES, COMPARED_STEPS, GAPS, chart_ratios, commutation_order
+
+WORST = "largest difference (rad)"
+AS_FAST = 1.1  # times as long: what the noise of a time hides
+
+
+def cells(data: xr.Dataset, variable: str) -> list[tuple[str, str, xr.Dataset]]:
+    """Scene, integrator and data of the cells in which a variable was measured."""
+    if variable not in data:
+        return []
+    there = np.isfinite(data[variable]).any([dim for dim in data[variable].dims if dim not in ("scene", "variant")])
+    return [
+        (str(scene), str(name), data.sel(scene=scene, variant=name))
+        for scene in data["scene"].values
+        for name in data["variant"].values
+        if there.sel(scene=scene, variant=name)
+    ]
+
+
+def facts(data: xr.Dataset) -> dict[str, Any]:
+    """Which rules commute with the reduction (rad), how far an unreduced form is from its kernel, what charts cost."""
+    gaps, kernels, charts = tables(data).values()
+    compared = cells(data, "theta_gap")
+    same, apart = (gaps[(gaps[WORST] < COMMUTES) == wanted] for wanted in (True, False))
+    slowest = charts.loc[charts["time (ratio)"].idxmax()] if len(charts) else {}
+    return {
+        "charts_periods": CHART_PERIODS,  # nutations
+        "compared_steps": COMPARED_STEPS,
+        "as_fast": AS_FAST - 1.0,
+        "commuting": listed(same["rule"]),
+        "commuting_gap": same[WORST].max(),
+        "others": listed(apart["rule"]),
+        "power_least": apart["power of h"].min(), "power_most": apart["power of h"].max(),
+        "rules": listed(name for _, name, _ in compared),
+        "twins_gap": max((float(cell[gap].max()) for *_, cell in compared for gap in GAPS), default=None),
+        "step_least": kernels["time (ratio)"].min(), "step_most": kernels["time (ratio)"].max(),
+        "iterations_least": kernels["iterations (ratio)"].min(), "iterations_most": kernels["iterations (ratio)"].max(),
+        "charts": len(charts) or None,
+        "charts_as_fast": int((charts["time (ratio)"] <= AS_FAST).sum()) if len(charts) else None,
+        "slowest": slowest.get("variant"),
+        "slowest_time": slowest.get("time (ratio)"),
+    }  # fmt: skip
+
+
+def listed(names: Iterable[str]) -> str | None:
+    """Names, each once."""
+    return ", ".join(dict.fromkeys(names)) or None
+
+
+def commutation(data: xr.Dataset) -> pd.DataFrame:
+    """The difference of reducing first and last by scene and rule; no power of h where it is rounding."""
+    rows = []
+    for scene, rule, cell in cells(data, "commutation_gap"):
+        gap, worst = cell["commutation_gap"].dropna("commutation_step").values, float(cell["commutation_gap"].max())
+        power = None if worst < COMMUTES else commutation_order(cell)
+        rows.append([scene, rule, power, worst, gap[-1], float(cell["commutation_step_size"].max())])
+    header = ["scene", "rule", "power of h", WORST, "at the finest step (rad)", "coarsest step (s)"]
+    return pd.DataFrame(rows, columns=header).astype({"power of h": float})
+
+
+def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
+    """Reducing first or last; kernels and their unreduced forms at each step; every chart against the smallest."""
+    kernels, charts = [], []
+    for scene, rule, cell in cells(data, "seconds_per_step"):
+        for step in range(cell.sizes["twin_step"]):
+            at = cell.isel(twin_step=step)
+            seconds, done = (at[name].sel(kernel=["reduced", "unreduced"]).values
+                             for name in ("seconds_per_step", "iterations_per_step"))  # fmt: skip
+            time, more = seconds[1] / seconds[0], done[1] / done[0]
+            kernels.append([scene, rule, float(at["twin_step_size"]), time, more, time / more, *seconds, *done])
+    for scene, method, cell in cells(data, "seconds"):
+        for one in chart_ratios(cell):
+            name = f"{method}[{one.chart}]"
+            charts.append([scene, name, one.base, one.time, one.error])
+    header = ["scene", "rule", "step (s)", "time (ratio)", "iterations (ratio)", "time of an iteration (ratio)",
+              "a step, reduced (s)", "unreduced (s)", "iterations a step, reduced", "unreduced"]  # fmt: skip
+    over = ["scene", "variant", "against", "time (ratio)", "axis error (ratio)"]
+    return {
+        "commutation": commutation(data),
+        "kernels": pd.DataFrame(kernels, columns=header),
+        "charts": pd.DataFrame(charts, columns=over).sort_values("time (ratio)", ascending=False, kind="stable"),
+    }

@@ -1,0 +1,1 @@
+"""How fast is a well-known method at the accuracy I need?"""

@@ -1,0 +1,78 @@
+"""Facts and the table of the study: what each method takes to reach an error."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from symtop.methods.framework.registry import integrator, integrators, split_name
+from symtop.runner.study import REFERENCE
+
+SHOWN = "goldstein"  # the scene of the figure
+TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)  # rad
+SCIPY, SAME = "rk45[axis]", "rk45-compiled[axis]"  # the same formulas, called through SciPy and compiled
+
+
+def shown(data: xr.Dataset) -> xr.Dataset:
+    """The scene and the run length of the figure."""
+    return data.sel(scene=SHOWN if SHOWN in data["scene"].values else data["scene"].values[0]).isel(nutations=0)
+
+
+def cost(cell: xr.Dataset, target: float, unit: str = "seconds", quantity: str = "axis") -> float:
+    """The least cost of a run of a variant whose error is at most the target, between settings as a power; or inf."""
+    error, paid = cell[quantity].values, cell[unit].values
+    good = np.isfinite(error) & np.isfinite(paid) & (error > 0.0)
+    error, paid = np.log(error[good]), np.log(paid[good])
+    answers = [math.inf]
+    for k in np.flatnonzero(error <= math.log(target)):
+        if k and error[k - 1] > math.log(target):
+            part = (math.log(target) - error[k - 1]) / (error[k] - error[k - 1])
+            answers.append(math.exp(paid[k - 1] + part * (paid[k] - paid[k - 1])))
+        else:
+            answers.append(math.exp(paid[k]))
+    return min(answers)
+
+
+def costs(data: xr.Dataset, target: float) -> dict[str, float]:
+    """Seconds of each variant that reaches an axis error in the figure, the least first."""
+    part = shown(data)
+    names = [str(name) for name in part["variant"].values if split_name(str(name))[0] != REFERENCE]
+    known = {name: cost(part.sel(variant=name), target) for name in names}
+    return dict(sorted(((name, one) for name, one in known.items() if one < math.inf), key=lambda item: item[1]))
+
+
+def for_any_body(name: str) -> bool:
+    """Does a method exist for a body without symmetry?"""
+    method = split_name(name)[0]
+    return method in integrators() and bool(integrator(method).general)
+
+
+def facts(data: xr.Dataset) -> dict[str, Any]:
+    """The fastest methods for any body at each error (s), the closed form (s), and what SciPy's loop costs."""
+    part = shown(data)
+    answers: dict[str, Any] = {
+        "scene": str(part["scene"].values), "nutations": float(part["nutations"]),
+        "scenes": ", ".join(map(str, data["scene"].values)),
+        "lengths": " and ".join(f"{length:g}" for length in data["nutations"].values),
+        "variants": data.sizes["variant"] - 1,
+        "bound": float(part["axis_bound"].min()),  # rad, what the truth can judge
+    }  # fmt: skip
+    for target in TARGETS:
+        first = next(((name, one) for name, one in costs(data, target).items() if for_any_body(name)), (None, None))
+        answers |= {
+            f"fastest_{-math.log10(target):.0f}": first[0],
+            f"fastest_{-math.log10(target):.0f}_seconds": first[1],
+        }
+    taken = costs(data, 1e-6)
+    both = SCIPY in taken and SAME in taken
+    return answers | {"scipy": taken[SCIPY] / taken[SAME] if both else None}  # times as long, at 1e-6 rad
+
+
+def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
+    """Microseconds of a run to each error in the figure, the fastest at 1e-6 rad first."""
+    by_target = {target: costs(data, target) for target in TARGETS}
+    names = dict.fromkeys(name for target in (1e-6, *TARGETS) for name in by_target[target])
+    rows = [[name, *(1e6 * by_target[target].get(name, math.nan) for target in TARGETS)] for name in names]
+    return {"times": pd.DataFrame(rows, columns=["variant", *(f"{target:.0e} rad (us)" for target in TARGETS)])}

@@ -1,0 +1,105 @@
+"""Figure 1, error against run time, and the chart of all runs to point at."""
+
+import math
+from itertools import product
+
+import numpy as np
+import xarray as xr
+
+from symtop.methods.framework.registry import split_name
+from symtop.report.figures import MOST_NAMED, error_band, label_lines
+from symtop.report.style import BLACK, BLUE, GREEN, LEAST_TEXT, ORANGE, PURPLE, SKY, VERMILLION, look, panels
+from symtop.runner.study import REFERENCE, Chart, Picture, Series
+
+from .facts import shown
+
+PALE, SCIPY = "#B8B8B8", (0, (1.2, 1.4))
+LINES = {  # label, colour and line; what is not here is pale
+    "stormer-verlet[angles]": ("Störmer-Verlet", GREEN, "-"),
+    "midpoint[angles]": ("midpoint (discrete Lagrangian)", BLUE, "-"),
+    "trapezoidal[angles]": ("trapezoidal (discrete Lagrangian)", SKY, "-"),
+    "rk4[axis]": ("RK4", ORANGE, "-"),
+    "rk45-compiled[axis]": ("RK45, compiled", VERMILLION, "-"),
+    "dop853-compiled[axis]": ("DOP853, compiled", "#8C510A", "-"),
+    "gauss-8[axis]": ("Gauss 8", PURPLE, "-"),
+    "strang[axis]": ("Strang splitting", "#66A61E", "-"),
+    "takahashi-imada[axis]": ("Takahashi-Imada (symmetric)", "#00573F", "-"),
+    "taylor[axis]": ("Taylor (heyoka)", BLACK, "-"),
+    "rk45[axis]": ("RK45 through SciPy", VERMILLION, SCIPY),
+}
+OTHERS = {  # pale ones
+    "series[axis]": ("Taylor for this top", PALE, "-"), "dop853[axis]": ("DOP853 through SciPy", PALE, SCIPY),
+    "tsit5-fixed[axis]": ("Tsit5", PALE, "-"), "vern9-fixed[axis]": ("Vern9", PALE, "-"),
+}  # fmt: skip
+LEAST, MOST = 1e-16, 3.0  # rad, of the panel
+COSTS = {"time of a run, one core (s)": "seconds", "force evaluations": "force_evaluations"}
+ERRORS = {
+    "largest error of the axis (rad)": "axis", "largest error of the attitude (rad)": "attitude",
+    "largest error of the energy / (E0 - min V)": "energy", "largest error of p_phi / larger momentum": "p_phi",
+}  # fmt: skip
+
+
+def pictures(data: xr.Dataset) -> list[Picture]:
+    """Error of the axis against the time of a run on one scene."""
+    part = shown(data)
+    figure, axes = panels(1, 1, height=3.5)
+    axis, ends = axes[0, 0], []
+    axis.set(xscale="log", yscale="log", ylim=(LEAST, MOST))
+    axis.set_xlabel(f"time of a run of {float(part['nutations']):g} nutations, one core (s)")
+    axis.set_ylabel("largest error of the axis (rad)")
+    level = error_band(axis, part["axis_bound"].values)
+    few = part.sizes["variant"] <= MOST_NAMED
+    for name in map(str, part["variant"].values):
+        cell = part.sel(variant=name)
+        x, y = (cell[key].values for key in ("seconds", "axis"))
+        good = np.isfinite(x) & np.isfinite(y) & (y < MOST)
+        if name == REFERENCE or not good.any():
+            continue
+        other = split_name(name)[0], look(name).color if few else PALE, "-"
+        label, color, dash = (LINES | OTHERS).get(name, other)
+        x, y = x[good], np.maximum(y[good], 0.3 * level)
+        thick = (1.0, 1.5, 1.5) if color == PALE else (1.7, 2.4, 2.0)
+        axis.plot(x, y, color=color, ls=dash, marker="o", **dict(zip(("lw", "ms", "zorder"), thick, strict=True)))
+        ends.append((label, color, x, y))
+    axis.text(0.995, math.sqrt(LEAST * level), "below the bound of the truth ", transform=axis.get_yaxis_transform(),
+              ha="right", va="center", fontsize=LEAST_TEXT, color="#444444")  # fmt: skip
+    walls = []
+    if REFERENCE in part["variant"].values:
+        exact = float(part["seconds"].sel(variant=REFERENCE).min())
+        walls = [([exact] * 40, np.geomspace(LEAST, MOST, 40)), ([0.85 * exact] * 40, np.geomspace(LEAST, MOST, 40))]
+        axis.axvline(exact, color="#555555", ls=(0, (1, 2)), lw=1.0)
+        place = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "ha": "right", "va": "bottom"}
+        axis.annotate("exact motion, no integrator", (exact, 0.16), (-2, 0), rotation=90, color="#444444",
+                      fontsize=LEAST_TEXT, **place)  # fmt: skip
+    low, high = axis.get_xlim()
+    axis.set_xlim(low, 6.0 * high)  # with room for the labels
+    label_lines(axis, ends, walls)
+    return [Picture("error-against-time", figure)]
+
+
+def charts(data: xr.Dataset) -> list[Chart]:
+    """Every run: two costs and four errors to choose from, a panel a scene and run length."""
+    names = list(map(str, data["variant"].values))
+    every, marks = {}, {}
+    for scene, length in product(map(str, data["scene"].values), data["nutations"].values):
+        cell, title = data.sel(scene=scene, nutations=length), f"{scene} | {length:g} nutations"
+        every[title] = [Series(name, _points(cell.sel(variant=name))) for name in names if name != REFERENCE]
+        if REFERENCE in names:
+            one = cell.sel(variant=REFERENCE)
+            marks[title] = (float(one["seconds"].min()), float(one["axis_bound"].min()))
+    costs = {name: place for place, name in enumerate(COSTS)}
+    errors = {name: len(COSTS) + place for place, name in enumerate(ERRORS)}
+    return [Chart("runs", "Error against cost of every run", costs, errors, every, ("scene", "run length"), marks)]
+
+
+def _points(cell: xr.Dataset) -> list[tuple[float | str | None, ...]]:
+    """Costs and errors of each run with three digits, None where there is none, and its setting in words."""
+    columns = [cell[key].values for key in (*COSTS.values(), *ERRORS.values())]
+    made = []
+    for k in np.flatnonzero(np.isfinite(cell["seconds"].values)):
+        numbers = [
+            float(f"{column[k]:.3g}") if np.isfinite(column[k]) and column[k] > 0.0 else None for column in columns
+        ]
+        step, tolerance = (float(cell[key].values[k]) for key in ("step_size", "tolerance"))
+        made.append((*numbers, f"step {step:.3g} s" if np.isfinite(step) else f"tolerance {tolerance:.1g}"))
+    return made

@@ -1,0 +1,164 @@
+"""Facts and tables of the stability study, from its dataset."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from symtop.methods.framework.registry import split_name
+
+from .atlas import COMMON, FAST, NEAR, SLOW, families, halved_by_pole, map_of, maps, methods_of
+from .failures import LOST
+from .mechanisms import BARELY, limits, measured, misses, resonant, sampled
+from .tables import PERIODS
+
+QUOTED = "stormer-verlet[angles]"  # whose numbers are quoted
+NAMES = (  # of all facts that are measured
+    "family", "stepped", "fast_variant", "fast_reach", "slow_variant", "slow_reach", "slow_none", "shortest",
+    "quoted_fast", "quoted_fails", "silent", "cells", "settled", "checks", "refuted", "angles", "angles_halved",
+    "others", "others_halved", "limited", "limit_least", "limit_variant", "resonant", "turned", "sleep_step",
+    "strang_sleeps", "cayley_sleeps", "sleep_miss", "law_middle", "sampled", "hidden", "small", "one_iteration",
+    "solved",
+)  # fmt: skip
+
+
+def facts(data: xr.Dataset) -> dict[str, Any]:
+    """How far methods are accurate and how they fail; what each mechanism does. Steps of maps are in nutations."""
+    answers: dict[str, Any] = dict.fromkeys(NAMES)
+    answers |= {"periods": PERIODS, "slow": SLOW, "fast": FAST, "near": NEAR, "barely": BARELY, "lost": LOST,
+              "common": COMMON}  # fmt: skip
+    if family := next(iter(families(data)), None):
+        answers |= atlas_facts(data, family)
+    for scene, variable, read in READ:
+        if measured(data, scene, variable):
+            answers |= read(data.sel(scene=scene))
+    return answers
+
+
+def atlas_facts(data: xr.Dataset, family: str) -> dict[str, Any]:
+    """The shares and reaches of the maps over the spin of one family."""
+    shown, known = maps(data, family), methods_of(data)
+    steps = {name: one for name, one in shown.items()
+             if one.control == "step_size" and not (name in known and known[name].exact_steps)}  # fmt: skip
+    made = np.concatenate([one.made.ravel() for one in shown.values()])
+    answers = {
+        "family": family,
+        "silent": float(pd.Series([one.silent for one in shown.values()]).median()),  # of the inaccurate runs
+        "cells": made.size,
+        "settled": 1.0 - made.mean(),  # share that was not run
+        **{name: int(data[name].sel(scene=family).sum()) for name in ("checks", "refuted")},
+    }
+    if steps:
+        for kind in ("fast", "slow"):
+            best = max(steps, key=lambda name: np.nan_to_num(steps[name].usual_reach[kind]))
+            answers |= {f"{kind}_variant": best, f"{kind}_reach": steps[best].usual_reach[kind]}
+        answers |= {"stepped": len(steps), "shortest": min(float(one.settings[0]) for one in steps.values()),
+                  "slow_none": sum(one.usual_reach["slow"] == 0.0 for one in steps.values())}  # fmt: skip
+    if QUOTED in steps:
+        answers |= {"quoted_fast": steps[QUOTED].usual_reach["fast"], "quoted_fails": steps[QUOTED].failure.setting}
+    return answers
+
+
+def pole_facts(part: xr.Dataset) -> dict[str, Any]:
+    """Of how many variants of fixed step a pole halves the accurate step, in angles and in other charts."""
+    halved: dict[bool, list[bool]] = {True: [], False: []}
+    for name, method in methods_of(part).items():
+        halves = halved_by_pole(map_of(part.sel(variant=name)))
+        if halves is not None and method.control == "step_size":
+            halved[method.charts() == ("angles",)].append(halves)
+    groups = {"angles": halved[True], "others": halved[False]}
+    answers = {name: len(group) for name, group in groups.items() if group}
+    return answers | {f"{name}_halved": sum(groups[name]) for name in answers}
+
+
+def resonance_facts(part: xr.Dataset) -> dict[str, Any]:
+    """Where small nutations grow (h omega), and how many variants a third of a turn a step loses a top with."""
+    phases = limits(part)
+    least = min(phases, key=lambda name: phases[name], default=None)
+    return {"limited": len(phases), "limit_least": phases.get(least), "limit_variant": least,
+            "resonant": len(resonant(part)), "turned": int(part["third_turn_phase"].count())}  # fmt: skip
+
+
+def sleeping_facts(part: xr.Dataset) -> dict[str, Any]:
+    """The spin from which a top sleeps at the longest step, and how far all of them are from theory."""
+    answers: dict[str, Any] = {"sleep_step": float(part["sleeping_step"].max())}
+    misses_ = []
+    for name, method in methods_of(part).items():
+        cell = part.sel(variant=name).dropna("rung", subset=["sleeping_threshold"])
+        if method.sleeps_from is not None and cell.sizes["rung"]:
+            steps, spins = (cell[key].values for key in ("sleeping_step", "sleeping_threshold"))
+            misses_ += [abs(one - method.sleeps_from(float(h))) for h, one in zip(steps, spins, strict=True)]
+            if split_name(name)[0] in ("strang", "cayley"):
+                answers[f"{split_name(name)[0]}_sleeps"] = float(spins[-1])
+    return answers | {"sleep_miss": max(misses_, default=None)}
+
+
+def sampling_facts(part: xr.Dataset) -> dict[str, Any]:
+    """What an energy error sampled once a nutation hides, and the share of the solver in that of the midpoint rule."""
+    hidden, ratios = sampled(part)
+    answers: dict[str, Any] = {"sampled": len(hidden) + len(ratios), "hidden": len(hidden),
+                               "small": sum(ratio > 10.0 for ratio in ratios.values())}  # fmt: skip
+    if "plain_energy" in part:
+        rule = part.dropna("variant", how="all", subset=["one_iteration_energy"]).isel(variant=0)
+        answers |= {"one_iteration": float(rule["one_iteration_energy"]),
+                  "solved": float(rule["plain_energy"][-1])}  # fmt: skip
+    return answers
+
+
+READ = (
+    ("grazing", "outcome", pole_facts), ("steady-fast", "third_turn_phase", resonance_facts),
+    ("sleeping", "sleeping_threshold", sleeping_facts), ("goldstein", "energy_once", sampling_facts),
+    ("separatrix", "horizon", lambda part: {"law_middle": float(pd.Series(misses(part)).median())}),  # 1/λ
+)  # fmt: skip
+
+
+def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
+    """Every map in numbers, the largest accurate share first; every limit in numbers."""
+    return {"atlas": atlas_table(data), "limits": limits_table(data)}
+
+
+def atlas_table(data: xr.Dataset) -> pd.DataFrame:
+    """A row for each family and variant; steps are in nutation periods."""
+    rows: list[dict[str, Any]] = []
+    for family in families(data):
+        for name, one in maps(data, family).items():
+            limit = data["linear_limit"].sel(scene=family, variant=name) if "linear_limit" in data else None
+            rows.append({
+                "variant": name, "scene": family, "set": one.control.replace("step_size", "step"),
+                "accurate (%)": 100.0 * one.accurate,
+                "accurate up to, fast tops": one.usual_reach["fast"],
+                "accurate up to, slow tops": one.usual_reach["slow"],
+                "fails from": one.failure.setting, "fails mostly by": one.failure.kind.replace("_", " "),
+                "ended early (%)": 100.0 * one.early, "wrong without an error (%)": 100.0 * one.silent,
+                "small nutations grow from": None if limit is None else float(limit.min()),
+            })  # fmt: skip
+    place = {"step": 0, "tolerance": 1, "none": 2}
+    table = pd.DataFrame(rows)
+    return table if table.empty else table.sort_values(
+        ["set", "accurate (%)"], key=lambda column: column.map(place) if column.name == "set" else -column
+    )  # fmt: skip
+
+
+LIMITS = {  # header: scene, variable
+    "nutations grow at h omega": ("steady-fast", "limit_phase"),
+    "first window of growth from": ("steady-fast", "window_start"),
+    "a third of a turn at": ("steady-fast", "third_turn_phase"),
+    "survives there (rad)": ("steady-fast", "surviving_at_third_turn"),
+    "sleeps from a spin of": ("sleeping", "sleeping_threshold"),
+    "energy error, every step": ("goldstein", "energy_every"),
+    "energy error, once a nutation": ("goldstein", "energy_once"),
+}
+
+
+def limits_table(data: xr.Dataset) -> pd.DataFrame:
+    """Limits of every variant of fixed step, the least linear limit first; of several steps the longest."""
+    there = {key: one for key, one in LIMITS.items() if one[0] in data["scene"].values and one[1] in data}
+    columns = {
+        key: data[name].sel(scene=scene).transpose("variant", ...).values for key, (scene, name) in there.items()
+    }
+    table = pd.DataFrame({"variant": data["variant"].values.astype(str)} | {
+        key: values if values.ndim == 1 else values[:, -1] for key, values in columns.items()
+    }).dropna(how="all", subset=list(columns))  # fmt: skip
+    first = next(iter(LIMITS))
+    return table.sort_values(first, kind="stable") if first in table else table

@@ -1,0 +1,85 @@
+"""What the measurements of single mechanisms say, each read from its scene of the dataset."""
+
+import math
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from .atlas import methods_of
+
+BARELY = 0.02  # rad: a top that is lost at a smaller displacement is lost to a resonance
+NEXT = 1.05  # times the largest displacement up to which all stay, at most: the first that was lost
+REVIVAL = 3.0  # times more survives past a resonance than in it; what stays dead beyond is no resonance
+LEAST_SAMPLED = 1e-14  # an energy error that is rounding
+LEAST_ASKED = 1e-12  # an energy error at every step from which on one asks what samples show of it
+OUTLASTS = 10.0  # 1/λ: two and a half digits more than the early error has
+EARLY = 1e-15, 1e-2  # rad, axis errors that predict the time next to a separatrix: above rounding, still small
+
+
+def measured(data: xr.Dataset, scene: str, variable: str) -> bool:
+    """Does any variant have a value of a variable on a scene?"""
+    return (
+        scene in data["scene"].values
+        and variable in data
+        and bool(np.isfinite(data[variable].sel(scene=scene).values).any())
+    )
+
+
+def variants_with(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
+    """The variants that have a value of a variable, by name."""
+    cells = {str(name): part.sel(variant=name) for name in part["variant"].values if variable in part}
+    return {name: cell for name, cell in cells.items() if np.isfinite(cell[variable].values).any()}
+
+
+def limits(part: xr.Dataset) -> dict[str, float]:
+    """The least step, as h omega, at which small nutations grow, of the methods that have a limit."""
+    return {
+        name: float(np.fmin(cell["limit_phase"], cell.get("window_start", math.nan)))
+        for name, cell in variants_with(part, "limit_phase").items()
+    }  # a narrow window may come first
+
+
+def resonant(part: xr.Dataset) -> dict[str, float]:
+    """By variant the linearly stable steps (h omega) where some small displacement is lost, and none just past."""
+    phases = {}
+    for name, cell in variants_with(part, "third_turn_phase").items():
+        at, past = float(cell["surviving_at_third_turn"]), float(cell["surviving_past_third_turn"])
+        if past > REVIVAL * at and NEXT * at < BARELY:
+            phases[name] = float(cell["third_turn_phase"])
+    return phases
+
+
+def outlasting(part: xr.Dataset) -> list[str]:
+    """Variants with a run that stays accurate next to the separatrix longer than predicted, by over `OUTLASTS`."""
+    longer = (part["horizon"] - part["predicted_horizon"]).transpose("variant", ...).values
+    variants = zip(map(str, part["variant"].values), longer, strict=True)
+    return [name for name, values in variants if np.max(values[np.isfinite(values)], initial=0.0) > OUTLASTS]
+
+
+def lawful(part: xr.Dataset) -> xr.DataArray:
+    """To which runs next to the separatrix does the law of their early error apply?"""
+    early, methods, apart = part["early_error"], methods_of(part), outlasting(part)
+    conserving = [
+        name in apart or (name in methods and "energy" in (methods[name].conserves or ()))
+        for name in map(str, part["variant"].values)
+    ]
+    return (early < EARLY[1]) & (early > EARLY[0]) & ~xr.DataArray(conserving, dims="variant")
+
+
+def misses(part: xr.Dataset) -> NDArray[np.float64]:
+    """By how much the law misses the accurate time of the runs to which it applies, in units of 1/λ."""
+    gap = np.abs(part["horizon"] - part["predicted_horizon"]).where(lawful(part)).values
+    return np.asarray(gap[np.isfinite(gap)])
+
+
+def sampled(part: xr.Dataset) -> tuple[list[str], dict[str, float]]:
+    """Variants whose energy error is at rounding if sampled once a nutation; how much too small those of others look.
+
+    No ratio is formed with a number at rounding.
+    """
+    pairs = {name: (float(cell["energy_once"]), float(cell["energy_every"]))
+             for name, cell in variants_with(part, "energy_once").items()}  # fmt: skip
+    asked = {name: pair for name, pair in pairs.items() if pair[1] > LEAST_ASKED}
+    hidden = [name for name, (once, _) in asked.items() if once <= LEAST_SAMPLED]
+    return hidden, {name: every / once for name, (once, every) in asked.items() if name not in hidden}

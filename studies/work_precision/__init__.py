@@ -1,1 +1,0 @@
-"""Which integrator is fastest at the accuracy I need?"""

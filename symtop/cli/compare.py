@@ -1,0 +1,118 @@
+"""``symtop compare``: error against run time of some methods on one scene, as a table, a figure and a dataset."""
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from symtop.cli.common import (
+    File,
+    as_text,
+    check_outputs,
+    completing,
+    json_option,
+    plugin_option,
+    say,
+    say_written,
+    table,
+    warn,
+)  # fmt: skip
+from symtop.core.progress import ticking
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+TARGETS = (1e-3, 1e-6, 1e-9)  # whose cheapest runs are shown
+FACTS = ("scene", "quantity", "horizon", "nutations", "cost", "timed", "budget")
+COLUMNS = ("step_size", "tolerance", "steps_per_nutation", "error", "seconds", "seconds_spread", "force_evaluations")
+
+
+@click.command(short_help="Compare methods on one scene: error against run time.")
+@click.argument("scene", shell_complete=completing("scenes"))
+@click.argument("methods", nargs=-1, required=True, shell_complete=completing("integrators"))
+@click.option("--quantity", default="axis", show_default=True, help="Error of what: axis, attitude, theta, energy, ...")
+@click.option("--cost", default="time", show_default=True, help="time, or evaluations, and nothing is timed.")
+@click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
+@click.option("--nutations", type=float, help="In place of a horizon: nutation periods.")
+@click.option("--budget", type=float, help="Most force evaluations of a run; 3e6 by default, 5e4 of plain Python.")
+@click.option("--output", "-o", type=File(), help="Write all runs to this netCDF file.")
+@click.option("--figure", type=File(), help="Draw error against cost: .png, .svg or .pdf.")
+@plugin_option
+@json_option
+def compare(
+    scene: str, methods: tuple[str, ...], output: str | None, figure: str | None, as_json: bool, **options: Any
+) -> None:
+    """Compare METHODS on one SCENE: which is cheapest for an error of 1e-3, 1e-6 and 1e-9?
+
+    A method is a name, or a variant such as rk4[angles]; without a chart it runs in the smallest one that shows the
+    quantity. FILE.py:NAME, a library and a command are steps of your own, as symtop judge takes them. Each is run from
+    coarse settings to fine ones, and its runs are timed against those of the others.
+
+    \b
+    symtop compare goldstein stormer-verlet midpoint rk4 dop853 taylor --figure c.png
+    symtop compare spheroid strang "rk4[angles]" bullet --nutations 10 --cost evaluations --output c.nc
+    symtop compare spheroid my.py:step rk4
+    """
+    check_outputs(output=output, figure=figure)
+    with ticking("loading"):
+        from symtop.core import netcdf
+        from symtop.judging import comparison
+        from symtop.judging.findings import pace
+        from symtop.measure.sweep import failed_setting
+        from symtop.measure.timing import NOISY
+
+    data = comparison.compare(scene, methods, **options)
+    if output is not None:
+        netcdf.write(data, output)
+    if figure is not None:
+        from symtop.report.plot import draw_compare
+
+        draw_compare(data, figure)
+    places = {target: comparison.cheapest(data, target).tolist() for target in TARGETS}
+    cells = [data.isel(variant=k) for k in range(data.sizes["variant"])]
+    records = [[_record(cell, target, places[target][k]) for target in TARGETS] for k, cell in enumerate(cells)]
+    if as_json:
+        facts = {name: (data.attrs | {"scene": scene})[name] for name in FACTS}
+        click.echo(
+            as_text(
+                facts
+                | {"exact_seconds": data["exact_seconds"].item(), "cheapest": [one for own in records for one in own]}
+            )
+        )
+        return
+    timed, end, count = options["cost"] == "time", data.attrs["horizon"], data.attrs["nutations"]
+    say(f"{scene} to t = {end:.6g} ({count:.3g} nutations): the cheapest run by {options['cost']}")
+    say(f"steps a nutation or tolerance{', time' * timed}, force evaluations; error of {data.attrs['quantity']}")
+    rows = [[str(data["variant"].values[k]), *(_cell(one, timed) for one in own)] for k, own in enumerate(records)]
+    click.echo(table(["variant", *map("error {:.0e}".format, TARGETS)], rows))
+    for cell in cells:
+        least = cell["error"].min().item()
+        words = [str(one) for one in cell["message"].values if one][:1] or [failed_setting(cell)]
+        words += [f"its least error was {least:.1e}"] if least > TARGETS[-1] else []
+        if any(words):
+            say(f"{cell['variant'].item()}: {'; '.join(filter(None, words))}")
+    if timed:
+        exact = pace(data["exact_seconds"].item())
+        say(f"The exact motion takes {exact}. A time is that of one call of the solver, with nothing around it.")
+        if float((data["seconds_spread"] > NOISY).sum() / data["seconds_spread"].notnull().sum()) > 0.5:
+            warn("the machine is busy: times are the least of some, and most others took a quarter longer")
+    say_written(output, figure)
+
+
+def _record(cell: "xr.Dataset", target: float, place: int) -> dict[str, Any]:
+    """The cheapest run of a variant for a target, or why there is none."""
+    record = {"variant": str(cell["variant"].item()), "target": target, "reached": place >= 0}
+    if place < 0:
+        return record | {"reason": str(cell["reached"].sel(target=target).item())}
+    return record | {name: cell[name].values[place].item() for name in COLUMNS}
+
+
+def _cell(record: dict[str, Any], timed: bool) -> str:
+    if not record["reached"]:
+        return f"not: {record['reason']}"
+    from symtop.judging.findings import pace
+
+    steps, tolerance = record["steps_per_nutation"], record["tolerance"]
+    fixed, formula = not math.isnan(record["step_size"]), math.isnan(tolerance)
+    setting = (f"{steps:.3g}" if steps < 1e3 else f"{steps:.0f}") if fixed else "-" if formula else f"{tolerance:.0e}"
+    return f"{setting:>6} {pace(record['seconds']) if timed else '':>{7 * timed}} {record['force_evaluations']:.1e}"

@@ -1,0 +1,192 @@
+"""compare(): what methods cost on one scene for the error that they make, as one dataset.
+
+The setting of each method is results for at each target (`symtop.measure.settings.seek`), from loose targets to tight
+ones, until one is not met; then steps are doubled until a run fails or has a few steps. Every run is kept. Runs that
+ended well are timed afterwards, against each other (`symtop.measure.timing`): a slow spell of the machine hits all
+methods alike.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from tqdm import tqdm
+
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError, boolean, one_of, positive
+from symtop.core.parallel import cores, in_threads
+from symtop.core.progress import beating
+from symtop.judging.adapters.adapter import integrator as adapted
+from symtop.judging.claims.subject import open_target
+from symtop.measure import columns, settings
+from symtop.measure.accuracy import as_table, blank_row
+from symtop.measure.errors import QUANTITIES
+from symtop.measure.sweep import RAISED, SPENT, TIMED, error_row_or_message, listed, timed_rows
+from symtop.methods.framework.registry import Integrator, integrator as find_integrator
+from symtop.model.scenes import Scene, horizon_of, scene as find_scene
+from symtop.run.simulation import likely_step
+
+COSTS = ("time", "evaluations")
+BUDGET = {"compiled": 3e6, "python": 5e4}  # force evaluations of a run
+REASONS = {  # of `seek`, as a cell of a table has room for them
+    settings.STOPPED: "rounding or the limits of its setting", settings.BUDGET: "budget", settings.FAILED: "it fails",
+    settings.TRIED: "it converges slowly or not at all",
+}  # fmt: skip
+
+
+def compare(
+    scene: "str | Scene", methods: Any, *, horizon: float | None = None, nutations: float | None = None,
+    quantity: str = "axis", cost: str = "time", budget: float | None = None, quiet: bool = False,
+) -> xr.Dataset:  # fmt: skip
+    """Error against run time, or against force evaluations, of some methods on one scene.
+
+    `methods` are names, variants such as ``rk4[axis]`` or records; a method without a chart runs in the smallest one
+    that shows the `quantity` (axis, attitude, theta, energy, p_phi or p_psi). A function, a class, ``FILE.py:NAME``, a
+    library or a command is a step in the chart of the axis, as `judge` takes it. Runs go to the `horizon`, the scene's
+    own by default, or over so many `nutations`. With the `cost` "evaluations" nothing is timed. `budget` is the most
+    force evaluations of a run, by default 3e6, for plain Python 5e4.
+
+    Dimensions ``variant``, ``setting`` (coarse to fine), ``target`` (1e-3, 1e-6, 1e-9, 1e-12). Variables: those of
+    `sweep`, errors and work of every run, and
+
+        error, error_bound          those of the `quantity`, rad or relative as in `symtop.errors`
+        seconds, seconds_spread     least of some run times, s, and their (median - least) / least: of one call of the
+                                    solver, as the attribute ``timed`` says; NaN for runs that failed
+        steps_per_nutation          of an adaptive method the mean; an eighth of the horizon is the unit on a separatrix
+        outcome, message            "ok", or how the run ended; "raised", with the message, if the scene was refused
+        reached(variant, target)    "met", or why not
+        exact_seconds               run time of the exact motion
+
+    Raises SymtopError for arguments that make no sense. `symtop.plot` draws the dataset.
+    """
+    chosen = find_scene(scene)
+    one_of("quantity", quantity, QUANTITIES)
+    one_of("cost", cost, COSTS)
+    if horizon is not None and nutations is not None:
+        raise SymtopError("compare takes horizon or nutations, not both", "horizon", "nutations")
+    if nutations is not None and not math.isfinite(chosen.nutation_period):
+        raise SymtopError(f"{chosen.name} has no nutation: give horizon, not nutations", "horizon", "nutations")
+    until = horizon if nutations is None else positive("nutations", nutations) * chosen.nutation_period
+    end = chosen.horizon if until is None else horizon_of(until)
+    most = None if budget is None else positive("budget", budget)
+    records = [find(one) for one in listed(methods)]
+    variants = [one.variant(one.chart_for(settings.observed(quantity))) for one in records]
+    names = [one.name for one in variants]
+    if not names or len(set(names)) < len(names):
+        raise SymtopError(f"methods must be one or more, each once, not {names!r}", "methods")
+
+    def tried(method: Integrator) -> tuple[list[dict[str, Any]], list[str]]:
+        limit = BUDGET[method.implementation] * min(method.speed, 1.0) if most is None else most
+        return _runs(chosen, method, end, limit, quantity)
+
+    exact = find_integrator("exact")
+    with beating(tqdm(total=len(names), desc="compare", disable=boolean("quiet", quiet) or None, leave=False)) as bar:
+        results = []
+        for one in in_threads(tried, variants, min(cores(), len(variants))):
+            results.append(one)
+            bar.update()
+        bar.set_description("timing")
+        rows: list[dict[str, Any]] = [{"setting_value": math.nan, "outcome": "ok"}]
+        pairs = zip([exact, *variants], [rows, *(runs for runs, _ in results)], strict=True)
+        timed_rows([(chosen, method, end, runs) for method, runs in pairs] if cost == "time" else [])
+    size = max(len(runs) for runs, _ in results)
+    blank: dict[str, Any] = {**SPENT, "message": "", "setting_value": math.nan}
+    tables = [
+        as_table([blank | run for run in runs] + [blank_row(method) | blank] * (size - len(runs)))
+        for method, (runs, _) in zip(variants, results, strict=True)
+    ]
+    data = xr.concat(tables, "variant").drop_vars("setting_value")
+    mean = data["reached_time"] / data["steps"].where(data["steps"] > 0.0)
+    data = data.assign(
+        error=data[quantity], error_bound=data[f"{quantity}_bound"], exact_seconds=rows[0].get("seconds", math.nan),
+        steps_per_nutation=chosen.time_scale(end) / data["step_size"].where(data["step_size"] > 0.0, mean),
+        reached=(("variant", "target"), [reached for _, reached in results]),
+    )  # fmt: skip
+    data = data.assign_coords(variant=names, target=list(settings.TARGETS), scene=chosen.name)
+    entries = {
+        name: columns.ERROR_TABLE[f"{quantity}{name.removeprefix('error')}"] for name in ("error", "error_bound")
+    }
+    entries["target"] = "error that is accepted, largest over the run", *entries["error"][1:]
+    own = {name: netcdf.Column(entry, {}) for name, entry in entries.items()}
+    return netcdf.describe(
+        columns.described(data, chosen.units, own), f"error against cost on {chosen.name}", units=chosen.units,
+        quantity=quantity, cost=cost, horizon=end, nutations=end / chosen.nutation_period,
+        timed=TIMED if cost == "time" else "nothing", budget=str(most or BUDGET),
+    )  # fmt: skip
+
+
+def find(method: Any) -> Integrator:
+    """A method by its name, its record, or as what `judge` takes: a step in the chart of the axis."""
+    if isinstance(method, Integrator):
+        return method
+    if isinstance(method, str) and not (set(method) & set("/ ") or ".py" in method):
+        return find_integrator(method)
+    return adapted(open_target(method, None, "axis"))
+
+
+def _runs(
+    scene: Scene, method: Integrator, horizon: float, budget: float, quantity: str
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """All runs of a variant, coarse to fine, and whether each target was met, or why not."""
+    rows: dict[float, dict[str, Any]] = {}
+    observe = settings.observed(quantity)
+
+    def run(setting: float) -> tuple[float, float]:
+        if setting not in rows:
+            limit = 2.0 * budget if method.adaptive else None  # rk45 at 1e-2 may shrink its steps
+            rows[setting] = error_row_or_message(scene, method, setting, horizon, observe, limit)
+            rows[setting]["setting_value"] = setting
+        error, work = (float(rows[setting][name]) for name in (quantity, "force_evaluations"))
+        return error if math.isfinite(error) else math.inf, work if math.isfinite(work) else 0.0
+
+    if method.control is None:
+        error, _ = run(math.nan)
+        met = ["met" if error <= target else "nothing can be set" for target in settings.TARGETS]
+        return list(rows.values()), met
+    ends, power = settings.limits(scene, method, horizon, quantity), float(method.order or 2)
+    power = power if method.fixed_step else 1.0
+    first = settings.TARGETS[0]
+    guess = likely_step(scene, method, horizon, first) if method.fixed_step else 0.1 * first
+    reached: list[str] = []
+    for k, target in enumerate(settings.TARGETS):
+        if k:
+            error, work = run(guess)
+            finer = (0.5 * target / max(error, 1e-3 * target)) ** (1.0 / power)
+            affordable = work / budget if method.fixed_step else 0.0
+            guess *= min(max(finer, affordable), 1.0)
+        if method.fixed_step and horizon / min(guess, ends[1]) > budget:
+            answer: float | str = settings.BUDGET
+        else:
+            answer = settings.seek(run, guess, target, ends, power, fixed_step=method.fixed_step, patience=budget)
+        if answer == settings.BUDGET and rows and method.fixed_step:  # the last run that can be afforded
+            last = min(rows)
+            affordable = last * run(last)[1] / budget
+            answer = affordable if 0.0 < affordable < last / 1.2 and run(affordable)[0] <= target else answer
+        if isinstance(answer, str):
+            why = RAISED if rows and all(row["outcome"] == RAISED for row in rows.values()) else REASONS[answer]
+            reached += [why] * (len(settings.TARGETS) - k)
+            break
+        guess = answer
+        reached.append("met")
+    while rows and method.fixed_step and rows[max(rows)]["outcome"] == "ok" and max(rows) < ends[1]:
+        run(min(2.0 * max(rows), ends[1]))
+    return [rows[setting] for setting in sorted(rows, reverse=True)] or [dict(blank_row(method))], reached
+
+
+def cheapest(data: xr.Dataset, target: float) -> np.ndarray:
+    """Place along ``setting`` of each variant's cheapest run within a target, or -1; its cost is that of `compare`."""
+    cost = data["seconds" if data.attrs["cost"] == "time" else "force_evaluations"].values
+    good = (data["outcome"].values == "ok") & (data["error"].values <= target) & np.isfinite(cost)
+    return np.where(good.any(axis=1), np.argmin(np.where(good, cost, np.inf), axis=1), -1)
+
+
+def ranked(data: xr.Dataset) -> tuple[float, dict[str, float]]:
+    """Force evaluations that every variant can spend, and the least error of each within them, the best first.
+
+    A variant whose evaluations nobody counts has no place.
+    """
+    work = data["force_evaluations"].where((data["outcome"] == "ok") & (data["force_evaluations"] > 0.0))
+    most = float(work.max("setting").min())
+    errors = data["error"].where(work <= most).min("setting").to_series().dropna()
+    return most, {str(name): float(error) for name, error in errors.sort_values().items()}

@@ -1,0 +1,251 @@
+"""What is judged, in a process of its own that answers calls; the verdict is computed in the one that asks.
+
+The process is forked, so that any function can be judged, and its answers are JSON: whatever it does to the judge's
+code in its memory, or writes, changes no threshold here. A call that does not return is ended with its process, and the
+rest of its stage is undecided; if it was a step backwards, the next process refuses such steps. Where the system cannot
+fork, or JAX is loaded here, whose threads a fork would lose, all is called in this process and has no limits.
+"""
+
+import contextlib
+import faulthandler
+import functools
+import json
+import multiprocessing
+import os
+import signal
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from symtop.core.errors import SymtopError, words_of
+from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat
+from symtop.judging.adapters.python_step import MATRIX, REDUCED, ROTATION
+from symtop.methods.framework.calling import OWN, solve
+from symtop.methods.framework.equations import FORMULATIONS
+from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.registry import Integrator
+from symtop.model.top import Angles, SymmetricTop
+
+Table = dict[str, Callable[..., Any]]
+THREADED = "jax"  # hangs in a process that was forked after its import
+LOOK = 0.05  # seconds between two looks
+WORDS = 160  # characters of what a process says before it ends
+FORMS = {"rotation": ROTATION, "matrix": MATRIX, "plane": REDUCED}  # others have that of their chart
+FACTS = ("name", "chart", "implementation", "own_loop", "takes_field")  # of a stepper, that are sent
+
+
+class Process:
+    """A process that calls the functions of the table that `make` returns there; a context, at whose end it ends."""
+
+    def __init__(self, make: Callable[[], Table]) -> None:
+        self.make, self.lost, self.limit, self.began = make, "", 0.0, 0.0
+        self.forked = "fork" in multiprocessing.get_all_start_methods() and THREADED not in sys.modules
+        self.table: Table | None = None
+        self.process: Any = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.process is not None:
+            if self.process.is_alive():
+                with contextlib.suppress(OSError):
+                    os.killpg(self.process.pid, signal.SIGKILL)
+                self.process.kill()
+            self.process.join()
+            self.pipe.close()
+            self.output.close()
+        self.process = None
+
+    end = __exit__
+
+    def allow(self, seconds: float) -> None:
+        """What is called from now on may take so long together; what was lost may be tried again."""
+        self.lost, self.limit, self.began = "", seconds, clock(self.process.pid if self.process else 0)
+
+    def call(self, name: str, *args: Any) -> Any:
+        """What a function of the table returns; SymtopError if it raises, or once its process has ended."""
+        if self.lost:
+            raise SymtopError(self.lost)
+        if not self.forked:
+            self.table = self.table or self.make()
+            return self.table[name](*args)
+        if self.process is None:
+            self._start()
+        try:
+            with contextlib.suppress(BrokenPipeError):
+                self.pipe.send((name, args))
+            kind, answer = self._answer()
+        except _LostError as failure:
+            back = heartbeat.inside and heartbeat.step < 0.0 and not heartbeat.forward_only
+            self.end()
+            if back:
+                heartbeat.forward_only = True
+                return self.call(name, *args)
+            self.lost = str(failure)
+            raise SymtopError(self.lost) from None
+        if kind == "error":
+            raise SymtopError(answer)
+        return answer
+
+    def _start(self) -> None:
+        context: Any = multiprocessing.get_context("fork")
+        self.pipe, theirs = context.Pipe()
+        self.output = tempfile.TemporaryFile()  # noqa: SIM115  (closed with the process)
+        self.process = context.Process(target=_serve, args=(self.make, self.pipe, theirs, self.output), daemon=True)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # newer versions of Python warn of threads; the child uses none of theirs
+            heartbeat.inside = False
+            self.process.start()
+        theirs.close()
+        self.began = clock(self.process.pid)
+
+    def _answer(self) -> Any:
+        """What the process sends; _LostError if it ends, hangs in a call or takes longer than it may."""
+        calls, since = heartbeat.calls, clock(self.process.pid)
+        while not self.pipe.poll(LOOK):
+            now = clock(self.process.pid)
+            if heartbeat.calls != calls or not heartbeat.inside:
+                calls, since = heartbeat.calls, now
+            if now - since > heartbeat.allowed:
+                raise _LostError(f"a step of h = {heartbeat.step:.3g} had not returned after {now - since:.0f} s")
+            if now - self.began > self.limit:
+                raise _LostError(f"it was not judged within {self.limit:.0f} s")
+        try:
+            return json.loads(self.pipe.recv_bytes())
+        except (EOFError, OSError, ValueError):
+            raise _LostError(self._death()) from None
+
+    def _death(self) -> str:
+        self.process.join(2.0)
+        code = self.process.exitcode
+        if code is not None and code < 0:
+            during = f" in a step of h = {heartbeat.step:.3g}" if heartbeat.inside else ""
+            return f"its process was ended by {signal.Signals(-code).name}{during}"
+        self.output.seek(0)
+        words = " ".join(self.output.read()[-4 * WORDS :].decode(errors="replace").split())[-WORDS:]
+        return f"its process ended with code {code}{': ' if words else ''}{words}"
+
+
+class _LostError(Exception):
+    """A process was ended, or ended by itself: why."""
+
+
+def _serve(make: Callable[[], Table], asking: Any, pipe: Any, output: Any) -> None:
+    os.setsid()  # what it starts is ended with it
+    asking.close()  # forked along; open, it would keep this process waiting for a judge that was killed
+    for stream in (1, 2):
+        os.dup2(output.fileno(), stream)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    faulthandler.disable()  # a crash is reported by the one that waits
+    table: Table = {}
+    while True:
+        try:
+            name, args = pipe.recv()
+        except EOFError:
+            return
+        try:
+            table = table or make()
+            answer = "answer", table[name](*args)
+        except BaseException as error:  # noqa: BLE001  (somebody else's code)
+            answer = "error", str(error) if isinstance(error, SymtopError) else words_of(error)
+        pipe.send_bytes(json.dumps(answer, default=lambda value: value.tolist()).encode())
+
+
+def clock(pid: int) -> float:
+    """Seconds, less those that a process has waited for a processor, which Linux counts; elsewhere all time counts."""
+    try:
+        waited = int(Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii").split()[1]) * 1e-9
+    except (OSError, IndexError, ValueError):
+        waited = 0.0
+    return time.monotonic() - waited
+
+
+def tried(call: Callable[[], Any], what: str, seconds: float = 60.0) -> None:
+    """Make a call in a process of its own first; SymtopError if that ends it or takes too long."""
+    with Process(lambda: {"call": call}) as process:
+        process.allow(seconds)
+        with contextlib.suppress(SymtopError):
+            process.call("call")
+        if process.lost:
+            raise SymtopError(f"{what} cannot be loaded: {process.lost}")
+
+
+# ---- a step ----------------------------------------------------------------------------------------------------------
+
+
+def table_of(opened: Callable[[], Stepper]) -> Table:
+    """The functions of a stepper that `Remote` asks for."""
+    stepper: Any = opened()
+
+    def march(since: float, *args: Any) -> tuple[Any, ...]:
+        stepper.since = since
+        return *stepper.march(*args), stepper.wrote
+
+    def along(f: Any, *args: Any) -> tuple[Any, ...]:
+        return stepper.along(f, *args), sorted(getattr(f, "times", ()))
+
+    def about() -> dict[str, Any]:
+        facts = {name: getattr(stepper, name) for name in FACTS}
+        kind = next((name for name, form in FORMS.items() if form is stepper.form), "")
+        return facts | {"kind": kind, "adaptive": stepper.adaptive is not None}
+
+    return {"march": march, "along": along, "about": about, "adaptive": lambda *args: stepper.adaptive(*args)._asdict()}
+
+
+class Remote(Stepper):
+    """A stepper whose steps are made in a process."""
+
+    def __init__(self, process: Process) -> None:
+        self.process, facts = process, process.call("about")
+        self.form = FORMS.get(facts["kind"]) or FORMULATIONS[facts["chart"]]
+        self.adaptive = functools.partial(_run, process, "adaptive") if facts["adaptive"] else None
+        for name in FACTS:
+            setattr(self, name, facts[name])
+
+    def renew(self) -> None:
+        """The next call is of a new process."""
+        self.process.end()
+
+    def march(self, top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
+        """The state at the marks."""
+        states, evaluations, wrote = self.process.call("march", self.since, top, par, y, h, marks)
+        self.wrote = bool(wrote)
+        return March(np.array(states, dtype=float).reshape(marks.size, y.size), int(evaluations))
+
+    def along(self, f: Any, t: float, y: Array, h: float, marks: Marks) -> Array:
+        """The states at the marks for a right-hand side that can be sent, from a time t on."""
+        states, times = self.process.call("along", f, t, y, h, marks)
+        getattr(f, "times", set[float]()).update(map(float, times))
+        return np.array(states, dtype=float).reshape(marks.size, y.size)
+
+
+# ---- a registered integrator -----------------------------------------------------------------------------------------
+
+
+def _run(process: Process, name: str, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+    done = process.call(name, top, start, plan)
+    return Run(**done | {one: np.array(done[one], dtype=float) for one in Run._fields[:3]})
+
+
+def separated(method: Integrator, process: Process) -> Integrator:
+    """The same, with solvers that run in a process, whose table is `solvers_of`; the package's own stay here."""
+    foreign = [chart for chart, one in method.solvers.items() if not getattr(one, "__module__", "").startswith(OWN)]
+    solvers = {chart: functools.partial(_run, process, chart) for chart in foreign}
+    return replace(method, solvers=dict(method.solvers) | solvers)
+
+
+def solvers_of(method: Integrator) -> Table:
+    """A method's solvers by their charts, whose runs are checked before they are sent."""
+
+    def asked(chart: str) -> Callable[..., Any]:
+        return lambda top, start, plan: solve(method, chart, top, start, plan)._asdict()
+
+    return {chart: asked(chart) for chart in method.solvers}

@@ -1,0 +1,363 @@
+"""Explicit pairs of order 5 to 9 with SciPy's control of the step, compiled, and the same tables with fixed steps.
+
+    k_1 = f(y),  k_i = f(y + h sum_{j<i} a_ij k_j),  y+ = y + h sum_i b_i k_i,  f(y+) is the k_1 of the next step
+    |err| as below, of parts err_m / (atol + rtol max(|y_m|, |y+_m|)), must be below 1;  q: the order of the estimate
+    h <- h min(10, .9 |err|^(-1/(q+1))) after a step (min(1, ..) after a rejection),  h max(.2, ..) when rejected
+
+    name              order   f a step   |err|, e_p = rms(err of order p)   samples between steps
+    rk45-compiled     5       6          e_4                                order 4, no further f
+    tsit5             5       6          e_4                                order 4, no further f
+    dop853-compiled   8       12         e_5^2 / sqrt(e_5^2 + e_3^2/100)    order 7, three f for all of a step
+    vern9             9       16         e_8                                a shorter step, not counted
+
+`rk45-compiled` and `dop853-compiled` are SciPy's `rk45` and `dop853` on the same equations (see `equations`): they
+accept and reject the same steps and take as many f, so that their times differ only by what Python costs and their
+errors not at all: they keep the language out of a comparison of methods.
+
+The stages of a step are written out, without the terms whose coefficient is zero, and keep their slopes in registers:
+on the axis a step of order 8 takes a quarter of the time of a loop over the table. Nothing is symplectic, symmetric or
+conserved but what is linear in the state. Sources: those of `pair_tables`; the initial step: Hairer, Norsett, Wanner,
+Solving Ordinary Differential Equations I, section II.4.
+"""
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.core.jit import combined, compile_kernel, register_jitable, set_item
+from symtop.methods.framework.adaptive import Adaptive, Loop as AdaptiveLoop
+from symtop.methods.framework.angles import LEAST_TOLERANCE
+from symtop.methods.framework.equations import FORMULATIONS
+from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
+from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
+from symtop.methods.framework.preparation import Body, Start, as_it_steps
+from symtop.methods.framework.registry import Integrator
+from symtop.methods.runge_kutta.explicit import Tableau, add, plus, row_of, store, weighted, written_out
+from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5, VERN9, Row, Table
+from symtop.methods.vectors import zero
+
+BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
+EVALUATIONS = 1_000_000_000  # a run's limit: about half a minute
+
+SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
+
+
+class Method(NamedTuple):
+    """A method in one chart, in functions that compile; `memory` (rows, size) begins with f(y), the rest is its own."""
+
+    advance: Callable[..., Any]  # (par, state, memory, tolerance, t, step, end) -> state, t, step, evaluations, outcome
+    refine: Callable[..., int]  # (par, state, memory, h) -> evaluations: what samples of a step need beyond that
+    sample: Callable[..., Any]  # (par, state, new, memory, h, x) -> the state at a fraction x of the step
+    last: int  # the row of f(y+) after a step
+    power: float  # of the error in the choice of the first step
+
+
+@register_jitable
+def rms(vector: Any, state: Any, other: Any, tolerance: float) -> float:
+    """Root mean square of a vector in units of what is allowed, tolerance (1 + |y|)."""
+    total = 0.0
+    for m in range(len(vector)):
+        part = vector[m] / (tolerance + max(abs(state[m]), abs(other[m])) * tolerance)
+        total += part * part
+    return math.sqrt(total / len(vector))
+
+
+@register_jitable
+def interpolate(dense: Any, state: Any, slopes: Any, h: float, x: float) -> Any:
+    """The state at a fraction x of the step."""
+    weights = dense[0] + dense[1][:3]  # a tuple of seven
+    for i in range(len(dense)):
+        row = dense[i]
+        weights = set_item(weights, i, x * (row[0] + x * (row[1] + x * (row[2] + x * row[3]))))
+    return plus(state, weighted(weights, state, slopes, h))
+
+
+@register_jitable
+def nothing_more(par: Any, state: Any, slopes: Any, h: float) -> int:
+    """Samples need no further evaluations."""
+    return 0
+
+
+def trying(attempt: Callable[..., Any], cost: int, power: float) -> Any:
+    """`Method.advance`: shrink the step until the error of ``attempt(par, state, slopes, h, tolerance)`` passes."""
+
+    @register_jitable
+    def advance(par, state, slopes, tolerance, t, step, end):  # type: ignore[no-untyped-def]
+        least = 10.0 * (np.nextafter(t, np.inf) - t)
+        step = max(step, least)
+        grow = GROW
+        evaluations = 0
+        while step >= least:
+            after = min(t + step, end)
+            h = after - t
+            new, error = attempt(par, state, slopes, h, tolerance)
+            evaluations += cost
+            change = GROW if error == 0.0 else SAFETY * error**power
+            if error < 1.0:
+                return new, after, h * min(grow, change), evaluations, OK
+            step = h * (change if change > SHRINK else SHRINK)  # noqa: FURB136  (max would pass NaN on)
+            grow = 1.0
+        return state, t, step, evaluations, STEP_TOO_SMALL
+
+    return advance
+
+
+@register_jitable
+def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, tolerance: float, power: float) -> float:
+    """SciPy's initial step: 1 % of |y|/|f|, then from the size of the second derivative, by one evaluation of f."""
+    d0, d1 = rms(state, state, state, tolerance), rms(slope, state, state, tolerance)
+    trial = min(1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1, end)
+    bent = add(field(par, add(state, slope, trial)), slope, -1.0)
+    d2 = rms(bent, state, state, tolerance) / trial
+    guess = max(1e-6, 1e-3 * trial) if max(d1, d2) <= 1e-15 else (0.01 / max(d1, d2)) ** -power
+    return min(100.0 * trial, guess, end)
+
+
+@functools.cache
+def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
+    """The loop of ``method(field)``, a `Method` whose memory has so many rows, on a `Formulation`, compiled.
+
+    It counts force evaluations. The place is (state, memory, time, step). `observe` sees the memory and the step that a
+    sample lies in.
+    """
+    field, ended, observe, prepare, size = form.field, form.ended, form.observe, form.prepare.numbers, form.prepare.size
+    sample = as_it_steps if form.present is None else form.present.sample
+    register_jitable(observe)
+    made: Method = method(field)
+    advance, refine, between, last, power = made
+    clock = size + rows * size
+
+    def march(  # type: ignore[no-untyped-def]
+        numbers, tolerance, times, budget, seen, place, states, momenta
+    ):
+        par, state = prepare(Body(*numbers[:3]), Start(*numbers[3:]))
+        memory, nothing, end = np.zeros((rows, size)), zero(state), times[-1]
+        steps = effort = outcome = 0
+        if seen < 0:
+            slope = field(par, state)
+            store(memory, 0, slope)
+            seen, t, step, effort = 0, 0.0, first_step(field, par, state, slope, end, tolerance, power), 2
+        else:
+            t, step = place[clock], place[clock + 1]
+            state = row_of(place[:size].reshape(1, size), 0, state)
+            memory[:] = place[size:clock].reshape(rows, size)
+        while t < end and effort < budget:
+            before, start = state, t
+            state, t, step, work, outcome = advance(par, before, memory, tolerance, start, step, end)
+            effort += work
+            if outcome != OK:
+                break
+            steps += 1
+            h = t - start
+            if seen < len(times) and times[seen] <= t:
+                effort += refine(par, before, memory, h)
+            while seen < len(times) and times[seen] <= t:
+                place_then = between(par, before, state, memory, h, (times[seen] - start) / h)
+                store(states, seen, sample(par, times[seen], place_then))
+                momenta[seen, 0], momenta[seen, 1] = observe(par, memory, place_then, nothing, h)
+                seen += 1
+            outcome = ended(state)
+            for m in range(size):
+                memory[0, m] = memory[last, m]
+            if outcome != OK:
+                break
+        for m in range(size):
+            place[m] = state[m]
+        place[size:clock] = memory.ravel()
+        place[clock], place[clock + 1] = t, step
+        return seen, steps, effort, outcome
+
+    compiled: AdaptiveLoop = compile_kernel(march)
+    return compiled
+
+
+def solver(form: Any, method: Any, rows: int) -> Adaptive:
+    """A solver of the registry on the equations of a `Formulation`."""
+    size, shown = form.prepare.size, form.prepare.size if form.present is None else form.present.size
+    clock = size * (1 + rows)
+
+    @functools.cache  # once: the hash of a table takes a fifth of the time of a call
+    def compiled() -> AdaptiveLoop:
+        return loop(form, method, rows)
+
+    return Adaptive(lambda _: compiled(), shown, clock + 2, clock, EVALUATIONS, BLOCK, check=form.prepare.check)
+
+
+def integrator(name: str, summary: str, reference: str, method: Any, rows: int, **claims: Any) -> Integrator:
+    """The record of a method with a tolerance that needs f and nothing else, in every chart."""
+    solvers = {chart: solver(form, method, rows) for chart, form in FORMULATIONS.items()}
+    return Integrator(
+        name=name, family="runge-kutta", summary=summary, solvers=solvers, control="tolerance", explicit=True,
+        conserves=frozenset(), least_tolerance=LEAST_TOLERANCE, reference=reference, needs="derivative", general=True,
+        **claims,
+    )  # fmt: skip
+
+
+@register_jitable
+def _forget(slopes: Any, i: int, slope: Any) -> None:
+    """Slopes that nobody reads again."""
+
+
+def summed(weights: Sequence[float]) -> Any:
+    """``(place, made, h)`` to place + h sum_j w_j k_j, term by term, of a tuple of slopes."""
+    used = tuple(float(weight) if weight else None for weight in weights)
+
+    def added(place, made, h):  # type: ignore[no-untyped-def]
+        return combined(place, made, used, h)
+
+    return register_jitable(added)
+
+
+def _stages(field: Callable[..., Any], rows: Sequence[Row], keep: Callable[..., Any]) -> Any:
+    """``(par, state, first, slopes, h)`` to the slopes of a step, a tuple of tuples; `keep` writes each down."""
+
+    def stage(i: int) -> Callable[..., Any]:
+        place = summed(rows[i - 1])
+
+        def slope(par, state, made, slopes, h):  # type: ignore[no-untyped-def]
+            new = field(par, place(state, made, h))
+            keep(slopes, i, new)
+            return new
+
+        return slope
+
+    return written_out(len(rows) + 1, stage)
+
+
+class Pair(NamedTuple):
+    """An explicit pair with its stages written out."""
+
+    name: str
+    table: Table
+    order: int
+    estimate: int  # order of the error estimate
+    summary: str
+    reference: str
+
+    @property
+    def rows(self) -> int:
+        """Slopes of a step, with the first of the next one and those that only samples need."""
+        return len(self.table.a) + 2 + len(self.table.extra)
+
+    def __call__(self, field: Callable[..., Any]) -> Method:
+        """What `loop` steps by: attempts, their error, and samples."""
+        table, dense = self.table, self.table.dense
+        keep = store if dense else _forget
+        stages, total = _stages(field, table.a, keep), summed(table.b)
+        error, third, cost = summed(table.error), summed(table.third), len(table.a) + 1
+        two = bool(self.table.third)
+
+        @register_jitable
+        def attempt(par, state, slopes, h, tolerance):  # type: ignore[no-untyped-def]
+            none, first = zero(state), row_of(slopes, 0, state)
+            made = stages(par, state, first, slopes, h)
+            new = plus(state, total(none, made, h))
+            last = field(par, new)
+            store(slopes, cost, last)
+            size = rms(error(none, (*made, last), h), state, new, tolerance)
+            if two:
+                other = rms(third(none, made, h), state, new, tolerance)
+                size = 0.0 if size == other == 0.0 else size * size / math.sqrt(size * size + 0.01 * other * other)
+            return new, size
+
+        @register_jitable
+        def polynomial(par, state, new, slopes, h, x):  # type: ignore[no-untyped-def]
+            return interpolate(dense, state, slopes, h, x)
+
+        @register_jitable
+        def shorter(par, state, new, slopes, h, x):  # type: ignore[no-untyped-def]
+            part = x * h
+            return plus(state, total(zero(state), stages(par, state, row_of(slopes, 0, state), slopes, part), part))
+
+        sample, power = polynomial if dense else shorter, -1.0 / (self.estimate + 1)
+        parts = Method(trying(attempt, cost, power), nothing_more, sample, cost, power)
+        return parts if not two else parts._replace(**_order_seven(table, field, cost))
+
+    def adaptive(self) -> Integrator:
+        """The pair with a tolerance."""
+        summary = f"{self.summary} with SciPy's step control, compiled"
+        return integrator(
+            self.name, summary, self.reference, self, self.rows, order=self.order, symplectic=False, symmetric=False
+        )
+
+    def fixed(self) -> Integrator:
+        """The table of the higher order with a step."""
+        a, b = self.table.a[: len(self.table.b) - 1], self.table.b
+        triangle = [value for i, row in enumerate(a) for value in (*row, *(0.0,) * (i + 1 - len(row)))]
+        arrays: Any = np.array(triangle), np.array(b)  # they travel faster than tuples
+        rule = Tableau(*arrays)
+        solvers = {
+            chart: FixedStep(fixed_loop(chart, self), rule, form.prepare, 1, implicit=False, present=form.present)
+            for chart, form in FORMULATIONS.items()
+        }
+        return replace(
+            self.adaptive(), name=f"{self.name}-fixed", summary=f"{self.summary} with fixed steps, compiled",
+            solvers=solvers, control="step_size", least_tolerance=0.0,
+        )  # fmt: skip
+
+
+def _order_seven(table: Table, field: Callable[..., Any], cost: int) -> dict[str, Any]:
+    """The samples of DOP853: three further stages, and a polynomial of degree 7 in nested form."""
+    stages = cost + 1 + len(table.extra)
+    rows = np.zeros((2, 4, stages))
+    for i, part in enumerate((table.extra, table.dense)):
+        for j, row in enumerate(part):
+            rows[i, j, : len(row)] = row
+    extra, dense = rows[0, :3], rows[1]
+
+    @register_jitable
+    def refine(par, state, slopes, h):  # type: ignore[no-untyped-def]
+        for i in range(len(extra)):
+            place = plus(state, weighted(extra[i, : cost + 1 + i], state, slopes, h))
+            store(slopes, cost + 1 + i, field(par, place))
+        return len(extra)
+
+    @register_jitable
+    def sample(par, state, new, slopes, h, x):  # type: ignore[no-untyped-def]
+        at = zero(state)
+        for i in range(len(dense)):
+            at = add(at, weighted(dense[len(dense) - 1 - i], state, slopes, h), 1.0)
+            for m in range(len(state)):
+                at = set_item(at, m, at[m] * (x if i % 2 == 0 else 1.0 - x))
+        first, last = row_of(slopes, 0, state), row_of(slopes, cost, state)
+        for m in range(len(state)):
+            moved = new[m] - state[m]
+            bent = (at[m] + 2.0 * moved - h * (last[m] + first[m])) * x
+            at = set_item(at, m, state[m] + ((bent + h * first[m] - moved) * (1.0 - x) + moved) * x)
+        return at
+
+    return {"refine": refine, "sample": sample}
+
+
+@functools.cache
+def fixed_loop(chart: str, pair: Pair) -> Loop:
+    """The loop with fixed steps in one chart; the rule is the table as a `Tableau`, for whoever wants to see it."""
+    form = FORMULATIONS[chart]
+    field, ended_at, rows = form.field, form.ended, pair.table.a[: len(pair.table.b) - 1]
+    stages, total, cost = _stages(field, rows, _forget), summed(pair.table.b), len(pair.table.b)
+
+    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
+        return 0.0
+
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        step = total(zero(state), stages(par, state, field(par, state), rule.b, h), h)
+        return step, carry, cost, ended_at(plus(state, step))
+
+    return kernel_loop(begin, increment, form.observe)
+
+
+RK45 = Pair("rk45-compiled", DORMAND_PRINCE, 5, 4, "Dormand-Prince", "dormand-prince-1980")
+PAIRS = (
+    Pair("tsit5", TSIT5, 5, 4, "Tsitouras's pair 5(4)", "tsitouras-2011"),
+    Pair("dop853-compiled", DOP853, 8, 7, "Dormand-Prince 8(5,3)", "prince-dormand-1981 hairer-norsett-wanner-1993"),
+    Pair("vern9", VERN9, 9, 8, "Verner's most efficient pair 9(8)", "verner-2010"),
+)
+
+
+def built_in() -> list[Integrator]:
+    """Each pair with a tolerance and, but for SciPy's RK45, with a step."""
+    return [RK45.adaptive()] + [make() for pair in PAIRS for make in (pair.adaptive, pair.fixed)]

@@ -1,0 +1,95 @@
+"""Numbers, lists and tables as the report and the command line print them; the filters of templates."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+FIRM = "\N{NO-BREAK SPACE}"
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+LARGEST_PLAIN = 1e4  # larger numbers are written with a power of ten
+MOST_COUNTED = 1e9  # larger whole numbers are no counts
+FEW = 4  # names that a sentence has; the others are counted, since a long list is a table's
+UNITS = ((1e-9, "ns"), (1e-6, "µs"), (1e-3, "ms"), (1.0, "s"), (60.0, "min"), (3600.0, "h"))  # of times, in seconds
+
+
+def number(value: float, digits: int = 2, unit: str = "") -> str:
+    """A number with so many significant digits, and its unit: ``10⁻⁶ rad``, ``1.4 × 10⁻¹³``, ``0.012``, ``340``."""
+    text = f"{value:.{digits}g}" if not 10.0**digits <= abs(value) < LARGEST_PLAIN else f"{value:.0f}"
+    mantissa, mark, power = text.partition("e")
+    ten = f"10{str(int(power or 0)).translate(RAISED)}"
+    printed = text if not mark else ten if mantissa == "1" else f"{mantissa}{FIRM}×{FIRM}{ten}"
+    return f"{printed}{FIRM}{unit}" if unit else printed
+
+
+def count(value: float) -> str:
+    """A whole number, thousands apart: ``12,345``."""
+    return f"{value:,.0f}"
+
+
+def percent(value: float, digits: int = 0) -> str:
+    """A share as a percentage: ``31 %``."""
+    return f"{100.0 * value:.{digits}f}{FIRM}%"
+
+
+def power(value: float) -> str:
+    """The power of ten next to a positive number: ``10⁻⁶``."""
+    return f"10{str(round(math.log10(value))).translate(RAISED)}"
+
+
+def fixed(value: float, digits: int = 2, unit: str = "") -> str:
+    """A number with so many digits after the point: ``1.90``."""
+    return f"{value:.{digits}f}{FIRM}{unit}" if unit else f"{value:.{digits}f}"
+
+
+def duration(seconds: float, digits: int = 2) -> str:
+    """A time, given in seconds, in the unit that suits it: ``5.4 µs``, ``176 µs``, ``4.8 ms``, ``2 h``."""
+    size, unit = next((one for one in reversed(UNITS) if abs(seconds) >= one[0]), UNITS[0])
+    return number(seconds / size, digits, unit)
+
+
+def microseconds(seconds: float, digits: int = 2) -> str:
+    """A time, given in seconds, in microseconds."""
+    return number(seconds * 1e6, digits, "µs")
+
+
+def code(name: str) -> str:
+    """A name as it is typed."""
+    return f"`{name}`"
+
+
+def cell(value: Any, digits: int = 3) -> str:
+    """What a cell of a table shows: a number with so many significant digits; nothing for what is missing."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, (int, float)):
+        whole = math.isfinite(value) and float(value).is_integer() and abs(value) < MOST_COUNTED
+        return count(value) if whole else number(value, digits)
+    return str(value)
+
+
+FILTERS = (number, count, percent, power, fixed, duration, microseconds, code, cell)
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table as GitHub-flavoured Markdown."""
+    escaped = [[cell.replace("|", "\\|").replace("<", "\\<") for cell in row] for row in [header, *rows]]
+    lines = [f"| {' | '.join(row)} |" for row in escaped]
+    return "\n".join([lines[0], "|" + "---|" * len(header), *lines[1:]])
+
+
+def columns(records: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[Any]]]:
+    """Header and rows of a table of records, which all have the same keys."""
+    return list(records[0]), [list(record.values()) for record in records]
+
+
+def abridged(names: Sequence[str], most: int = FEW) -> str:
+    """The first names of a list as a sentence has them, and how many more there are."""
+    *first, last = [*names[:most], f"{len(names) - most} more"] if len(names) > most else names or ["none"]
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def counted(count: int, noun: str = "variant") -> str:
+    """So many things: ``1 variant``, ``12 variants``."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"

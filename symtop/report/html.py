@@ -1,0 +1,150 @@
+"""Markdown of the report as HTML: figures with their captions, tables that scroll, formulas, charts to point at.
+
+markdown-it-py reads the Markdown. What the report has beyond a text is recognised in its blocks: a paragraph that is
+one picture, with the paragraph below it, becomes a figure; a paragraph in bold above a table is its title. Formulas
+between ``$$``, and the markers of `symtop.report.template`, stand between pieces of Markdown.
+"""
+
+import html
+import itertools
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
+
+LONG = 27  # characters of a cell that may be broken into lines
+AT_ONCE = 2  # figures
+MATHML = "http://www.w3.org/1998/Math/MathML"
+PIECES = re.compile(r"^<!-- (?P<kind>chart|table) (?P<name>\S+) -->$|^\$\$(?P<formula>.+?)\$\$$", re.MULTILINE)
+
+
+def slug(heading: str) -> str:
+    """The anchor of a heading, as GitHub and the site make it."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+
+
+class Anchors:
+    """Names for the things on a page that a link may lead to, each given once."""
+
+    def __init__(self, *taken: str) -> None:
+        self.given = {*taken}
+
+    def __call__(self, name: str) -> str:
+        """The name, with a number behind it if it was given before."""
+        later = (f"{name}-{count}" for count in itertools.count(1))
+        free = next(one for one in itertools.chain([name], later) if one not in self.given)
+        self.given.add(free)
+        return free
+
+
+class Writer:
+    """Writes pieces of one page; `images` has source, width and height of each figure by its address.
+
+    `markers` turns the kind and the name of a marker into HTML.
+    """
+
+    def __init__(
+        self, images: Mapping[str, Mapping[str, Any]], markers: Callable[[str, str], str], *taken: str
+    ) -> None:
+        self.images, self.markers, self.anchor = images, markers, Anchors(*taken)
+        self._shown = 0  # figures so far: the first ones, of the front page, are loaded at once
+        self._parser = MarkdownIt("commonmark", {"html": False}).enable("table")
+
+    def __call__(self, text: str) -> str:
+        """A text in Markdown as HTML."""
+        made, end = [], 0
+        for piece in PIECES.finditer(text):
+            made += [self._markdown(text[end : piece.start()]), self._piece(piece)]
+            end = piece.end()
+        return "\n".join(filter(None, [*made, self._markdown(text[end:])]))
+
+    def _piece(self, piece: re.Match[str]) -> str:
+        if piece["formula"] is None:
+            return self.markers(piece["kind"], piece["name"])
+        from latex2mathml.converter import convert
+
+        shown = str(convert(piece["formula"], display="block")).replace(f' xmlns="{MATHML}"', "")  # HTML needs none
+        return f'<div class="formulas">{shown}</div>'
+
+    def _markdown(self, text: str) -> str:
+        tokens, title, made = self._parser.parse(text), "", []
+        for begin, end in _blocks(tokens):
+            block = tokens[begin:end]
+            kind = block[0].type
+            bold = _title(block[1]) if kind == "paragraph_open" else ""
+            if bold:
+                block[0].attrSet("class", "title")
+            if kind == "paragraph_open" and _only(block[1], "image"):
+                made.append(self._figure(block[1].children[0]))  # type: ignore[index]
+            elif kind == "paragraph_open" and made and made[-1].endswith("<figcaption></figcaption></figure>"):
+                made[-1] = self._captioned(made[-1], self._rendered(block[1:2]))
+            elif kind == "table_open":
+                made.append(self._table(block, title))
+            elif kind == "heading_open":
+                made.append(self._heading(block))
+            else:
+                made.append(self._rendered(block))
+            title = bold
+        return "\n".join(made)
+
+    def _rendered(self, tokens: Sequence[Token]) -> str:
+        return str(self._parser.renderer.render(tokens, self._parser.options, {}))
+
+    def _heading(self, block: Sequence[Token]) -> str:
+        name = self.anchor(slug(block[1].content))
+        level = block[0].tag
+        return f'<{level} id="{name}">{self._rendered(block[1:2])} {link(name, block[1].content)}</{level}>'
+
+    def _figure(self, image: Token) -> str:
+        address, alt = str(image.attrs["src"]), html.escape(image.content)
+        shown = self.images.get(address, {})
+        size = f' width="{shown["width"]}" height="{shown["height"]}"' if shown else ""
+        lazy = ' loading="lazy" decoding="async"' if self._shown >= AT_ONCE else ""
+        self._shown += 1
+        name = self.anchor(Path(address).stem)
+        return (
+            f'<figure id="{name}"><div class="scroll" tabindex="0" role="region" aria-label="Figure {name}"><img '
+            f'src="{shown.get("source", address)}"{size}{lazy} alt="{alt}"></div>'
+            "<figcaption></figcaption></figure>"
+        )
+
+    def _captioned(self, figure: str, caption: str) -> str:
+        name = figure.partition('id="')[2].partition('"')[0]
+        words = f"<figcaption>{caption} {link(name, f'figure {name}')}</figcaption>"
+        return figure.replace("<figcaption></figcaption>", words)
+
+    def _table(self, block: Sequence[Token], title: str) -> str:
+        name = self.anchor(slug(title) or "table")
+        for cell, content in itertools.pairwise(block):
+            if cell.type == "td_open" and len(content.content) > LONG and " " in content.content:
+                cell.attrSet("class", "words")
+        body = self._rendered(block).replace("<th>", '<th scope="col">')
+        body = body.replace("<table>", f'<table data-name="{name}">', 1)
+        return (
+            f'<div class="scroll" tabindex="0" role="region" aria-label="{html.escape(title) or "Table"}">{body}</div>'
+        )
+
+
+def link(name: str, what: str) -> str:
+    """A sign beside a thing that leads to it."""
+    return f'<a class="anchor" href="#{name}" aria-label="Link to {html.escape(what)}">#</a>'
+
+
+def _blocks(tokens: Sequence[Token]) -> list[tuple[int, int]]:
+    """Beginning and end of each block of the highest level."""
+    ends = [place + 1 for place, token in enumerate(tokens) if token.level == 0 and token.nesting <= 0]
+    return list(itertools.pairwise([0, *ends]))
+
+
+def _only(inline: Token, kind: str) -> bool:
+    return [one.type for one in inline.children or []] == [kind]
+
+
+def _title(inline: Token) -> str:
+    """What a paragraph has in bold at its beginning, but for a sentence."""
+    children = [one for one in inline.children or [] if one.type != "text" or one.content]
+    bold = children[1].content if children and children[0].type == "strong_open" else ""
+    return "" if bold.endswith(".") else bold

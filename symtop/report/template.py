@@ -1,0 +1,177 @@
+"""The page of a study: its template, in Markdown, filled with its facts, tables and figures.
+
+A template is `page.md` beside the study's `study.py`, or NAME.md beside a study of one's own in NAME.py; without one,
+the page shows everything that the study has (`templates/plain.md`). In it stand
+
+    {{ question }}                            the question of the study
+    {{ f.NAME | number(2, "rad") }}           a fact in a format of `symtop.report.formats`
+    {{ pages.drift }}                         a link to the page of another study; its question is the text
+    {{ table("NAME", title="What it shows") }}
+    {% call figure("NAME", title="What is drawn", alt="For those who cannot see it") %}
+    The caption: what was found, and how it was drawn.
+    {% endcall %}
+
+A sentence with a fact that was not measured is left out, and the page says once that there are such; `has("NAME", ...)`
+says whether facts were measured, and figures and tables made. A figure that was not drawn vanishes with its title and
+caption, a table without rows too.
+"""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from symtop.core.errors import SymtopError
+from symtop.methods.framework.registry import integrators
+from symtop.report import formats
+from symtop.report.formats import table
+
+MOST_ROWS = 15  # of a table on a page; the rest is in its CSV
+PLAIN = "plain.md"
+MARKER = "<!-- {kind} {name} -->"  # where the page in HTML has a chart, or a table in full
+GAP = "\N{OBJECT REPLACEMENT CHARACTER}"  # in place of what was not measured, until its sentence is left out
+PARTIAL = "*This run measured a part of the study; sentences about the rest are left out.*"
+
+Findings = Mapping[str, Any]
+
+
+def filled(findings: Findings, results: Path, *, pages: Mapping[str, str] | None = None) -> str:
+    """The page of a study in Markdown, its question as a heading of the first level.
+
+    `pages` are links to the pages of all studies, by name. Raises SymtopError for a template that is wrong.
+    """
+    name = findings["study"]
+    given = {"question": findings["question"], "pages": Links(pages or {})} | _names([findings], results)
+    given |= {"f": SimpleNamespace(**findings["facts"]), "facts": findings["facts"]}
+    given |= {kind: [one["name"] for one in findings[kind]] for kind in ("pictures", "tables")}
+    text = rendered(findings["page"], f"page of {name}", given)
+    head, _, body = without_gaps(text).strip().partition("\n\n")
+    parts = [head, PARTIAL if GAP in text else "", body, *findings["failures"], findings.get("measured")]
+    return "\n\n".join(filter(None, [*parts, _ending(findings)])) + "\n"
+
+
+def front(template: str, studies: Sequence[Findings], results: Path, pages: Mapping[str, str]) -> str:
+    """A page on all studies: `fact("STUDY.NAME")` is a fact or None, figures and tables are named ``STUDY-NAME``."""
+    facts = {f"{study['study']}.{name}": value for study in studies for name, value in study["facts"].items()}
+    titles = {study["title"]: pages.get(study["study"], "").partition("](")[2] for study in studies}
+    given = {"pages": Links(pages), "fact": facts.get, "methods": len(integrators())}
+    given["listed"] = [f"[{title}]({address}" for title, address in titles.items() if address]
+    text = rendered(template, "front page", given | _names(studies, results, whole=True))
+    return without_gaps(text).strip() + "\n"
+
+
+def answer(findings: Findings, results: Path) -> str:
+    """The answer of a study: the first paragraph or list below its question, as plain text; empty if there is none."""
+    page = filled(findings, results).replace(f"{PARTIAL}\n\n", "")
+    below = re.split(r"\n{2,}", page.partition("\n\n")[2].strip())[0]
+    below = ", ".join(re.findall(r"^- (.*)$", below, re.MULTILINE)) if below.startswith("- ") else below
+    return (
+        ""
+        if below.startswith(("#", "**", "!", "|", "<", "Data:"))
+        else re.sub(r"[`*]|\[([^]]+)\]\([^)]*\)", r"\1", below)
+    )
+
+
+class Links(dict[str, str]):
+    """Links to pages by the names of studies; the name alone where there is no page."""
+
+    def __missing__(self, name: str) -> str:
+        return name
+
+
+def rendered(template: str | None, name: str, given: Mapping[str, Any]) -> str:
+    """A template (None: the plain one) with what is given; SymtopError if it is wrong or names what is not there."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError
+
+    environment = Environment(  # noqa: S701  (it makes Markdown, and what makes HTML of that escapes it)
+        loader=PackageLoader("symtop", "report/templates"), undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True, finalize=lambda value: GAP if value is None else value,
+    )  # fmt: skip
+    environment.filters |= {one.__name__: _passing(one) for one in formats.FILTERS}
+    template = template and template.replace("endraw %}", "endraw +%}")  # which keeps the empty line that follows
+    try:
+        ready = environment.get_template(PLAIN) if template is None else environment.from_string(template)
+        text = ready.render(**given)
+    except (TemplateError, TypeError, ValueError) as error:
+        place = f", line {error.lineno}" if getattr(error, "lineno", None) else ""  # type: ignore[union-attr]
+        raise SymtopError(f"{name}{place}: {error}") from error
+    return "\n\n".join(map(_unwrapped, re.split(r"\n{2,}", text.strip()))) + "\n"
+
+
+def without_gaps(text: str) -> str:
+    """A text without the sentences and the items of lists in which something is missing."""
+    blocks = [_known(block) if GAP in block else block for block in text.split("\n\n")]
+    return "\n\n".join(filter(None, blocks))
+
+
+def _known(block: str) -> str:
+    listed = re.match(r"[-*] |\d+[.)] ", block)
+    parts = re.split(r"\n(?=[-*] |\d+[.)] )" if listed else r"(?<=[.?]) |(?<=[.?]\*\*) ", block)
+    kept = [part for part in parts if GAP not in part]
+    return "" if all(re.fullmatch(r"\*\*[^*]+\*\*", part) for part in kept) else ("\n" if listed else " ").join(kept)
+
+
+def _passing(filter_: Callable[..., str]) -> Callable[..., str | None]:
+    """A format as a filter of templates: None, which was not measured, passes, and a name that is not there fails."""
+    from jinja2 import Undefined
+
+    def passed(value: Any, *options: Any, **named: Any) -> str | None:
+        value = str(value) if isinstance(value, Undefined) else value
+        return None if value is None else filter_(value, *options, **named)
+
+    return passed
+
+
+def _unwrapped(block: str) -> str:
+    """A paragraph or an item as one line, since it is filled with words of any length; other blocks as they are."""
+    if re.match(r"[-*] |\d+[.)] ", block):
+        return re.sub(r"\n +", " ", block)
+    return block if re.match(r"[|#>`\s]|<!--|\$\$", block) else " ".join(block.split("\n"))
+
+
+def _names(studies: Sequence[Findings], results: Path, *, whole: bool = False) -> dict[str, Callable[..., Any]]:
+    """`figure`, `table` and `has` on the figures, tables and facts of some studies."""
+    pictures: dict[str, Any] = {}
+    tables: dict[str, Any] = {}
+    facts: set[str] = set()
+    for study in studies:
+        before = f"{study['study']}-" if whole else ""
+        pictures |= {f"{before}{one['name']}": one for one in study["pictures"]}
+        tables |= {f"{before}{one['name']}": one for one in study["tables"] if one["rows"]}
+        facts |= {f"{before}{name}" for name, value in study["facts"].items() if value is not None}
+
+    def figure(name: str, title: str = "", alt: str = "", chart: str = "", caller: Any = None) -> str:
+        if name not in pictures:
+            return ""
+        caption = " ".join(caller().split()) if caller else ""
+        if GAP in caption:  # what stands below a figure is its caption: there must be one
+            caption = f"{_known(caption) or f'{title}.'} {GAP}"
+        parts = [f"**{title}**" if title else "", f"![{alt}](figures/{pictures[name]['file']})", caption]
+        return "\n\n".join(filter(None, [*parts, MARKER.format(kind="chart", name=chart) if chart else ""])) + "\n"
+
+    def listed(
+        name: str, title: str = "", rows: int = MOST_ROWS, columns: Sequence[str] | None = None, digits: int = 3
+    ) -> str:
+        if name not in tables:
+            return ""
+        import pandas as pd
+
+        file, count = tables[name]["file"], tables[name]["rows"]
+        frame = pd.read_csv(results / "tables" / file, nrows=min(rows, MOST_ROWS))
+        frame = frame if columns is None else frame[list(columns)]
+        cells = [[formats.cell(value, digits) for value in row] for row in frame.itertuples(index=False)]
+        shown = f"the first {len(cells)} of {count:,} rows; " if count > len(cells) else ""
+        whole = [MARKER.format(kind="table", name=Path(file).stem)] if count > len(cells) else []
+        head = f"**{title or name}** ({shown}[CSV](tables/{file}))"
+        return "\n\n".join([head, table(list(map(str, frame.columns)), cells), *whole]) + "\n"
+
+    def has(*names: str) -> bool:
+        return all(name in pictures or name in tables or name in facts for name in names)
+
+    return {"figure": figure, "table": listed, "has": has}
+
+
+def _ending(findings: Findings) -> str:
+    name, cases = findings.get("dataset"), findings["cases"]
+    return f"Data: [{name}]({name}), {formats.count(cases)} case{'' if cases == 1 else 's'}." if name else ""

@@ -1,0 +1,137 @@
+"""Adams methods: coefficients on any nodes, against SciPy's Adams codes, orders, steps of one length, samples."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy import integrate
+
+import symtop
+from symtop.methods.framework.equations import FORMULATIONS
+from symtop.methods.runge_kutta import adams
+from symtop.methods.runge_kutta.adams import (
+    ALPHA,
+    BETA,
+    GAMMA,
+    HIGHEST,
+    LAST,
+    LENGTH,
+    NUMBERS,
+    ORDER_THEN,
+    PSI,
+    SIGMA,
+    G,
+)
+
+
+def prepared(steps, h, k):
+    """The memory with the psi of past steps, the newest first, and the coefficients of a step h of order k."""
+    memory = np.zeros((LAST + 1, 6))
+    memory[NUMBERS : NUMBERS + len(steps), PSI] = np.cumsum(steps)
+    adams.coefficients(memory, k, h)
+    return memory[NUMBERS : NUMBERS + k + 1]
+
+
+def test_coefficients_of_equal_steps_are_those_of_adams_and_bashforth():
+    made = prepared(np.full(13, 0.25), 0.25, 12)
+    np.testing.assert_allclose(made[:7, G], [1, 1 / 2, 5 / 12, 3 / 8, 251 / 720, 95 / 288, 19087 / 60480], rtol=1e-13)
+    np.testing.assert_array_equal(made[:12, BETA], 1.0)
+    np.testing.assert_allclose(made[:, SIGMA], 1.0, rtol=1e-14)
+    np.testing.assert_allclose(made[:12, ALPHA], 1.0 / np.arange(1, 13), rtol=1e-15)
+    np.testing.assert_allclose(GAMMA[:6], [1, 1 / 2, 1 / 12, 1 / 24, 19 / 720, 3 / 160], rtol=1e-13)
+    np.testing.assert_allclose(np.diff(made[:7, G]), -np.array(GAMMA[1:7]), rtol=1e-12)  # gamma*_j
+
+
+@pytest.mark.parametrize("k", range(1, HIGHEST + 1))
+def test_a_predictor_integrates_polynomials_below_its_order_on_any_nodes_and_no_higher_one(k):
+    rng = np.random.default_rng(k)
+    past, h = rng.uniform(0.5, 2.0, 13), 0.8
+    nodes = -np.concatenate([[0.0], np.cumsum(past)])[:k]
+    made = prepared(past, h, k)
+    for degree in range(k + 1):
+        f = nodes**degree if degree else np.ones(k)
+        differences = []  # psi_1 .. psi_i f[t_n, .., t_{n-i}], of the nodes behind
+        table = f.astype(float)
+        factor = 1.0
+        for i in range(k):
+            differences.append(factor * table[0])
+            if i + 1 < k:
+                table = (table[:-1] - table[1:]) / (nodes[: -i - 1] - nodes[i + 1 :])
+                factor *= nodes[0] - nodes[i + 1]
+        terms = h * made[:k, G] * made[:k, BETA] * differences
+        exact = h ** (degree + 1) / (degree + 1)
+        gap = abs(np.sum(terms) - exact) / max(np.abs(terms).sum(), exact)
+        assert gap < 1e-11 if degree < k else gap > 1e-2, (degree, gap)
+
+
+@pytest.mark.parametrize("name", ["spheroid", "goldstein"])
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-10])
+def test_it_needs_no_more_evaluations_than_scipys_adams_codes_and_errs_no_more(name, tolerance):
+    scene = symtop.scene(name)
+    field = symtop.field("axis", scene.top)
+    times = np.linspace(0.0, scene.horizon, 33)
+    truth = symtop.reference(scene, times)["axis"].values
+    run = symtop.simulate(scene, "adams[axis]", tolerance=tolerance, samples=33, guard=False)
+    error = float(symtop.errors(run)["axis"].max())
+    start = field.state(scene.start)
+    lsoda = integrate.solve_ivp(
+        field, (0.0, scene.horizon), start, method="LSODA", rtol=tolerance, atol=tolerance, t_eval=times
+    )
+    count = [0]
+
+    def counted(t, y):
+        count[0] += 1
+        return field(t, y)
+
+    vode = integrate.ode(counted).set_integrator("vode", method="adams", rtol=tolerance, atol=tolerance, nsteps=10**6)
+    vode.set_initial_value(start, 0.0)
+    states = np.array([vode.integrate(t)[:3] for t in times[1:]])
+    for evaluations, axis in ((lsoda.nfev, lsoda.y[:3].T), (count[0], np.vstack([truth[:1], states]))):
+        assert run.attrs["force_evaluations"] < 1.02 * evaluations
+        assert error < 1.1 * np.linalg.norm(axis - truth, axis=1).max()
+
+
+@pytest.mark.parametrize("chart", list(FORMULATIONS))
+def test_errors_follow_the_tolerance_and_orders_rise_with_it(chart):
+    runs = [
+        symtop.simulate("spheroid", f"adams[{chart}]", tolerance=tolerance, samples=161, guard=False)
+        for tolerance in (1e-5, 1e-8, 1e-11)  # at 1e-4 a quaternion is longer than one by more than 0.1 %, an outcome
+    ]
+    assert [run.attrs["outcome"] for run in runs] == ["ok"] * 3
+    errors = [float(symtop.errors(run)["axis"].max()) for run in runs]
+    assert all(50.0 * fine < coarse for coarse, fine in itertools.pairwise(errors))
+    assert errors[-1] < 1e-9
+    counts = [run.attrs["force_evaluations"] for run in runs]
+    assert counts[-1] < 5.6 * counts[0]  # of one order k it would be 1000^(2/k) times: k = 8 and more
+    assert all(2 * run.attrs["steps"] <= run.attrs["force_evaluations"] for run in runs)
+
+
+def steps_of(tolerance):
+    """(length, order) of each step on the axis, by a run in pieces of one step."""
+    scene = symtop.scene("spheroid")
+    solver = symtop.integrator("adams").solvers["axis"]
+    kernel, place, times = solver.loop(tolerance), np.zeros(solver.room), np.array([8.0])
+    numbers = (scene.top.I1, scene.top.I3, scene.top.mgl, *(getattr(scene.start, n) for n in scene.start.__slots__))
+    seen, made = -1, []
+    states, momenta = np.empty((1, 6)), np.empty((1, 2))
+    while seen < 1:
+        seen, *_ = kernel(numbers, tolerance, times, 1, seen, place, states, momenta)
+        made.append((place[6 + 6 * LAST + LENGTH], int(place[6 + 6 * LAST + ORDER_THEN])))
+    return made[1:]  # the first call evaluates f at the start
+
+
+def test_it_starts_with_order_one_and_keeps_the_length_of_steps():
+    made = steps_of(1e-9)
+    orders, lengths = [k for _, k in made], np.array([h for h, _ in made])
+    assert orders[:5] == [1, 2, 3, 4, 5]  # the start, in steps that double
+    np.testing.assert_array_equal(lengths[1:4] / lengths[:3], 2.0)
+    assert 6 <= np.median(orders) <= 12
+    assert np.mean(lengths[1:] == lengths[:-1]) > 0.5
+    assert np.median([k for _, k in steps_of(1e-3)]) < np.median(orders)
+
+
+def test_nothing_that_belongs_to_the_map_of_one_step_is_claimed():
+    method = symtop.integrator("adams")
+    assert (method.order, method.symplectic, method.symmetric) == (None, None, None)
+    assert math.isclose(method.least_tolerance, symtop.integrator("dop853-compiled").least_tolerance)

@@ -1,0 +1,93 @@
+"""All templates together: short, few figures, no sentence twice, links that lead somewhere, what is not measured."""
+
+import re
+from collections import Counter
+
+import pytest
+
+from symtop.core.errors import SymtopError
+from symtop.report import template
+from symtop.report.page import TEMPLATES
+from symtop.runner import run as runner
+
+OTHERS = {name: TEMPLATES / f"{name}.md" for name in ("front", "measured", "equations")}
+PAGES = {name: page for name in runner.names() if (page := runner.file_beside(name, "page.md")) is not None}
+TEXTS = {name: page.read_text(encoding="utf-8") for name, page in {**OTHERS, **PAGES}.items()}
+CALL = re.compile(r"{% call figure\((.*?)\) %}(.*?){% endcall %}", re.DOTALL)
+MOST_LINES, MOST_FIGURES, MOST_WORDS = 120, 3, 1100  # of a template
+
+
+def sentences(text: str) -> list[str]:
+    """The sentences of a template in words, numbers and names left out."""
+    prose = re.sub(r"{%.*?%}|{{.*?}}", " ", re.sub(r"^#.*$", " ", text, flags=re.MULTILINE), flags=re.DOTALL)
+    parts = (" ".join(part.split()) for part in re.split(r"(?<=[.:])\s", prose))
+    return [part for part in parts if len(part.split()) >= 6]
+
+
+def test_no_sentence_stands_twice():
+    assert sentences("# Q\n\nOne two three four five {{ f.x }} six. Short one.") == ["One two three four five six."]
+    counts = Counter(part for text in TEXTS.values() for part in sentences(text))
+    assert [part for part, count in counts.items() if count > 1] == []
+    assert sum(counts.values()) > 50
+
+
+@pytest.mark.parametrize("name", ["front", *PAGES])
+def test_a_page_is_short_and_its_figures_have_titles_captions_and_words_for_the_blind(name):
+    text = TEXTS[name]
+    assert text.startswith("# " if name == "front" else "# {{ question }}\n\n")
+    assert text.count("\n") <= MOST_LINES
+    assert len(text.split()) <= MOST_WORDS
+    figures = CALL.findall(text)
+    assert len(re.findall(r"figure\(", text)) == len(figures) <= MOST_FIGURES
+    for given, caption in figures:
+        assert re.search(r'title="[^"]{8,}"', given), given
+        assert re.search(r'alt="[^"]{20,}"', given), given
+        assert len(caption.split()) > 8, caption
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_links_to_pages_name_studies_or_benchmarks(name):
+    linked = set(re.findall(r"\bpages\.(\w+)", TEXTS[name]))
+    assert linked <= {*runner.names(), "peers", "bench", "measured"}
+
+
+def test_the_front_page_renders_without_any_study_and_with_what_there_is(tmp_path):
+    text = template.front(TEXTS["front"], [], tmp_path, {})
+    assert not re.search("None|not measured|!\\[", text)
+    assert template.GAP not in text
+    facts = {"bounds": 4, "bounds_held": 3, "closed_form": 1e-16, "digits": 45}
+    study = {"study": "truth", "title": "Truth", "facts": facts, "pictures": [], "tables": []}
+    said = template.front(TEXTS["front"], [study], tmp_path, {"truth": "[How?](#how)"})
+    assert "3 of 4 error bounds hold" in said
+    assert "[Truth](#how)" in said
+
+
+PAGE = """# {{ question }}
+
+It is {{ f.a }}. It is not {{ f.b }}. So it ends.
+
+**Head.** Only {{ f.b }}.
+
+{% raw %}Raw.{% endraw %}
+
+- one {{ f.a }}
+- two {{ f.b }}
+  and more
+
+{% call figure("drawn", title="A title", alt="For the blind") %}Found {{ f.b }}.{% endcall %}
+"""
+
+
+def test_a_sentence_about_what_was_not_measured_is_left_out_and_the_page_says_so_once(tmp_path):
+    findings = {"study": "mine", "question": "Q?", "page": PAGE, "facts": {"a": 1, "b": None}, "tables": [],
+                "pictures": [{"name": "drawn", "file": "a.png"}], "failures": [], "cases": 1}  # fmt: skip
+    text = template.filled(findings, tmp_path)
+    assert text.split("\n\n") == ["# Q?", template.PARTIAL, "It is 1. So it ends.", "Raw.", "- one 1", "**A title**",
+                                  "![For the blind](figures/a.png)", "A title.\n"]  # fmt: skip
+    assert template.answer(findings, tmp_path) == "It is 1. So it ends."
+    whole = template.filled(findings | {"facts": {"a": 1, "b": 2}}, tmp_path)
+    assert template.PARTIAL not in whole
+    assert "**Head.** Only 2." in whole
+    assert "- two 2 and more" in whole
+    with pytest.raises(SymtopError, match="page of mine"):
+        template.filled(findings | {"facts": {"a": 1}}, tmp_path)

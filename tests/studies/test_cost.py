@@ -1,0 +1,507 @@
+"""The study of cost: the ladder, prices, the ranking with its intervals, safe settings, and what its data say."""
+
+import math
+import timeit
+
+import numpy as np
+import pytest
+import xarray as xr
+from symtop_studies.cost import cells, facts, ladder, prices as pricing, study, tops as tops_module
+from symtop_studies.cost.cells import GENERAL, Cell
+from symtop_studies.cost.ranking import Ladder, cost_to_reach, hindsight, run_lengths, safe, slowdowns, wins
+from symtop_studies.cost.tops import ASKED, FIRST, KINDS, MOMENTA, NATURAL, SCENE, natural, tops_of
+
+import symtop
+from symtop.core import netcdf
+from symtop.measure import datasets
+from symtop.measure.accuracy import error_row
+from symtop.measure.ranking import nearest, regime
+from symtop.measure.settings import TARGETS
+from symtop.measure.verdicts import barriers
+from symtop.methods.framework.registry import integrator
+from symtop.model.scenes import Scene
+from symtop.model.top import Angles, SymmetricTop, flat
+from symtop.report.template import PARTIAL
+from symtop.runner.run import load
+from symtop.runner.study import Case
+from tests.templates import checked
+
+INF, NAN = math.inf, math.nan
+EACH = ("strang[axis]", "midpoint[angles]", "stormer-verlet-reversible[angles]", "rk4[attitude]", "rk45-compiled[axis]")
+
+
+def scene_of(tops, member):
+    numbers = tops.numbers[member].tolist()
+    return Scene(f"m{member}", SymmetricTop(*numbers[:3]), Angles(*numbers[3:]), horizon=float(tops.times[member, -1]))
+
+
+# ---- the arithmetic of costs -----------------------------------------------------------------------------------------
+
+
+def test_a_cost_lies_on_the_line_between_the_last_miss_and_the_first_hit():
+    work = np.array([[10.0], [20.0], [40.0]])
+    errors = np.array([[1e-2], [1e-4], [1e-6]])  # two decades for each doubling
+    reached = cost_to_reach(work, errors, [1e-2, 1e-3, 1e-4, 1e-5, 1e-7])
+    assert reached[:, 0] == pytest.approx([10.0, 10.0 * math.sqrt(2.0), 20.0, 20.0 * math.sqrt(2.0), INF])
+
+
+@pytest.mark.parametrize(
+    ("errors", "cost"),
+    [
+        ([1e-5, 1e-1, 1e-2, 1e-4], 20.0 * 2.0**1.5),  # the first was luck
+        ([INF, INF, 1e-4, 1e-6], 40.0),  # nothing to interpolate from: the hit itself
+        ([1e-2, 1e-4, 1e-2, 1e-2], INF),  # the hit is missed again
+        ([1e-1, 1e-2, NAN, NAN], INF),  # it left before
+        ([1e-4, NAN, NAN, NAN], 10.0),  # the coarsest run is enough
+        ([NAN, NAN, NAN, NAN], INF),
+        ([1e-2, 0.0, NAN, NAN], 10.0),  # an error of zero: close to the miss, and never below it
+    ],
+)
+def test_what_counts_as_a_hit(errors, cost):
+    work = np.where(np.isnan(errors), NAN, [10.0, 20.0, 40.0, 80.0])[:, np.newaxis]
+    assert cost_to_reach(work, np.array(errors)[:, np.newaxis], [1e-3])[0, 0] == pytest.approx(cost, rel=0.01)
+
+
+def test_a_slowdown_is_over_the_cheapest_on_the_same_top_and_a_win_is_beyond_ties():
+    table = np.array([[1.0, 4.0, INF], [2.0, 2.0, INF]])
+    assert np.array_equal(slowdowns(table), [[1.0, 2.0, NAN], [2.0, 1.0, NAN]], equal_nan=True)
+    won, level = wins(np.array([[1.0, 1.0, 1.0], [1.05, 2.0, 0.5], [3.0, 1.2, INF]]))
+    assert won.tolist() == [[False, True, False], [False, False, True], [False, False, False]]
+    assert level.tolist() == [[True, True, False], [True, False, True], [False, False, False]]
+
+
+def test_run_lengths_are_shares_of_the_tops_that_were_asked():
+    budgets = np.array([0.5, 1.0, 2.0, 10.0])
+    assert run_lengths(np.array([1.0, 2.0, 3.0, INF, NAN]), budgets).tolist() == [0.0, 0.25, 0.5, 0.75]
+
+
+# ---- winners with intervals ------------------------------------------------------------------------------------------
+
+QUIET = np.array([0.01, 0.01])
+
+
+def test_wins_and_what_is_met_have_one_denominator_each():
+    table = np.array([[1.0, 1.0, 1.0, INF], [1.05, 2.0, 0.5, INF], [INF, INF, 3.0, INF]])
+    contest = hindsight(["a", "b", "c"], table, np.full(3, 0.01))
+    assert (contest.tops, contest.solved) == (4, 3)
+    one = {standing.name: standing for standing in contest.standings}
+    assert (one["a"].share, one["a"].level, one["a"].met) == pytest.approx((1 / 3, 2 / 3, 3 / 4))
+    assert one["c"].met == pytest.approx(1 / 4)
+    assert not contest.called
+    assert hindsight(["a", "b"], np.full((2, 4), INF), QUIET).first is None
+
+
+def test_a_lead_is_called_if_neither_the_tops_nor_the_prices_can_turn_it():
+    draw = np.random.default_rng(0)
+    fair, ahead = draw.random((2, 2000)), draw.random((2, 2000)) * [[0.7], [1.0]]
+    assert not hindsight("ab", fair, QUIET).called
+    assert hindsight("ab", ahead, QUIET).called
+    assert not hindsight("ab", ahead[:, :12], QUIET).called  # too few tops
+    assert not hindsight("ab", ahead, QUIET * 40.0).called  # the same tops, with prices that are hardly known
+    assert not hindsight("ab", ahead, QUIET, marked=["a"]).called
+
+
+def test_the_interval_of_a_share_covers_it_as_often_as_it_says():
+    """Tops from a known distribution: a wins where its cost is 1/1.1 of b's, on a share that can be worked out."""
+    draw, inside = np.random.default_rng(5), 0
+    true = 1.0 / (2.0 * 1.1)  # of a/b uniform in (0, 2): a wins where a/b < 1/1.1
+    for _ in range(60):
+        first = hindsight("ab", np.stack([2.0 * draw.random(200), np.ones(200)]), QUIET * 0.0).standings
+        one = next(standing for standing in first if standing.name == "a")
+        inside += one.low <= true <= one.high
+    assert 51 <= inside <= 60
+
+
+def test_noise_of_a_price_widens_the_interval_of_a_share():
+    draw = np.random.default_rng(2)
+    table = np.stack([np.exp(0.1 * draw.standard_normal(3000)), np.full(3000, 1.1)])
+    narrow, wide = (hindsight("ab", table, np.array([error, error])).standings[0] for error in (0.0, 0.06))
+    assert wide.share == narrow.share
+    assert wide.high - wide.low > 3.0 * (narrow.high - narrow.low)
+
+
+def steps(name, met, per_step=1.0, error=0.0, levels=8):
+    settings = 2.0 ** np.arange(levels)
+    return Ladder(name, np.asarray(met, dtype=float), settings, per_step * settings, True, error)
+
+
+def test_a_safe_setting_serves_95_of_100_tops():
+    met = np.arange(1.0, 101.0)  # of 100 tops one needs so many steps each
+    (one,), _ = safe([steps("a", met)])
+    assert one.setting == pytest.approx(95.0)
+    assert one.seconds == pytest.approx(95.0, rel=1e-6)  # a step costs one
+    assert one.low < one.seconds < one.high
+    (spoilt,), called = safe([steps("a", np.where(met > 94.0, INF, met))])
+    assert math.isinf(spoilt.seconds)  # six tops are never met
+    assert not called
+    tolerance = Ladder("b", 10.0 ** -np.linspace(2.0, 6.0, 100), 10.0 ** -np.arange(1.0, 9.0), np.arange(8.0) + 1.0,
+                       False, 0.0)  # fmt: skip
+    (tight,), _ = safe([tolerance])
+    assert tight.setting == pytest.approx(10.0 ** -(2.0 + 4.0 * 94 / 99), rel=1e-6)
+
+
+def test_hindsight_and_safe_may_have_other_winners():
+    """A step that suits most tops and fails on one in five, against one that costs a little more on all of them."""
+    met = np.full(200, 4.0)
+    met[::5] = 100.0
+    choices, called = safe([steps("spoilt", met), steps("even", np.full(200, 6.0))])
+    assert called
+    assert [one.name for one in choices] == ["even", "spoilt"]
+    assert hindsight(["spoilt", "even"], np.stack([met, np.full(200, 6.0)]), QUIET).first.name == "spoilt"
+
+
+def test_a_safe_lead_inside_the_prices_is_not_called():
+    met = np.full(200, 4.0)
+    for error, called in ((0.005, True), (0.10, False)):
+        assert safe([steps("a", met, 1.0, error), steps("b", met, 1.08, error)])[1] is called
+
+
+# ---- prices ----------------------------------------------------------------------------------------------------------
+
+
+def tree_of(price, names=("a", "b", "c"), **others):
+    """Prices (processes, variants) in a dataset of the study."""
+    price = np.asarray(price, dtype=float)
+    shape = (*price.shape, len(pricing.TOLERANCES))
+    dims = ("scene", "variant", "priced_at")
+    group = xr.Dataset(
+        {"price": (dims, np.broadcast_to(price[..., np.newaxis], shape)), "call": (dims, np.full(shape, 2e-6)),
+         "sampled": (dims[:2], np.full(price.shape, NAN))},
+        coords={"scene": [f"{pricing.BATCHES[k // 5]}-{k % 5}" for k in range(len(price))], "variant": list(names),
+                "priced_at": list(pricing.TOLERANCES)},
+    )  # fmt: skip
+    return xr.DataTree.from_dict({"prices": group} | others)
+
+
+def test_a_price_is_the_median_and_slow_or_negative_slopes_do_not_move_it():
+    quiet = np.array([[5e-9, 6e-9, 7e-9]] * 5)
+    planted = quiet.copy()
+    planted[0, 0], planted[1, 1] = 4e-10, -3e-9  # below what the arithmetic can take, and negative
+    planted[2, 2] = 2.3e-8  # a process that was disturbed
+    plain, spoilt = (pricing.prices(tree_of(each)) for each in (quiet, planted))
+    assert spoilt.price == pytest.approx(plain.price)
+    assert spoilt.marked == []
+    assert np.min(planted, axis=0)[0] == 4e-10  # the control: the least of them would be that
+
+
+def test_a_process_that_is_slower_at_everything_is_no_spread():
+    quiet = np.array([[5e-9, 6e-9, 7e-9]] * 5)
+    quiet, names = np.tile(quiet, 4), "abcdefghijkl"
+    together = quiet * np.array([1.0, 1.3, 1.1, 0.8, 1.0])[:, np.newaxis]
+    apart = quiet * np.random.default_rng(1).uniform(0.7, 1.3, quiet.shape)
+    assert pricing.prices(tree_of(together, names)).marked == []
+    assert pricing.prices(tree_of(together, names)).spread.max() < 0.01
+    assert pricing.prices(tree_of(apart, names)).marked  # the control
+    few = tree_of(together[:, :3])  # of so few a common factor would be their own noise
+    assert pricing.prices(few).marked == ["a", "b", "c"]
+
+
+def test_a_noisy_price_is_measured_again_and_marked_if_it_stays():
+    noisy = np.array([[5e-9, 6e-9, 7e-9]] * 5) * np.array([[1.0, 1.0, 1.0]] * 5)
+    noisy[:, 1] *= [1.0, 1.4, 0.7, 1.5, 1.1]
+    first = pricing.prices(tree_of(noisy))
+    assert first.marked == ["b"]
+    again = np.full((5, 3), NAN)
+    again[:, 1] = 6e-9
+    assert pricing.prices(tree_of(np.concatenate([noisy, again]))).marked == []
+    again[:, 1] = noisy[:, 1]
+    assert pricing.prices(tree_of(np.concatenate([noisy, again]))).marked == ["b"]
+
+
+def test_prices_of_fresh_processes_agree_with_a_run_timed_by_hand():
+    """Evaluations times the price, plus the call, is the time of a run of another length."""
+    names = ["strang[axis]", "rk4[axis]"]
+    each = xr.concat([pricing.measured(names, 3, 0.001) for _ in range(2)], "scene")
+    for name in names:
+        call, evaluations = pricing.run_of(integrator(name), pricing.TOLERANCE, 20)
+        by_hand = min(timeit.repeat(call, number=50, repeat=20)) / 50
+        price, rest = (float(each[key].sel(variant=name).min()) for key in ("price", "call"))
+        assert evaluations * price + rest == pytest.approx(by_hand, rel=0.5)
+
+
+def test_variants_whose_order_follows_the_tolerance_have_a_price_at_each():
+    assert pricing.tolerances_of(integrator("series-adaptive[axis]")) == pricing.TOLERANCES
+    assert pricing.tolerances_of(integrator("rk45-compiled[axis]")) == (pricing.TOLERANCE,)
+    known = pricing.Prices(["a"], np.array([8.0 / 4.0 ** np.arange(7)]), np.zeros((1, 7)), np.zeros(1), np.zeros(1), [],
+                           NAN)  # fmt: skip
+    price, _ = known.at("a", np.array([1e-2, 1e-3, 1e-4, NAN]))
+    assert price[:3] == pytest.approx([8.0, 4.0, 2.0])
+
+
+# ---- many tops against one -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def tops():
+    return tops_of(60, 20, 3, 10.0)
+
+
+def test_scales_of_many_tops_are_those_of_scenes(tops):
+    scenes = [scene_of(tops, k) for k in range(80)]
+    assert tops.energy_scale[:80] == pytest.approx([one.energy_scale for one in scenes], rel=1e-6)
+    assert tops.period[:80] == pytest.approx([one.nutation_period for one in scenes], rel=1e-6)
+    assert tops.regime[:80] == pytest.approx(np.array([regime(one) for one in scenes]), abs=1e-6)
+    ends = [barriers(one) for one in scenes]
+    wide = tops.width[:80] > 1e-3
+    assert tops.width[:80][wide] == pytest.approx(np.array([one.lowest - one.highest for one in ends])[wide], abs=1e-6)
+
+
+def test_the_natural_tops_are_those_that_are_written_down():
+    tops = natural(20_000, 1)
+    I1, I3, mgl, theta, _, _, theta_dot, phi_dot, psi_dot = tops.T
+    assert (natural(50, 1) == tops[:50]).all()
+    assert not (natural(50, 2) == tops[:50]).all()
+    assert np.quantile(np.cos(theta), [0.25, 0.5, 0.75]) == pytest.approx([-0.5, 0.0, 0.5], abs=0.02)  # isotropic
+    spin = np.log2(np.abs(I3 * (psi_dot + phi_dot * np.cos(theta)) / (2.0 * np.sqrt(I1 * mgl))))
+    assert np.quantile(spin, [0.0, 0.5, 1.0]) == pytest.approx([-4.0, 0.5, 5.0], abs=0.05)
+    assert (I3 / I1).min() > 0.02
+    assert (I3 / I1).max() < 1.46
+    assert np.hypot(theta_dot, phi_dot * np.sin(theta)).max() <= 2.0 + 1e-9
+
+
+def test_the_named_scenes_are_tops_among_the_others(tops):
+    assert (tops.kinds == KINDS.index(NATURAL)).sum() == 20
+    assert (tops.kinds == KINDS.index(SCENE)).sum() == len(tops_module.named())
+    assert np.array_equal(tops.numbers[-len(tops_module.named()) :], [*tops_module.named().values()])
+    assert "goldstein" in tops_module.named()
+    members = list(tops.members(np.array([3, 0, 11])))
+    assert np.array_equal([flat(*one) for one in members], tops.numbers[[3, 0, 11]])
+
+
+def test_samples_fall_on_the_same_times_at_every_step(tops):
+    for level in (0, 3, 9):
+        h = tops.period / FIRST * 0.5**level
+        assert np.array_equal((tops.marks << level) * h[:, np.newaxis], tops.times, equal_nan=True)
+    phases = np.sort(np.mod(tops.times[0] / tops.period[0], 1.0))
+    assert np.diff(phases).max() < 0.25  # they see all phases of the nutation
+
+
+@pytest.mark.parametrize("name", EACH)
+def test_errors_of_many_runs_are_those_of_each(tops, name):
+    row, chosen = integrator(name), np.flatnonzero(tops.kinds < 2)[:4]
+    level = 5 if row.fixed_step else 4
+    shown = ladder.run_level(row, tops, chosen, level, 1e6)
+    many = tops.errors(row.charts()[0], shown, chosen)
+    for k, member in enumerate(chosen):
+        setting = tops.period[member] / FIRST * 0.5**level if row.fixed_step else ladder.setting_of(row, level)
+        alone = error_row(scene_of(tops, member), row, setting, float(tops.times[member, -1]))
+        if alone["outcome"] != "ok":
+            assert many["axis"][k] == INF
+            continue
+        for quantity in set(ASKED) & many.keys():  # a dozen samples against a thousand
+            assert 0.3 * alone[quantity] <= many[quantity][k] <= 1.001 * alone[quantity] + 1e-14
+        assert many[MOMENTA][k] <= max(alone["p_phi"], alone["p_psi"]) * 1.001 + 1e-14
+
+
+def test_a_failed_run_has_an_infinite_error(tops):
+    class Shown:
+        states = np.full((1, tops.marks.size, 6), NAN)
+        momenta = np.full((1, tops.marks.size, 2), NAN)
+
+    errors = tops.errors("axis", Shown, np.array([4]))
+    assert set(errors) == {"axis", "energy", MOMENTA}
+    assert all(value == INF for values in errors.values() for value in values)
+
+
+def test_targets_are_asked_where_they_mean_something(tops):
+    asked, bounds = tops.asked(TARGETS), tops.bounds()
+    for place, target in enumerate(TARGETS):
+        for name in ASKED:
+            assert (asked[name][place] <= (tops.width > target)).all()
+            assert (bounds[name][asked[name][place]] <= 0.1 * target).all()
+    assert not asked["axis"][0].all()  # sleeping tops nutate less than 1e-3
+
+
+# ---- a method on the tops --------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def strang(tops):
+    return ladder.table(integrator("strang[axis]"), tops, 2e4, twin=False, guarded=4)
+
+
+def test_finer_targets_cost_more_and_never_more_than_the_budget(strang):
+    cost = strang["cost"].transpose("quantity", "target", "member").values
+    for values in cost:
+        both = ~np.isnan(values[0]) & ~np.isnan(values[1])
+        assert (values[0, both] <= values[1, both]).all()
+    assert cost[np.isfinite(cost)].max() <= 2e4 * 1.001
+    assert np.isnan(strang["cost"].sel(quantity="attitude").values).all()
+
+
+@pytest.mark.parametrize("name", ["strang[axis]", "series-adaptive[axis]"])
+def test_the_stored_setting_meets_the_target_at_the_stored_cost(tops, strang, name):
+    row = integrator(name)
+    table = strang if name == "strang[axis]" else ladder.table(row, tops, 2e4, twin=False, guarded=0)
+    one = table.sel(quantity="axis", target=1e-3)
+    members = np.flatnonzero(np.isfinite(one["cost"].values))[:6]
+    assert np.array_equal(np.isfinite(one["met_at"].values), np.isfinite(one["cost"].values))
+    for member in members:
+        setting, horizon = float(one["met_at"][member]), float(tops.times[member, -1])
+        step = tops.period[member] / setting if row.fixed_step else setting
+        alone = error_row(scene_of(tops, member), row, step, horizon)
+        assert alone["axis"] < (4e-3 if row.fixed_step else 1e-2)
+        assert alone["force_evaluations"] == pytest.approx(float(one["cost"][member]), rel=0.1)
+
+
+def test_every_top_that_is_drawn_is_judged_or_dropped_and_silent_runs_are_wrong(strang):
+    runs, wrong, silent = (strang[name].values for name in ("runs", "wrong", "silent"))
+    assert (runs[0] == strang["drawn"].values).all()
+    assert (runs <= strang["drawn"].values).all()
+    assert (silent <= wrong).all()
+    assert (wrong <= runs).all()
+    assert wrong[0].sum() > wrong[6].sum()
+    data = xr.DataTree.from_dict({"short": strang.expand_dims(scene=["tops"], variant=["strang[axis]"])})
+    health = cells.health(data, "strang[axis]")
+    assert (health.dropped >= 0).all()
+    assert health.dropped[-1].sum() > 0  # a budget ends every ladder of order 2
+    assert np.array_equal(health.dropped, health.drawn - runs)
+
+
+def test_the_guard_is_counted_once_for_every_run_that_it_was_asked_about(strang):
+    data = xr.DataTree.from_dict({"short": strang.expand_dims(scene=["tops"], variant=["strang[axis]"])})
+    rows = cells.guard_counts(data)
+    asked = np.isfinite(strang["foretold"].values).sum()
+    assert rows[["wrong", "between", "right"]].to_numpy().sum() == asked > 0
+    assert rows["wrong"][rows["whole"]].sum() > 0  # its trial covers coarse runs whole, and says so
+
+
+def test_a_variant_is_asked_for_what_it_shows_and_does_not_keep_anyway():
+    assert ladder.quantities_of(integrator("strang[axis]"), twin=False) == ("axis", "energy")
+    assert ladder.quantities_of(integrator("strang[attitude]"), twin=True) == ("attitude",)
+    assert ladder.quantities_of(integrator("midpoint[angles]"), twin=False) == ASKED
+    assert ladder.quantities_of(integrator("gauss-4[axis]"), twin=False) == ("axis",)
+
+
+def test_the_work_of_the_typical_top_grows_with_the_setting(strang):
+    work = strang["work"].values[:, KINDS.index(NATURAL)]
+    assert (np.diff(work) > 0.0).all()
+    assert work[5] == pytest.approx(10.0 * FIRST * 2.0**5, rel=0.15)  # one evaluation a step over ten nutations
+
+
+# ---- what is said ----------------------------------------------------------------------------------------------------
+
+
+def test_no_method_of_this_top_takes_part_in_a_contest_for_any_body():
+    assert cells.of_class("kicks", True, GENERAL)
+    assert cells.of_class("kicks", False, "kicks")
+    assert not cells.of_class("kicks", False, GENERAL)  # it exists for symmetric bodies alone
+    assert cells.of_class("this-top", False, "this-top")
+    assert not cells.of_class("", True, GENERAL)  # a plug-in that does not say what it needs
+    assert all(integrator(name).general for name in study.far.candidates())
+
+
+def test_the_old_names_answer_with_the_new_one():
+    for name in ("population", "work_precision", "phase_diagram"):
+        with pytest.raises(symtop.SymtopError, match="is now cost"):
+            load(name)
+
+
+def test_the_grid_has_every_compiled_variant_and_says_what_it_leaves_out():
+    names = {case.integrator for case in study.STUDY.cases(True) if case.group == "short"}
+    assert {"strang[axis]", "strang[attitude]", "midpoint[angles]", "rk45-compiled[angles]", "taylor[axis]"} <= names
+    assert not {name for name in names if "unreduced" in name or name.startswith("exact")}
+    assert sum(case.timed for case in study.STUDY.cases(False)) == 5
+
+
+@pytest.fixture(scope="module")
+def data(quick_results):
+    return netcdf.read_any(quick_results / "cost.nc")
+
+
+def test_quick_results_hold_every_verdict(data):
+    assert {"short", "long", "tops", "prices", "far"} <= set(data.children)
+    winners = cells.winners(data)
+    assert len(winners) == 2 * len(cells.CLASSES) * 2 * len(TARGETS)
+    for one in winners:
+        for best in filter(None, (one["safe"], one["hindsight"])):
+            method = integrator(best.name)
+            assert cells.of_class(method.needs, method.general, one["needs"])
+            assert best.low <= best.high
+        if one["hindsight"]:
+            assert one["solved"] <= one["asked"]
+    taken = cells.costs(data, Cell("short", "axis", 1e-3, NATURAL))
+    assert not any("[attitude]" in name for name in taken.names if f"{name.split('[')[0]}[axis]" in taken.names)
+
+
+def test_a_cost_holds_the_call(data):
+    cell = Cell("short", "axis", 1e-3, NATURAL)
+    seconds, counted = cells.costs(data, cell), cells.costs(data, cell, cells.EVALUATIONS)
+    row = seconds.names.index("rk4[axis]")
+    price, call = pricing.prices(data).at("rk4[axis]", np.array([NAN]))
+    good = np.isfinite(counted.values[row])
+    assert call[0] > 2e-7
+    assert seconds.values[row, good] == pytest.approx(counted.values[row, good] * price[0] + call[0])
+
+
+def test_called_winners_survive_prices_that_are_measured_again(data):
+    """The prices drawn from their own intervals once more: nobody who is called loses his cell to another."""
+    cell = Cell("short", "axis", 1e-9, NATURAL)
+    taken, contest = cells.costs(data, cell), cells.contest(data, cell)
+    again = taken.values * np.exp(taken.errors * np.random.default_rng(9).standard_normal(len(taken.names)))[:, None]
+    second = hindsight(taken.names, again, taken.errors)
+    if contest.called:
+        assert second.first.name == contest.first.name
+    dearer = np.where(np.array(taken.names) == contest.first.name, 3.0, 1.0)[:, np.newaxis]
+    worse = hindsight(taken.names, taken.values * dearer, taken.errors)
+    assert worse.first.name != contest.first.name  # the control: three times as dear, it wins nowhere
+
+
+@pytest.mark.parametrize("quantity", ["axis", "attitude", "energy"])
+def test_advice_counts_the_nearest_tops_of_the_quick_results(quick_results, quantity):
+    scene = symtop.scene("goldstein")
+    near = nearest(quick_results / "cost.nc", scene, quantity, 1e-6, scene.horizon)
+    assert near.tops == 50
+    assert (near.quantity, near.target) == (quantity, 1e-6)
+    counts = list(near.served.values())
+    assert counts == sorted(counts, reverse=True)
+    assert counts[0] >= 20  # some variant is near the cheapest on most of them
+    advice = symtop.recommend(scene, accuracy=1e-6, quantity=quantity, horizon=20.0, results=quick_results)
+    assert "of the 50 nearest random tops" in advice.nearest
+    assert advice.nearest in str(advice)
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A few variants on a few tops, with prices that are given."""
+    names = ["rk4[axis]", "takahashi-imada[axis]", "taylor[axis]", "series[axis]"]
+    asked = study.QUICK["short"] | {"strata": 60, "natural": 30}
+    cases = [Case("tops", name, asked, group="short") for name in names]
+    cases += [Case("short", "exact", asked, group="tops")]
+    few = study.FAR_QUICK | {"members": 2, "levels": 6, "steps": 4e3, "budget": 1e4}
+    cases += [Case("natural", "rk4[axis]", few, group="far")]
+    tree = datasets.combine([(case, study.measure(case)) for case in cases])
+    return tree.assign({"prices": tree_of([[7e-9, 3e-8, 1.4e-8, 8e-9]] * 5, names)["prices"]})
+
+
+def test_facts_and_tables_are_those_of_the_cells(small):
+    said, tables = facts.facts(small), facts.tables(small)
+    winners = tables["winners"].query("tops == 'natural'").set_index(["needs", "error"])
+    for place, target in ((3, 1e-3), (6, 1e-6)):
+        one = cells.winner(small, Cell("short", "axis", target, NATURAL))
+        assert said[f"safe_{place}"] == one["safe"].name.removesuffix("[axis]")
+        assert winners.loc[GENERAL, target]["time (us)"] == pytest.approx(1e6 * one["safe"].seconds)
+    assert said["kicks"] == "takahashi-imada"
+    assert said["lagrangian"] is None  # there is none among these
+    assert said["kicks_seconds"] > 0.0
+    assert cells.safest(small, Cell("short", "axis", 1e-12, NATURAL, "kicks"))[0][0].seconds == INF
+    assert tables["use"].iloc[3]["1e-12 rad"] == facts.NOTHING
+    assert said["nutations_long"] is None  # nothing was run over a thousand
+    assert "takahashi-imada" not in set(winners.loc[GENERAL]["safe"])  # it exists for symmetric bodies alone
+    assert "takahashi-imada (symmetric)" in tables["use"].iloc[3]["1e-3 rad"]
+    assert tables["use"].iloc[3]["keeps, at 1e-6 rad"] == "momenta, energy bounded"
+    assert len(tables["prices"]) == 4
+
+
+def test_a_share_of_silent_runs_is_that_of_its_kind(small):
+    table = facts.tables(small)["silent"].set_index(["variant", "kind of top"])
+    health = cells.health(small, "rk4[axis]")
+    kind = KINDS.index("near-separatrix")
+    rows = table.loc[("rk4[axis]", "near-separatrix")]
+    at = [int(np.argmin(np.abs(health.setting - steps))) for steps in facts.STEPS]
+    assert np.array_equal(rows["wrong"], health.wrong[at, kind] / health.drawn[kind])
+
+
+def test_the_page_says_what_was_measured(small, tmp_path):
+    text = checked("cost", small, tmp_path, elsewhere={"use"})
+    assert PARTIAL in text  # there are no long runs

@@ -1,0 +1,48 @@
+"""Planted false claims: a fresh process judges them, the caught are counted, and one that escapes is named."""
+
+import pytest
+import xarray as xr
+from symtop_studies.claims import facts, figures, planted, study
+
+import symtop
+from symtop.judging.battery import SCENE
+from symtop.measure.datasets import combine
+from symtop.runner.study import Case
+
+LIAR = "planted-hidden-kick"
+
+
+@pytest.fixture(scope="module")
+def data():
+    """An honest method and a liar, as the study stores them."""
+    (liar,) = (case for case in planted.cases(quick=True) if case.integrator == LIAR)
+    cases = [Case(SCENE, "strang", {"quick": True}), liar]
+    return combine([(case, study.measure(case)) for case in cases])
+
+
+def test_a_liar_is_judged_beside_the_honest_and_registered_nowhere(data):
+    said = facts.facts(data)
+    assert (said["integrators"], said["refuted"]) == (1, 0)
+    assert (said["planted"], said["caught"]) == (1, 1)
+    assert not {LIAR, "hidden-kick"} & symtop.integrators().keys()
+    row = facts.tables(data)["planted"].iloc[0]
+    assert (row["integrator"], row["claim"], row["verdict"]) == (LIAR, "symmetric", "refuted")
+    shown = {text.get_text() for picture in figures.pictures(data) for text in picture.figure.axes[0].texts}
+    assert "1 of 1" in shown
+
+
+def test_one_that_escapes_is_named_and_one_refuted_for_another_claim_is_not_caught(data):
+    liar = data["variant"] == LIAR
+    verdict = xr.where(liar & (data["claim"] == "symmetric"), "confirmed", data["verdict"])
+    fooled = data.assign(verdict=xr.where(liar & (data["claim"] == "order"), "refuted", verdict))
+    said = facts.facts(fooled)
+    assert (said["planted"], said["caught"]) == (1, 0)
+    assert "0 of 1" in {text.get_text() for text in next(figures.pictures(fooled)).figure.axes[0].texts}
+
+
+def test_a_part_of_the_study_without_them_says_nothing_of_them(data):
+    part = data.sel(variant=["strang"])
+    said = facts.facts(part)
+    assert (said["planted"], said["caught"]) == (None, 0)
+    assert "planted" not in facts.tables(part)
+    assert not any(" of " in text.get_text() for text in next(figures.pictures(part)).figure.axes[0].texts)

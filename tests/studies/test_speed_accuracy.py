@@ -1,0 +1,73 @@
+"""The study of speed: costs are those of its runs, and its figure and page show them."""
+
+import math
+
+import numpy as np
+import pytest
+from symtop_studies.speed import facts, figures, study
+
+import symtop
+from symtop.measure import datasets
+from symtop.runner.study import Case
+from tests.templates import checked
+
+
+@pytest.fixture(scope="module")
+def data():
+    """A few methods on one scene at five settings each."""
+    asked = {"lengths": (10.0,), "settings": 5}
+    names = ("exact", "rk4[axis]", "rk4[attitude]", "strang[axis]", "stormer-verlet[angles]", "taylor[axis]")
+    cases = [Case("goldstein", name, asked) for name in names]
+    return datasets.combine([(case, study.measure(case)) for case in cases])
+
+
+def test_a_run_is_that_of_its_setting(data):
+    cell = facts.shown(data).sel(variant="rk4[axis]")
+    scene, step = symtop.scene("goldstein"), float(cell["step_size"][2])
+    run = symtop.simulate(scene, "rk4[axis]", step_size=step, horizon=10.0 * scene.nutation_period, guard=False)
+    assert float(symtop.errors(run)["axis"].max()) == pytest.approx(float(cell["axis"][2]), rel=0.05)
+    assert np.isfinite(cell["seconds"]).all()
+    attitude = facts.shown(data).sel(variant="rk4[attitude]")
+    ended = symtop.simulate(scene, "rk4[attitude]", step_size=float(attitude["step_size"][0]),
+                            horizon=10.0 * scene.nutation_period, guard=False).attrs["outcome"]  # fmt: skip
+    assert ended == "not_normalised"  # so long a step loses the quaternion's length, and is neither judged nor timed
+    assert not np.isfinite(attitude[["attitude", "seconds"]].isel(setting=0).to_array()).any()
+    assert np.isfinite(attitude[["attitude", "seconds"]].isel(setting=slice(1, None)).to_array()).all()
+    assert not np.isfinite(facts.shown(data)["axis"].sel(variant="rk4[attitude]")).any()
+
+
+def test_a_cost_lies_between_the_runs_that_miss_and_meet_the_error(data):
+    cell = facts.shown(data).sel(variant="strang[axis]")
+    error, seconds = cell["axis"].values, cell["force_evaluations"].values
+    middle = math.sqrt(error[1] * error[2])
+    assert facts.cost(cell, middle, "force_evaluations") == pytest.approx(math.sqrt(seconds[1] * seconds[2]))
+    assert facts.cost(cell, error[2], "force_evaluations") == pytest.approx(seconds[2])
+    assert facts.cost(cell, 1e-3 * error.min(), "force_evaluations") == math.inf
+
+
+def test_the_chart_holds_every_run_and_the_marks_of_the_truth(data):
+    (chart,) = figures.charts(data)
+    assert list(chart.panels) == ["goldstein | 10 nutations"]
+    (marks,) = chart.marks.values()
+    assert marks[0] == float(facts.shown(data)["seconds"].sel(variant="exact").min())
+    points = {series.integrator: series.points for series in chart.panels["goldstein | 10 nutations"]}
+    assert "exact" not in points
+    place = chart.y["largest error of the axis (rad)"]
+    assert [point[place] for point in points["rk4[axis]"]] == [
+        float(f"{value:.3g}") for value in facts.shown(data)["axis"].sel(variant="rk4[axis]").values
+    ]
+    assert {point[place] for point in points["rk4[attitude]"]} == {None}
+
+
+def test_the_page_says_what_was_measured(data, tmp_path):
+    text = checked("speed", data, tmp_path, elsewhere={"error-against-time"})
+    assert "`takahashi" not in text
+    answers = facts.facts(data)
+    assert answers["fastest_6"] in text
+    assert answers["scipy"] is None
+
+
+def test_a_method_for_symmetric_bodies_is_not_called_one_for_any_body():
+    assert facts.for_any_body("rk4[axis]")
+    assert not facts.for_any_body("takahashi-imada[axis]")
+    assert not facts.for_any_body("series[axis]")

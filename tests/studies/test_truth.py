@@ -1,0 +1,42 @@
+"""The truth study: its facts are those of its data, and its page says them."""
+
+import numpy as np
+import pytest
+from symtop_studies.truth import facts, study
+from symtop_studies.truth.measures import BOUND, ERROR
+
+from symtop.measure import datasets
+from symtop.runner.study import Case
+from tests.templates import checked
+
+
+@pytest.fixture(scope="module")
+def data():
+    """Two sources on one scene, at two times."""
+    cases = [Case("spheroid", name, {"horizons": [8.0, 20.0]}) for name in ("closed form", "double, attitude")]
+    return datasets.combine([(case, study.measure(case)) for case in cases])
+
+
+def test_facts_follow_from_the_errors_and_a_bound_that_is_broken_is_counted(data):
+    answers = facts.facts(data)
+    assert answers["closed_form"] == float(data[ERROR].sel(variant="closed form").max()) < 1e-14
+    assert answers["integrated"] > answers["closed_form"]
+    assert (answers["bounds"], answers["bounds_held"]) == (4, 4)
+    assert answers["quadruple"] is None
+    worse = data.assign({ERROR: data[ERROR].where(data["horizon"] < 10.0, 2.0 * data[BOUND])})
+    assert facts.facts(worse)["bounds_held"] == 2
+
+
+def test_tables_hold_each_source_at_its_longest_time(data):
+    ends = facts.tables(data)["sources"]
+    assert list(ends["time (s)"]) == [20.0, 20.0]
+    row = ends.set_index("source").loc["closed form"]
+    last = data.sel(scene="spheroid", variant="closed form", horizon=20.0)
+    assert (row["axis error (rad)"], row["claimed bound (rad)"]) == (float(last[ERROR]), float(last[BOUND]))
+
+
+def test_the_page_says_what_was_measured(data, tmp_path):
+    text = checked("truth", data, tmp_path)
+    assert "4 of 4 bounds" in text
+    assert "quadruple precision, which" not in text  # there was none
+    assert np.isfinite(facts.facts(data)["bound_ratio"])

@@ -1,0 +1,35 @@
+"""What every template of a study must do: render whole and with nothing measured, and name only what is there."""
+
+import re
+from collections.abc import Collection
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+
+from symtop.report import template
+from symtop.runner import run as runner
+
+NAMED = re.compile(r"\b(?:figure|table)\(\"([\w-]+)\"|\(tables/\w+?-([\w-]+)\.csv\)")
+
+
+def checked(name: str, data: object, folder: Path, elsewhere: Collection[str] = ()) -> str:
+    """The page of a study with what a dataset shows; all that its template names is there, with or without numbers.
+
+    Figures and tables that are shown `elsewhere` stand on the front page.
+    """
+    study, page = runner.load(name), runner.file_beside(name, "page.md")
+    assert page is not None
+    found = runner.findings_of(
+        study, data, folder, lambda figure, _: plt.close(figure), failures=[], cases=1, page=page
+    )
+    there = {one["name"] for kind in ("pictures", "tables") for one in found[kind]}
+    absent = set(re.findall(r"has\(\"([\w-]+)\"\)", found["page"])) - there
+    assert {first or linked for first, linked in NAMED.findall(found["page"])} - absent == there - {*elsewhere}, (
+        "figures and tables of the template and of the study differ"
+    )
+    text = template.filled(found, folder)
+    empty = {**found, "facts": dict.fromkeys(found["facts"]), "pictures": [], "tables": []}
+    for one in (text, template.filled(empty, folder)):
+        assert not re.search(r"\b(None|nan|inf)\b", one), one
+        assert "{{" not in one
+    return text
