@@ -26,6 +26,7 @@ import numba
 from numba import njit, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.typing.templates import builtin_registry
 from numba.cpython.unsafe.tuple import tuple_setitem
@@ -39,7 +40,7 @@ from symtop.core.jit_functions import Function, fused, marked, two_product
 from symtop.core.sines import polynomials, sincos
 
 __all__ = [
-    "code_of", "combined", "compile_kernel", "fused", "is_cached", "register_jitable", "set_item", "to_fixed_tuple",
+    "code_of", "compile_kernel", "fused", "is_cached", "register_jitable", "set_item", "to_fixed_tuple",
 ]  # fmt: skip
 
 set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple
@@ -197,38 +198,39 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             super().save_overload(signature, data)
 
 
-@contextlib.contextmanager
-def _no_code_of_inner_functions() -> Iterator[None]:
-    """While a kernel is compiled, what it calls is optimised and linked into it as ever, but gets no machine code.
+def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
+    """Compile a kernel: what it calls is optimised and linked into it as ever, but gets no machine code of its own.
 
-    numba makes that of each inner function, and nobody runs it: Python calls a function through a wrapper, which inner
-    ones lack. Their environments get an address with the kernel. The caller holds numba's lock; a version of numba
-    that lacks what is replaced here compiles as it does.
+    numba makes that of each inner function, and nobody runs it: Python and C call a function through a wrapper, which
+    inner ones lack. Their environments get an address with the kernel's code. The caller holds numba's lock; a version
+    of numba that lacks what is replaced here compiles as it does.
     """
-    try:
-        finish, set_env = JITCodeLibrary._finalize_final_module, JITCPUCodegen.set_env
-    except AttributeError:
-        yield
-        return
+    finish, set_env = getattr(JITCodeLibrary, "_finalize_final_module", None), getattr(JITCPUCodegen, "set_env", None)
+    if finish is None or set_env is None or not hasattr(CompileResult, "_find_referenced_environments"):
+        return compiling(signature)
 
     def link_only(library: Any) -> None:
         names = [function.name for function in library._final_module.functions if not function.is_declaration]
         if any(name.startswith(WRAPPERS) for name in names) or not any(name.startswith("_ZN") for name in names):
-            return finish(library)  # type: ignore[no-any-return]
+            finish(library)
+            return
         library._finalize_dynamic_globals()
         library._verify_declare_only_symbols()
         library._finalized = True
-        return None
 
     def set_where_defined(codegen: Any, name: str, environment: Any) -> None:
         if codegen._engine.is_symbol_defined(name):
             set_env(codegen, name, environment)
 
-    JITCodeLibrary._finalize_final_module, JITCPUCodegen.set_env = link_only, set_where_defined
     try:
-        yield
+        JITCodeLibrary._finalize_final_module, JITCPUCodegen.set_env = link_only, set_where_defined
+        entry = compiling(signature)
     finally:
         JITCodeLibrary._finalize_final_module, JITCPUCodegen.set_env = finish, set_env
+    for result in kernel.overloads.values():
+        for environment in result._find_referenced_environments():
+            set_env(result.library.codegen, environment.env_name, environment)
+    return entry
 
 
 def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
@@ -249,12 +251,7 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
                 with contextlib.suppress(SymtopError, OSError):  # a cache that cannot be written costs time and no run
                     make_private(Path(kernel._cache._cache_path))
                     stack.enter_context(locked(Path(kernel._cache._cache_path) / "code", wait=True))
-            with _no_code_of_inner_functions():
-                entry = compiling(signature)
-            compiled = kernel.overloads[signature]
-            for environment in compiled._find_referenced_environments():
-                compiled.library.codegen.set_env(environment.env_name, environment)
-            return entry
+            return _lean(kernel, compiling, signature)
 
     return compile_now
 
@@ -326,24 +323,3 @@ def _two_product(a, b):  # type: ignore[no-untyped-def]
         return product, _fma(a, b, -product)
 
     return exactly
-
-
-@intrinsic
-def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
-    """place + h w_0 terms_0 + h w_1 terms_1 + ... of tuples, in this order and without the terms whose weight is None.
-
-    Written out: a closure for each term takes twice as long to compile, a loop four times as long to run.
-    """
-    used = [j for j, weight in enumerate(weights) if weight is not types.none]
-
-    def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        result, rows, numbers, step = arguments
-        factors = [(j, builder.fmul(step, builder.extract_value(numbers, j))) for j in used]
-        for m in range(len(place)):
-            total = builder.extract_value(result, m)
-            for j, factor in factors:
-                total = builder.fadd(total, builder.fmul(factor, builder.extract_value(rows, [j, m])))
-            result = builder.insert_value(result, total, m)
-        return result
-
-    return place(place, terms, weights, h), emit
