@@ -389,13 +389,14 @@ def _the_motion(question: _Question, limit: float) -> Advice:
     """The answer to whoever has the motion itself, whose error is below a limit."""
     scene, accuracy, quantity, horizon = question[:4]
     exact, seconds = integrator("exact"), _exact_seconds(question)
+    lines = _lines(question, exact, None)
     reason = (
         f"exact, the closed form, meets {quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}: error below "
         f"{limit:.2g} in {seconds:.2g} s, without steps; it needs {NEEDS['solution']} (solution). {_carries(exact)}"
     )
     return Advice(
         scene.name, quantity, accuracy, horizon, exact.name, expected_error=limit, seconds=seconds,
-        confidence="at the reference's limit", reason=reason, **_lines(question, exact, None),
+        confidence="at the reference's limit", reason=reason, command=lines["command"], python=lines["python"],
     )  # fmt: skip
 
 

@@ -46,8 +46,8 @@ def _line(scene: Scene, variant: Integrator) -> dict[str, Any]:
     budget = SHARE * BUDGET[variant.implementation] * min(variant.speed, 1.0)
     try:
         data = compare(scene, [variant], budget=budget, quiet=True).isel(variant=0)
-    except Exception as error:  # noqa: BLE001  (shown in the place of the line; the other lines are computed)
-        words = str(error) if isinstance(error, SymtopError) else words_of(error)
+    except Exception as problem:  # noqa: BLE001  (shown in the place of the line; the other lines are computed)
+        words = str(problem) if isinstance(problem, SymtopError) else words_of(problem)
         return {"seconds": [], "error": [], "failed": 0, "message": words}
     seconds, error, outcome = (data[name].values for name in ("seconds", "error", "outcome"))
     good = np.isfinite(seconds) & (error > 0.0)
