@@ -248,7 +248,8 @@ def test_advice_on_drawn_scenes_costs_little_more_than_the_best_of_all(monkeypat
     monkeypatch.setitem(settings.MOST_EVALUATIONS, "compiled", candidates.LONGEST)
     rows = candidates.excess(16)
     assert len(rows) > 12
-    assert np.mean([ratio <= candidates.TIE for *_, ratio in rows]) >= 0.8, rows  # of few; the benchmark asks for 0.95
+    assert np.mean([row.table <= candidates.TIE for row in rows]) >= 0.85, rows  # of few; the benchmark asks for 0.95
+    assert np.median([row.advice for row in rows]) <= candidates.TIE, rows
 
 
 def test_a_cover_prefers_what_serves_tops_that_nothing_before_it_does():

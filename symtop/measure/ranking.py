@@ -12,8 +12,8 @@ which variants served it:
 Where there is no stored study, `cheapest` reads the table ``candidates.tsv``, which was made from one
 (`benchmarks/candidates.py`). A row holds the variants that between them were next to the cheapest on most random tops
 of every kind, for an accuracy of a quantity, a length in nutations, a class of `NEEDS`, and, in some, only of methods
-that exist for a body without symmetry. Five of them come within 1.1 times the least on 99 % of the tops over 10
-nutations, and on 95 % over 1000.
+that exist for a body without symmetry. Made from half of the tops, five of a row come within 1.1 times the least on 96
+to 100 % of the others over 10 nutations, and on 88 to 100 % over 1000.
 """
 
 import functools
