@@ -15,6 +15,8 @@ from click.testing import CliRunner
 
 os.environ.setdefault("SYMTOP_CACHE", str(Path(__file__).resolve().parent.parent / ".pytest_cache" / "symtop"))
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # its threads wait for each other on busy cores
+
 # processes that tests start import dask only where they say so
 os.environ["PYTHONPATH"] = os.pathsep.join(
     [str(Path(__file__).resolve().parent / "bare"), *filter(None, [os.environ.get("PYTHONPATH")])]
