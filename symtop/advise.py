@@ -24,12 +24,14 @@ stands it is mostly the fastest way, and the advice says so with its time.
 """
 
 import math
+import shlex
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from symtop.core.errors import SymtopError, boolean, one_of, positive
+from symtop.core.progress import post
 from symtop.judging.claims.subject import declared
 from symtop.measure import settings
 from symtop.measure.errors import QUANTITIES, errors
@@ -48,6 +50,7 @@ from symtop.methods.framework.registry import (
 from symtop.model import scenes
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run.guard import MOST_STEPS
+from symtop.run.plugins import loaded
 from symtop.run.simulation import simulate
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
@@ -203,13 +206,16 @@ def recommend(
     if accuracy < limit:
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(question, [], (), source)
+    if {*allowed} == {"solution"} and question.allows(integrator("exact")):
+        return _the_motion(question, limit)
     guesses, source = _candidates(question, near)
     source += f" ({Path(results) / STORED})" if results is not None else ""
     trials: list[_Trial] = []
     ranked: list[_Trial] = []
     fails: dict[str, list[str]] = {}
     # those of high order first: they are the cheapest at most accuracies, and their cost ends the other searches
-    for method in sorted(map(integrator, guesses), key=lambda method: -(method.order or 0)):
+    for number, method in enumerate(sorted(map(integrator, guesses), key=lambda method: -(method.order or 0)), 1):
+        post(f"trying method {number} of {len(guesses)}; the first time each is compiled")
         rivals = (one.met.evaluations for one in trials if one.met.integrator.needs not in THIS_TOP)
         patience = TOO_DEAR * min(rivals, default=math.inf)
         trial = _try(question, method, guesses[method.name], patience)
@@ -260,6 +266,8 @@ def _candidates(question: _Question, near: Near | None) -> tuple[dict[str, float
     scene, usable = question.scene, _usable(question.quantity, question.needs)
     usable = [name for name in usable if question.allows(integrator(name))]
     everyone: dict[str, float | None] = dict.fromkeys(usable)
+    if not everyone:
+        return everyone, "no compiled method is within these limits"
     if question.step is not None:
         return everyone, f"tried all {len(everyone)} compiled methods of fixed step that you can use"
     if near is None:
@@ -373,7 +381,22 @@ def _advice(
         f"{best.words()} meets {goal}: {worth}; {source}. {_carries(best.met.integrator)}", runner_up="".join(runners),
         beside=_beside(beside, best.seconds),
         closed_form=_without_steps(question, best.seconds), nearest=near.words(served) if near and served else "",
-        fails=fails, **_lines(question, best.met),
+        fails=fails, **_lines(question, best.met.integrator, best.met.setting),
+    )  # fmt: skip
+
+
+def _the_motion(question: _Question, limit: float) -> Advice:
+    """The answer to whoever has the motion itself, whose error is below a limit."""
+    scene, accuracy, quantity, horizon = question[:4]
+    exact, seconds = integrator("exact"), _exact_seconds(question)
+    lines = _lines(question, exact, None)
+    reason = (
+        f"exact, the closed form, meets {quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}: error below "
+        f"{limit:.2g} in {seconds:.2g} s, without steps; it needs {NEEDS['solution']} (solution). {_carries(exact)}"
+    )
+    return Advice(
+        scene.name, quantity, accuracy, horizon, exact.name, expected_error=limit, seconds=seconds,
+        confidence="at the reference's limit", reason=reason, command=lines["command"], python=lines["python"],
     )  # fmt: skip
 
 
@@ -391,25 +414,34 @@ def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
     return "".join(f"Made for this top: {one.words()}{time}." for one, time in zip(trials, times, strict=True))
 
 
-def _lines(question: _Question, met: settings.Met) -> dict[str, str]:
+def _lines(question: _Question, method: Integrator, setting: float | None) -> dict[str, str]:
     """The command and the Python line that make the recommended run; no command for a scene that has no name here."""
     scene, _, _, horizon = question[:4]
-    value, name, whole = float(met.setting), met.integrator.name, horizon == scene.horizon
+    name, whole = method.name, horizon == scene.horizon
     known = scenes.scenes().get(scene.name) == scene
-    shown, control = f'"{name}"' if "[" in name else name, str(met.integrator.control)
+    shown, control = f'"{name}"' if "[" in name else name, str(method.control)
+    option = "" if setting is None else f" --{control.replace('_', '-')} {float(setting)!r}"
     until = "" if whole else f" --horizon {horizon!r}"
-    command = f"symtop run {scene.name} {shown} --{control.replace('_', '-')} {value!r}{until}"
+    files = "".join(f" --plugin {shlex.quote(file)}" for file in loaded())
+    command = f"symtop run {scene.name} {shown}{option}{until}{files}"
     of, until = f'"{scene.name}"' if known else "scene", "" if whole else f", horizon={horizon!r}"
-    python = f'symtop.simulate({of}, "{name}", {control}={value!r}{until})'
+    option = "" if setting is None else f", {control}={float(setting)!r}"
+    python = f'symtop.simulate({of}, "{name}"{option}{until})'
     return {"command": command if known else "", "python": python}
+
+
+def _exact_seconds(question: _Question) -> float:
+    """Seconds of the exact motion at the horizon."""
+    scene, _, quantity, horizon = question[:4]
+    exact = integrator("exact")
+    call = bare_run(scene, exact, exact.chart_for(settings.observed(quantity)), math.nan, horizon)
+    return timings([call], batches=5, batch=0.002)[0].best
 
 
 def _without_steps(question: _Question, best: float) -> str:
     """What the closed form costs beside a run of `best` seconds (nan if there is none), and why it is not advised."""
     scene, _, quantity, horizon = question[:4]
-    exact = integrator("exact")
-    call = bare_run(scene, exact, exact.chart_for(settings.observed(quantity)), math.nan, horizon)
-    taken = timings([call], batches=5, batch=0.002)[0].best
+    taken = _exact_seconds(question)
     limit = settings.judgeable(scene, quantity, horizon)
     error = f", with an error below {limit:.1g}" if math.isfinite(limit) else ""
     if not best > taken:
@@ -439,7 +471,7 @@ class EngineAdvice:
     advice: Advice | None
 
     def __str__(self) -> str:
-        default, maps = next(iter(self.errors)), SETTINGS.get(self.engine, {self.engine: self.engine})
+        default, maps = next(iter(self.errors)), _settings()[self.engine]
         lines = [
             f"{self.engine} on {self.scene}, step {self.step_size:g}, to t = {self.horizon:g}: the axis is off by",
             *(f"    {value:.2e} rad  {name} ({maps[name]})" for name, value in self.errors.items()),
@@ -456,6 +488,11 @@ class EngineAdvice:
         return "\n".join(lines)
 
 
+def _settings() -> dict[str, dict[str, str]]:
+    """The maps by the settings of each engine, and each map by itself where no engine has its name."""
+    return {name: {name: name} for name in engines()} | SETTINGS
+
+
 def i_use(
     engine: str, scene: "str | Scene", *, step_size: float | None = None, horizon: float | None = None,
     accuracy: float | None = None, **limits: Any,
@@ -467,7 +504,7 @@ def i_use(
     `horizon` its own by default. Raises SymtopError for an engine that is
     not known and for numbers that are out of range. It takes some seconds.
     """
-    maps = SETTINGS | {name: {name: name} for name in engines()}
+    maps = _settings()
     one_of("engine", engine, maps)
     start, h = scenes.scene(scene), STEP if step_size is None else positive("step_size", step_size)
     end = start.horizon if horizon is None else horizon_of(horizon)

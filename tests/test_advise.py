@@ -285,3 +285,26 @@ def test_limits_leave_out_what_a_user_cannot_use():
     slow = ask(accuracy=1e-3, step_size=0.002, time_a_step=1e-12)
     assert slow.integrator is None
     assert any(words.startswith("A step takes over 1e-12 s") for words in slow.fails)
+
+
+def test_the_command_of_a_plug_in_loads_it(tmp_path, monkeypatch):
+    file = tmp_path / "my scene.py"
+    monkeypatch.setattr(advise, "loaded", lambda: (str(file),))
+    assert symtop.recommend("spheroid", accuracy=1e-6, needs="solution").command.endswith(f" --plugin '{file}'")
+
+
+def test_who_has_the_solution_is_given_the_exact_motion_with_its_price():
+    """Negative controls: with a step there is none, and beside the derivative it is a line and not the answer."""
+    advice = symtop.recommend("spheroid", accuracy=1e-6, needs="solution", horizon=20.0)
+    assert advice.integrator == "exact"
+    assert advice.expected_error < 1e-14
+    assert 1e-7 < advice.seconds < 1e-2
+    assert advice.step_size is advice.tolerance is None
+    run = eval(advice.python, {"symtop": symtop})
+    assert run.attrs["integrator"] == "exact"
+    assert float(run["time"][-1]) == 20.0
+    assert advice.command == "symtop run spheroid exact --horizon 20.0"
+    stepped = symtop.recommend("spheroid", accuracy=1e-6, needs="solution", step_size=0.01)
+    assert stepped.integrator is None
+    assert "no compiled method is within these limits" in stepped.reason
+    assert symtop.recommend("spheroid", accuracy=1e-3, needs=("solution", "kicks")).integrator != "exact"

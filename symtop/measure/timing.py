@@ -109,10 +109,12 @@ def timings(
 
 
 def bare_run(
-    scene: Scene, method: Integrator, chart: str, setting: float, horizon: float, samples: int = 2
-) -> Callable[[], Run]:
+    scene: Scene, method: Integrator, chart: str, setting: float, horizon: float, samples: int = 2,
+    budget: float | None = None,
+) -> Callable[[], Run]:  # fmt: skip
     """A call of one of a method's solvers, start to horizon, with nothing around it."""
-    plan, _ = make_plan(scene, method, **method.setting(setting).kwargs(), horizon=horizon, samples=samples)
+    control = method.setting(setting).kwargs()
+    plan, _ = make_plan(scene, method, **control, horizon=horizon, samples=samples, budget=budget)
     solve = method.solvers[chart]
     return lambda: solve(scene.top, scene.start, plan)
 

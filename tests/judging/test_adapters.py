@@ -106,7 +106,7 @@ def shrinks(state, h, dT, dV):
     ("step", "verdicts", "words"),
     [
         (verlet, dict.fromkeys(("order", "symplectic", "symmetric", "energy"), "confirmed"), "yes"),
-        (half_a_kick_short, {"order": "refuted", "symplectic": "confirmed"}, "0 by its h^1 term"),
+        (half_a_kick_short, {"order": "refuted", "symplectic": "confirmed"}, "0, a step wrong from its h^1 term on"),
         (shrinks, {"order": "confirmed", "symplectic": "refuted"}, "no, "),
     ],
 )  # fmt: skip

@@ -220,7 +220,7 @@ def test_without_a_claim_it_says_the_order_that_a_step_has_and_not_the_slope(onl
     only("order")
     ledger = symtop.judge(wrong.rounded_triple, quick=True)
     assert ledger.refuted == []
-    assert str(ledger["order"].measured) == "2 by its h^3 term"
+    assert str(ledger["order"].measured) == "2, a step wrong from its h^3 term on"
     assert description(ledger.findings) == "order 2"
 
 
