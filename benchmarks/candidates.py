@@ -1,7 +1,7 @@
 """The methods that `recommend` tries first: their table, made from a stored study, and advice against all candidates.
 
     python -m benchmarks.candidates make results/cost.nc    # writes symtop/measure/candidates.tsv
-    python -m benchmarks.candidates check 200               # of drawn scenes; exit code 1 if the table lacks the cheapest
+    python -m benchmarks.candidates check 200               # of drawn scenes; exit code 1 if the table fails
 
 A row of the table is a greedy cover of the random tops of the study: the variant that costs at most `TIE` times the
 least on most of them, then the one that does so on most of those that are left, and so on. One whose cost is next to
