@@ -15,15 +15,21 @@ from symtop.model.exact.free_body import FreeBody
 from tests.model.bodies import KINDS, UNIT, Body, PreciseBody, apart, bodies
 
 PERIODS = 1e6  # of the furthest sample
-LARGEST = 24.0  # units of 2^-53
+LARGEST = 20.0  # units of 2^-53
 
 
 def times_of(body, precise, rng):
-    """0, within three periods, and far to both sides; near a separatrix and a sphere a period may last for ever."""
+    """0, within three periods, as M passes from one end of the middle axis to the other, and far to both sides.
+
+    Near a separatrix the passage lasts a moment of its period; there and near a sphere a period may last for ever.
+    """
     natural = 2.0 * math.pi * float(np.median(body.inertia)) / (float(precise.G) or 1.0)
     period = min(float(precise.period or natural), 1e6 * natural)
-    near, far = rng.uniform(0.0, 3.0, 2) * period, rng.uniform(-PERIODS, PERIODS) * period
-    return np.array([0.0, *near, 1e-3 * far, far])
+    near, far = rng.uniform(0.0, 3.0) * period, rng.uniform(-PERIODS, PERIODS) * period
+    passage = near
+    if precise.period:
+        passage = float((2 * precise.K * int(rng.integers(1, 6)) + rng.uniform(-2.0, 2.0) - precise.u0) / precise.rate)
+    return np.array([0.0, near, passage, 1e-3 * far, far])
 
 
 def errors(body, rng, change=lambda free: None):
