@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from symtop.methods.lagrangian.damped_oscillator import ONE_SIDED
+
 from .measures import AGAINST_RK45, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOPS, order
-from .oscillator import ONE_SIDED
 from .quartic_measures import ERROR, MAPS, PERIODS, QUARTICS, STEP, STEPS, oscillator_of, quartic_order
 
 CRITICAL = "damping-2"  # the scene of critical damping

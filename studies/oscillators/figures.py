@@ -3,13 +3,13 @@
 import numpy as np
 import xarray as xr
 
+from symtop.methods.lagrangian.damped_oscillator import ONE_SIDED
 from symtop.report import style
 from symtop.report.figures import SMALLEST
 from symtop.runner.study import Picture
 
 from .facts import CRITICAL
 from .measures import OSCILLATORS, order
-from .oscillator import ONE_SIDED
 from .quartic_measures import ERROR, MAPS, QUARTICS, STEP
 
 SYMBOLS = {"midpoint": "o", "trapezoidal": "s", ONE_SIDED: "v"}

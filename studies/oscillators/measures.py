@@ -12,10 +12,18 @@ import xarray as xr
 
 from symtop.measure.accuracy import as_table
 from symtop.measure.order import Fit, power_law
+from symtop.methods.lagrangian.damped_oscillator import (
+    Array,
+    Oscillator,
+    discrete_exponents,
+    discrete_path,
+    legendre,
+    notebook_positions,
+    rule_sums,
+)
 from symtop.model.scenes import Scene
 
 from .damped_top import Friction, damped_run, damped_truth, six_variables
-from .oscillator import Array, Oscillator, discrete_exponents, discrete_path, legendre, notebook_positions, rule_sums
 
 OSCILLATORS = {f"damping-{b:g}": Oscillator(damping=b) for b in (0.0, 0.1, 1.0, 2.0, 3.0, 4.0)}  # by scene
 AGAINST_RK45 = ("damping-0", "damping-0.1")

@@ -12,12 +12,12 @@ oscillator and, by two of these, the top (`quartic`): the line from the seed to 
 
 import xarray as xr
 
+from symtop.methods.lagrangian.damped_oscillator import ONE_SIDED
 from symtop.model.scenes import scene
 from symtop.runner.study import Case, Study
 
 from . import facts, figures, measures, quartic_measures
 from .measures import AGAINST_RK45, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOPS
-from .oscillator import ONE_SIDED
 
 
 def cases(quick: bool) -> list[Case]:

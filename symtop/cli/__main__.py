@@ -1,7 +1,8 @@
 """The command ``symtop``, also ``python -m symtop.cli``: `main`, and then the end of the process at once.
 
 Python would first take apart what was compiled: seconds for hundreds of megabytes of kernels, in which the prompt does
-not come back. Where other threads still work, they are waited for as usual.
+not come back. Where other threads still work, they are waited for as usual. Linear algebra has one thread:
+`symtop.core.parallel` says why.
 """
 
 import atexit
@@ -10,10 +11,12 @@ import sys
 import threading
 
 from symtop.cli.main import main
+from symtop.core.parallel import VARIABLES
 
 
 def run() -> None:
     """Run the command line of this process, and end it with its exit code."""
+    os.environ.update({name: "1" for name in VARIABLES if name not in os.environ})  # before NumPy reads them
     try:
         main()
     except SystemExit as end:

@@ -33,7 +33,7 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 @click.option("--energy", type=click.Choice(["kept", "bounded"]), help="Claim what becomes of the energy.")
 @click.option("--adaptive", is_flag=True, help="Judge a class of SciPy's at a tolerance, not at fixed steps.")
 @click.option("--autonomous", is_flag=True, help="It was written for y' = f(y), without a time.")
-@click.option("--quick", is_flag=True, help="Ten seconds at most: shorter runs.")
+@click.option("--quick", is_flag=True, help="Shorter runs: some ten seconds, or forty where a step takes 1 ms.")
 @click.option("--seed", type=int, help="Draw the starts, times and steps of an earlier judging again.")
 @click.option("--output", type=File(dir_okay=False), help="Write the findings to this netCDF file.")
 @click.option("--card", type=File(dir_okay=False), help="Write a page with two figures and the ledger (HTML).")

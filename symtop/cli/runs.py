@@ -13,10 +13,10 @@ import click
 from symtop.cli import common
 from symtop.cli.common import File, as_text, check_outputs, completing, say, say_written, separated, table, warn
 from symtop.core.errors import SymtopError, whole
-from symtop.core.progress import ticking
+from symtop.core.progress import post, ticking
 
 FEWEST, FEW, MANY = 1000, 100_000, 20  # steps that are timed before a run of many times as many
-LONG_ENOUGH = 0.1  # seconds of steps that are timed
+LONG_ENOUGH = 0.5  # seconds of steps that are timed, beside those of a run of few
 SAME = 0.01  # relative difference of the step used from --step-size that is printed
 COMPARED = 100_000  # tops whose errors are shown, the first of the population: those of a million take 1 GB
 
@@ -105,6 +105,12 @@ def run(
         sys.exit(3)
 
 
+def _seconds(run: Callable[[int], object], steps: int) -> float:
+    began = time.monotonic()
+    run(steps)
+    return time.monotonic() - began
+
+
 def estimate(steps: float, run: Callable[[int], object]) -> None:
     """Say before a run of so many steps how long it takes, if that is above ten seconds; `run` makes a few steps."""
     from symtop.run.guard import MOST_STEPS
@@ -113,13 +119,11 @@ def estimate(steps: float, run: Callable[[int], object]) -> None:
         return
     with ticking("timing some steps"):
         run(FEWEST)  # which compiles
-        for few in (FEWEST, FEW):
-            began = time.monotonic()
-            run(few)
-            spent = time.monotonic() - began
-            took = spent * steps / few
-            if spent > LONG_ENOUGH:
-                break
+        few, fixed, spent = FEWEST, _seconds(run, FEWEST), 0.0
+        while spent < LONG_ENOUGH and few * MANY < steps:
+            few *= 4
+            spent = _seconds(run, few) - fixed  # what a run takes whatever its steps does not count
+    took = spent * steps / (few - FEWEST)
     if took > 10.0:
         warn(f"{steps:.3g} steps take about {f'{took:.2g} s' if took < 100.0 else f'{took / 60.0:.2g} min'}")
 
@@ -156,6 +160,7 @@ def long(
     h = period / PER_NUTATION if step_size is None else step_size
     count = whole("steps", steps, 1, MOST_STEPS)
     estimate(count, lambda few: long_run(scene, integrator, steps=few, step_size=h, quiet=True))
+    post(f"running {count:.3g} steps")
     try:
         data = long_run(scene, integrator, steps=count, step_size=h, checkpoint=checkpoint or True, output=output)
     except KeyboardInterrupt:
@@ -218,6 +223,7 @@ def ensemble(
     compared = [name for name in QUANTITIES if variables is None or name in variables]
     if figure is not None and not compared:
         raise SymtopError("--figure needs axis or energy among --variables, whose errors it shows")
+    post(f"running {members} tops")
     try:
         data = runs.ensemble(tops, integrator, variables=variables, path=output, **settings)
     except KeyboardInterrupt:

@@ -25,6 +25,8 @@ from typing import Any
 import numba
 from numba import njit, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.typing.templates import builtin_registry
 from numba.cpython.unsafe.tuple import tuple_setitem
@@ -38,7 +40,7 @@ from symtop.core.jit_functions import Function, fused, marked, two_product
 from symtop.core.sines import polynomials, sincos
 
 __all__ = [
-    "code_of", "combined", "compile_kernel", "fused", "is_cached", "register_jitable", "set_item", "to_fixed_tuple",
+    "code_of", "compile_kernel", "fused", "is_cached", "register_jitable", "set_item", "to_fixed_tuple",
 ]  # fmt: skip
 
 set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple
@@ -48,6 +50,7 @@ OPTIONS = {"error_model": "numpy", "nogil": True}  # division by zero gives infi
 HASH = hashlib.sha256().digest_size  # bytes before the code in its file
 NAMES = "by content"  # of kernels: those that were stored before may share one
 WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # kernels alone call it: 14 % less to compile
+WRAPPERS = ("_ZN7cpython", "cfunc.")  # names of functions that Python and C can call
 INLINED = {"forceinline": True, **WITHIN}
 
 _stands_for: dict[int, list[object]] = {}  # id of a function: what numba compiles in its place
@@ -195,6 +198,40 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             super().save_overload(signature, data)
 
 
+def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
+    """Compile a kernel: what it calls is optimised and linked into it as ever, but gets no machine code of its own.
+
+    numba makes that of each, and nobody runs it: Python and C call a function through a wrapper, which inner ones lack.
+    Environments get addresses with the kernel's code. The caller holds numba's lock; other numbas compile as usual.
+    """
+    finish, set_env = getattr(JITCodeLibrary, "_finalize_final_module", None), getattr(JITCPUCodegen, "set_env", None)
+    if finish is None or set_env is None or not hasattr(CompileResult, "_find_referenced_environments"):
+        return compiling(signature)
+
+    def link_only(library: Any) -> None:
+        names = [function.name for function in library._final_module.functions if not function.is_declaration]
+        if any(name.startswith(WRAPPERS) for name in names) or not any(name.startswith("_ZN") for name in names):
+            finish(library)
+            return
+        library._finalize_dynamic_globals()
+        library._verify_declare_only_symbols()
+        library._finalized = True
+
+    def set_where_defined(codegen: Any, name: str, environment: Any) -> None:
+        if codegen._engine.is_symbol_defined(name):
+            set_env(codegen, name, environment)
+
+    try:
+        JITCodeLibrary._finalize_final_module, JITCPUCodegen.set_env = link_only, set_where_defined
+        entry = compiling(signature)
+    finally:
+        JITCodeLibrary._finalize_final_module, JITCPUCodegen.set_env = finish, set_env
+    for result in kernel.overloads.values():
+        for environment in result._find_referenced_environments():
+            set_env(result.library.codegen, environment.env_name, environment)
+    return entry
+
+
 def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
     """numba's compilation, of a kernel that is not on disk by one process at a time: the next ones load it.
 
@@ -213,7 +250,7 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
                 with contextlib.suppress(SymtopError, OSError):  # a cache that cannot be written costs time and no run
                     make_private(Path(kernel._cache._cache_path))
                     stack.enter_context(locked(Path(kernel._cache._cache_path) / "code", wait=True))
-            return compiling(signature)
+            return _lean(kernel, compiling, signature)
 
     return compile_now
 
@@ -285,24 +322,3 @@ def _two_product(a, b):  # type: ignore[no-untyped-def]
         return product, _fma(a, b, -product)
 
     return exactly
-
-
-@intrinsic
-def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
-    """place + h w_0 terms_0 + h w_1 terms_1 + ... of tuples, in this order and without the terms whose weight is None.
-
-    Written out: a closure for each term takes twice as long to compile, a loop four times as long to run.
-    """
-    used = [j for j, weight in enumerate(weights) if weight is not types.none]
-
-    def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        result, rows, numbers, step = arguments
-        factors = [(j, builder.fmul(step, builder.extract_value(numbers, j))) for j in used]
-        for m in range(len(place)):
-            total = builder.extract_value(result, m)
-            for j, factor in factors:
-                total = builder.fadd(total, builder.fmul(factor, builder.extract_value(rows, [j, m])))
-            result = builder.insert_value(result, total, m)
-        return result
-
-    return place(place, terms, weights, h), emit

@@ -68,31 +68,14 @@ ROOT = Path(__file__).resolve().parents[2]
 _DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")  # told in every file
 
 
-def _revision() -> str:
-    """The commit that the checkout is at, read from its git folder; "unknown" where there is none."""
-    with contextlib.suppress(OSError, IndexError):
-        folder = ROOT / ".git"
-        if folder.is_file():  # of a second work tree: "gitdir: PATH"
-            folder = ROOT / folder.read_text(encoding="utf-8").split(maxsplit=1)[1].strip()
-        commit = (folder / "HEAD").read_text(encoding="utf-8").split()[-1]
-        if commit.startswith("refs/"):  # a branch
-            shared = folder / "commondir"
-            folder = folder / shared.read_text(encoding="utf-8").strip() if shared.is_file() else folder
-            loose, packed = folder / commit, folder / "packed-refs"
-            lines = [] if loose.is_file() else packed.read_text(encoding="utf-8").splitlines()
-            commit = next((line.split()[0] for line in lines if line.endswith(f" {commit}")), "") or loose.read_text()
-        return commit[:12]
-    return "unknown"
-
-
-def _has_changes() -> bool:
-    """Does the checkout hold code that is not committed? Starts git."""
-    command = ["git", "-C", str(ROOT), "status", "--porcelain", "--", "symtop", "studies"]
-    try:
-        status = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)  # noqa: S603
-    except (OSError, subprocess.SubprocessError):
-        return False
-    return (ROOT / ".git").exists() and bool(status.stdout.strip())
+def _git(*arguments: str) -> str:
+    """What git says of the checkout that this is; empty where there is none, or no git."""
+    command = ["git", "-C", str(ROOT), *arguments]
+    with contextlib.suppress(OSError, subprocess.SubprocessError):
+        if (ROOT / ".git").exists():  # git would take that of a folder above
+            done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)  # noqa: S603
+            return done.stdout.strip()
+    return ""
 
 
 @functools.cache
@@ -101,9 +84,10 @@ def provenance(*, changes: bool = False) -> dict[str, str]:
 
     With `changes`, the revision is marked if the checkout holds code that is not committed (a report says so).
     """
+    edited = changes and _git("status", "--porcelain", "--", "symtop", "studies")
     return {
         "symtop_version": __version__,
-        "symtop_revision": _revision() + ("+changes" if changes and _has_changes() else ""),
+        "symtop_revision": (_git("rev-parse", "HEAD")[:12] or "unknown") + ("+changes" if edited else ""),
         "python_version": platform.python_version(),
         "dependencies": json.dumps({package: version(package) for package in _DEPENDENCIES}, sort_keys=True),
         "platform": f"{platform.system()} {platform.machine()}",

@@ -1,4 +1,4 @@
-"""The explorer's answers: one run beside the exact motion, as a dataset, and as a script; a map of many runs.
+"""The explorer's answers: one run beside the exact motion, as a dataset, and as a script; a map; an oscillator.
 
 The page sends a flat mapping of numbers and names, which `setup` reads. The script gives the numbers of the page to the
 last bit.
@@ -23,6 +23,7 @@ from symtop.core.errors import SymtopError, finite, positive
 from symtop.measure.conservation import CONSTANTS, residuals
 from symtop.methods.framework.plan import sentence
 from symtop.methods.framework.registry import Integrator, integrator, integrators
+from symtop.methods.lagrangian.damped_oscillator import Oscillator, discrete_path, notebook_positions, rule_sums
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.scenes import Scene, closed_form, horizon_of, scenes
@@ -43,6 +44,8 @@ PORTRAIT = 361  # points of the exact phase curve, over one nutation
 COLUMNS, ROWS = 48, 32  # steps, spins
 MAP_SAMPLES = 9
 MOST_MAP_STEPS = 20_000_000  # of all cells: seconds of an implicit method
+OSCILLATOR_HORIZON, MOST_OSCILLATOR_STEPS = 25.0, 10_000
+RULES = ("midpoint", "trapezoidal")  # of the discrete Lagrangian of the oscillator
 
 
 @dataclass(frozen=True)
@@ -238,6 +241,40 @@ def outcome_map(chosen: Setup, steps: np.ndarray, spins: np.ndarray) -> dict[str
         "error_rad": _float32(worst),
         "failed": int(np.isnan(worst).sum()),
         "cells_a_second": step.size / seconds,
+    }
+
+
+def damped(fields: Mapping[str, Any]) -> tuple[float, float]:
+    """Friction and step of the oscillator: `friction` (at least 0) and `oscillator_step`. SymtopError for others."""
+    friction, step = finite("friction", fields.get("friction")), positive("step", fields.get("oscillator_step"))
+    if friction < 0.0:
+        raise SymtopError(f"friction must be at least 0, not {friction!r}", "friction")
+    if not OSCILLATOR_HORIZON / MOST_OSCILLATOR_STEPS <= step <= OSCILLATOR_HORIZON / 2.0:
+        least = OSCILLATOR_HORIZON / MOST_OSCILLATOR_STEPS
+        raise SymtopError(f"step must be between {least} and {OSCILLATOR_HORIZON / 2.0}, not {step!r}", "step")
+    return friction, step
+
+
+def oscillator(friction: float, step: float) -> dict[str, Any]:
+    """The notebook's oscillator x'' + b x' + x = 0 from x = 1 at rest, as base64 of float32 over ``time``.
+
+    ``midpoint`` and ``trapezoidal`` are forced discrete Lagrangians, ``guess`` is what the notebook tried; ``exact`` is
+    over ``exact_time``. `largest` has the largest error of x of the two rules.
+    """
+    body, steps = Oscillator(damping=friction), max(2, round(OSCILLATOR_HORIZON / step))
+    paths = {
+        rule: discrete_path(body, rule_sums(rule), 1.0, 0.0, OSCILLATOR_HORIZON, steps, steps + 1) for rule in RULES
+    }
+    times, dense = paths["midpoint"][0], np.linspace(0.0, OSCILLATOR_HORIZON, FEWEST_SAMPLES)
+    exact = body.exact(times, 1.0, 0.0)[0]
+    arrays = {
+        "time": times, "exact_time": dense, "exact": body.exact(dense, 1.0, 0.0)[0],
+        "guess": notebook_positions(friction, times[1], 1.0, float(exact[1]), steps)[1],
+        **{rule: position for rule, (_, position, _) in paths.items()},
+    }  # fmt: skip
+    return {
+        "largest": {rule: float(np.max(np.abs(arrays[rule] - exact))) for rule in RULES},
+        "arrays": {name: _float32(values) for name, values in arrays.items()},
     }
 
 

@@ -1,8 +1,9 @@
-"""The explorer's server: a page with its files, and four actions, for this machine only.
+"""The explorer's server: a page with its files, and six actions, for this machine only.
 
     GET  /  /style.css  /*.js           the page and its modules (HEAD: without the body; a query is ignored)
     GET  /catalogue                     scenes and integrators
-    POST /run  /netcdf  /script  /map   one run: as arrays, as a file, as a script; a grid of runs
+    POST /run  /netcdf  /script         one run: as arrays, as a file, as a script
+    POST /map  /cost  /oscillator       a grid of runs; error against run time; the damped oscillator
 
 It listens on 127.0.0.1. It answers only requests that name this machine as their host, and POST requests only if they
 send JSON and a browser names no other origin, so that a page from elsewhere cannot use it.
@@ -24,14 +25,14 @@ from typing import Any
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, whole, words_of
 from symtop.core.parallel import cores
-from symtop.explore import answers
+from symtop.explore import answers, cost
 
 STATIC = Path(__file__).parent / "static"
 PAGES = {
     "/": ("page.html", "text/html; charset=utf-8"),
     **{
         f"/{name}.js": (f"{name}.js", "text/javascript; charset=utf-8")
-        for name in ("explore", "draw", "portrait", "map", "stories")
+        for name in ("explore", "draw", "portrait", "map", "cost", "stories")
     },
     "/style.css": ("style.css", "text/css; charset=utf-8"),
 }
@@ -53,6 +54,8 @@ ACTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], bytes], str]] = {
     "/run": (answers.setup, lambda chosen: json.dumps(answers.answer(chosen)).encode(), "application/json"),
     "/netcdf": (answers.setup, _netcdf, "application/x-netcdf"),
     "/script": (answers.setup, lambda chosen: answers.script(chosen).encode(), "text/x-python; charset=utf-8"),
+    "/cost": (cost.question, lambda asked: json.dumps(cost.chart(asked)).encode(), "application/json"),
+    "/oscillator": (answers.damped, lambda asked: json.dumps(answers.oscillator(*asked)).encode(), "application/json"),
     "/map": (answers.grid, lambda grid: json.dumps(answers.outcome_map(*grid)).encode(), "application/json"),
 }
 
@@ -170,7 +173,7 @@ class Handler(BaseHTTPRequestHandler):
                 body = action(chosen)
         except SymtopError as error:
             # The page shows the sentence in place of a run, as an ordinary answer; a file cannot be replaced by it.
-            self._refuse(200 if self.place in ("/run", "/map") else 400, str(error))
+            self._refuse(200 if self.place not in ("/netcdf", "/script") else 400, str(error))
         except Exception as error:  # noqa: BLE001  (the page shows it, and the server keeps running)
             self._refuse(500, f"the run failed: {type(error).__name__}: {' '.join(str(error).split())}")
         else:

@@ -16,7 +16,7 @@ from tqdm import tqdm
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, boolean, one_of, positive
 from symtop.core.parallel import cores, in_threads
-from symtop.core.progress import beating
+from symtop.core.progress import beating, post
 from symtop.judging.adapters.adapter import integrator as adapted
 from symtop.judging.claims.subject import open_target
 from symtop.measure import columns, settings
@@ -83,10 +83,13 @@ def compare(
     exact = find_integrator("exact")
     with beating(tqdm(total=len(names), desc="compare", disable=boolean("quiet", quiet) or None, leave=False)) as bar:
         results = []
+        post(f"running {len(names)} methods, which are compiled the first time")
         for one in in_threads(tried, variants, min(cores(), len(variants))):
             results.append(one)
             bar.update()
+            post(f"{len(results)} of {len(names)} methods have run")
         bar.set_description("timing")
+        post("timing the runs")
         rows: list[dict[str, Any]] = [{"setting_value": math.nan, "outcome": "ok"}]
         pairs = zip([exact, *variants], [rows, *(runs for runs, _ in results)], strict=True)
         timed_rows([(chosen, method, end, runs) for method, runs in pairs] if cost == "time" else [])

@@ -223,7 +223,8 @@ def description(findings: Sequence[Finding]) -> str:
     kept, bounded, lost = of_kind("kept"), of_kind("bounded"), of_kind("drift", "growing", "random walk")
     words += [f"keeps {kept}"] if kept else []
     words += [f"{bounded} bounded"] if bounded else []
-    return (", ".join(words) or "nothing could be measured") + (f"; not {lost}" if lost else "")
+    without = "not" if kept or bounded else "does not keep"
+    return (", ".join(words) or "nothing could be measured") + (f"; {without} {lost}" if lost else "")
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -82,7 +82,7 @@ def judge(
     `chart` says what y is: "axis" (e, L), shape (6,); "attitude" (q, L), shape (7,); "angles" (theta, phi, psi and
     their rates), shape (6,), in radians and the units of the scene's top. Claims that are not made are measured all
     the same. `conserves` holds names such as "p_phi", "energy"; `energy` is "kept" or "bounded". The step runs in a
-    process of its own: one that hangs or crashes costs a verdict and says so. `quick` takes ten seconds at most. It is
+    process of its own: one that hangs or crashes costs a verdict and says so. `quick` makes shorter runs. It is
     also tried at starts, times and steps that are drawn at random; `seed`, which the findings name, draws the same
     again. `autonomous` says that it was written for y' = f(y), whatever f is called with.
     `tell` is handed what is judged and then each finding, as they are made.

@@ -82,15 +82,18 @@ def timings(
     *,
     warm: bool = False,
     patience: float = math.inf,
+    exact: bool = True,
 ) -> list[Timing]:
     """Time several functions against each other.
 
     Those that are `warm`, called before, have no first call (NaN), and a call that turns out to be longer than a batch
     is the first sample of its function: a long run costs no more calls than it has samples. A function whose samples
     have taken `patience` seconds together has no more of them, but two at least: a long one meets both fast and slow
-    moments of the machine. The closed form is compiled before anything is timed, whoever calls it.
+    moments of the machine. The closed form is compiled before anything is timed, whoever calls it; if nothing that
+    is timed does (not `exact`), it stays as it is.
     """
-    closed_form.compile_now()
+    if exact:
+        closed_form.compile_now()
     firsts, calls = [], []
     samples: list[list[float]] = []
     for function in functions:
@@ -109,10 +112,12 @@ def timings(
 
 
 def bare_run(
-    scene: Scene, method: Integrator, chart: str, setting: float, horizon: float, samples: int = 2
-) -> Callable[[], Run]:
+    scene: Scene, method: Integrator, chart: str, setting: float, horizon: float, samples: int = 2,
+    budget: float | None = None,
+) -> Callable[[], Run]:  # fmt: skip
     """A call of one of a method's solvers, start to horizon, with nothing around it."""
-    plan, _ = make_plan(scene, method, **method.setting(setting).kwargs(), horizon=horizon, samples=samples)
+    control = method.setting(setting).kwargs()
+    plan, _ = make_plan(scene, method, **control, horizon=horizon, samples=samples, budget=budget)
     solve = method.solvers[chart]
     return lambda: solve(scene.top, scene.start, plan)
 

@@ -29,6 +29,14 @@ def test_mujoco_is_told_its_best_setting_and_the_gain_of_another_method():
     assert "Its best setting is RK4 of 4.0" in str(advice)
 
 
+@pytest.mark.parametrize("engine", ["bullet", "yade", "mujoco-euler"])
+def test_an_engine_is_told_of_by_its_settings_and_a_map_by_itself(engine):
+    """Bullet and yade are names of maps, too."""
+    advice = i_use(engine, "goldstein", step_size=0.025, horizon=5.0, accuracy=1e-16)
+    assert [*advice.errors] == [*SETTINGS.get(engine, {engine: engine})]
+    assert all(f"{name} (" in str(advice) for name in advice.errors)
+
+
 def test_an_engine_without_a_gyroscopic_term_has_nothing_to_match():
     advice = i_use("havok", "goldstein", horizon=10.0)
     assert advice.advice is None

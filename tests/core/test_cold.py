@@ -10,8 +10,10 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from numba import types
+from numba.core.codegen import JITCodeLibrary
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import TypingError
 
@@ -105,3 +107,32 @@ def test_garbage_is_collected_again_after_a_kernel_is_compiled_or_refused():
     with pytest.raises(TypingError):
         compile_kernel(refused)(1.0)
     assert gc.isenabled()
+
+
+@pytest.mark.parametrize("way", ["lean", "another numba", "numba alone"])
+def test_inner_functions_get_no_machine_code_and_kernels_the_same_bits(monkeypatch, way):
+    def tenth(x):
+        if x > 1e6:
+            raise ValueError("too large")
+        return 0.1 * x * UNIQUE
+
+    def kernel(rows):
+        total = 0.1
+        for k in range(len(rows)):
+            total += tenth(rows[k])
+        return total + np.sum(np.sort(rows))
+
+    rows, generated, generate = np.linspace(0.0, 3.0, 17), [], JITCodeLibrary._finalize_specific
+    expected = sum((tenth(x) for x in rows.tolist()), 0.1) + rows.sum()
+    jit.register_jitable(tenth, jit.OPTIONS | jit.WITHIN)
+    monkeypatch.setattr(JITCodeLibrary, "_finalize_specific", lambda one: (generated.append(one.name), generate(one)))
+    kernel.__code__ = kernel.__code__.replace(co_filename=f"<{way}>")  # no file, and so no cache on disk
+    compiled = compile_kernel(kernel)
+    if way == "another numba":
+        monkeypatch.setattr(jit, "JITCodeLibrary", None)  # which has not what is replaced
+    if way == "numba alone":
+        monkeypatch.setattr(compiled, "compile", compiled.compile.__wrapped__)
+    assert compiled(rows) == pytest.approx(expected, rel=1e-15)
+    assert sum(name.endswith(".tenth") for name in generated) == (0 if way == "lean" else 1)
+    with pytest.raises(ValueError, match="too large"):
+        compiled(1e7 * rows)

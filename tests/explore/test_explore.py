@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import warnings
 from pathlib import Path
@@ -20,7 +21,7 @@ import symtop
 from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning
-from symtop.explore import answers
+from symtop.explore import answers, cost
 from symtop.explore.server import STATIC, address
 from symtop.methods.framework.registry import engines
 from symtop.model import charts
@@ -386,4 +387,122 @@ def test_a_warning_is_shown_on_the_page(site, monkeypatch):
     with Browser() as browser:
         browser.open(address(site))
         browser.wait_for("document.querySelector('#warnings').textContent === 'the phase will be <lost>'")
+        assert browser.problems == []
+
+
+def costs(**changes):
+    """The chart of costs once all of its lines are there."""
+    asked, end = cost.question(fields(**changes)), time.monotonic() + 120.0
+    while (answer := cost.chart(asked))["missing"] and time.monotonic() < end:
+        time.sleep(0.05)
+    return answer
+
+
+def test_the_first_chart_of_costs_is_there_at_once_and_its_lines_are_those_of_compare(monkeypatch):
+    monkeypatch.setattr(cost, "_lines", {})
+    asked = cost.question(fields(integrator="trapezoidal", second="strang", horizon=7.5))
+    cost.chart(asked)
+    cost._lines.clear()
+    began = time.thread_time()
+    first = cost.chart(asked)
+    assert time.thread_time() - began < 1.0
+    assert first["missing"] > 0
+    whole = costs(integrator="trapezoidal", second="strang", horizon=7.5)
+    lines = {line["name"]: line for line in whole["lines"]}
+    assert {"trapezoidal", "strang", *cost.BESIDE} == {*lines}
+    data = symtop.compare(asked[0].scene, ["trapezoidal[angles]"], budget=3e5, quiet=True).isel(variant=0)
+    known = data["error"].values[np.isfinite(data["seconds"].values)]
+    assert lines["trapezoidal"]["error"] == known.tolist()
+    assert whole["missing"] == 0
+    assert max(lines["trapezoidal"]["error"]) / min(lines["trapezoidal"]["error"]) > 1e4
+    slower = np.argsort(lines["trapezoidal"]["seconds"])
+    assert np.argmin(lines["trapezoidal"]["error"]) in slower[-2:]
+    again = costs(integrator="trapezoidal", second="strang", horizon=7.5)
+    assert again["lines"] == whole["lines"]  # stored; the runs of the page are timed again
+
+
+def test_the_run_of_the_page_is_a_point_on_the_line_of_its_method():
+    """The least of some times, as others work beside; a run that fails has no time."""
+    line = next(line for line in costs(integrator="strang")["lines"] if line["name"] == "strang")
+    (shown,) = asked = cost.question(fields(integrator="strang", step_size=0.02))
+    error = answers.answer(shown)["largest"]["axis_error"]
+    seconds = min(cost.chart(asked)["seconds"][0] for _ in range(8))
+    expected = np.exp(np.interp(-np.log(error), -np.log(line["error"]), np.log(line["seconds"])))
+    assert 1 / 3 < seconds / expected < 3.0
+    assert costs(step_size=0.6)["seconds"] == [None]
+    with pytest.raises(SymtopError, match="midpoint"):
+        cost.question(fields(second="midpont"))
+
+
+def test_a_line_that_cannot_be_measured_says_why(monkeypatch):
+    def refused(*args, **options):
+        raise SymtopError("the scene is <odd>")
+
+    monkeypatch.setattr(cost, "_lines", {})
+    monkeypatch.setattr(cost, "compare", refused)
+    assert {line["message"] for line in costs()["lines"]} == {"the scene is <odd>"}
+
+
+def test_a_run_is_answered_while_lines_are_measured(site, monkeypatch):
+    measured = threading.Event()
+
+    def late(*args, **options):
+        measured.wait(60.0)
+        raise SymtopError("late")
+
+    monkeypatch.setattr(cost, "_lines", {})
+    monkeypatch.setattr(cost, "compare", late)
+    began = time.monotonic()
+    for step in (0.02, 0.03, 0.04):
+        chart = json.loads(request(site, "POST", "/cost", json.dumps(fields(step_size=step)), **JSON)[1])
+        assert chart["missing"] == len(cost.BESIDE) + 1
+        assert chart["seconds"][0] > 0.0
+    assert json.loads(request(site, "POST", "/run", json.dumps(fields()), **JSON)[1])["outcome"] == "ok"
+    assert time.monotonic() - began < 20.0
+    measured.set()
+
+
+def test_the_oscillator_of_the_page_is_the_notebooks():
+    """Order two with either rule and any friction; without friction the guess is the midpoint rule."""
+    for friction in (0.0, 0.1, 2.0, 3.7):
+        coarse, fine = (answers.oscillator(friction, step)["largest"] for step in (0.1, 0.05))
+        for rule in answers.RULES:
+            assert coarse[rule] / fine[rule] == pytest.approx(4.0, rel=0.05)
+    arrays = {name: unpacked(text) for name, text in answers.oscillator(0.3, 0.5)["arrays"].items()}
+    decay = np.exp(-0.15 * arrays["exact_time"])
+    turn = np.sqrt(1.0 - 0.15**2) * arrays["exact_time"]
+    exact = decay * (np.cos(turn) + 0.15 / np.sqrt(1.0 - 0.15**2) * np.sin(turn))
+    np.testing.assert_allclose(arrays["exact"], exact, atol=1e-6)
+    assert np.abs(arrays["midpoint"][-10:]).max() < 0.1 < np.abs(arrays["guess"][-10:]).max()  # it damps nothing
+    for wrong, word in (({"friction": -0.1}, "friction must be at least 0"), ({"oscillator_step": 20.0}, "step must")):
+        with pytest.raises(SymtopError, match=word):
+            answers.damped({"friction": 0.1, "oscillator_step": 0.5} | wrong)
+
+
+def test_the_chart_of_costs_and_the_oscillator_are_on_the_page(site, tmp_path):
+    with Browser(1280, 900) as browser:
+        browser.open(address(site))
+        data = "document.querySelector('#cost').dataset"
+        browser.wait_for(f"{data}.missing === '0' && {data}.points === '1'")
+        answered(browser, lambda: browser.set("#second", "strang"))
+        browser.wait_for(f"{data}.points === '2'")
+        drawn = browser.evaluate("document.querySelector('#cost').toDataURL()")
+        answered(browser, lambda: browser.set("#step_size", 0.05))  # the points move along their lines
+        browser.wait_for(
+            f"{data}.points === '2' && document.querySelector('#cost').toDataURL() !== {json.dumps(drawn)}"
+        )
+        answered(browser, lambda: browser.set("#step_size", 0.6))  # midpoint fails, strang does not
+        browser.wait_for(f"{data}.points === '1'")
+        count, maps = browser.evaluate("+document.body.dataset.swings"), browser.evaluate("document.body.dataset.maps")
+        before = browser.evaluate(PLOT.format("oscillator"))
+        browser.set("#friction-slider", 1.5)
+        browser.wait_for(f"+document.body.dataset.swings > {count}")
+        assert browser.evaluate(PLOT.format("oscillator")) != before
+        assert "friction=1.5" in browser.evaluate("location.hash")
+        assert browser.evaluate("document.body.dataset.maps") == maps  # the top has not changed
+        browser.set("#friction", -1)
+        browser.wait_for("document.querySelector('#oscillator-key').textContent.includes('at least 0')")
+        for width in (1280, 390):
+            browser.resize(width, 900)
+            assert browser.too_wide == 0
         assert browser.problems == []

@@ -8,6 +8,10 @@ import numpy as np
 import pytest
 
 import symtop
+from symtop.judging.adapters.adapter import integrator
+from symtop.judging.adapters.python_step import PythonStep
+from symtop.judging.claims.constants import long_run
+from symtop.judging.claims.subject import seconds_a_step
 from symtop.methods.framework.registry import Integrator
 
 SPHEROID = symtop.scene("spheroid")
@@ -82,3 +86,30 @@ def test_memory_that_grows_with_the_steps_is_seen():
         return good.solvers["angles"](top, start, plan)
 
     assert 16.0 < bytes_a_step(dataclasses.replace(good, solvers={"angles": hoard})) < 48.0
+
+
+def test_a_step_that_blows_up_has_the_time_of_its_finite_steps():
+    """A run that stops at infinity is over at once, however many steps it was asked for."""
+
+    def grows(f, t, y, h):
+        return 2.0 * y + h * f(t, y)
+
+    def euler(f, t, y, h):
+        return y + h * f(t, y)
+
+    seconds = [seconds_a_step(PythonStep(step, "axis"), SPHEROID) for step in (grows, euler)]
+    assert 0.1 < seconds[0] / seconds[1] < 10.0
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_finer_runs_after_one_that_fails_late_share_its_steps(quick):
+    made = []
+
+    def fails(f, t, y, h):
+        made.append(h)
+        return y * (math.nan if t > 20.0 * SPHEROID.nutation_period and h > 0.005 * SPHEROID.nutation_period else 1.0)
+
+    method = integrator(PythonStep(fails, "axis"))
+    run = long_run(method, SPHEROID, "axis", quick=quick, most=4000)
+    assert run.outcome == "ok"
+    assert (len(made) < 6000) is quick

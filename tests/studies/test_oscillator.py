@@ -9,7 +9,12 @@ import pytest
 from symtop_studies.oscillators import facts, figures, study
 from symtop_studies.oscillators.damped_top import Friction, damped_run, damped_truth
 from symtop_studies.oscillators.measures import convergence, damped_top_table, decay, notebook_history
-from symtop_studies.oscillators.oscillator import (
+from symtop_studies.oscillators.quartic_measures import QUARTICS
+
+import symtop
+from symtop.measure import datasets
+from symtop.measure.order import power_law
+from symtop.methods.lagrangian.damped_oscillator import (
     ONE_SIDED,
     Oscillator,
     discrete_exponents,
@@ -17,11 +22,6 @@ from symtop_studies.oscillators.oscillator import (
     notebook_positions,
     rule_sums,
 )
-from symtop_studies.oscillators.quartic_measures import QUARTICS
-
-import symtop
-from symtop.measure import datasets
-from symtop.measure.order import power_law
 from symtop.runner.study import Case
 from tests.templates import checked
 

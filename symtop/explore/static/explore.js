@@ -1,6 +1,7 @@
 // Controls, requests to the server, and the animation.
 
 import { Sphere, plot, tone } from "./draw.js";
+import { drawCost } from "./cost.js";
 import { OutcomeMap } from "./map.js";
 import { portrait } from "./portrait.js";
 import { STORIES } from "./stories.js";
@@ -13,12 +14,15 @@ const START = [
   ["theta_dot", "theta' (rad/s)", -2, 2, false], ["phi_dot", "phi' (rad/s)", -5, 5, false], ["psi_dot", "psi' (rad/s)", -10, 10, false],
 ];
 const SETTINGS = [["step_size", "step (s)", 1e-5, 1, true], ["tolerance", "tolerance", 1e-13, 1e-2, true], ["horizon", "time (s)", 0.5, 500, true]];
+const OSCILLATOR = [["friction", "friction b", 0, 4, false], ["oscillator_step", "step (s)", 0.0025, 2.5, true]];
+const SWINGS = { midpoint: "#0072b2", trapezoidal: "#e69f00", guess: "#cc79a7" };
 const PLOTS = ["axis_error", "energy", "p_phi", "p_psi"];
 
 const values = {};
 const rows = {};
 const sphere = new Sphere($("sphere"));
 const outcomes = new OutcomeMap($("map"), (step, spin) => { rows.step_size.set(step); rows.psi_dot.set(spin); edited("start"); ask(); });
+let costs = null, swinging = null, costed = "", mapping = false, patient;
 let catalogue, run = null, second = null, mapped = "", place = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, asking = false, stale = false, drawnAt = -1;
 
 function control([name, label, least, most, logarithmic], group) {
@@ -38,10 +42,15 @@ function control([name, label, least, most, logarithmic], group) {
   row.append(words, slider, number);
   $(group).append(row);
   const show = (value) => { number.value = +value.toPrecision(6); slider.value = forth(value); };
-  slider.addEventListener("input", () => { values[name] = +back(+slider.value).toPrecision(6); number.value = values[name]; edited(group); ask(); });
-  number.addEventListener("change", () => { values[name] = number.value === "" ? null : +number.value; slider.value = forth(values[name]); edited(group); ask(); });
+  slider.addEventListener("input", () => { values[name] = +back(+slider.value).toPrecision(6); number.value = values[name]; changed(group); });
+  number.addEventListener("change", () => { values[name] = number.value === "" ? null : +number.value; slider.value = forth(values[name]); changed(group); });
   const span = (value) => { if (name.endsWith("_dot")) Object.assign(slider, { min: Math.min(least, -2 * Math.abs(value)), max: Math.max(most, 2 * Math.abs(value)) }); };
   rows[name] = { row, set: (value) => { values[name] = value; span(value); show(value); } };
+}
+
+// The oscillator is no part of the run.
+function changed(group) {
+  if (group === "oscillator") askOscillator(); else { edited(group); ask(); }
 }
 
 // A top or a start that was changed is no longer the scene's, and the page and the run say so.
@@ -138,7 +147,7 @@ async function ask() {
     const [answer, other] = await Promise.all(asked.map(async (one) => one && (await one).json()));
     clearTimeout(patience);
     const refused = answer.error || (other && other.error);
-    if (refused) refuse(refused); else { show(answer, other, began); if (!stale) await askMap(); }
+    if (refused) refuse(refused); else { show(answer, other, began); if (!stale) askMap(); }
   } catch {
     clearTimeout(patience);
     refuse("the explorer's server does not answer; is symtop explore still running?");
@@ -147,17 +156,56 @@ async function ask() {
   if (stale) { stale = false; ask(); }
 }
 
-// The map is asked for when something else than its own two axes has changed.
+// The map is asked for when something else than its own two axes has changed, and then the costs, as both may have to be
+// compiled: meanwhile runs are answered.
 async function askMap() {
+  if (mapping) return;
   const range = mapRange();
-  const question = JSON.stringify({ ...values, ...range, scene: "", step_size: 0, psi_dot: 0, tolerance: 0, second: "" });
-  if (question === mapped) return;
-  const answer = await (await post("map", range)).json();
+  const question = JSON.stringify({ ...values, ...range, scene: "", step_size: 0, psi_dot: 0, tolerance: 0, second: "", friction: 0, oscillator_step: 0 });
+  clearTimeout(patient);
+  if (question === mapped) { patient = setTimeout(askCost, 300); return; }
+  mapping = true;
+  const name = values.integrator;
+  const response = await post("map", range).catch(() => null);  // `ask` says that nobody answers
+  const answer = response && await response.json();
+  mapping = false;
+  if (!answer) return;
   mapped = question;
   outcomes.cells = answer.error ? null : { ...answer, range, error: unpack(answer.error_rad) };
-  $("map-note").textContent = answer.error || `${values.integrator}, ${answer.columns * answer.rows} runs, ${answer.failed} ended early, ${Math.round(answer.cells_a_second / 1000)} 000 runs a second`;
+  $("map-note").textContent = answer.error || `${name}, ${answer.columns * answer.rows} runs, ${answer.failed} ended early, ${Math.round(answer.cells_a_second / 1000)} 000 runs a second`;
   outcomes.draw({ step: values.step_size, spin: values.psi_dot });
   document.body.dataset.maps = +(document.body.dataset.maps || 0) + 1;
+  askMap();
+}
+
+// Lines come one by one, measured while the page is used: it asks again until all are there.
+async function askCost() {
+  clearTimeout(patient);
+  if (document.hidden) { patient = setTimeout(askCost, 1000); return; }
+  const question = costed = JSON.stringify(values);
+  const response = await post("cost").catch(() => null);  // `ask` says that nobody answers
+  if (!response || question !== costed) return;
+  const answer = await response.json();
+  costs = answer.error ? null : answer;
+  const bad = answer.error ? [answer.error] : answer.lines.filter((line) => line.message).map((line) => `${line.name}: ${line.message}`);
+  $("cost-note").textContent = [...bad, ...(answer.missing ? [`${answer.missing} methods are being measured`] : [])].join("; ");
+  drawPlots();
+  document.body.dataset.costs = answer.error ? "refused" : answer.lines.length;
+  if (answer.missing) patient = setTimeout(askCost, 700);
+}
+
+// The damped oscillator by both rules of its discrete Lagrangian, and the notebook's guess.
+async function askOscillator() {
+  keep();
+  const question = JSON.stringify([values.friction, values.oscillator_step]);
+  const response = await post("oscillator").catch(() => null);
+  const answer = response ? await response.json() : { error: "the explorer's server does not answer" };
+  if (question !== JSON.stringify([values.friction, values.oscillator_step])) return;
+  swinging = answer.error ? null : Object.fromEntries(Object.entries(answer.arrays).map(([key, text]) => [key, unpack(text)]));
+  const entry = (name, words, color) => { const mark = document.createElement("b"); mark.className = "swatch"; mark.style.borderColor = color; mark.textContent = words; return [mark, " "]; };
+  $("oscillator-key").replaceChildren(...(answer.error ? [answer.error] : Object.keys(SWINGS).flatMap((name) => entry(name, name in answer.largest ? `${name}, off by ${answer.largest[name].toExponential(1)}` : "the notebook's guess at the force", SWINGS[name]))));
+  drawPlots();
+  document.body.dataset.swings = +(document.body.dataset.swings || 0) + 1;
 }
 
 function unpack(text) {
@@ -216,6 +264,10 @@ function show(answer, other, began) {
     return item;
   }));
   $("netcdf").disabled = $("script").disabled = false;
+  run.error = answer.outcome === "ok" ? answer.largest.axis_error : null;
+  if (second) second.error = other.outcome === "ok" ? other.largest.axis_error : null;
+  if (costs) costs.seconds = [];  // those of the runs before
+  clearTimeout(patient);
   drawPlots();
   Object.assign(document.body.dataset, {
     answer: answer.outcome, answers: +(document.body.dataset.answers || 0) + 1, steps: answer.steps,
@@ -231,6 +283,8 @@ function drawPlots() {
   plot($("plot-theta"), run.time, [{ values: run.trueTheta, color: "#9a9a9a", dash: [2, 3] }, { values: run.degrees, color: run.color }, ...beside("degrees")], false, now);
   for (const name of PLOTS) plot($(`plot-${name}`), run.time, [{ values: run[name], color: run.color }, ...beside(name)], true, now);
   for (const [id, one] of [["swatch-1", run], ["swatch-2", second]]) if (one) $(id).style.borderColor = one.color;
+  if (costs) drawCost($("cost"), costs, [run, second].flatMap((one, k) => (one ? [{ name: k ? values.second : values.integrator, seconds: costs.seconds[k], error: one.error, color: one.color }] : [])), catalogue.integrators);
+  if (swinging) plot($("plot-oscillator"), [0, 25], [{ values: swinging.exact, time: swinging.exact_time, color: "#9a9a9a", dash: [2, 3] }, ...Object.keys(SWINGS).map((name) => ({ values: swinging[name], time: swinging.time, color: SWINGS[name] }))], false, NaN);
   portrait($("portrait"), second ? [run, second] : [run]);
   outcomes.draw({ step: values.step_size, spin: values.psi_dot });
   drawnAt = performance.now();
@@ -268,6 +322,7 @@ async function begin() {
   for (const entry of TOP) control(entry, "top");
   for (const entry of START) control(entry, "start");
   for (const entry of SETTINGS) control(entry, "settings");
+  for (const entry of OSCILLATOR) control(entry, "oscillator");
   for (const { name } of catalogue.scenes) $("scene").append(new Option(name, name));
   for (const family of new Set(catalogue.integrators.map((entry) => entry.family))) {
     const group = document.createElement("optgroup");
@@ -295,9 +350,12 @@ async function begin() {
   window.addEventListener("resize", drawPlots);
   if (!playing) $("play").textContent = "Play";
   rows.tolerance.set(1e-6);
+  rows.friction.set(0.1);
+  rows.oscillator_step.set(0.5);
   values.integrator = catalogue.integrators[0].name;
   values.second = "";
   if (!restore()) { chooseScene(catalogue.scenes[0].name); chooseIntegrator(values.integrator); }
+  askOscillator();
   requestAnimationFrame(frame);
 }
 

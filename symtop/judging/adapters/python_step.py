@@ -232,11 +232,13 @@ def _matrix_of(top: SymmetricTop, at: Angles) -> tuple[Body, tuple[float, ...]]:
 def _with_quaternions(states: Array) -> Array:
     """States (q, w) of states (R, w): q of the nearest rotation, |q|^2 the length of R's third column; NaN if none."""
     shown = np.full((len(states), 7), np.nan)
-    for k, state in enumerate(states):
-        if np.isfinite(state).all() and np.linalg.det(state[:9].reshape(3, 3)) > 0.0:
-            matrix = state[:9].reshape(3, 3)
-            x, y, z, w = Rotation.from_matrix(matrix).as_quat()
-            shown[k] = *(np.sqrt(np.linalg.norm(matrix[:, 2])) * np.array([w, x, y, z])), *state[9:]
+    matrices = states[:, :9].reshape(-1, 3, 3)
+    with np.errstate(all="ignore"):
+        good = np.isfinite(states).all(axis=1) & (np.linalg.det(matrices) > 0.0)
+    if good.any():
+        turned = Rotation.from_matrix(matrices[good]).as_quat()[:, [3, 0, 1, 2]]
+        lengths = np.sqrt(np.linalg.norm(matrices[good][:, :, 2], axis=1))
+        shown[good] = np.concatenate([lengths[:, None] * turned, states[good, 9:]], axis=1)
     return shown
 
 

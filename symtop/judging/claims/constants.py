@@ -24,7 +24,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import AdapterSolver
-from symtop.judging.claims.subject import CONSTANTS, PLANE, Subject, declared
+from symtop.judging.claims.subject import CONSTANTS, PLANE, STEPS_A_NUTATION, Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
 from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, residuals, tops
 from symtop.measure.step_map import one_step
@@ -38,11 +38,11 @@ from symtop.run.simulation import make_plan
 from symtop.run.trajectory import Trajectory
 
 STEPS, QUICK_STEPS = 1_000_000, 50_000
-STEPS_A_NUTATION = 118.02
 FINER = (1.0, 3.17, 10.03)  # times more, if a run does not reach its end
 SAMPLES = 4001
 PILOT = 400  # steps of the run that is sampled at every step
 EVALUATIONS = {"compiled": 2e8, "python": 4e4}
+LEAST_SHARE = 0.25  # of the most steps with --quick: what a run gets after one that used them and failed
 QUICK_SHARE = 0.25  # of these; no verdict on a method of the package changes
 TOLERANCE = 1e-6  # of an adaptive method without a default of its own
 KEPT = 1e-11
@@ -159,6 +159,8 @@ def long_run(
         shown, run, plan = _run(method, scene, inside, steps, step, SAMPLES)
         if run.outcome == "ok" or not method.fixed_step:
             break
+        if quick and most is not None:
+            most = max(most - run.steps, LEAST_SHARE * most)
     _, other, _ = _run(method, scene, inside, PILOT, 0.21 * step, PILOT + 1)
     steady = len({one.force_evaluations / max(one.steps, 1) for one in (first, other)}) == 1
     reported = None

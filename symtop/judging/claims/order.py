@@ -186,7 +186,8 @@ class ChartSeries(NamedTuple):
     @property
     def measured(self) -> Measured:
         """The order that is seen, or the least that it can be."""
-        text = f"{self.order} by its h^{self.order + 1} term" if self.series.is_exact else f"{self.order} or more"
+        exact, term = self.series.is_exact, self.order + 1
+        text = f"{self.order}, a step wrong from its h^{term} term on" if exact else f"{self.order} or more"
         return Measured("by a term", self.order, text=text)
 
 

@@ -42,6 +42,7 @@ FINEST = {"compiled": 2e5, "python": 1e4}  # most steps of a run of the order
 FEWEST = 300  # steps of the longest run of the order, however slow
 LADDER = 2.5  # times the steps of the longest run: what all of them take
 ENOUGH_STEPS, AT_REST = 50.0, 1e-9  # steps a nutation with a right-hand side of zero, and how far they may go
+STEPS_A_NUTATION = 118.02  # of a long run, and of the steps that are timed: an implicit one costs more if it is long
 ENOUGH = 0.03  # seconds after which the time of a step is known
 
 
@@ -120,21 +121,24 @@ def timed(stepper: Stepper, scene: Scene, claims: dict[str, Any], **options: Any
 
 
 def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
-    """Seconds a step, from runs of more and more steps; what a run costs at its start is left out."""
-    start, run = stepper.from_start(scene.top, generic_start(scene), scene.time_scale() / 1000.0)
+    """Seconds a step, from runs of more and more steps; what a run costs at its start is left out.
 
-    def seconds(steps: int) -> float:
+    A run that blows up is no longer than its last finite state: then the longest run before it is timed, start and all.
+    """
+    start, run = stepper.from_start(scene.top, generic_start(scene), scene.time_scale() / STEPS_A_NUTATION)
+
+    def seconds(steps: int) -> tuple[float, bool]:
         began = time.perf_counter()
-        run(start, steps)
-        return time.perf_counter() - began
+        end = run(start, steps)
+        return time.perf_counter() - began, bool(np.isfinite(end).all())
 
-    first, steps = min(seconds(1), seconds(1)), 1
+    first, steps = min(seconds(1)[0], seconds(1)[0]), 1
     while True:
-        steps *= 4
-        taken = seconds(steps)
-        if taken - first > max(ENOUGH, first) or steps > 1e7:  # what a start costs scatters as much as it costs
-            taken = min(taken, seconds(steps), seconds(steps))  # others may have been at work
-            return max(taken - first, 1e-9) / steps
+        taken, finite = seconds(4 * steps)
+        steps *= 4 if finite else 1
+        if not finite or taken - first > max(ENOUGH, first) or steps > 1e7:  # a start's cost scatters as much as it is
+            taken = min(seconds(steps)[0] for _ in range(3))  # others may have been at work
+            return max(taken - first * finite, 1e-9) / steps
 
 
 def declared(method: Integrator, claim: str) -> str:

@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.jit import combined, compile_kernel, register_jitable, set_item
+from symtop.core.jit import compile_kernel, register_jitable, set_item
 from symtop.methods.framework.adaptive import Adaptive, Loop as AdaptiveLoop
 from symtop.methods.framework.angles import LEAST_TOLERANCE
 from symtop.methods.framework.equations import FORMS
@@ -38,6 +38,7 @@ from symtop.methods.framework.preparation import as_it_steps
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import Tableau, add, plus, row_of, store, weighted, written_out
 from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5, VERN9, Row, Table
+from symtop.methods.simd import combined
 from symtop.methods.vectors import zero
 
 BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second

@@ -1,0 +1,214 @@
+"""The exact motion of a free body against 50 digits, a symmetric top, and the equations of motion."""
+
+import math
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import symtop
+from symtop.core.jit_functions import two_product
+from symtop.core.numbers import context
+from symtop.model.exact import free_body
+from symtop.model.exact.free_body import FreeBody
+from tests.model.bodies import KINDS, UNIT, Body, PreciseBody, apart, bodies
+
+PERIODS = 1e6  # of the furthest sample
+LARGEST = 20.0  # units of 2^-53
+
+
+def times_of(body, precise, rng):
+    """0, within three periods, as M passes from one end of the middle axis to the other, and far to both sides.
+
+    Near a separatrix the passage lasts a moment of its period; there and near a sphere a period may last for ever.
+    """
+    natural = 2.0 * math.pi * float(np.median(body.inertia)) / (float(precise.G) or 1.0)
+    period = min(float(precise.period or natural), 1e6 * natural)
+    near, far = rng.uniform(0.0, 3.0) * period, rng.uniform(-PERIODS, PERIODS) * period
+    passage = near
+    if precise.period:
+        passage = float((2 * precise.K * int(rng.integers(1, 6)) + rng.uniform(-2.0, 2.0) - precise.u0) / precise.rate)
+    return np.array([0.0, near, passage, 1e-3 * far, far])
+
+
+def errors(body, rng, change=lambda free: None):
+    """Of the attitude, over the bound as well, and of the momentum over its length, in units of 2^-53."""
+    precise, free = PreciseBody(*body[1:]), FreeBody(*body[1:])
+    change(free)
+    times = times_of(body, precise, rng)
+    motion, length, rows = free.samples(times), float(precise.G) or 1.0, []
+    for q, m, bound, true in zip(motion.quaternion, motion.momentum, motion.bound, precise.states(times), strict=True):
+        turn = apart(precise.mp, q, true[:4])
+        rows.append((turn / UNIT, turn / bound, apart(precise.mp, m, true[4:]) / (2.0 * length * UNIT)))
+    return np.max(rows, axis=0)
+
+
+def largest(count, seed):
+    """Largest errors of so many bodies by kind."""
+    rng, worst = np.random.default_rng(seed + 1), {}
+    for body in bodies(count, seed):
+        worst[body.kind] = np.maximum(worst.get(body.kind, 0.0), errors(body, rng))
+    return worst
+
+
+def check(worst):
+    assert set(worst) == set(KINDS)
+    for kind, (turn, share, momentum) in worst.items():
+        assert share < 1.0, (kind, share)
+        assert turn < LARGEST, (kind, turn)
+        assert momentum < LARGEST, (kind, momentum)
+
+
+def test_motion_is_that_of_fifty_digits():
+    check(largest(4 * len(KINDS), seed=48))
+
+
+@pytest.mark.slow
+def test_motion_of_ten_thousand_bodies_is_that_of_fifty_digits():
+    with ProcessPoolExecutor() as pool:
+        parts = list(pool.map(largest, [10 * len(KINDS)] * 77, range(100, 177)))
+    worst = {kind: np.max([part[kind] for part in parts], axis=0) for kind in KINDS}
+    check(worst)
+    for kind, (turn, share, momentum) in worst.items():
+        print(f"{kind:18s} {turn:6.2f} {momentum:6.2f} of 2^-53, {share:.2f} of the bound")
+
+
+@pytest.mark.parametrize("place", [free_body.SIGN, free_body.PHASE, free_body.HALF, free_body.LEAN, free_body.A2])
+def test_one_wrong_sign_breaks_the_bound(place):
+    body = Body("hyperbolic", np.array([0.5, 0.9, 1.3]), np.array([0.8, 0.0, 0.6, 0.0]), np.array([0.5, 0.9, 0.81]))
+
+    def wrong(free):
+        free._constants[place] *= -1.0
+
+    assert errors(body, np.random.default_rng(1))[1] < 1.0
+    assert errors(body, np.random.default_rng(1), wrong)[1] > 1e9
+
+
+def test_rates_of_one_double_are_worse_than_the_bound():
+    body = next(bodies(1, seed=2))
+
+    def short(free):
+        free._constants[[free_body.PHASE + 1, free_body.HALF + 1]] = 0.0
+
+    assert errors(body, np.random.default_rng(1), short)[1] > 1e3
+
+
+def test_interpreted_functions_return_the_bits_of_compiled_ones(monkeypatch):
+    times = np.array([0.0, 0.7, -1e3, 1e9])
+    compiled = [FreeBody(*body[1:]) for body in bodies(3 * len(KINDS), seed=5)]
+    for kernel in (free_body._build, free_body._fill):
+        kernel.compile()
+    motions = [FreeBody(*body[1:]).samples(times) for body in bodies(3 * len(KINDS), seed=5)]
+    for kernel in (free_body._build, free_body._fill):
+        monkeypatch.setattr(kernel, "ready", lambda _: False)
+    for body, motion, first in zip(bodies(3 * len(KINDS), seed=5), motions, compiled, strict=True):
+        plain = FreeBody(*body[1:])
+        np.testing.assert_array_equal(plain._constants, first._constants)
+        np.testing.assert_array_equal(plain.samples(times).quaternion, motion.quaternion)
+        np.testing.assert_array_equal(plain.samples(times).momentum, motion.momentum)
+
+
+@pytest.mark.parametrize("rates", [(0.3, 0.0, 2.0), (-1.5, 0.0, 0.4), (1.0, 0.0, 0.0), (0.2, 0.0, -3.0)])
+@pytest.mark.parametrize("moments", [(1.0, 0.4), (0.8, 1.5)])
+def test_symmetric_body_moves_as_the_symmetric_top(moments, rates):
+    (I1, I3), times = moments, np.linspace(0.0, 300.0, 401)
+    start = symtop.Angles(1.1, theta_dot=rates[0], psi_dot=rates[2])
+    scene = symtop.Scene("free", symtop.SymmetricTop(I1, I3, 0.0), start, horizon=300.0)
+    momentum = [two_product(moment, rate) for moment, rate in zip((I1, I1, I3), rates, strict=True)]
+    half = 0.5 * start.theta
+    body = FreeBody((I1, I1, I3), (math.cos(half), math.sin(half), 0.0, 0.0), *np.transpose(momentum))
+    true, motion = symtop.reference(scene, times), body.samples(times)
+    gap = 2.0 * np.linalg.norm(motion.quaternion - true["quaternion"].values, axis=1)
+    assert (gap <= motion.bound + true["attitude_error_bound"].values).all()
+    assert motion.bound.max() < 1e-14
+    off = FreeBody((1.001 * I1, I1, I3), (math.cos(half), math.sin(half), 0.0, 0.0), *np.transpose(momentum))
+    apart_by = 2.0 * np.linalg.norm(off.samples(times).quaternion - true["quaternion"].values, axis=1)
+    assert apart_by.max() > 1e-3
+
+
+CHECK_CASE = {  # NASA's brick: yaw, pitch, roll and body rates in degrees
+    10: "-4.31861073067739 3.74448482493602 -65.9772500239938 -2.41890222169288 -23.5525695195605 28.1285926300414",
+    20: "-6.36379156986781 4.06909796412636 4.22159045867153 -5.42273468006839 22.7159305764525 28.6082817473166",
+    30: "-4.29769350049079 -3.81026674049925 -56.0259821311546 12.6183907759142 -17.3974747616114 31.1195888869443",
+}
+BRICK, RATES = ("0.00189422", "0.006211019", "0.007194665"), (10, 20, 30)
+
+
+def _angles(mp, state, moments):
+    """Yaw, pitch, roll and rates of a state, degrees."""
+    w, x, y, z, *momentum = state
+    yaw, roll = (
+        mp.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z),
+        mp.atan2(2 * (w * x + y * z), w * w - x * x - y * y + z * z),
+    )
+    turned = [m / moment for m, moment in zip(momentum, moments, strict=True)]
+    return [mp.degrees(value) for value in (yaw, mp.asin(2 * (w * y - z * x)), roll, *turned)]
+
+
+def _field(moments):
+    """The equations of motion of (q, M)."""
+
+    def field(_, state):
+        w, x, y, z, m1, m2, m3 = state
+        o1, o2, o3 = (m / moment for m, moment in zip((m1, m2, m3), moments, strict=True))
+        turning = [
+            -x * o1 - y * o2 - z * o3,
+            w * o1 + y * o3 - z * o2,
+            w * o2 - x * o3 + z * o1,
+            w * o3 + x * o2 - y * o1,
+        ]
+        return [value / 2 for value in turning] + [m2 * o3 - m3 * o2, m3 * o1 - m1 * o3, m1 * o2 - m2 * o1]
+
+    return field
+
+
+def test_check_case_has_fifteen_digits_by_the_closed_form_and_by_series():
+    mp = context(24)  # Taylor's series of the equations of motion, by mpmath
+    moments = [mp.mpf(moment) for moment in BRICK]
+    start = [mp.one, mp.zero, mp.zero, mp.zero, *(i * mp.radians(rate) for i, rate in zip(moments, RATES, strict=True))]
+    series, precise = mp.odefun(_field(moments), 0, start), PreciseBody(moments, start[:4], start[4:])
+    assert precise.mp.nstr(precise.period, 15) == "17.3844892719394"
+    high = [float(value) for value in start[4:]]
+    low = [float(value - top) for value, top in zip(start[4:], high, strict=True)]
+    motion = FreeBody([float(moment) for moment in moments], (1, 0, 0, 0), high, low).samples([10.0, 20.0, 30.0])
+    coarse = solve_ivp(
+        _field([float(m) for m in moments]),
+        (0.0, 30.0),
+        [1.0, 0.0, 0.0, 0.0, *high],
+        "DOP853",
+        (10.0, 20.0, 30.0),
+        rtol=1e-13,
+        atol=1e-16,
+    )
+    for place, (time, published) in enumerate(CHECK_CASE.items()):
+        (closed,) = precise.states([time])
+        for state in (closed, series(time)):
+            shown = [precise.mp.nstr(value, 15) for value in _angles(precise.mp, state, moments)]
+            assert shown == published.split()
+        assert apart(precise.mp, motion.quaternion[place], closed[:4]) < motion.bound[place] + 2e-15  # rounded moments
+        assert apart(precise.mp, coarse.y[:4, place], closed[:4]) < 1e-11
+
+
+@pytest.mark.parametrize(
+    ("inertia", "quaternion", "momentum", "words"),
+    [
+        ((1.0, 2.0), (1, 0, 0, 0), (1, 2, 3), "inertia must be 3"),
+        ((1.0, -2.0, 2.0), (1, 0, 0, 0), (1, 2, 3), "positive moments"),
+        ((1.0, 2.0, math.nan), (1, 0, 0, 0), (1, 2, 3), "inertia must be 3 finite"),
+        ((1.0, 2.0, 2.5), (0, 0, 0, 0), (1, 2, 3), "names no attitude"),
+        ((1.0, 2.0, 2.5), (1, 0, 0, 0), (1e-101, 2, 3), "1e-100"),
+        ((1e-31, 2.0, 2.5), (1, 0, 0, 0), (1, 2, 3), "1e-30"),
+    ],
+)
+def test_bodies_that_are_none_are_refused(inertia, quaternion, momentum, words):
+    with pytest.raises(symtop.SymtopError, match=words):
+        FreeBody(inertia, quaternion, momentum)
+
+
+def test_times_are_a_row_of_finite_numbers():
+    body = FreeBody((1.0, 2.0, 2.5), (1, 0, 0, 0), (1, 2, 3))
+    for times in ([0.0, math.nan], [[0.0]], [2e100]):
+        with pytest.raises(symtop.SymtopError, match="times must be"):
+            body.samples(times)
+    assert body.samples([1e100]).bound == math.pi
