@@ -88,7 +88,7 @@ def step_of(scene: str, settings: dict[str, Any]) -> float | None:
         return step
     from symtop.model.scenes import scene as find
 
-    return find(scene).time_scale(settings.get("horizon")) / positive("per_nutation", count)
+    return find(scene, bodies=True).time_scale(settings.get("horizon")) / positive("per_nutation", count)
 
 
 per_nutation_option = click.option("--per-nutation", type=float, help="In place of a step: steps in a nutation period.")

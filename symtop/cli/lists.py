@@ -128,11 +128,13 @@ def scenes(name: str | None, wide: bool, as_json: bool) -> None:
     """
     from symtop.model import scenes as catalogue
 
-    chosen = [catalogue.scene(name)] if name is not None else list(catalogue.scenes().values())
+    listed = [*catalogue.scenes().values(), *catalogue.body_scenes().values()]
+    chosen = [catalogue.scene(name, bodies=True)] if name is not None else listed
     records: list[Record] = [scene.record() for scene in chosen]
     keys = {"name": "name", "horizon": "horizon (s)", "nutation": "nutation period (s)", "purpose": "purpose"}
     short: list[Record] = [{column: record[key] for column, key in keys.items()} for record in records]
-    note = "horizon: the time a run covers; nutation: one period of it. One in full: symtop scenes NAME."
+    times = "horizon: the time a run covers; nutation: one period of it, of a body its natural period."
+    note = f"{times} One in full: symtop scenes NAME."
     one = None if name is None else _numbers(chosen[0])
     _print(records, short, note, one, _scene_page, wide=wide, as_json=as_json)
 
@@ -141,20 +143,30 @@ def _numbers(scene: "Scene") -> Record:
     """The record of a scene with every number of its top and its start."""
     top, start = scene.top, scene.start
     momenta = top.momenta(start)
+    cosines = () if scene.of_body else top.turning_cosines(start)
     return {
         **scene.record(),
         "top": {name: getattr(top, name) for name in top.__slots__},
         "start": {name: getattr(start, name) for name in start.__slots__},
         "momenta": {"p_phi": momenta.p_phi, "p_psi": momenta.p_psi},
-        "theta": sorted(math.acos(min(1.0, max(-1.0, cosine))) for cosine in top.turning_cosines(start)),
+        "theta": sorted(math.acos(min(1.0, max(-1.0, cosine))) for cosine in cosines),
     }
 
 
+def _digits(value: Any) -> str:
+    """A number, or a row of numbers."""
+    return f"({', '.join(map(_digits, value))})" if isinstance(value, tuple) else f"{value:.10g}"
+
+
 def _scene_page(numbers: Record) -> str:
-    name, purpose, (low, high) = (numbers.pop(key) for key in ("name", "purpose", "theta"))
+    name, purpose, angles = (numbers.pop(key) for key in ("name", "purpose", "theta"))
     parts = {key: numbers.pop(key) for key in ("top", "start", "momenta")}
-    lines = {key: ", ".join(f"{name}={value:.10g}" for name, value in part.items()) for key, part in parts.items()}
-    lines["theta"] = f"from {low:.6g} to {high:.6g} rad ({math.degrees(low):.4g} to {math.degrees(high):.4g} degrees)"
+    lines = {key: ", ".join(f"{name}={_digits(value)}" for name, value in part.items()) for key, part in parts.items()}
+    if angles:
+        low, high = angles
+        lines["theta"] = (
+            f"from {low:.6g} to {high:.6g} rad ({math.degrees(low):.4g} to {math.degrees(high):.4g} degrees)"
+        )
     title = textwrap.fill(f"{name}: {purpose}" if purpose else name, terminal_width())
     return f"{title}\n\n{facts(lines | numbers, terminal_width())}"
 

@@ -59,7 +59,7 @@ def run(
     check_outputs(output=output, figure=figure)
     with ticking("loading"):
         from symtop.core import netcdf
-        from symtop.measure.errors import QUANTITIES, errors
+        from symtop.measure.errors import OF_BODY, QUANTITIES, errors
         from symtop.measure.verdicts import judgement
         from symtop.model import scenes
         from symtop.run.reference.truth import reference
@@ -68,21 +68,22 @@ def run(
         settings["step_size"] = h = common.step_of(scene, settings)
     if h is not None and h > 0.0:
         few_steps = partial(simulate, scene, integrator, step_size=h, samples=2, guard=False)
-        horizon = settings["horizon"] or scenes.scene(scene).horizon
+        horizon = settings["horizon"] or scenes.scene(scene, bodies=True).horizon
         estimate(horizon / h, lambda few: few_steps(horizon=few * h))
     with ticking("running"):
         data = simulate(scene, integrator, guard=warn if guard else False, **settings)
         if output is not None:
             netcdf.write(data, output)
-        chosen = scenes.scene(scene)
+        chosen = scenes.scene(scene, bodies=True)
         truth = reference(chosen, data["time"].values, precision="closed-form")
         error = errors(data)
-        verdict = judgement(chosen, data, error["axis"].values)
+        verdict = judgement(chosen, data, error["attitude" if chosen.of_body else "axis"].values)
         if figure is not None:
             from symtop.report.plot import draw_run
 
             draw_run(chosen, data, truth, error, figure)
-    series = {name: error[name].dropna("time").values for name in QUANTITIES if name in error}
+    words = QUANTITIES | OF_BODY if chosen.of_body else QUANTITIES
+    series = {name: error[name].dropna("time").values for name in words if name in error}
     largest = {name: {"largest": values.max(), "last": values[-1]} for name, values in series.items() if values.size}
     facts = data.attrs
     if as_json:
@@ -99,7 +100,7 @@ def run(
         if facts["outcome"] == "ok":
             say(f"judged against the truth: {verdict.words()}")
         for name, values in largest.items():
-            click.echo(f"  {QUANTITIES[name]:<30} largest {values['largest']:.3e}   last {values['last']:.3e}")
+            click.echo(f"  {words[name]:<30} largest {values['largest']:.3e}   last {values['last']:.3e}")
         say_written(output, figure)
     if facts["outcome"] != "ok":
         sys.exit(3)

@@ -25,7 +25,7 @@ from symtop.measure.errors import QUANTITIES
 from symtop.measure.sweep import RAISED, SPENT, TIMED, error_row_or_message, listed, timed_rows
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.scenes import Scene, horizon_of, scene as find_scene
-from symtop.run.simulation import likely_step
+from symtop.run.simulation import chart_of, likely_step
 
 COSTS = ("time", "evaluations")
 BUDGET = {"compiled": 3e6, "python": 5e4}  # force evaluations of a run
@@ -60,7 +60,7 @@ def compare(
 
     Raises SymtopError for arguments that make no sense. `symtop.plot` draws the dataset.
     """
-    chosen = find_scene(scene)
+    chosen = find_scene(scene, bodies=True)
     one_of("quantity", quantity, QUANTITIES)
     one_of("cost", cost, COSTS)
     if horizon is not None and nutations is not None:
@@ -71,7 +71,7 @@ def compare(
     end = chosen.horizon if until is None else horizon_of(until)
     most = None if budget is None else positive("budget", budget)
     records = [find(one) for one in listed(methods)]
-    variants = [one.variant(one.chart_for(settings.observed(quantity))) for one in records]
+    variants = [one.variant(chart_of(one, chosen.observes, settings.observed(quantity))) for one in records]
     names = [one.name for one in variants]
     if not names or len(set(names)) < len(names):
         raise SymtopError(f"methods must be one or more, each once, not {names!r}", "methods")
@@ -92,7 +92,8 @@ def compare(
         post("timing the runs")
         rows: list[dict[str, Any]] = [{"setting_value": math.nan, "outcome": "ok"}]
         pairs = zip([exact, *variants], [rows, *(runs for runs, _ in results)], strict=True)
-        timed_rows([(chosen, method, end, runs) for method, runs in pairs] if cost == "time" else [])
+        timed = [(chosen, method, end, runs) for method, runs in pairs if method is not exact or not chosen.of_body]
+        timed_rows(timed if cost == "time" else [])
     size = max(len(runs) for runs, _ in results)
     blank: dict[str, Any] = {**SPENT, "message": "", "setting_value": math.nan}
     tables = [

@@ -80,10 +80,10 @@ def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> C
 
 
 def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
-    """Relative change of energy, p_phi and p_psi since the start, signed."""
+    """Relative change of those of energy, p_phi and p_psi that a run shows since the start, signed."""
     scales = {"energy": scene.energy_scale, "p_phi": scene.momentum_scale, "p_psi": scene.momentum_scale}
-    values = {name: getattr(run, name) for name in CONSTANTS}
-    return {name: (values[name] - values[name][0]) / scales[name] for name in CONSTANTS}
+    values = {name: shown for name in CONSTANTS if (shown := getattr(run, name)) is not None}
+    return {name: (shown - shown[0]) / scales[name] for name, shown in values.items()}
 
 
 def growth(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Fit:

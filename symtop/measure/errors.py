@@ -6,7 +6,8 @@
 
 The energy's scale is `Scene.energy_scale`, the energy of the nutation above the steady precession with the same
 momenta, without the energy of the spin: on `fast` it is 9.2e-5, and the kinetic energy, nearly all spin, 5000. Both
-momenta share one scale because one of them may vanish. Radians and momenta never share a norm.
+momenta share one scale because one of them may vanish. Radians and momenta never share a norm. Of a body without
+symmetry the scale of the energy is that of the start, kinetic and |mgl|, and that of p_phi and of the vector L is |L|.
 
 A trajectory of another program is checked first. A quaternion shows the attitude, the axis and theta; theta, phi and
 psi the same; theta and phi the axis; an axis shows theta. Vectors that are not quite of length one are scaled to it.
@@ -26,6 +27,7 @@ from symtop.core.errors import SymtopError, SymtopWarning, one_of, positive
 from symtop.core.numbers import EPSILON
 from symtop.methods.framework.lanes import members_of
 from symtop.model import charts
+from symtop.model.body import Attitude, RigidBody
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.ensemble.inputs import read_members
@@ -40,6 +42,11 @@ QUANTITIES: dict[str, str] = {
     "p_phi": "relative error of p_phi",
     "p_psi": "relative error of p_psi",
 }
+OF_BODY = {  # in the place of these, and one that tops do not have
+    "energy": "energy error / (T0 + |mgl|)",
+    "momentum": "relative error of the momentum",
+}
+
 ERRORS = {  # what each is of and against what, and its units
     "axis": ("angle between the axis and the true axis", "rad"),
     "attitude": ("angle of the rotation between the attitude and the true attitude", "rad"),
@@ -47,6 +54,7 @@ ERRORS = {  # what each is of and against what, and its units
     "energy": ("error of the energy against that of the start, relative to E0 - min V", "1"),
     "p_phi": ("error of p_phi against that of the start, relative to the larger momentum", "1"),
     "p_psi": ("error of p_psi against that of the start, relative to the larger momentum", "1"),
+    "momentum": ("error of the angular momentum in the space frame, relative to that of the start", "1"),
 }
 
 
@@ -83,7 +91,7 @@ def errors(
         return _of_members(run, scene, precision)
     foreign = scene is not None and "integrator" not in getattr(run, "attrs", {})
     run = sampled(run) if isinstance(run, xr.Dataset) else run
-    chosen = scene_of(run) if scene is None else find_scene(scene)  # type: ignore[arg-type]
+    chosen = scene_of(run) if scene is None else find_scene(scene, bodies=True)  # type: ignore[arg-type]
     refuse_other_scene(run, chosen)
     data = checked(run) if foreign else Trajectory.of_data(run)
     truth = reference(chosen, data.time, precision)
@@ -96,6 +104,8 @@ def errors(
     shown = dataset(data.time, columns | {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns})
     for name in columns:
         words, units = ERRORS[name]
+        if chosen.of_body:
+            words = words.replace("E0 - min V", "the kinetic energy of the start and |mgl|")
         shown.variables[name].attrs.update(long_name=words, units=units)
         shown.variables[f"{name}_bound"].attrs.update(long_name=f"least {words} to be told from none", units=units)
     attributes = {"scene": chosen.name, "precision": truth.attrs["precision"]}
@@ -141,6 +151,8 @@ def error_bound(scene: Scene, run: Trajectory, truth: xr.Dataset, quantity: str)
         grain = scene.energy_grain if quantity == "energy" else 1.0
         return np.full(truth.sizes["time"], 4.0 * EPSILON * grain)
     true = truth.variables  # ``truth[name]`` would make a DataArray
+    if quantity == "momentum":
+        return np.asarray(true["attitude_error_bound"].values + 4.0 * EPSILON)
     bound: charts.Array = true[f"{quantity}_error_bound"].values + EPSILON
     if quantity == "attitude" and run.quaternion is None:  # phi and psi come as doubles; their rounding is an angle
         bound = bound + 0.5 * EPSILON * (np.abs(true["phi"].values) + np.abs(true["psi"].values))
@@ -168,6 +180,8 @@ def errors_against(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str
                 attitude = charts.quaternion_from_angles(run.theta, run.phi, run.psi)
             low = true.get("quaternion_lo", 0.0)
             columns["attitude"] = charts.attitude_distance(attitude, true["quaternion"], low)
+        if run.momentum is not None:
+            columns["momentum"] = np.linalg.norm(run.momentum - true["momentum"], axis=1) / scene.momentum_scale
     return columns
 
 
@@ -188,7 +202,8 @@ def scene_of(run: xr.Dataset | Mapping[str, Any]) -> Scene:
     try:
         top, start = (json.loads(attributes[name]) for name in ("top", "start"))
         name, horizon = str(attributes["scene"]), positive("horizon", attributes["horizon"])
-        return Scene(name, SymmetricTop(**top), Angles(**start), horizon)
+        kinds = (RigidBody, Attitude) if "I2" in top else (SymmetricTop, Angles)
+        return Scene(name, kinds[0](**top), kinds[1](**start), horizon)
     except (KeyError, TypeError, ValueError) as error:
         raise SymtopError(
             "scene is missing: these data do not say of which top and start they are, so give errors(data, scene)"

@@ -152,7 +152,8 @@ def one_step(method: Integrator, chart: str, scene: Scene, h: float) -> StepMap:
 def generic_start(scene: Scene) -> Angles:
     """A point of the scene's true motion where nothing is special: no turning point, no phase of zero."""
     if not math.isfinite(scene.nutation_period):
-        return scene.start
+        start: Angles = scene.start
+        return start
     motion = closed_form(scene)(np.array([0.3711 * scene.nutation_period]))
     return Angles(*(float(value[0]) for value in motion))
 

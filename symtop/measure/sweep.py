@@ -82,7 +82,7 @@ def sweep(
     integrators may be asked for than are in the file, but not fewer. Raises SymtopError for arguments that make no
     sense.
     """
-    chosen = [find_scene(one) for one in listed(scenes)]
+    chosen = [find_scene(one, bodies=True) for one in listed(scenes)]
     methods = [find_integrator(one) for one in listed(integrators)]
     silent = boolean("quiet", quiet)
     workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
@@ -231,7 +231,7 @@ def timed_rows(cells: "list[tuple[Scene, Integrator, float, list[dict[str, Any]]
     rows, calls = [], []
     for scene, method, horizon, runs in cells:
         rows += (ended := [one for one in runs if one["outcome"] == "ok"])
-        calls += [bare_run(scene, method, method.charts()[0], one["setting_value"], horizon) for one in ended]
+        calls += [bare_run(scene, method, next(iter(method.solvers)), one["setting_value"], horizon) for one in ended]
     with foreign_code("a method that is timed"):
         taken = timings(calls, BATCHES, BATCH, warm=True, patience=PATIENCE) if calls else []
     for one, timing in zip(rows, taken, strict=True):

@@ -39,6 +39,8 @@ class Barriers(NamedTuple):
 
 def barriers(scene: Scene) -> Barriers:
     """What the axis of a scene never passes."""
+    if scene.of_body:  # it may point anywhere
+        return Barriers(0.0, math.pi, OUTSIDE, ACCURATE)
     low, high = scene.top.turning_cosines(scene.start)
     highest, lowest = math.acos(min(high, 1.0)), math.acos(max(low, -1.0))
     width = lowest - highest if lowest - highest > STEADY else 1.0
@@ -47,9 +49,11 @@ def barriers(scene: Scene) -> Barriers:
 
 def pole_passed(scene: Scene, p_phi: Any, p_psi: Any) -> NDArray[np.bool_]:
     """At which samples (...) of momenta the axis has passed a pole on the side that those of the start forbid."""
+    passed = np.zeros(np.shape(p_phi), dtype=bool)
+    if scene.of_body:  # which no momentum keeps from a pole
+        return passed
     momenta = scene.top.momenta(scene.start)
     least = NO_GAP * scene.momentum_scale
-    passed = np.zeros(np.shape(p_phi), dtype=bool)
     for gap, now in ((momenta.north, p_phi - p_psi), (momenta.south, p_phi + p_psi)):
         if abs(gap) > least:
             passed |= now * gap < 0.0
@@ -69,7 +73,7 @@ class Judgement(NamedTuple):
 
 
 def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgement:
-    """The verdict on a run with the given axis errors at its samples; NaN counts as the worst."""
+    """The verdict on a run with the given errors of the axis, of a body of its attitude; NaN counts as the worst."""
     times, ended = run["time"].values, str(run.attrs["outcome"])
     if ended != "ok":
         return Judgement(ended, float(run.attrs["reached_time"]), str(run.attrs["outcome_message"]))
@@ -78,7 +82,7 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         return Judgement("accurate", float(times[-1]), f"accurate to {worst:.2g} rad up to t = {times[-1]:.6g}")
     theta, energy = run["theta"].values, np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
     beyond = ~((theta >= truth.highest - truth.margin) & (theta <= truth.lowest + truth.margin))
-    strays = beyond | pole_passed(scene, run["p_phi"].values, run["p_psi"].values)
+    strays = beyond | pole_passed(scene, run["p_phi"].values, run.get("p_psi", run["p_phi"]).values)
     half = energy.size // 2
     early, late = np.max(energy[:half] if half >= FEWEST else energy), np.max(energy[half:])
     if strays.any():

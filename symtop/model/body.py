@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError, finite, positive
-from symtop.core.jit_functions import inlined
+from symtop.core.jit_functions import inlined, two_product
 from symtop.model.top import LARGEST, bounded, unit, vector
 
 SLACK = 1e-12  # of the triangle inequality: moments come rounded
@@ -164,6 +164,10 @@ class RigidBody:
         w1, w2, w3 = at.omega_body
         return self.I1 * w1, self.I2 * w2, self.I3 * w3
 
+    def momentum_lo(self, at: Attitude) -> tuple[float, ...]:
+        """What the products in `momentum` are rounded by."""
+        return tuple(two_product(moment, rate)[1] for moment, rate in zip(self.moments, at.omega_body, strict=True))
+
     def energy(self, at: Attitude) -> float:
         """Total energy of a start."""
         kinetic = 0.5 * math.fsum(m * w for m, w in zip(self.momentum(at), at.omega_body, strict=True))
@@ -201,11 +205,13 @@ def product(first: Sequence[float], second: Sequence[float]) -> tuple[float, flo
 
 
 def rotated(quaternion: Any, vectors: Any) -> Any:
-    """q v q*, of a vector (3,) or of rows (n, 4) and (n, 3)."""
+    """q v q*, of a vector (3,) or of rows (n, 4) and (n, 3); q that is not of length one stretches by |q|^2."""
     w, x, y, z = np.moveaxis(np.asarray(quaternion), -1, 0)
     a, b, c = np.moveaxis(np.asarray(vectors), -1, 0)
-    p, q, s = y * c - z * b + w * a, z * a - x * c + w * b, x * b - y * a + w * c
-    turned = np.stack([a + 2.0 * (y * s - z * q), b + 2.0 * (z * p - x * s), c + 2.0 * (x * q - y * p)], axis=-1)
+    along, size = 2.0 * (x * a + y * b + z * c), w * w - x * x - y * y - z * z
+    turn, twice = (y * c - z * b, z * a - x * c, x * b - y * a), 2.0 * w
+    parts = zip((a, b, c), (x, y, z), turn, strict=True)
+    turned = np.stack([size * v + along * r + twice * u for v, r, u in parts], axis=-1)
     return turned if turned.ndim > 1 else tuple(turned.tolist())
 
 

@@ -217,7 +217,7 @@ class View:
     """
 
     chart: str
-    top: SymmetricTop
+    top: Any  # SymmetricTop; of the chart body a RigidBody
     states: Any
     p_phi: Any = None
     p_psi: Any = None

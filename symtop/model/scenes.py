@@ -115,15 +115,15 @@ class Scene:
     @property
     def energy_grain(self) -> float:
         """(|E0| + |mgl|) / `energy_scale`, at least 1: how much larger rounding is in relative errors of the energy."""
-        return max((abs(self.top.energy(self.start)) + abs(self.top.mgl)) / self.energy_scale, 1.0)
+        return max(float(abs(self.top.energy(self.start)) + abs(self.top.mgl)) / self.energy_scale, 1.0)
 
     @property
     def momentum_scale(self) -> float:
-        """The larger of p_phi and p_psi in size, what the errors of both are divided by; of a body, |L| of the start."""
+        """What errors of p_phi and p_psi are divided by, the larger of both in size; of a body, |L| of the start."""
         if self.of_body:
             return max(math.hypot(*self.top.momentum(self.start)), TINY)
         momenta = self.top.momenta(self.start)
-        return max(abs(momenta.p_phi), abs(momenta.p_psi), TINY)
+        return max(float(abs(momenta.p_phi)), float(abs(momenta.p_psi)), TINY)
 
     def record(self) -> dict[str, str]:
         """What tables show of this scene, by column."""
@@ -293,23 +293,22 @@ def _catalogue() -> dict[str, Scene]:
 
 @functools.lru_cache(maxsize=1)
 def _bodies() -> dict[str, Scene]:
-    def free(name: str, moments: tuple[float, ...], rates: tuple[float, ...], horizon: float, purpose: str) -> Scene:
-        return Scene(name, RigidBody(*moments), Attitude(omega_body=rates), horizon, purpose)
-
     brick = RigidBody(0.00189422, 0.006211019, 0.007194665)  # kg m^2
-    rates = tuple(math.radians(rate) for rate in (10.0, 20.0, 30.0))
+    rates = math.radians(10.0), math.radians(20.0), math.radians(30.0)
     swinging = Attitude((0.8, 0.6, 0.0, 0.0), (0.2, 0.3, 3.0))
     catalogue = [
         Scene("check-case-2", brick, Attitude(omega_body=rates), 30.0,
-              "a free brick: check case 2 of NASA's simulations in six degrees of freedom, space axes at the start north,"
-              " east, down", units="SI"),
-        free("tennis-racket", (1.0, 2.0, 3.0), (1e-3, 1.0, 1e-3), 100.0,
-             "free, turning about its middle axis: it flips over again and again"),
-        free("free-wobble", (1.0, 1.01, 1.6), (0.3, 0.0, 1.0), 60.0, "free and nearly symmetric: a slow wobble"),
+              "a free brick, check case 2 of NASA's flight simulations; space axes: north, east, down at the start",
+              units="SI"),
+        Scene("tennis-racket", RigidBody(1.0, 2.0, 3.0), Attitude(omega_body=(1e-3, 1.0, 1e-3)), 100.0,
+              "free, turning about its middle axis: it flips over again and again"),
+        Scene("free-wobble", RigidBody(1.0, 1.01, 1.6), Attitude(omega_body=(0.3, 0.0, 1.0)), 60.0,
+              "free and nearly symmetric: a slow wobble"),
         Scene("heavy-brick", RigidBody(1.0, 1.2, 0.6, 1.0, (0.1, 0.0, 1.0)), swinging, 20.0,
               "a heavy body near a symmetric top: regular"),
         Scene("heavy-chaotic", RigidBody(1.0, 1.6, 0.8, 2.0, (0.5, 0.2, 1.0)),
-              Attitude((0.8, 0.6, 0.0, 0.0), (0.4, 0.5, 0.9)), 20.0, "a heavy body far from symmetry: chaotic"),
+              Attitude((0.8, 0.6, 0.0, 0.0), (0.4, 0.5, 0.9)), 20.0,
+              "a heavy body far from symmetry, chaotic: errors grow a millionfold in 50"),
     ]  # fmt: skip
     return {entry.name: entry for entry in catalogue}
 

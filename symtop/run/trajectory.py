@@ -64,7 +64,7 @@ class Trajectory(NamedTuple):
             if outcome == "ok" and not (whole := np.isfinite(energy + run.p_phi)).all():  # its squares overflow
                 outcome, reached = "not_finite", plan.last_of(whole)
             return cls(
-                plan.times, view.theta, phi, psi, axis, quaternion, energy, p_theta, run.p_phi, run.p_psi, chart,
+                plan.times, view.theta, phi, psi, axis, quaternion, energy, p_theta, run.p_phi, run.p_psi, None, chart,
                 plan.step_size, plan.tolerance, *run[3:6], outcome, reached,
             )  # fmt: skip
 
@@ -74,11 +74,14 @@ class Trajectory(NamedTuple):
         outcome, reached = run.outcome, run.reached
         if outcome == "ok" and not (whole := np.isfinite(view.energy)).all():
             outcome, reached = "not_finite", plan.last_of(whole)
+        facts: dict[str, Any] = {
+            "chart": BODY, "step_size": plan.step_size, "tolerance": plan.tolerance, "steps": run.steps,
+            "force_evaluations": run.force_evaluations, "newton_iterations": run.newton_iterations, "outcome": outcome,
+            "reached_time": reached,
+        }  # fmt: skip
         return cls(
             plan.times, view.theta, axis=view.axis, quaternion=view.quaternion, energy=view.energy, p_phi=run.p_phi,
-            momentum=view.momentum, chart=BODY, step_size=plan.step_size, tolerance=plan.tolerance, steps=run.steps,
-            force_evaluations=run.force_evaluations, newton_iterations=run.newton_iterations, outcome=outcome,
-            reached_time=reached,
+            momentum=view.momentum, **facts,
         )  # fmt: skip
 
     @classmethod

@@ -24,6 +24,11 @@ A *certificate* holds the closed form of a scene against independent checks, onc
 It takes up to half a second and is kept on disk under a hash of the top, the start, the sources and the libraries; each
 later reference of the scene names it. It lowers no bound: one that contradicts the bounds raises them.
 
+A *body* without symmetry has no such closed form. Free, its motion is exact (`symtop.model.exact.free_body`); with a
+weight it is an integration in long double, bounded by a second one (`symtop.model.exact.heavy_body`), or with
+precision="quad" by one in quadruple precision. Beyond the time at which the bound passes 1e-9 rad, as it does in chaos,
+there is no reference.
+
 With a `precision` the values are heyoka's integration of the equations of motion in that arithmetic, judged by the
 closed form in 40 digits at some thirty times (`symtop.run.reference.independent_checks`): a check, and digits beyond
 double, stored as pairs, ``theta + theta_lo``. An integration that visibly differs from the closed form has that
@@ -39,7 +44,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 from reprlib import repr as short
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -51,6 +56,7 @@ from symtop.core.files import cache_root, make_private, prune, touch
 from symtop.core.numbers import EPSILON, TINY, real_numbers
 from symtop.methods.taylor import heyoka
 from symtop.model import charts
+from symtop.model.body import Attitude, RigidBody
 from symtop.model.charts import Array
 from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.exact.turning_points import RATE
@@ -72,6 +78,10 @@ from symtop.run.reference.independent_checks import (
 )
 from symtop.run.reference.sensitivity import FAR, LEAST, conditioning
 from symtop.run.trajectory import dataset
+
+if TYPE_CHECKING:
+    from symtop.model.exact.free_body import BodyMotion, FreeBody
+    from symtop.model.exact.heavy_body import HeavyBody
 
 PRECISIONS = ("closed-form", "double", "longdouble", "quad")
 KINDS = ("digits", "discrete-map", "integration")  # of certificates
@@ -107,13 +117,19 @@ def reference(
     ``conditioning`` how much the motion amplifies a change of its start (`symtop.run.reference.sensitivity`): bounds
     are of the motion from the very doubles that are given.
 
-    Raises SymtopError for times that are negative, not finite or none at all.
+    Of a body without symmetry: ``quaternion``, ``axis`` (its third), ``theta``, ``momentum`` (L in the space frame),
+    ``energy``, ``p_phi``, ``axis_error_bound`` and ``attitude_error_bound``.
+
+    Raises SymtopError for times that are negative, not finite or none at all, and for those of a body at which its
+    motion is not known to 1e-9 rad.
     """
-    chosen = find_scene(scene)
+    chosen = find_scene(scene, bodies=True)
     wanted = real_numbers("times", times)
     if wanted.ndim != 1 or wanted.size == 0 or not np.isfinite(wanted).all() or wanted.min() < 0.0:
         raise SymtopError(f"times must be a row of finite numbers of at least 0, not {short(times)}")
     one_of("precision", precision, PRECISIONS)
+    if chosen.of_body:
+        return _of_body(chosen, wanted, precision, certify)
     if certify is not None:
         one_of("certify", certify, KINDS)
         if precision != "closed-form":
@@ -130,6 +146,53 @@ def reference(
         data, words = _by_integration(chosen, wanted, source)
     words = {"scene": chosen.name, "precision": source, "asked_for": precision} | words
     return netcdf.describe(data, f"reference motion of {chosen.name}", chosen.units, **words)
+
+
+@functools.lru_cache(maxsize=64)
+def _motion(body: RigidBody, start: Attitude) -> "FreeBody | HeavyBody":
+    at = start.quaternion, body.momentum(start), body.momentum_lo(start)
+    if body.free:
+        from symtop.model.exact.free_body import FreeBody
+
+        return FreeBody(body.moments, *at)
+    from symtop.model.exact.heavy_body import HeavyBody
+
+    return HeavyBody(body.moments, body.torque, *at)
+
+
+@functools.lru_cache(maxsize=16)
+def _samples(body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> "BodyMotion":
+    """A motion at times, kept for a while: methods on one scene ask for the same ones."""
+    motion, times = _motion(body, start), np.frombuffer(plain).copy()
+    return motion.samples(times) if body.free else motion.samples(times, precise=precise)  # type: ignore[call-arg]
+
+
+def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) -> xr.Dataset:
+    """The motion of a body without symmetry."""
+    body, start = scene.top, scene.start
+    known = ("closed-form",) if body.free else ("closed-form", "longdouble", "quad")
+    one_of(f"precision on {scene.name}", precision, known)
+    if certify is not None:
+        raise SymtopError(f"certify must be None on {scene.name}, a body without symmetry, not {certify!r}")
+    shown = _samples(body, start, times.tobytes(), precision == "quad")
+    if (lost := shown.lost(times)) is not None:
+        words = "its motion is not known to 1e-9 rad from there on"
+        raise SymtopError(f"times must be below {lost:.6g} on {scene.name}, not {times.max():.6g}: {words}")
+    quaternion = shown.quaternion
+    momentum = charts.lifted(np.concatenate([quaternion, shown.momentum], axis=1))
+    axis = charts.axis_from_quaternion(quaternion)
+    columns = {"theta": charts.theta_from_axis(axis), "axis": axis, "quaternion": quaternion, "momentum": momentum}
+    columns |= {"quaternion_lo": shown.quaternion_lo, "attitude_error_bound": shown.bound}
+    columns |= dict.fromkeys(("axis_error_bound", "theta_error_bound"), shown.bound + 2.0 * EPSILON)
+    constants = {"energy": body.energy(start), "p_phi": body.momenta(start).p_phi}
+    data = dataset(times, columns | {name: np.full(times.size, value) for name, value in constants.items()})
+    if body.free:
+        source, words = "closed-form", "from the arithmetic of the exact motion of a free body"
+    else:
+        source = "quad" if precision == "quad" else "longdouble"
+        words = "64 times the distance of two integrations that differ in order, steps and rounding"
+    said = {"scene": scene.name, "precision": source, "asked_for": precision, "bound": words}
+    return netcdf.describe(data, f"reference motion of {scene.name}", scene.units, **said)
 
 
 def _by_closed_form(scene: Scene, times: Array, certify: str | None) -> tuple[xr.Dataset, dict[str, str]]:

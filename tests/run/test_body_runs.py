@@ -1,0 +1,180 @@
+"""Runs of a body without symmetry: orders, conserved quantities, errors against the truth, and what is refused."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import symtop
+from symtop.cli.main import main
+from symtop.model.body import Attitude, RigidBody, product, rotated
+from symtop.model.charts import attitude_distance
+from symtop.model.scenes import body_scenes
+
+BODIES = ("check-case-2", "heavy-brick")
+# half the steps that a nutation of rk4 takes are few for a method of order 8
+FIXED = {"rk4": (4, 40), "tsit5-fixed": (5, 30), "dop853-compiled-fixed": (8, 8), "series-general": (16, 5)}
+ADAPTIVE = ("rk45", "dop853", "rk45-compiled", "dop853-compiled", "tsit5", "vern9", "odex", "series-general-adaptive")
+ANGLE = math.radians(0.3)
+
+
+def error(name: str, method: str, quantity: str = "attitude", **settings: float) -> float:
+    """Largest error of a run."""
+    run = symtop.simulate(name, method, samples=41, **settings)
+    assert run.outcome == "ok"
+    return float(symtop.errors(run)[quantity].max())
+
+
+@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize(("method", "order", "steps"), [(name, *facts) for name, facts in FIXED.items()])
+def test_the_error_falls_by_the_order(name: str, method: str, order: int, steps: int) -> None:
+    step = body_scenes()[name].nutation_period / steps
+    coarse, fine = (error(name, method, step_size=h) for h in (step, 0.5 * step))
+    slope = math.log2(coarse / fine)
+    assert order - 0.6 < slope
+    assert slope < order + 1.6 or order == 16  # long steps of a series fall as powers of h over its radius
+
+
+@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("method", [name for name in ADAPTIVE if name in symtop.integrators()])
+def test_a_tight_tolerance_comes_to_the_true_motion(name: str, method: str) -> None:
+    assert error(name, method, tolerance=1e-11) < 1e-7
+
+
+def test_a_wrong_sign_in_the_inertia_is_seen() -> None:
+    # the same start on the mirrored body: I1 and I3 exchanged turn the gyroscopic torque around
+    scene = body_scenes()["check-case-2"]
+    body = scene.top
+    other = symtop.Scene("other", RigidBody(body.I3, body.I2, body.I1), scene.start, scene.horizon)
+    run = symtop.simulate(other, "series-general", step_size=0.1, samples=41)
+    truth = symtop.reference(scene, run.time.values)
+    assert attitude_distance(run["quaternion"].values, truth["quaternion"].values).max() > 0.1
+
+
+@pytest.mark.parametrize("mgl", [0.0, 2.0])
+def test_a_symmetric_body_moves_as_the_top_does(mgl: float) -> None:
+    at = symtop.Angles(theta=0.7, phi=0.2, psi=0.4, theta_dot=0.3, phi_dot=0.5, psi_dot=3.0)
+    top = symtop.Scene("top", symtop.SymmetricTop(2.0, 1.0, mgl), at, 10.0)
+    quaternion = symtop.reference(top, [0.0])["quaternion"].values[0]
+    across = 0.5 * math.sin(0.7)  # omega in body axes, from the rates
+    rates = (0.3 * math.cos(0.4) + across * math.sin(0.4), across * math.cos(0.4) - 0.3 * math.sin(0.4), at.spin)
+    body = symtop.Scene("body", RigidBody(2.0, 2.0, 1.0, mgl), Attitude(tuple(quaternion), rates), 10.0)
+    times = np.linspace(0.0, 10.0, 21)
+    one, other = (symtop.reference(scene, times)["quaternion"].values for scene in (top, body))
+    assert attitude_distance(one, other).max() < 2e-14
+    run = symtop.simulate(body, "series-general", step_size=0.05, samples=21)
+    assert (
+        attitude_distance(run["quaternion"].values, symtop.reference(top, run.time.values)["quaternion"].values).max()
+        < 1e-12
+    )
+    assert body.top.energy(body.start) == pytest.approx(top.top.energy(at), rel=1e-14)
+    assert body.top.momenta(body.start) == pytest.approx(top.top.momenta(at)[:2], rel=1e-14)
+
+
+def test_energy_and_momentum_of_a_run_are_those_of_its_states() -> None:
+    run = symtop.simulate("heavy-brick", "rk4", step_size=0.2, samples=11)
+    truth, errors = symtop.reference("heavy-brick", run.time.values), symtop.errors(run)
+    assert {*errors.data_vars} >= {"attitude", "axis", "theta", "momentum", "energy", "p_phi", "attitude_bound"}
+    assert "p_psi" not in run
+    np.testing.assert_allclose(run["p_phi"], run["momentum"][:, 2], rtol=1e-13)
+    assert abs(run["energy"][0] - truth["energy"][0]) < 1e-15
+    assert 1e-6 < abs(run["energy"] - run["energy"][0]).max() < 1e-1
+
+
+def test_a_trajectory_of_another_program_is_judged() -> None:
+    times = np.linspace(0.0, 30.0, 31)
+    truth = symtop.reference("check-case-2", times)
+    assert (
+        symtop.errors({"time": times, "quaternion": truth["quaternion"].values}, "check-case-2")["attitude"].max()
+        < 1e-14
+    )
+    turned = [product(q, (math.cos(ANGLE / 2), math.sin(ANGLE / 2), 0.0, 0.0)) for q in truth["quaternion"].values]
+    off = symtop.errors({"time": times, "quaternion": np.array(turned)}, "check-case-2")["attitude"].values
+    np.testing.assert_allclose(off, ANGLE, rtol=1e-9)
+
+
+def test_a_run_knows_its_body_from_its_file(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    run = symtop.simulate("heavy-brick", "rk4", step_size=0.05, samples=11)
+    run.to_netcdf(tmp_path / "run.nc")
+    import xarray as xr
+
+    with xr.open_dataset(tmp_path / "run.nc") as stored:
+        assert json.loads(stored.attrs["top"])["centre"] == pytest.approx(list(body_scenes()["heavy-brick"].top.centre))
+        np.testing.assert_array_equal(symtop.errors(stored)["attitude"], symtop.errors(run)["attitude"])
+
+
+def test_chaos_ends_the_reference() -> None:
+    with pytest.raises(symtop.SymtopError, match=r"times must be below \d+.* on heavy-chaotic, not 400"):
+        symtop.reference("heavy-chaotic", [0.0, 20.0, 100.0, 200.0, 400.0])
+    assert float(symtop.reference("heavy-chaotic", [20.0])["attitude_error_bound"][0]) < 1e-12
+
+
+def test_a_sweep_and_a_comparison_take_a_body(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    data = symtop.sweep(
+        "heavy-brick", ["rk4", "tsit5-fixed"], per_nutation=[32, 64], quiet=True, path=tmp_path / "s.nc"
+    )
+    error = data["attitude"].values[0]
+    assert ((error[:, 1] < error[:, 0] / 10.0) & (error[:, 1] > 1e-12)).all()
+    assert (data["chart"].values == "body").all()
+    shown = symtop.compare("check-case-2", ["rk4", "series-general"], quantity="attitude", quiet=True)
+    assert [*shown["variant"].values] == ["rk4[body]", "series-general[body]"]
+    assert (shown["seconds"].max("setting") > 0.0).all()
+    assert math.isnan(float(shown["exact_seconds"]))
+
+
+def test_the_command_line_takes_a_body() -> None:
+    done = CliRunner().invoke(main, ["run", "tennis-racket", "rk4", "--step-size", "0.01"])
+    assert done.exit_code == 0
+    assert "rk4[body] on tennis-racket: reached t = 100" in done.output
+    assert "relative error of the momentum" in done.output
+    shown = CliRunner().invoke(main, ["scenes", "heavy-brick"])
+    assert shown.exit_code == 0
+    assert "I2=1.2" in shown.output
+
+
+def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
+    turn = np.array([0.5, -0.5, 0.1, 0.7])
+    turn /= np.linalg.norm(turn)
+    columns = np.array([rotated(turn, axis) for axis in np.eye(3)]).T
+    matrix = columns @ np.diag([1.0, 1.4, 2.1]) @ columns.T
+    body = RigidBody.from_inertia(matrix.tolist(), 2.0, (columns @ [0.0, 0.6, 0.8]).tolist())
+    assert body.moments == pytest.approx((1.0, 1.4, 2.1), rel=1e-14)
+    at = Attitude((0.6, 0.0, 0.8, 0.0), (0.3, 0.2, 0.1))
+    inside = body.in_principal(at)
+    spin = np.array(at.omega_body)
+    assert 0.5 * spin @ matrix @ spin == pytest.approx(
+        0.5 * np.dot(body.momentum(inside), inside.omega_body), rel=1e-13
+    )
+    heavy = rotated(inside.quaternion, body.centre)[2]  # the height of the centre, in either axes
+    assert heavy == pytest.approx(rotated(at.quaternion, columns @ [0.0, 0.6, 0.8])[2], rel=1e-13)
+    brick = RigidBody.from_brick(12.0, (1.0, 2.0, 3.0))
+    assert brick.moments == (13.0, 10.0, 5.0)
+    corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-1.0, 1.0) for z in (-1.5, 1.5)]
+    points = RigidBody.from_points([1.5] * 8, corners)
+    assert sorted(points.moments) == pytest.approx([15.0, 30.0, 39.0])
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: RigidBody(1.0, 1.0, 2.1), "I3 must be at most the sum of the other moments"),
+        (lambda: RigidBody(-1.0, 1.0, 1.0), "I1 must be above zero, not -1.0"),
+        (lambda: RigidBody(1.0, math.nan, 1.0), "I2 must be a finite number, not nan"),
+        (lambda: RigidBody(1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0)), "centre must be a direction and of a length"),
+        (lambda: RigidBody.from_inertia([[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]), "matrix must be symmetric"),
+        (lambda: Attitude((0.0, 0.0, 0.0, 0.0)), "quaternion must have unit length, not 0"),
+        (lambda: Attitude(omega_body=(1.0, 2.0)), "omega_body must be 3 numbers, not 2"),
+        (lambda: symtop.Scene("x", RigidBody(1.0, 1.0, 1.0), symtop.Angles(0.3), 1.0), "must be Attitude, not Angles"),
+        (lambda: symtop.simulate("heavy-brick", "stormer-verlet", step_size=1), "integrator must have a chart for"),
+        (lambda: symtop.simulate("heavy-brick", "rk4", step_size=1, observe="nutation"), "known: axis, attitude"),
+        (lambda: symtop.long_run("heavy-brick", "rk4", step_size=0.1, steps=9), "scene must be one of a SymmetricTop"),
+        (lambda: symtop.recommend("heavy-brick", accuracy=1e-3), "SymmetricTop here, not heavy-brick"),
+        (lambda: symtop.reference("heavy-brick", [1.0], certify="digits"), "certify must be None on heavy-brick"),
+    ],
+)  # fmt: skip
+def test_what_is_no_body_or_takes_none_is_refused(make, words: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(symtop.SymtopError) as refused:
+        make()
+    assert words in str(refused.value)
