@@ -444,6 +444,7 @@ def _advice(
 def _the_motion(question: _Question, limit: float) -> Advice:
     """The answer to whoever has the motion itself, whose error is below a limit."""
     scene, accuracy, quantity, horizon = question[:4]
+    closed_form.compile_now()  # its time is the answer
     exact, seconds = integrator("exact"), _exact_seconds(question)
     lines = _lines(question, exact, None)
     reason = (
