@@ -1,7 +1,9 @@
 """`recommend`: the cheapest integrator, with its step or tolerance, that meets an accuracy on a scene.
 
     1. Candidates. A stored study of cost counts on how many of the random tops nearest to this one a method was the
-       cheapest or nearly so (`symtop.measure.ranking`). Without a stored study every compiled method is a candidate.
+       cheapest or nearly so (`symtop.measure.ranking`). Without a stored study a table that was made from one names
+       five. One more is tried if the trials disagree with it: three of the five fail, or its fourth or fifth is the
+       fastest. Where it does not answer, or nothing of it gets there, every compiled method is a candidate.
     2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
        (`symtop.measure.settings`), against the closed form and a target lowered by the law of growth; one run is timed.
     3. Confirmation. The three fastest candidates are run to the whole horizon, if a budget of force evaluations allows
@@ -36,7 +38,7 @@ from symtop.judging.claims.subject import declared
 from symtop.measure import settings
 from symtop.measure.errors import QUANTITIES, errors
 from symtop.measure.phase import FREQUENCIES
-from symtop.measure.ranking import STORED, Near, nearest
+from symtop.measure.ranking import STORED, Near, cheapest, nearest
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import (
     NEEDS,
@@ -48,6 +50,7 @@ from symtop.methods.framework.registry import (
     split_name,
 )
 from symtop.model import scenes
+from symtop.model.exact import closed_form
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run.guard import MOST_STEPS
 from symtop.run.plugins import loaded
@@ -55,8 +58,11 @@ from symtop.run.simulation import simulate
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
 THIS_TOP = ("this-top", "solution")  # needs of what is named beside the answer, unless it is asked for
+OF_ANY = tuple(need for need in NEEDS if need not in THIS_TOP)  # of what is the answer, unless others are asked for
 KEPT = {"energy": ("energy",), "momenta": ("p_phi", "p_psi")}  # claims, by what a user wants kept
 CANDIDATES = 8  # methods of the stored study that are tried
+FEW = 5  # methods of the table that are tried
+AGREED = 3  # of them meet the accuracy at least, and the fastest is one of so many first
 FINALISTS = 3  # methods that are run to the whole horizon
 TOO_DEAR = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
 CONFIDENCE = {
@@ -173,8 +179,8 @@ def recommend(
 
     `accuracy` is the largest error of `quantity` over the run: radians for ``axis``, ``attitude`` and ``theta``, and
     relative for others, energy and momenta by the scales of `symtop.errors`. `horizon` is the scene's own by default.
-    `results` is a folder with a stored ``cost.nc``; without it every compiled method is tried. `needs` leaves out
-    methods that need something else (`Integrator.needs`), for example ``("derivative", "kicks")`` where there is no
+    `results` is a folder with a stored ``cost.nc``; without it a table made from one says what is tried. `needs` leaves
+    out methods that need something else (`Integrator.needs`), for example ``("derivative", "kicks")`` where there is no
     formula; without them, what is made for this very top is not the answer but named beside it (`Advice.beside`).
 
     `step_size` is the step that you have: every method of fixed step runs with it, and the fastest that is good enough
@@ -191,7 +197,7 @@ def recommend(
     if quantity in settings.ANGLES and accuracy >= math.pi:
         raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}", "accuracy")
     horizon = scene.horizon if horizon is None else horizon_of(horizon)
-    comparable = allowed or [need for need in NEEDS if need not in THIS_TOP]
+    comparable = allowed or OF_ANY
     near = None if results is None else nearest(Path(results) / STORED, scene, quantity, accuracy, horizon, comparable)
     limit = settings.judgeable(scene, quantity, horizon)
     step = None if step_size is None else positive("step_size", step_size)
@@ -210,25 +216,8 @@ def recommend(
         return _the_motion(question, limit)
     guesses, source = _candidates(question, near)
     source += f" ({Path(results) / STORED})" if results is not None else ""
-    trials: list[_Trial] = []
-    ranked: list[_Trial] = []
-    fails: dict[str, list[str]] = {}
-    # those of high order first: they are the cheapest at most accuracies, and their cost ends the other searches
-    for number, method in enumerate(sorted(map(integrator, guesses), key=lambda method: -(method.order or 0)), 1):
-        post(f"trying method {number} of {len(guesses)}; the first time each is compiled")
-        rivals = (one.met.evaluations for one in trials if one.met.integrator.needs not in THIS_TOP)
-        patience = TOO_DEAR * min(rivals, default=math.inf)
-        trial = _try(question, method, guesses[method.name], patience)
-        _sort_in(trial, trials, fails, method.name)
-    trials = _timed(question, trials, fails)
-    own_of_top = [] if allowed else [one for one in trials if one.met.integrator.needs in THIS_TOP]
-    for number, tried in enumerate([one for one in trials if one not in own_of_top]):
-        if number < FINALISTS or not ranked:
-            _sort_in(_confirm(question, tried), ranked, fails, tried.met.integrator.name)
-    beside: list[_Trial] = []
-    for tried in own_of_top[:1]:
-        _sort_in(_confirm(question, tried), beside, fails, tried.met.integrator.name)
-    ranked, beside = _timed(question, ranked, fails), _timed(question, beside, fails)
+    search = _Search(question, guesses, [] if near is not None else _menu(question))
+    ranked, beside, fails = search.answers(), search.beside(), search.fails
     # Times of the user's own methods in plain Python say nothing beside those of compiled ones.
     own = [one.name for one in integrators().values() if one.implementation == "python" and not is_built_in(one.name)]
     if own:
@@ -237,12 +226,61 @@ def recommend(
     return _advice(question, ranked, sentences, source, near, beside)
 
 
-def _sort_in(trial: "_Trial | str", trials: list[_Trial], fails: dict[str, list[str]], name: str) -> None:
-    """To the trials, or its name to those that fail for the same reason."""
-    if isinstance(trial, _Trial):
-        trials.append(trial)
-    else:
-        fails.setdefault(trial, []).append(name)
+class _Search:
+    """Trials of candidates by their guesses, and of others if the `menu`, which they are from, does not serve."""
+
+    def __init__(self, question: _Question, guesses: dict[str, float | None], menu: list[str]) -> None:
+        self.question, self.guesses, self.menu = question, guesses, menu
+        self.trials: list[_Trial] = []  # the fastest first
+        self.fails: dict[str, list[str]] = {}  # names of methods by why they are no answer
+        of_top = [] if question.needs else [name for name in guesses if integrator(name).needs in THIS_TOP]
+        self._try(guesses)
+        answers = [name for name in self._names() if name in menu]
+        if menu and (len(answers) < AGREED or menu.index(answers[0]) >= AGREED):
+            self._try(menu[FEW : FEW + 1])
+        self._of_top = [name for name in self._names() if name in of_top][:1]
+        self._general = [name for name in self._names() if name not in of_top]
+
+    def answers(self) -> list[_Trial]:
+        """The finalists that were run to the end, the fastest first."""
+        ranked = self._confirmed(self._general, FINALISTS)
+        if not ranked and self.menu:
+            everyone = _everyone(self.question._replace(needs=self.question.needs or OF_ANY))
+            rest = {*everyone} - {*self.guesses, *self.menu}
+            self._try(rest)
+            ranked = self._confirmed([name for name in self._names() if name in rest], FINALISTS)
+        return _timed(self.question, ranked, self.fails)
+
+    def beside(self) -> list[_Trial]:
+        """The fastest that is made for this very top, run to the end."""
+        return _timed(self.question, self._confirmed(self._of_top, 1), self.fails)
+
+    def _names(self) -> list[str]:
+        return [one.met.integrator.name for one in self.trials]
+
+    def _try(self, names: Collection[str]) -> None:
+        """Those of high order first: they are the cheapest at most accuracies, and their cost ends other searches."""
+        for number, method in enumerate(sorted(map(integrator, names), key=lambda method: -(method.order or 0)), 1):
+            post(f"trying method {number} of {len(names)}; the first time each is compiled")
+            rivals = (one.met.evaluations for one in self.trials if one.met.integrator.needs not in THIS_TOP)
+            patience = TOO_DEAR * min(rivals, default=math.inf)
+            self._sort_in(_try(self.question, method, self.guesses.get(method.name), patience), self.trials, method)
+        self.trials = _timed(self.question, self.trials, self.fails)
+
+    def _confirmed(self, names: Sequence[str], most: int) -> list[_Trial]:
+        """Of the trials with these names, so many of the first, or as many as it takes to have one, run to the end."""
+        ranked: list[_Trial] = []
+        for number, tried in enumerate([one for one in self.trials if one.met.integrator.name in names]):
+            if number < most or not ranked:
+                self._sort_in(_confirm(self.question, tried), ranked, tried.met.integrator)
+        return ranked
+
+    def _sort_in(self, trial: "_Trial | str", trials: list[_Trial], method: Integrator) -> None:
+        """To the trials, or its name to those that fail for the same reason."""
+        if isinstance(trial, _Trial):
+            trials.append(trial)
+        else:
+            self.fails.setdefault(trial, []).append(method.name)
 
 
 def _usable(quantity: str, needs: tuple[str, ...] = ()) -> list[str]:
@@ -261,17 +299,35 @@ def _same(variant: str, usable: Sequence[str]) -> str | None:
     return next((name for name in (variant, *usable) if name in usable and split_name(name)[0] == method), None)
 
 
+def _everyone(question: _Question) -> list[str]:
+    """Every compiled method that the user can use."""
+    return [name for name in _usable(question.quantity, question.needs) if question.allows(integrator(name))]
+
+
+def _menu(question: _Question) -> list[str]:
+    """Of the methods that the user can use, those that the table names; none where it does not answer."""
+    if question.step is not None or question.keeps or question.max_step < math.inf or question.pace < math.inf:
+        return []
+    scene, accuracy, quantity, horizon = question[:4]
+    nutations, usable = horizon / scene.time_scale(horizon), _everyone(question)
+    rows = cheapest(question.needs, quantity, accuracy, nutations, general=question.general)
+    return list(dict.fromkeys(name for row in rows if (name := _same(row, usable))))
+
+
 def _candidates(question: _Question, near: Near | None) -> tuple[dict[str, float | None], str]:
     """Names of methods to try, each with a first guess of its setting, and a phrase on their origin."""
-    scene, usable = question.scene, _usable(question.quantity, question.needs)
-    usable = [name for name in usable if question.allows(integrator(name))]
+    scene, usable = question.scene, _everyone(question)
     everyone: dict[str, float | None] = dict.fromkeys(usable)
     if not everyone:
         return everyone, "no compiled method is within these limits"
     if question.step is not None:
         return everyone, f"tried all {len(everyone)} compiled methods of fixed step that you can use"
+    of_top = [] if question.needs else _menu(question._replace(needs=THIS_TOP[:1]))[:1]  # named beside the answer
     if near is None:
-        return everyone, f"tried all {len(everyone)} compiled methods (without a stored study)"
+        menu = _menu(question)[:FEW]
+        few = dict.fromkeys([*menu, *(name for name in usable if menu and not is_built_in(name)), *of_top])
+        said = f"tried the {len(menu)} methods that a study of random tops found the cheapest for such questions"
+        return (few, said) if menu else (everyone, f"tried all {len(everyone)} compiled methods")
     chosen: dict[str, float | None] = {}
     for variant, count in near.served.items():
         name = _same(variant, usable)
@@ -281,7 +337,7 @@ def _candidates(question: _Question, near: Near | None) -> tuple[dict[str, float
     if not chosen:
         return everyone, f"tried all {len(everyone)} compiled methods (none served the nearest random tops)"
     served = f"tried the {len(chosen)} methods that served the {near.tops} nearest random tops most often"
-    return chosen | dict.fromkeys(name for name in usable if integrator(name).needs in THIS_TOP), served
+    return dict.fromkeys(of_top) | chosen, served
 
 
 def _try(question: _Question, method: Integrator, guess: float | None, patience: float) -> "_Trial | str":
@@ -388,6 +444,7 @@ def _advice(
 def _the_motion(question: _Question, limit: float) -> Advice:
     """The answer to whoever has the motion itself, whose error is below a limit."""
     scene, accuracy, quantity, horizon = question[:4]
+    closed_form.compile_now()  # its time is the answer
     exact, seconds = integrator("exact"), _exact_seconds(question)
     lines = _lines(question, exact, None)
     reason = (
@@ -431,25 +488,26 @@ def _lines(question: _Question, method: Integrator, setting: float | None) -> di
 
 
 def _exact_seconds(question: _Question) -> float:
-    """Seconds of the exact motion at the horizon."""
+    """Seconds of the exact motion at the horizon, interpreted where it is not compiled yet, which takes 20 s."""
     scene, _, quantity, horizon = question[:4]
     exact = integrator("exact")
     call = bare_run(scene, exact, exact.chart_for(settings.observed(quantity)), math.nan, horizon)
-    return timings([call], batches=5, batch=0.002)[0].best
+    closed_form.load()
+    return timings([call], batches=5, batch=0.002, exact=False)[0].best
 
 
 def _without_steps(question: _Question, best: float) -> str:
     """What the closed form costs beside a run of `best` seconds (nan if there is none), and why it is not advised."""
     scene, _, quantity, horizon = question[:4]
-    taken = _exact_seconds(question)
+    taken, way = _exact_seconds(question), "" if closed_form.load() else ", interpreted"
     limit = settings.judgeable(scene, quantity, horizon)
     error = f", with an error below {limit:.1g}" if math.isfinite(limit) else ""
     if not best > taken:
         more = f", {taken / best:.2g} times that" if math.isfinite(best) else ""
-        return f"The closed form, integrator exact, takes {taken * 1e6:.2g} us{more}{error}, and no step."
+        return f"The closed form, integrator exact, takes {taken * 1e6:.2g} us{way}{more}{error}, and no step."
     return (
-        f"The fastest way is no integrator: the closed form (exact) takes {taken * 1e6:.2g} us, {best / taken:.2g} "
-        f"times less{error}. The integrators are compared for what they do where there is no closed form."
+        f"The fastest way is no integrator: the closed form (exact) takes {taken * 1e6:.2g} us{way}, {best / taken:.2g}"
+        f" times less{error}. The integrators are compared for what they do where there is no closed form."
     )
 
 

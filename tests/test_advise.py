@@ -9,11 +9,13 @@ import pytest
 from click.testing import CliRunner
 
 import symtop
+from benchmarks import candidates
 from symtop import advise
 from symtop.cli.main import main
 from symtop.measure import settings
 from symtop.measure.ranking import regime
 from symtop.methods.framework.registry import methods
+from symtop.model.exact import closed_form
 
 
 def measured(scene, advice, quantity="axis"):
@@ -42,10 +44,11 @@ def test_a_longer_horizon_than_can_be_run_is_extrapolated(monkeypatch):
     assert measured(symtop.scene("spheroid"), advice) <= 5e-3
 
 
-def test_a_method_that_cannot_start_at_a_pole_is_left_out():
+def test_a_method_that_cannot_start_at_a_pole_is_left_out(monkeypatch):
     """A user who named no chart is not told of one, and what runs in another chart is recommended."""
     top, start = symtop.SymmetricTop(1.0, 0.5, 1.0), symtop.Angles(0.0, psi_dot=9.0, theta_dot=0.5)
     scene = symtop.Scene("upright", top, start, 5.0)
+    monkeypatch.setattr(advise, "_menu", lambda _: ["rk4[angles]", "strang", "vern9-fixed[axis]"])
     advice = symtop.recommend(scene, accuracy=1e-6)
     assert advice.confidence == "checked"
     assert measured(scene, advice) <= 1e-6
@@ -126,6 +129,7 @@ def few(monkeypatch, count):
     """Only the first of some cheap methods are candidates."""
     names = ("strang", "takahashi-imada", "srkn-6-4", "kahan-li-6", "gauss-6")[:count]
     monkeypatch.setattr(advise, "_candidates", lambda *_: (dict.fromkeys(names), "of a few"))
+    monkeypatch.setattr(advise, "_menu", lambda _: [])
 
 
 def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_with_it():
@@ -191,6 +195,68 @@ def test_a_regime_does_not_depend_on_units():
     same = symtop.Scene("same", bigger, faster, 1.0)
     np.testing.assert_allclose(regime(same), regime(scene), rtol=1e-9, atol=1e-9)
     assert np.linalg.norm(regime(symtop.scene("spheroid")) - regime(scene)) > 0.1
+
+
+def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it(monkeypatch):
+    tried, real = [], advise._try
+    monkeypatch.setattr(advise, "_try", lambda *given: tried.append(given[1].name) or real(*given))
+    scene = symtop.scene("goldstein")
+    menu = ["vern9-fixed[axis]", "gauss-6[axis]", "rk4[axis]", "strang[axis]", "cayley[axis]", "srkn-14-6[axis]"]
+    monkeypatch.setattr(advise, "_menu", lambda question: ["series[axis]"] if question.needs else menu)
+    advice = symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
+    assert sorted(tried) == sorted([*menu[:5], "series[axis]"])
+    assert advice.integrator == "vern9-fixed[axis]"
+    assert "tried the 5 methods" in advice.reason
+    tried.clear()
+    menu[:5] = menu[4::-1]  # the fastest is the last of five
+    symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
+    assert sorted(tried) == sorted([*menu, "series[axis]"])
+    tried.clear()
+    menu[:] = ["stormer-verlet", "strang[axis]", "midpoint", "trapezoidal", "cayley[axis]", "kahan[axis]"]
+    monkeypatch.setattr(settings, "MOST_EVALUATIONS", {"compiled": 3e4, "python": 3e4})
+    advice = symtop.recommend(scene, accuracy=1e-11, horizon=30.0)  # of which none gets there
+    assert advice.confidence == "checked"
+    assert {*tried} - {"series[axis]"} == {*advise._usable("axis", advise.OF_ANY)}
+
+
+def test_the_table_names_methods_for_every_class_and_none_where_a_user_limits_steps():
+    scene = symtop.scene("goldstein")
+    ask = functools.partial(advise._Question, scene, 1e-6, "axis", scene.horizon)
+    assert len(advise._menu(ask(()))) == 6
+    for need in ("derivative", "expression", "lagrangian", "kicks", "group", "this-top"):
+        assert {symtop.integrator(name).needs for name in advise._menu(ask((need,)))} == {need}
+    both = advise._menu(ask(("derivative", "kicks")))
+    assert {symtop.integrator(name).needs for name in both[:2]} == {"derivative", "kicks"}
+    assert all(symtop.integrator(name).general for name in advise._menu(ask((), general=True)))
+    for limit in ({"step": 0.01}, {"max_step": 0.1}, {"keeps": "energy"}, {"pace": 1e-3}):
+        assert advise._menu(ask((), **limit)) == []
+    assert advise._menu(ask(())._replace(quantity="precession_rate")) == []  # the study has no such quantity
+
+
+def test_the_closed_form_is_not_compiled_to_print_its_price(monkeypatch):
+    for kernel in (closed_form._build, closed_form._fill, closed_form._compare):
+        monkeypatch.setattr(kernel, "patience", math.inf)
+        monkeypatch.setattr(kernel, "compiled", None)
+        monkeypatch.setattr(kernel, "_is_cached", lambda: False)
+        monkeypatch.setattr(kernel, "compile", lambda: pytest.fail("compiled"))
+    few(monkeypatch, 1)
+    assert "us, interpreted" in symtop.recommend("spheroid", accuracy=1e-3, horizon=3.0).closed_form
+
+
+@pytest.mark.slow
+def test_advice_on_drawn_scenes_costs_little_more_than_the_best_of_all(monkeypatch):
+    monkeypatch.setitem(settings.MOST_EVALUATIONS, "compiled", candidates.LONGEST)
+    rows = candidates.excess(16)
+    assert len(rows) > 12
+    assert np.mean([row.table <= candidates.TIE for row in rows]) >= 0.85, rows  # of few; the benchmark asks for 0.95
+    assert np.median([row.advice for row in rows]) <= candidates.TIE, rows
+
+
+def test_a_cover_prefers_what_serves_tops_that_nothing_before_it_does():
+    costs = np.array([[1.0, 1.0, 1.0, 9.0], [1.05, 1.05, 1.05, 8.0], [5.0, 5.0, 5.0, 1.0], [np.inf] * 4])
+    assert candidates.cover(costs, 3) == [0, 2, 1]
+    assert candidates.cover(costs, 9) == [0, 2, 1]  # nothing of what gets nowhere
+    assert candidates.cover(np.full((2, 3), np.inf), 2) == []
 
 
 def random_scene(rng, number):

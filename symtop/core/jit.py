@@ -201,9 +201,8 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
     """Compile a kernel: what it calls is optimised and linked into it as ever, but gets no machine code of its own.
 
-    numba makes that of each inner function, and nobody runs it: Python and C call a function through a wrapper, which
-    inner ones lack. Their environments get an address with the kernel's code. The caller holds numba's lock; a version
-    of numba that lacks what is replaced here compiles as it does.
+    numba makes that of each, and nobody runs it: Python and C call a function through a wrapper, which inner ones lack.
+    Environments get addresses with the kernel's code. The caller holds numba's lock; other numbas compile as usual.
     """
     finish, set_env = getattr(JITCodeLibrary, "_finalize_final_module", None), getattr(JITCPUCodegen, "set_env", None)
     if finish is None or set_env is None or not hasattr(CompileResult, "_find_referenced_environments"):

@@ -233,5 +233,5 @@ def seconds(scene: Scene, mets: Sequence[Met], quantity: str, horizon: float) ->
     for met in mets:
         chart = met.integrator.chart_for(observed(quantity))
         runs.append(bare_run(scene, met.integrator, chart, met.setting, met.horizon))
-    taken = timings(runs, batches=5, batch=0.002, patience=0.1)
+    taken = timings(runs, batches=5, batch=0.002, patience=0.1, exact=False)
     return [timing.best * horizon / met.horizon for timing, met in zip(taken, mets, strict=True)]

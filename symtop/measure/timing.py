@@ -82,15 +82,18 @@ def timings(
     *,
     warm: bool = False,
     patience: float = math.inf,
+    exact: bool = True,
 ) -> list[Timing]:
     """Time several functions against each other.
 
     Those that are `warm`, called before, have no first call (NaN), and a call that turns out to be longer than a batch
     is the first sample of its function: a long run costs no more calls than it has samples. A function whose samples
     have taken `patience` seconds together has no more of them, but two at least: a long one meets both fast and slow
-    moments of the machine. The closed form is compiled before anything is timed, whoever calls it.
+    moments of the machine. The closed form is compiled before anything is timed, whoever calls it; if nothing that
+    is timed does (not `exact`), it stays as it is.
     """
-    closed_form.compile_now()
+    if exact:
+        closed_form.compile_now()
     firsts, calls = [], []
     samples: list[list[float]] = []
     for function in functions:

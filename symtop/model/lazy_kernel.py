@@ -48,6 +48,14 @@ class LazyKernel:
                 self._kernel.compile(self._signature)
                 self.compiled = self._kernel
 
+    def load(self) -> bool:
+        """Load it if it is in the cache; whether the compiled function is there now."""
+        with self._lock:
+            known = self.compiled is not None or self._is_cached()
+        if known:
+            self.compile()
+        return known
+
     def _is_cached(self) -> bool:
         if self._kernel is None:
             from numba.core import sigutils  # 0.3 s

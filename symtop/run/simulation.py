@@ -60,7 +60,10 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
         marks: Any = np.arange(steps + 1)
         return marks * (horizon / steps), marks, False
     place: Any = np.arange(samples, dtype=float)
+    long_enough = math.isfinite(period) and horizon > 2.0 * period
     for dithered in (False, True):
+        if long_enough and not dithered and samples * WIDEST_GAP <= 1.0:
+            continue  # so few leave a wider stretch unseen, wherever they fall
         if dithered:
             place[1:last] += np.mod(GOLDEN * place[1:last], 1.0) - 0.5
         if steps is None:
@@ -68,7 +71,6 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
         else:
             marks = _marks(steps, place, last)
             times = marks * (horizon / steps)
-        long_enough = math.isfinite(period) and horizon > 2.0 * period
         if dithered or not long_enough or _unseen(times, period) < WIDEST_GAP:
             break
     return times, marks, dithered

@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import warnings
 from pathlib import Path
@@ -440,6 +441,25 @@ def test_a_line_that_cannot_be_measured_says_why(monkeypatch):
     monkeypatch.setattr(cost, "_lines", {})
     monkeypatch.setattr(cost, "compare", refused)
     assert {line["message"] for line in costs()["lines"]} == {"the scene is <odd>"}
+
+
+def test_a_run_is_answered_while_lines_are_measured(site, monkeypatch):
+    measured = threading.Event()
+
+    def late(*args, **options):
+        measured.wait(60.0)
+        raise SymtopError("late")
+
+    monkeypatch.setattr(cost, "_lines", {})
+    monkeypatch.setattr(cost, "compare", late)
+    began = time.monotonic()
+    for step in (0.02, 0.03, 0.04):
+        chart = json.loads(request(site, "POST", "/cost", json.dumps(fields(step_size=step)), **JSON)[1])
+        assert chart["missing"] == len(cost.BESIDE) + 1
+        assert chart["seconds"][0] > 0.0
+    assert json.loads(request(site, "POST", "/run", json.dumps(fields()), **JSON)[1])["outcome"] == "ok"
+    assert time.monotonic() - began < 20.0
+    measured.set()
 
 
 def test_the_oscillator_of_the_page_is_the_notebooks():

@@ -248,7 +248,7 @@ def returns_nothing(f, t, y, h):
     y += h * f(t, y)
 
 
-@pytest.mark.parametrize("claimed", [3, 10, 12, 1000])
+@pytest.mark.parametrize("claimed", [3, 1000, *(pytest.param(claim, marks=pytest.mark.slow) for claim in (10, 12))])
 def test_the_order_that_is_there_is_found_whatever_is_claimed(claimed, only):
     """Long steps, as a method of order 10 may take, show no slope of one of order 2."""
     only("order")

@@ -58,7 +58,7 @@ def test_a_correct_method_is_not_refuted(name):
     assert ledger["pole"].verdict in ("measured", "inapplicable")  # never claimed of a step
 
 
-@pytest.mark.parametrize("name", ["heun", "AdamsBashforth", "own_drift", "rotation_strang", "separable_forest_ruth"])
+@pytest.mark.parametrize("name", ["AdamsBashforth", "own_drift", "rotation_strang", "separable_forest_ruth"])
 def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, only, monkeypatch):
     only(*(claim.name for claim in battery.TABLE))
     monkeypatch.setattr(order, "DRAWS", (96, 8))

@@ -58,10 +58,11 @@ FREE = [2, 1, 2, 3, 6, 9, 18, 30, 56, 99]  # dimensions of the free Lie algebra 
 ROOT = 19**0.5
 
 
-def test_there_are_as_many_conditions_as_there_are():
+@pytest.mark.parametrize("longest", [9, pytest.param(10, marks=pytest.mark.slow)])
+def test_there_are_as_many_conditions_as_there_are(longest):
     """McLachlan and Quispel, Acta Numerica 11 (2002) 341, of Runge-Kutta-Nystrom methods."""
-    count = [free - vanishing(length).shape[1] for length, free in enumerate(FREE, start=1)]
-    assert count == [2, 1, 2, 2, 4, 5, 10, 14, 25, 39]
+    count = [free - vanishing(length).shape[1] for length, free in enumerate(FREE[:longest], start=1)]
+    assert count == [2, 1, 2, 2, 4, 5, 10, 14, 25, 39][:longest]
 
 
 def test_log_undoes_exp_and_begins_as_baker_campbell_and_hausdorff_say():

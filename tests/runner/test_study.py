@@ -212,7 +212,7 @@ STUDY = Study("clocked", "Clocked", "Alone?", cases, measure)
 """
 
 
-@pytest.mark.parametrize("count", [8, 2])
+@pytest.mark.parametrize("count", [pytest.param(8, marks=pytest.mark.slow), 2])
 def test_timed_cases_run_one_at_a_time_in_workers_that_are_there_already(tmp_path, monkeypatch, count):
     """Few of them, too: workers have the kernels, this process has not. (Side by side: `test_pool`.)"""
     monkeypatch.setattr("symtop.runner.pool.slowdown", lambda *_: math.inf)

@@ -22,7 +22,7 @@ const values = {};
 const rows = {};
 const sphere = new Sphere($("sphere"));
 const outcomes = new OutcomeMap($("map"), (step, spin) => { rows.step_size.set(step); rows.psi_dot.set(spin); edited("start"); ask(); });
-let costs = null, swinging = null, costed = "", patient;
+let costs = null, swinging = null, costed = "", mapping = false, patient;
 let catalogue, run = null, second = null, mapped = "", place = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, asking = false, stale = false, drawnAt = -1;
 
 function control([name, label, least, most, logarithmic], group) {
@@ -147,7 +147,7 @@ async function ask() {
     const [answer, other] = await Promise.all(asked.map(async (one) => one && (await one).json()));
     clearTimeout(patience);
     const refused = answer.error || (other && other.error);
-    if (refused) refuse(refused); else { show(answer, other, began); if (!stale) await askMap(); }
+    if (refused) refuse(refused); else { show(answer, other, began); if (!stale) askMap(); }
   } catch {
     clearTimeout(patience);
     refuse("the explorer's server does not answer; is symtop explore still running?");
@@ -156,17 +156,26 @@ async function ask() {
   if (stale) { stale = false; ask(); }
 }
 
-// The map is asked for when something else than its own two axes has changed.
+// The map is asked for when something else than its own two axes has changed, and then the costs, as both may have to be
+// compiled: meanwhile runs are answered.
 async function askMap() {
+  if (mapping) return;
   const range = mapRange();
   const question = JSON.stringify({ ...values, ...range, scene: "", step_size: 0, psi_dot: 0, tolerance: 0, second: "", friction: 0, oscillator_step: 0 });
-  if (question === mapped) return;
-  const answer = await (await post("map", range)).json();
+  clearTimeout(patient);
+  if (question === mapped) { patient = setTimeout(askCost, 300); return; }
+  mapping = true;
+  const name = values.integrator;
+  const response = await post("map", range).catch(() => null);  // `ask` says that nobody answers
+  const answer = response && await response.json();
+  mapping = false;
+  if (!answer) return;
   mapped = question;
   outcomes.cells = answer.error ? null : { ...answer, range, error: unpack(answer.error_rad) };
-  $("map-note").textContent = answer.error || `${values.integrator}, ${answer.columns * answer.rows} runs, ${answer.failed} ended early, ${Math.round(answer.cells_a_second / 1000)} 000 runs a second`;
+  $("map-note").textContent = answer.error || `${name}, ${answer.columns * answer.rows} runs, ${answer.failed} ended early, ${Math.round(answer.cells_a_second / 1000)} 000 runs a second`;
   outcomes.draw({ step: values.step_size, spin: values.psi_dot });
   document.body.dataset.maps = +(document.body.dataset.maps || 0) + 1;
+  askMap();
 }
 
 // Lines come one by one, measured while the page is used: it asks again until all are there.
@@ -259,7 +268,6 @@ function show(answer, other, began) {
   if (second) second.error = other.outcome === "ok" ? other.largest.axis_error : null;
   if (costs) costs.seconds = [];  // those of the runs before
   clearTimeout(patient);
-  patient = setTimeout(askCost, 300);
   drawPlots();
   Object.assign(document.body.dataset, {
     answer: answer.outcome, answers: +(document.body.dataset.answers || 0) + 1, steps: answer.steps,

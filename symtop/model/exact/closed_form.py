@@ -180,6 +180,12 @@ def compile_now() -> None:
         kernel.compile()
 
 
+def load() -> bool:
+    """Load the compiled functions that are in the cache; whether closed forms are made by compiled code now."""
+    loaded = [kernel.load() for kernel in (_build, _fill, _compare)]
+    return all(loaded)
+
+
 def short_constants(rows: Array) -> tuple[Array, int]:
     """Constants of tops and starts (n, 9) in the short arithmetic, (n, SIZE), and how many it does not serve."""
     if _build.ready(FORM_SECONDS * len(rows)):

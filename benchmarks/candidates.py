@@ -1,0 +1,181 @@
+"""The methods that `recommend` tries first: their table, made from a stored study, and advice against all candidates.
+
+    python -m benchmarks.candidates make results/cost.nc    # writes symtop/measure/candidates.tsv
+    python -m benchmarks.candidates check 200               # of drawn scenes; exit code 1 if the table fails
+
+A row of the table is a greedy cover of the random tops of the study: the variant that costs at most `TIE` times the
+least on most of them, then the one that does so on most of those that are left, and so on. One whose cost is next to
+the least on a few hard tops comes before a second one that is good where the first is.
+
+A check draws scenes that the table was not made from, with accuracies and lengths of its own. The cost of a method is
+the force evaluations of the run that its search over the whole horizon ends with (`symtop.measure.settings`), moved to
+the very accuracy along the method's order, times the seconds of one, and the seconds of a call. Those of the best
+method in the table and of the advised one are compared with the least. The advice compares single runs, whose errors
+lie between 0.3 times the accuracy and it, and whose times vary: it may take the second best of two that are close.
+"""
+
+import functools
+import itertools
+import math
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+import symtop
+from symtop import advise
+from symtop.core import netcdf
+from symtop.measure import ranking, settings
+from symtop.measure.ranking import MENU, PRICED_AT
+from symtop.methods.framework.registry import NEEDS, integrator
+from symtop.run.simulation import likely_step
+
+TIE = 1.1  # costs of a ratio below this are level
+SHARE = 0.95  # of the scenes, on which a method of the table costs at most `TIE` times the least
+CLASSES = {ranking.ANY: advise.OF_ANY, **{need: (need,) for need in NEEDS if need != "solution"}}
+SEED = 2027  # of the scenes of a check; the study draws with another
+SPANS, ACCURACIES = (3.0, 300.0), (1e-10, 1e-3)  # nutations and errors that are drawn, evenly in the logarithm
+QUANTITIES = ("axis", "axis", "axis", "attitude", "energy")
+PRICED = 1e-6  # accuracy of the runs that are timed
+PATIENCE = 8.0  # times the least cost so far that a run may be foreseen to take
+MOST = 1e6  # evaluations of it
+LONGEST = 1e7  # evaluations of a run of the advice: a minute or more of vain trials elsewhere
+SHORT = 0.01  # nutations of the run of a step or few, which takes as long as a call
+
+
+def cover(costs: np.ndarray, count: int) -> list[int]:
+    """Places of the variants, `count` or fewer, that between them cost at most `TIE` times the least on most tops.
+
+    `costs` is (variants, tops), infinite where a variant does not get there. Between equals the smaller mean excess is
+    first; variants that get nowhere are left out.
+    """
+    best = costs.min(axis=0)
+    ratio = costs[:, np.isfinite(best)] / best[np.isfinite(best)]
+    least, chosen = np.full(ratio.shape[1], np.inf), list[int]()
+    for _ in range(min(count, int(np.isfinite(ratio).any(axis=1).sum()))):
+        met = np.minimum(ratio, least)
+        value = (met <= TIE).mean(axis=1) - 1e-2 * np.log(np.minimum(met, 1e3)).mean(axis=1)
+        value[[*chosen, *np.flatnonzero(~np.isfinite(ratio).any(axis=1))]] = -np.inf
+        chosen.append(int(value.argmax()))
+        least = met[chosen[-1]]
+    return chosen
+
+
+def table(data: xr.DataTree) -> list[str]:
+    """The lines of the table, from the dataset of the study of cost."""
+    prices = data["prices"].to_dataset()[["price", "call"]].sel(priced_at=PRICED_AT, method="nearest").median("scene")
+    lines = ["\t".join((*ranking.ASKED, "variants"))]
+    for span in ("short", "long"):
+        group = data[span].to_dataset().isel(scene=0)
+        price, names = prices.sel(variant=group["variant"].values), group["variant"].values
+        seconds = (group["cost"] * price["price"] + price["call"]).fillna(np.inf)
+        asked = itertools.product(group["quantity"].values, group["target"].values, CLASSES, (False, True))
+        for quantity, target, need, general in asked:
+            rows = np.isin(group["needs"].values, CLASSES[need]) & ((group["general"].values == 1.0) | (not general))
+            costs = seconds.sel(quantity=quantity, target=target).transpose("variant", "member").values[rows]
+            chosen = [str(names[rows][place]) for place in cover(costs, MENU)] if rows.any() else []
+            key = f"{float(group['nutations'].max()):g}", quantity, f"{target:g}", need, "yes" if general else "no"
+            lines += ["\t".join((*key, " ".join(chosen)))] if chosen else []
+    return lines
+
+
+def scenes(count: int) -> "list[tuple[symtop.Scene, str, float]]":
+    """Drawn scenes, each with a quantity and an accuracy that the reference can judge, below the nutation's width."""
+    drawn = symtop.population(2 * count, seed=SEED)
+    rng, chosen = np.random.default_rng(SEED), list[tuple[symtop.Scene, str, float]]()
+    for k, row in enumerate(np.stack([drawn[name].values for name in symtop.model.top.NUMBERS], axis=1).tolist()):
+        spans, accuracies = (np.exp(rng.uniform(*np.log(ends))) for ends in (SPANS, ACCURACIES))
+        top, start, quantity = symtop.SymmetricTop(*row[:3]), symtop.Angles(*row[3:]), QUANTITIES[k % len(QUANTITIES)]
+        period = top.nutation_period(start)
+        if len(chosen) < count and math.isfinite(period):
+            scene = symtop.Scene(f"drawn-{k}", top, start, float(spans) * period)
+            if settings.judgeable(scene, quantity, scene.horizon) <= 0.1 * accuracies:
+                chosen.append((scene, quantity, float(accuracies)))
+    return chosen
+
+
+@functools.cache
+def prices(quantity: str) -> dict[str, tuple[float, float]]:
+    """Seconds of an evaluation and of a call of each candidate, from two runs on one scene, timed against each other.
+
+    As in the study, the energy is not asked of a method that keeps it: any step would do.
+    """
+    scene, known = symtop.scene("goldstein"), map(integrator, advise._usable(quantity, advise.OF_ANY))
+    each = [one for one in known if quantity not in (one.conserves or ())]
+    runs = []
+    for horizon in (scene.horizon, SHORT * scene.nutation_period):
+        step = functools.partial(likely_step, scene, horizon=horizon, accuracy=PRICED)
+        asked = [(one, step(one) if one.fixed_step else PRICED) for one in each]
+        mets = [settings.attempt(scene, one, setting, horizon, quantity) for one, setting in asked]
+        runs.append((np.array(settings.seconds(scene, mets, quantity, horizon)), [met.evaluations for met in mets]))
+    (long, many), (short, few) = runs
+    price = (long - short) / np.subtract(many, few)
+    call = np.maximum(short - price * few, 0.0)
+    return {one.name: pair for one, *pair in zip(each, price.tolist(), call.tolist(), strict=True)}  # type: ignore[misc]
+
+
+def costs(scene: symtop.Scene, quantity: str, accuracy: float, advised: str | None) -> dict[str, float]:
+    """Seconds of the candidates that meet the accuracy and may be the cheapest, and of the advised one."""
+    each, spent, first = prices(quantity), dict[str, float](), ranking.cheapest((), quantity, accuracy, 100.0)
+    for name in sorted(each, key=lambda name: (name not in first, -(integrator(name).order or 0))):
+        price, call = each[name]
+        most = math.inf if name == advised else min(PATIENCE * min(spent.values(), default=math.inf) / price, MOST)
+        met = settings.search(scene, integrator(name), accuracy, quantity, scene.horizon, patience=most)
+        if isinstance(met, settings.Met):
+            spent[name] = work(met, accuracy) * price + call
+    return spent
+
+
+def work(met: settings.Met, accuracy: float) -> float:
+    """Evaluations at the very accuracy: those of a method of order p grow as error^(-1/p)."""
+    return met.evaluations * (met.error / accuracy) ** (1.0 / (met.integrator.order or math.inf))
+
+
+class Row(NamedTuple):
+    """A question, the advice and the cheapest method, and what the advised one costs over that, and the table's."""
+
+    question: str
+    advised: str
+    best: str
+    advice: float
+    table: float  # of the best that the table names
+
+
+def excess(count: int) -> list[Row]:
+    """The rows of drawn scenes on which something meets the accuracy."""
+    rows = []
+    for scene, quantity, accuracy in scenes(count):
+        advised = str(symtop.recommend(scene, accuracy=accuracy, quantity=quantity).integrator)
+        each = costs(scene, quantity, accuracy, advised)
+        menu = advise._menu(advise._Question(scene, accuracy, quantity, scene.horizon, ()))
+        if each:
+            words = f"{scene.name} {quantity} {accuracy:.1e} over {scene.horizon / scene.nutation_period:.3g} nutations"
+            best = min(each, key=each.__getitem__)
+            over = {name: cost / each[best] for name, cost in each.items()}
+            named = min((over[name] for name in menu if name in over), default=math.inf)
+            rows.append(Row(words, advised, best, over.get(advised, math.inf), named))
+    return rows
+
+
+def main() -> int:
+    """Make the table, or check the advice."""
+    if sys.argv[1] == "make":
+        Path(ranking.TABLE).write_text("\n".join(table(netcdf.read_any(Path(sys.argv[2])))) + "\n", encoding="utf-8")
+        return 0
+    settings.MOST_EVALUATIONS["compiled"] = LONGEST
+    rows = excess(int(sys.argv[2]))
+    for row in sorted(rows, key=lambda row: -row.advice):
+        if row.advice > TIE:
+            print(f"{row.question}: {row.advised} costs {row.advice:.2f} times {row.best}, the table's {row.table:.2f}")
+    advice, named = (np.mean([getattr(row, name) <= TIE for row in rows]) for name in ("advice", "table"))
+    print(f"at most {TIE} times the best of all candidates, on {len(rows)} scenes:")
+    print(
+        f"  {named:.1%} of the table's methods, {advice:.1%} of the advice, which settings and times of one run decide"
+    )
+    return int(named < SHARE)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
