@@ -378,15 +378,6 @@ def test_no_registered_integrator_is_refuted_and_few_claims_stay_open():
 # ---- command and study -----------------------------------------------------------------------------------------------
 
 
-def test_the_command_prints_one_sentence_for_each_claim():
-    code, output = run_claims("stormer-verlet", "--quick")
-    assert code == 0
-    lines = output.strip().splitlines()
-    assert len(lines) == len(CLAIMS)
-    assert all(line.startswith("stormer-verlet, ") and line.endswith(".") for line in lines)
-    assert "order: claims 2; confirmed: its table meets the conditions up to order 2 to 1e-16; slopes att" in lines[0]
-
-
 def test_the_study_counts_lists_and_draws_a_refuted_claim(tmp_path, clean_registry):
     plugins.load(planted.LIARS / "symplectic_rk4.py")
     study = runner.load("claims")

@@ -29,6 +29,7 @@ def times_of(body, precise, rng):
     passage = near
     if precise.period:
         passage = float((2 * precise.K * int(rng.integers(1, 6)) + rng.uniform(-2.0, 2.0) - precise.u0) / precise.rate)
+        passage = min(passage, PERIODS * period)  # the errors of the rates take over beyond
     return np.array([0.0, near, passage, 1e-3 * far, far])
 
 

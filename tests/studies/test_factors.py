@@ -34,7 +34,7 @@ from symtop.runner.study import Case
 from tests.templates import checked
 
 SCENE = symtop.scene("spheroid")
-SHORT = Goal(10.0, 1e-6, LANGUAGES, CALLS)
+SHORT = Goal(3.0, 1e-5, LANGUAGES, CALLS)
 
 
 @pytest.fixture(scope="module")

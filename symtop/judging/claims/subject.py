@@ -138,7 +138,7 @@ def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
         steps *= 4 if finite else 1
         if not finite or taken - first > max(ENOUGH, first) or steps > 1e7:  # a start's cost scatters as much as it is
             taken = min(seconds(steps)[0] for _ in range(3))  # others may have been at work
-            return max(taken - first * finite, 1e-9) / steps
+            return max(taken - first * finite, 0.5 * taken) / steps  # the start alone may have been disturbed
 
 
 def declared(method: Integrator, claim: str) -> str:

@@ -5,13 +5,13 @@
 in body axes, c the weight times the centre of mass. Three different moments, or a centre off the axis, have no closed
 form: this is an integration and is never called exact.
 
-heyoka integrates twice in long double (64 bits), with tolerances of 1e-2 and 1e-5 of the rounding unit: other orders
-(26 and 29), other steps, and so other rounding. The start and 1/I are rounded alike, and the motion amplifies that as
-well: the first run has them off by one unit more, up and down in turn. The bound of the second, which is returned, is
-`SAFETY` times the largest distance of the two up to that time, at the samples and at `CHECKS` others. In quadruple
-precision (113 bits), which takes 7 to 40 times as long, the second of these is compared with one run, whose error is
-smaller by the ratio of the units, 2^-49, as long as the distance is small (`LINEAR`). Where the bound exceeds what is
-asked, the motion is lost (chaos).
+heyoka integrates in long double (64 bits), tolerances 1e-2 and, what is returned, 1e-5 of the rounding unit. The
+first is done twice, with steps of at most `SHORTER` of the mean step, because steps of one length share most of their
+rounding, and with the start and 1/I off by one unit, up and down in two patterns, because these are rounded, too. The
+bound is `SAFETY` times the largest distance from these two up to that time, at the samples and at `CHECKS` others. In
+quadruple precision (113 bits), which takes 5 times as long, all three are compared with one run, whose error is smaller
+by the ratio of the units, 2^-49, as long as the distance is small (`LINEAR`). Where the bound exceeds what is asked
+the motion is lost (chaos).
 Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
 """
 
@@ -29,14 +29,14 @@ from symtop.model.charts import Array
 from symtop.model.exact.free_body import BodyMotion, checked_body, checked_times
 
 LONG, QUAD = 2.0**-63, 2.0**-112  # rounding units
-TOLERANCES = (1e-2 * LONG, 1e-5 * LONG, 1e-2 * QUAD)  # of the three runs, the last one in quadruple precision
-SAFETY, LINEAR, CHECKS = 64.0, 1e-4, 32
+TOLERANCES = (1e-2 * LONG, 1e-2 * LONG, 1e-5 * LONG, 1e-2 * QUAD)  # of the runs, the last one in quadruple precision
+SAFETY, LINEAR, CHECKS, SHORTER = 256.0, 1e-4, 32, 0.4
 ACCURACY, PAIR = 1e-9, 2.0**-104  # rad: asked by default, what a pair of doubles holds
 MOST_STEPS = 100_000  # of one run: 10 s, in quadruple precision 6 min
 START_DIGITS = 60
 
 
-@functools.lru_cache(maxsize=3)
+@functools.lru_cache(maxsize=4)
 def _stepper(run: int) -> Any:
     """heyoka's integrator of a body, to be copied: the state belongs to a run."""
     import heyoka as hy  # Linux only
@@ -54,7 +54,7 @@ def _stepper(run: int) -> Any:
         (m2, m3 * o1 - m1 * o3 + g3 * c1 - g1 * c3),
         (m3, m1 * o2 - m2 * o1 + g1 * c2 - g2 * c1),
     ]
-    kind = np.longdouble if run < 2 else hy.real128
+    kind = np.longdouble if run < 3 else hy.real128
     zero, tolerance = [kind("0")] * 7, kind(repr(TOLERANCES[run]))
     return hy.taylor_adaptive(system, zero, tol=tolerance, fp_type=kind, compact_mode=True)  # unrolled: 5 s to compile
 
@@ -110,23 +110,32 @@ class HeavyBody:
         """Values, their low halves and bounds at times of one sign."""
         last = times[np.argmax(np.abs(times))]
         sizes = np.unique(np.abs(np.concatenate([[0.0], times, last * (np.arange(1, CHECKS + 1) / CHECKS)])))
-        (other, rest), (high, low) = (self._run(np.copysign(sizes, last), run) for run in (precise, 1 + precise))
-        apart = 2.0 * np.sqrt((((other - high) + (rest - low))[:, :4] ** 2).sum(axis=1))
+        grid = np.copysign(sizes, last)
+        fine = self._run(grid, 2)
+        longest = SHORTER * abs(float(last)) / max(fine[2], 1) or math.inf
+        runs = [self._run(grid, 0, longest), self._run(grid, 1, longest), fine]
+        *others, (high, low, _) = [*runs, self._run(grid, 3)] if precise else runs
+        gaps = [((other - high) + (rest - low))[:, :4] for other, rest, _ in others]
+        apart = 2.0 * np.sqrt((np.square(gaps)).sum(axis=2).max(axis=0))
         reached = np.maximum.accumulate(np.where(np.isnan(apart), math.inf, np.maximum(apart, LONG)))
         unit = QUAD / LONG if precise else 1.0
         bound = np.where(reached < LINEAR, SAFETY * unit * reached + PAIR, math.inf)
         place = np.searchsorted(sizes, np.abs(times))
         return high[place], low[place], bound[place]
 
-    def _run(self, grid: Array, run: int) -> tuple[Array, Array]:
-        """States (n, 7) at a grid from 0 on as pairs of doubles; NaN beyond what `MOST_STEPS` reach."""
+    def _run(self, grid: Array, run: int, longest: float = math.inf) -> tuple[Array, Array, int]:
+        """States (n, 7) at a grid from 0 on as pairs of doubles, NaN beyond what `MOST_STEPS` reach; steps.
+
+        The first two runs take steps of at most `longest`.
+        """
         stepper = copy.copy(_stepper(run))
         kind = stepper.state.dtype.type
-        off = [0.0 if run else LONG * (-1) ** i for i in range(13)]
+        off = [LONG * (-1) ** (i >> run) if run < 2 else 0.0 for i in range(13)]
         numbers = [kind(self._digits(value * (1 + e))) for value, e in zip(self._numbers, off, strict=True)]
         stepper.state[:], stepper.pars[:] = numbers[:7], numbers[7:]
-        *_, states = stepper.propagate_grid(np.array([kind(t) for t in grid.tolist()]), max_steps=MOST_STEPS)
+        times, most = np.array([kind(t) for t in grid.tolist()]), kind(longest if run < 2 else math.inf)
+        _, _, _, steps, *_, states = stepper.propagate_grid(times, max_steps=MOST_STEPS, max_delta_t=most)
         high, low = np.full((grid.size, 7), np.nan), np.full((grid.size, 7), np.nan)
         high[: len(states)] = states.astype(np.float64)
         low[: len(states)] = (states - states.astype(np.float64).astype(states.dtype)).astype(np.float64)
-        return high, low
+        return high, low, int(steps)
