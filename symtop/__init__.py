@@ -34,8 +34,15 @@ if TYPE_CHECKING:
     from symtop.methods.runge_kutta.explicit import runge_kutta as runge_kutta
     from symtop.methods.splitting.composition import composition as composition
     from symtop.methods.taylor.series import series as series
+    from symtop.model.body import Attitude as Attitude, RigidBody as RigidBody
     from symtop.model.exact.closed_form import ClosedForm as ClosedForm
-    from symtop.model.scenes import Scene as Scene, register_scene as register_scene, scene as scene, scenes as scenes
+    from symtop.model.scenes import (
+        Scene as Scene,
+        body_scenes as body_scenes,
+        register_scene as register_scene,
+        scene as scene,
+        scenes as scenes,
+    )
     from symtop.model.top import Angles as Angles, Momenta as Momenta, SymmetricTop as SymmetricTop
     from symtop.report.card import card as card
     from symtop.report.plot import plot as plot
@@ -64,7 +71,8 @@ _NAMES = {  # by the module that holds them
     "methods.taylor.series": "series",
     "methods.splitting.composition": "composition",
     "model.exact.closed_form": "ClosedForm",
-    "model.scenes": "Scene register_scene scene scenes",
+    "model.body": "Attitude RigidBody",
+    "model.scenes": "Scene body_scenes register_scene scene scenes",
     "model.top": "Angles Momenta SymmetricTop",
     "run.ensemble.ensemble": "ensemble",
     "run.long_run": "long_run",

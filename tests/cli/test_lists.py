@@ -75,7 +75,7 @@ def test_a_variant_is_shown_in_full_and_has_one_chart():
     page = printed("integrators", "rk4[axis]")
     assert page.startswith("rk4[axis]: classical Runge-Kutta method")
     assert re.search(r"^charts +axis$", page, re.MULTILINE)
-    assert re.search(r"^charts +angles, axis, attitude$", printed("integrators", "rk4"), re.MULTILINE)
+    assert re.search(r"^charts +angles, axis, attitude, body$", printed("integrators", "rk4"), re.MULTILINE)
 
 
 def test_one_scene_is_shown_in_full():
