@@ -15,7 +15,11 @@ from symtop.model.scenes import body_scenes
 
 BODIES = ("check-case-2", "heavy-brick")
 # half the steps that a nutation of rk4 takes are few for a method of order 8
-FIXED = {"rk4": (4, 40), "tsit5-fixed": (5, 30), "dop853-compiled-fixed": (8, 8), "series-general": (16, 5)}
+FIXED = {
+    "rk4": (4, 40), "tsit5-fixed": (5, 30), "dop853-compiled-fixed": (8, 8), "series-general": (16, 5),
+    "strang": (2, 40), "strang-drift-first": (2, 40), "yoshida-4": (4, 40), "suzuki-4": (4, 40), "kahan-li-6": (6, 20),
+    "kahan-li-8": (8, 10),
+}  # fmt: skip
 ADAPTIVE = ("rk45", "dop853", "rk45-compiled", "dop853-compiled", "tsit5", "vern9", "odex", "series-general-adaptive")
 ANGLE = math.radians(0.3)
 
@@ -71,6 +75,35 @@ def test_a_symmetric_body_moves_as_the_top_does(mgl: float) -> None:
     )
     assert body.top.energy(body.start) == pytest.approx(top.top.energy(at), rel=1e-14)
     assert body.top.momenta(body.start) == pytest.approx(top.top.momenta(at)[:2], rel=1e-14)
+
+
+def test_splittings_keep_what_they_must() -> None:
+    run = symtop.errors(symtop.simulate("check-case-2", "kahan-li-6", step_size=0.3, samples=101))
+    assert run["momentum"].max() < 4e-15
+    assert 1e-10 < run["attitude"].max() < 1e-4  # and yet it has an error
+    heavy = [symtop.errors(symtop.simulate("heavy-brick", "strang", step_size=h, horizon=2000.0)) for h in (0.1, 0.05)]
+    for one in heavy:
+        energy, half = one["energy"].values, one.sizes["time"] // 2
+        assert one["p_phi"].max() < 2e-14
+        assert energy[half:].max() < 1.3 * energy[:half].max()  # it swings, and does not grow
+    grown = symtop.errors(symtop.simulate("heavy-brick", "rk4", step_size=0.05, horizon=2000.0))["energy"].values
+    assert grown[-1] > 1.7 * grown[len(grown) // 2]
+
+
+@pytest.mark.parametrize("method", ["strang", "kahan-li-8"])
+def test_a_splitting_makes_the_steps_of_the_symmetric_top(method: str) -> None:
+    """Two moments that are equal make the drift exact; two that are not make another method."""
+    quaternion, rates = (0.8, 0.6, 0.0, 0.0), (0.2, 0.3, 3.0)
+    start = symtop.Angles.from_quaternion(quaternion, omega_body=rates)
+    top = symtop.Scene("top", symtop.SymmetricTop(2.0, 1.0, 2.0), start, 10.0)
+    gaps = []
+    for second in (2.0, 2.0 + 1e-6):
+        body = symtop.Scene("body", RigidBody(2.0, second, 1.0, 2.0), Attitude(quaternion, rates), 10.0)
+        runs = (symtop.simulate(one, f"{method}[{chart}]", step_size=0.1, guard=False)["quaternion"].values
+                for one, chart in ((top, "attitude"), (body, "body")))  # fmt: skip
+        gaps.append(attitude_distance(*runs).max())
+    assert gaps[0] < 2e-14
+    assert gaps[1] > 1e-7
 
 
 def test_energy_and_momentum_of_a_run_are_those_of_its_states() -> None:

@@ -41,7 +41,7 @@ class Pose(NamedTuple):
 
 
 @register_jitable
-def _opened(plain: Any) -> Any:
+def opened(plain: Any) -> Any:
     """A body and a start, of their 13 numbers."""
     I1, I2, I3, c1, c2, c3 = plain[:6]
     return General(1.0 / I1, 1.0 / I2, 1.0 / I3, I1, I2, I3, c1, c2, c3), Pose(*plain[6:])
@@ -66,7 +66,7 @@ class _OfBody(Preparation):
         return self.numbers(*self.opened(top.flat(at)))
 
 
-on_body = _OfBody(_on_body, 7, opened=_opened, momenta=_momenta)
+on_body = _OfBody(_on_body, 7, opened=opened, momenta=_momenta)
 
 
 @register_jitable

@@ -84,11 +84,12 @@ class Preparation:
 
 
 @functools.cache
-def _on_numbers(scale: Callable[..., Any], opened: Callable[[Any], Any]) -> Any:
-    """`scale` by itself, compiled; `opened` makes the table from plain numbers."""
+def _on_numbers(scale: Callable[..., Any], table: Callable[[Any], Any], opened: Callable[[Any], Any]) -> Any:
+    """`scale` by itself, compiled; `table` makes the table from plain numbers, `opened` the top and the start."""
 
-    def scaled(body, start, numbers, h):  # type: ignore[no-untyped-def]
-        return scale(opened(numbers), Body(*body), Start(*start), h)
+    def scaled(plain, numbers, h):  # type: ignore[no-untyped-def]
+        top, at = opened(plain)
+        return scale(table(numbers), top, at, h)
 
     return compile_kernel(scaled)
 
@@ -100,15 +101,15 @@ class Scaled:
     rule: Any  # a NamedTuple
     scale: Callable[..., Any]
     pack: Pack | None = None
+    opened: Callable[..., Any] = opened  # as `Preparation` has it
 
     def __post_init__(self) -> None:
         register_jitable(self.scale)
 
     def __call__(self, top: SymmetricTop, at: Angles, h: float) -> Any:
         """The rule of one run."""
-        opened, table = (self.pack or as_fields)(self.rule)
-        numbers = flat(top, at)
-        return _on_numbers(self.scale, opened)(numbers[:3], numbers[3:], table, h)
+        made, table = (self.pack or as_fields)(self.rule)
+        return _on_numbers(self.scale, made, self.opened)(flat(top, at), table, h)
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ def kick_angles(par: Any, force: Any, step: Any, tau: float, bend: float) -> Any
 
 
 @register_jitable
-def drift_angles(rule: Any, state: Any, step: Any, tau: float) -> Any:
+def drift_angles(par: Any, rule: Any, state: Any, step: Any, tau: float) -> Any:
     """Free flight for a time I1 tau."""
     return (step[0] + tau * (state[1] + step[1]), step[1], step[2], step[3])
 
@@ -77,7 +77,7 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
         d += rule.kick[i] / (4.0 * par.I1 * cos_x * cos_x)
         if i < n:
             step = kick_angles(par, force_angles(par, before, step), step, rule.kick[i], 0.0)
-            step = drift_angles(rule, before, step, rule.drift[i])
+            step = drift_angles(par, rule, before, step, rule.drift[i])
     k = 0.5 * h * (1.0 / par.I3 - 1.0 / par.I1)
     plus, minus = dstate[2] + dstate[3], dstate[2] - dstate[3]
     determinant = 2.0 * k * (a + d) + 4.0 * a * d
@@ -88,7 +88,7 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
 
 @register_jitable
 def _drift_in_lanes(state: Any, step: Any, tau: float) -> Any:
-    return drift_angles(None, state, step, tau), True
+    return drift_angles(None, None, state, step, tau), True
 
 
 @register_jitable

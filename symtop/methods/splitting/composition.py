@@ -4,6 +4,7 @@ A composition alternates kicks b_0 .. b_n with drifts a_1 .. a_n (`loop`). The c
 
     angles          free flight of theta; centrifugal and gravity kicks, singular at the poles (`angles`)
     axis, attitude  the exact free symmetric top; gravity kicks, singular nowhere (`space`)
+    body            a free motion of order two, for tables of Strang steps (`body`)
 
 Every method here is explicit, symplectic and symmetric, and keeps p_phi and p_psi. `stormer-verlet` and its
 compositions live in the angles chart, all others in the space frame.
@@ -15,14 +16,16 @@ from collections.abc import Callable, Sequence
 
 from symtop.core.errors import SymtopError, finite, one_of, row
 from symtop.methods.framework.angles import on_angles
+from symtop.methods.framework.body import on_body
 from symtop.methods.framework.loop import FixedStep, Loop, Prepare
 from symtop.methods.framework.preparation import Scaled
 from symtop.methods.framework.registry import Integrator, ModifiedEnergy
 from symtop.methods.framework.space import on_attitude, on_axis
-from symtop.methods.splitting import angles, space
+from symtop.methods.splitting import angles, body, space
 from symtop.methods.splitting.coefficients import METHODS
 from symtop.methods.splitting.loop import Composition, closed, packed
 from symtop.methods.splitting.rotor import ROTATIONS, TUNED
+from symtop.model.charts import BODY
 
 _KERNELS: dict[str, dict[str, tuple[Loop, Prepare]]] = {
     "angles": {"angles": (angles.march, on_angles)},
@@ -66,15 +69,18 @@ def composition(
     scale = angles.scale if chart == "angles" else space.tuned if table.turn == TUNED else space.scale
     stages = Scaled(table, scale, packed)
     one_drift = bare and rule.drift == (1.0,)
+    solvers = {
+        shown: FixedStep(march, stages, prepare, 1, implicit=False)
+        for shown, (march, prepare) in _KERNELS[chart].items()
+    }
+    if chart == "space" and rotation == "exact" and not boost and body.of_strang_steps(rule):
+        solvers[BODY] = FixedStep(body.march_body, body.scaled(table), on_body, 1, implicit=False)
     closed_forms = _KICK_DRIFT_KICK.get((chart, rotation)) if one_drift and rule.kick == (0.5, 0.5) else None
     modified, sleeps = closed_forms or (None, None)
     return Integrator(
         name=name, family="splitting",
         summary=summary or f"splitting with {len(rule.drift)} drifts and {rule.forces} forces a step",
-        solvers={
-            shown: FixedStep(march, stages, prepare, 1, implicit=False)
-            for shown, (march, prepare) in _KERNELS[chart].items()
-        },
+        solvers=solvers,
         order=order, explicit=True, symplectic=True, symmetric=all(numbers == numbers[::-1] for numbers in rule[:3]),
         conserves=frozenset({"p_phi", "p_psi"} | ({"cayley_energy"} if one_drift and rotation != "exact" else set())),
         reference=reference, needs="this-top" if table.turn == TUNED else "kicks",

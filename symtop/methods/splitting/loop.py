@@ -130,7 +130,7 @@ def compose(force: Any, kick: Any, drift: Any, par: Any, rule: Any, state: Any, 
     for i in range(n):
         if rule.kick[i] != 0.0:
             step = kick(par, now, step, rule.kick[i], rule.bend[i])
-        step = drift(rule, state, step, rule.drift[i])
+        step = drift(par, rule, state, step, rule.drift[i])
         if rule.kick[i + 1] != 0.0:
             now = force(par, state, step)
     if rule.kick[n] != 0.0:

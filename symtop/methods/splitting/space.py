@@ -201,7 +201,7 @@ def _kernel(force: Any, turned: Any, ended: Any, process: Any, spun: Any, dimens
     )
 
     @register_jitable
-    def drift(rule, state, step, half):  # type: ignore[no-untyped-def]
+    def drift(par, rule, state, step, half):  # type: ignore[no-untyped-def]
         s, m = rotor(rule, half_square(state, step, half), half)
         return turned(state, step, s, m)
 

@@ -1,0 +1,116 @@
+"""Splitting in the chart `body` (q, M): kicks of the weight between free motions of order two, for any three moments.
+
+    kick(b h):   M += b h Gamma x c
+    drift(a h):  R3(a h/2)  R1(a h)  R3(a h/2)  S(a h)
+
+The free motion is not elementary, but M^2/2 I2 commutes with all of it, and its flow S turns the body about L. What is
+left of the kinetic energy, (1/I1 - 1/I2) M1^2/2 + (1/I3 - 1/I2) M3^2/2, has two flows that turn about an axis of the
+body: R1 by the angle (1/I1 - 1/I2) M1 a h, and R3 likewise. R1 is the identity for I1 = I2, and the drift exact.
+
+A drift is symmetric and of order two, so that kick-drift-kick is, too, and a composition of such steps has the order
+that it has elsewhere. Tables that are not, for exact free motions only, fall to order two here and are left out. Every
+flow is one of the Hamiltonian: symplectic on T*SO(3), L_z moves by rounding alone, and without a weight all of L.
+
+With s, c = sin, cos of a half angle and m = c - 1 = -2 sin^2 of its half, no increment is a difference of large
+numbers; the turn S gives q the length that rounding has taken.
+Source: Touma, Wisdom, Astron. J. 107 (1994) 1189; Fasso, J. Comput. Phys. 189 (2003) 527.
+"""
+
+import math
+from typing import Any
+
+from symtop.core.jit import register_jitable
+from symtop.methods.framework import body
+from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.preparation import Scaled
+from symtop.methods.splitting.loop import Composition, compose, packed, stages
+from symtop.model.body import vertical
+
+
+@register_jitable
+def _scale(rule: Any, top: Any, at: Any, h: float) -> Any:
+    return stages(rule, h, h, 0.0, 0.0)
+
+
+def scaled(rule: Composition) -> Scaled:
+    """The table of a run."""
+    return Scaled(rule, _scale, packed, body.opened)
+
+
+def of_strang_steps(rule: Composition) -> bool:
+    """Is it a composition of kick-drift-kick steps, or drift-kick-drift, so that its order needs no exact drift?"""
+    half = [0.0, *(0.5 * a for a in rule.drift), 0.0]
+    steps = all(abs(b - x - y) < 1e-14 for b, x, y in zip(rule.kick, half, half[1:], strict=False))
+    return not any(rule.gradient) and (steps or (rule.drift, rule.kick) == ((0.5, 0.5), (0.0, 1.0, 0.0)))
+
+
+@register_jitable
+def _force(par: Any, state: Any, step: Any) -> Any:
+    return vertical(state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3])
+
+
+@register_jitable
+def _kick(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any:
+    x, y, z = body.torque(par, *force)
+    return (*step[:4], step[4] + pull * x, step[5] + pull * y, step[6] + pull * z)
+
+
+@register_jitable
+def _about(w: float, x: float, y: float, z: float, M1: float, M2: float, M3: float, turn: float) -> Any:
+    """What a turn by turn M1 about the first of three cyclic axes adds to q, M2 and M3."""
+    quarter = 0.25 * turn * M1
+    q = math.sin(quarter)
+    s, m = 2.0 * q * math.cos(quarter), -2.0 * q * q
+    C, S = -2.0 * s * s, 2.0 * s * (1.0 + m)
+    return m * w - s * x, m * x + s * w, m * y + s * z, m * z - s * y, C * M2 + S * M3, C * M3 - S * M2
+
+
+@register_jitable
+def _about_first(state: Any, d: Any, turn: float) -> Any:
+    w, x, y, z = state[0] + d[0], state[1] + d[1], state[2] + d[2], state[3] + d[3]
+    a, b, c, e, m2, m3 = _about(w, x, y, z, state[4] + d[4], state[5] + d[5], state[6] + d[6], turn)
+    return d[0] + a, d[1] + b, d[2] + c, d[3] + e, d[4], d[5] + m2, d[6] + m3
+
+
+@register_jitable
+def _about_third(state: Any, d: Any, turn: float) -> Any:
+    w, x, y, z = state[0] + d[0], state[1] + d[1], state[2] + d[2], state[3] + d[3]
+    a, e, b, c, m1, m2 = _about(w, z, x, y, state[6] + d[6], state[4] + d[4], state[5] + d[5], turn)
+    return d[0] + a, d[1] + b, d[2] + c, d[3] + e, d[4] + m1, d[5] + m2, d[6]
+
+
+@register_jitable
+def _about_momentum(state: Any, d: Any, turn: float) -> Any:
+    """The flow of turn |M|^2/2."""
+    w, x, y, z = state[0] + d[0], state[1] + d[1], state[2] + d[2], state[3] + d[3]
+    M1, M2, M3 = state[4] + d[4], state[5] + d[5], state[6] + d[6]
+    size = math.sqrt(M1 * M1 + M2 * M2 + M3 * M3)
+    quarter = 0.25 * turn * size
+    q = math.sin(quarter)
+    m = -2.0 * q * q
+    s = 2.0 * q * math.cos(quarter) / size if size > 0.0 else 0.0
+    m += 0.5 * (1.0 + m) * (1.0 - (w * w + x * x + y * y + z * z))
+    return (
+        d[0] + (m * w - s * (M1 * x + M2 * y + M3 * z)), d[1] + (m * x + s * (M1 * w + M3 * y - M2 * z)),
+        d[2] + (m * y + s * (M2 * w + M1 * z - M3 * x)), d[3] + (m * z + s * (M3 * w + M2 * x - M1 * y)),
+        d[4], d[5], d[6],
+    )  # fmt: skip
+
+
+@register_jitable
+def _drift(par: Any, rule: Any, state: Any, step: Any, time: float) -> Any:
+    half, whole = 0.5 * time * (par.a3 - par.a2), time * (par.a1 - par.a2)
+    step = _about_first(state, _about_third(state, step, half), whole)
+    return _about_momentum(state, _about_third(state, step, half), time * par.a2)
+
+
+def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+    return _force(par, state, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+
+def _increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
+    step, force = compose(_force, _kick, _drift, par, rule, state, carry)
+    return step, force, rule.forces, body.ended_body(step)
+
+
+march_body = kernel_loop(_begin, _increment, body.observe_body)
