@@ -1,0 +1,61 @@
+"""The free brick of NASA's check case 2: published digits of its motion, and histories of simulators against it."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from benchmarks.check_case import ANGLES, EARTH, RATES, largest_errors, truth, yaw_pitch_roll
+from symtop.core.errors import SymtopError
+
+# mpmath: the closed form and a Taylor series in 60 digits agree in all that are shown; degrees, and degrees a second
+EXACT = {
+    10.0: ((-4.31861073067739, 3.74448482493602, -65.9772500239938),
+           (-2.41890222169288, -23.5525695195605, 28.1285926300414)),
+    20.0: ((-6.36379156986781, 4.06909796412636, 4.22159045867153),
+           (-5.42273468006839, 22.7159305764525, 28.6082817473166)),
+    30.0: ((-4.29769350049079, -3.81026674049925, -56.0259821311546),
+           (12.6183907759142, -17.3974747616114, 31.1195888869443)),
+}  # fmt: skip
+
+
+def test_the_motion_has_the_digits_of_two_independent_ways() -> None:
+    quaternion, rates = truth(np.array([*EXACT]))
+    angles, wanted = zip(*EXACT.values(), strict=True)
+    np.testing.assert_allclose(yaw_pitch_roll(quaternion), angles, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(rates, wanted, rtol=0.0, atol=1e-13)
+
+
+@pytest.fixture
+def history(tmp_path):  # type: ignore[no-untyped-def]
+    """Writes the exact motion as a history, in axes that turn with the Earth; `off` degrees are added to the yaw."""
+
+    def written(off: float = 0.0, earth: float = EARTH):  # type: ignore[no-untyped-def]
+        times = np.arange(0.0, 31.0)
+        quaternion, rates = truth(times)
+        half = -0.5 * earth * times
+        w, x, y, z = quaternion.T
+        c, s = np.cos(half), np.sin(half)
+        local = np.stack([c * w - s * x, c * x + s * w, c * y - s * z, c * z + s * y], axis=1)
+        table = pd.DataFrame({"time": times, "longitude_deg": 0.0})
+        table[ANGLES] = yaw_pitch_roll(local)
+        table[RATES] = rates
+        table[ANGLES[0]] += off
+        table.to_csv(tmp_path / "history.csv", index=False, float_format="%.17g")
+        return tmp_path / "history.csv"
+
+    return written
+
+
+def test_a_history_is_judged(history) -> None:  # type: ignore[no-untyped-def]
+    attitude, rate = largest_errors(history())
+    assert attitude < 1e-12
+    assert rate < 1e-13
+    assert largest_errors(history(off=0.01))[0] == pytest.approx(0.01, rel=1e-9)
+    # without the Earth's rotation it is off by what that is in 30 s
+    assert largest_errors(history(earth=0.0))[0] == pytest.approx(np.degrees(30.0 * EARTH), rel=1e-9)
+
+
+def test_another_table_is_refused(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    (tmp_path / "other.csv").write_text("time,yaw\n0,0\n")
+    with pytest.raises(SymtopError, match="must be a history with the columns of the check case"):
+        largest_errors(tmp_path / "other.csv")
