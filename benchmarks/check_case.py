@@ -33,8 +33,8 @@ RATES = [f"bodyAngularRateWrtEi_deg_s_{name}" for name in ("Roll", "Pitch", "Yaw
 def truth(times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Quaternions (n, 4) and rates in body axes (n, 3), deg/s."""
     motion, moments = symtop.reference(SCENE, times), symtop.scene(SCENE, bodies=True).top.moments
-    quaternion = motion["quaternion"].values
-    inside = rotated(quaternion * [1.0, -1.0, -1.0, -1.0], motion["momentum"].values)
+    quaternion = motion["quaternion"].to_numpy()
+    inside = rotated(quaternion * [1.0, -1.0, -1.0, -1.0], motion["momentum"].to_numpy())
     return quaternion, np.degrees(inside / np.array(moments))
 
 
