@@ -49,13 +49,13 @@ def ratio(ours: Timing, theirs: Timing) -> tuple[float, float, float]:
 
 
 def keys() -> list[tuple[str, str]]:
-    """Integrator and chart of every compiled fixed-step kernel; none of them is compiled for it."""
+    """Integrator and chart of every compiled fixed-step kernel of the top; none of them is compiled for it."""
     return [
         (method.name, chart)
         for method in methods().values()
         if method.fixed_step and method.implementation == "compiled"
-        for chart, solver in method.solvers.items()
-        if inside(solver) is not None
+        for chart in method.charts()
+        if inside(method.solvers[chart]) is not None
     ]
 
 

@@ -10,7 +10,7 @@ from symtop_studies.stability.many_verdicts import VERDICTS
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError
 from symtop.measure import columns
-from symtop.measure.errors import ERRORS, QUANTITIES
+from symtop.measure.errors import ERRORS, OF_BODY, QUANTITIES
 from symtop.runner.scripts import file_beside, names
 from tests.core.test_conventions import lacking
 
@@ -43,7 +43,7 @@ def test_every_entry_is_a_name_with_units_that_are_known(key):
 
 
 def test_an_error_table_says_of_what_and_against_what():
-    assert ERRORS.keys() == QUANTITIES.keys()
+    assert ERRORS.keys() == (QUANTITIES | OF_BODY).keys()
     data = columns.described(table_of(), "SI")
     words = "largest angle between the axis and the true axis over the run"
     assert data["axis"].attrs == {"long_name": words, "units": "rad"}
