@@ -92,8 +92,9 @@ def compare(
         if any(words):
             say(f"{cell['variant'].item()}: {'; '.join(filter(None, words))}")
     if timed:
-        exact = pace(data["exact_seconds"].item())
-        say(f"The exact motion takes {exact}. A time is that of one call of the solver, with nothing around it.")
+        exact = data["exact_seconds"].item()  # NaN for a body without symmetry
+        motion = f"The exact motion takes {pace(exact)}. " if math.isfinite(exact) else ""
+        say(f"{motion}A time is that of one call of the solver, with nothing around it.")
         if float((data["seconds_spread"] > NOISY).sum() / data["seconds_spread"].notnull().sum()) > 0.5:
             warn("the machine is busy: times are the least of some, and most others took a quarter longer")
     say_written(output, figure)

@@ -152,9 +152,10 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
     ax.set_ylim(bottom=0.1 * level)
     if compared:
         nutations, end = data.attrs["nutations"], data.attrs["horizon"]
-        runs = f"{nutations:.3g} nutations" if nutations > 0.0 else f"t = {end:g}"
+        unit = "natural periods" if str(data["variant"].values[0]).endswith("[body]") else "nutations"
+        runs = f"{nutations:.3g} {unit}" if nutations > 0.0 else f"t = {end:g}"
         ax.set_title(f"{data['scene'].item()}, {runs}", loc="left", weight="bold")
-        if x == "seconds":
+        if x == "seconds" and data["exact_seconds"].notnull():
             ax.axvline(exact := data["exact_seconds"].item(), color="0.35", ls=(0, (1, 2)), lw=1.0)
             ax.text(exact, 0.1, "exact motion ", rotation=90, ha="right", size=LEAST_TEXT, transform=edge["transform"])
     name_ends(ax, ends)

@@ -73,7 +73,7 @@ _LOOKS = {  # of the methods that people know; `look` finds one for every other 
     "exact": Look(GREY, "x"),
 }  # fmt: skip
 
-FILLS = {"angles": "none", "axis": "full", "attitude": "left"}  # of a marker, by chart
+FILLS = {"angles": "none", "axis": "full", "attitude": "left", "body": "top"}  # of a marker, by chart
 
 
 def look(name: str) -> Look:

@@ -155,6 +155,7 @@ def test_a_sweep_and_a_comparison_take_a_body(tmp_path) -> None:  # type: ignore
     assert [*shown["variant"].values] == ["rk4[body]", "series-general[body]"]
     assert (shown["seconds"].max("setting") > 0.0).all()
     assert math.isnan(float(shown["exact_seconds"]))
+    assert "natural periods" in symtop.plot(shown).get_title(loc="left")
 
 
 def test_the_command_line_takes_a_body() -> None:
