@@ -50,6 +50,7 @@ from symtop.methods.framework.registry import (
     split_name,
 )
 from symtop.model import scenes
+from symtop.model.charts import BODY
 from symtop.model.exact import closed_form
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run.guard import MOST_STEPS
@@ -461,8 +462,8 @@ def _carries(method: Integrator) -> str:
     """Does a method carry over to a body without symmetry?"""
     if method.general is not True:
         return "It does not carry over to a body without symmetry."
-    chart = ", in another chart: [axis] is that of a symmetric top" if method.charts() == ("axis",) else ""
-    return f"It carries over to a body without symmetry{chart}."
+    here = ", in the chart body" if BODY in integrator(method.method).solvers else ", which symtop does not run it on"
+    return f"It carries over to a body without symmetry{here}."
 
 
 def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
@@ -534,11 +535,16 @@ class EngineAdvice:
             f"{self.engine} on {self.scene}, step {self.step_size:g}, to t = {self.horizon:g}: the axis is off by",
             *(f"    {value:.2e} rad  {name} ({maps[name]})" for name, value in self.errors.items()),
         ]
-        if self.best != default:
+        near = self.errors[self.best] <= WORST
+        if self.best != default and near:
             times = self.errors[default] / self.errors[self.best]
             lines.append(f"Its best setting is {self.best}, {times:.3g} times nearer than {default}.")
+        if not near:
+            lines.append(
+                f"No setting is within {WORST:g} rad: none is better than another, and there is nothing to match."
+            )
         if self.advice is None:
-            return "\n".join([*lines, f"No setting is within {WORST:g} rad, so that there is nothing to match."])
+            return "\n".join(lines)
         if self.advice.accuracy != self.errors[self.best]:
             return "\n".join([*lines, str(self.advice)])
         much = f"{self.gain:.3g} times fewer" if self.gain >= 1.0 else f"{1.0 / self.gain:.3g} times more"

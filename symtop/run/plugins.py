@@ -8,7 +8,7 @@ from pathlib import Path
 from symtop.core.errors import SymtopError, foreign_code
 from symtop.core.files import execute, python_file
 from symtop.methods.framework.registry import integrators, is_built_in, split_name
-from symtop.model.scenes import added_scenes, scenes
+from symtop.model.scenes import added_scenes, body_scenes, scenes
 
 _loaded: dict[Path, list[str]] = {}  # files of plug-ins in use, and the names that each has registered
 
@@ -18,13 +18,13 @@ def load(path: str | Path) -> list[str]:
     file = python_file(path, "plugin", "a Python file")
     if file in _loaded:
         return _loaded[file]
-    before = [*integrators().values(), *scenes().values()]
+    before = [*integrators().values(), *scenes().values(), *body_scenes().values()]
     with foreign_code(f"plugin {file.name}"):
         try:
             execute(f"symtop_plugin_{file.stem}", file)
         except SymtopError as error:  # the names in it are the file's, and no options of a command
             raise SymtopError(f"plugin {file.name}: {error}") from error
-    entries = (*integrators().items(), *scenes().items())
+    entries = (*integrators().items(), *scenes().items(), *body_scenes().items())
     _loaded[file] = [name for name, entry in entries if not any(entry is known for known in before)]
     return _loaded[file]
 
