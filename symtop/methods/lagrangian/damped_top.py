@@ -16,12 +16,14 @@ Euler-Lagrange equations, the other the four that remain when both momenta are e
 Source: Marsden and West, Acta Numerica 10 (2001) 357, part three.
 """
 
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.angles import accelerations, with_rates
 from symtop.methods.framework.loop import March, Marks, kernel_loop
@@ -31,6 +33,7 @@ from symtop.methods.library.scipy_ivp import integrated
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 
+NEAR = 0.01  # rad from a pole, where the friction of precession, c_phi/(I1 sin^2 theta) a unit of time, is stiff
 Rates = Callable[[float, Any], tuple[float, ...]]
 
 
@@ -125,3 +128,28 @@ def damped_truth(scene: Scene, friction: Friction, times: Array) -> tuple[Array,
     start = (at.theta, at.phi, at.psi, scene.top.I1 * at.theta_dot)
     four = integrated(_four_equations(scene, friction), start, times, *solver)
     return six, float(np.max(np.abs(six[:3] - four[:3])))
+
+
+def _near_pole(_: float, y: Any) -> float:
+    """Falls through zero where the axis comes within `NEAR` of a pole."""
+    return math.sin(y[0]) - math.sin(NEAR)
+
+
+_near_pole.terminal, _near_pole.direction = True, -1.0  # type: ignore[attr-defined]
+
+
+def theta_before_pole(scene: Scene, friction: Friction, times: Array, most: int) -> Array:
+    """Theta (rad) at tolerance 1e-13, at the times before the axis comes within `NEAR` of a pole, perhaps all.
+
+    SymtopError if it takes more than `most` evaluations.
+    """
+    rates, count = _four_equations(scene, friction), itertools.count(1)
+
+    def counted(t: float, y: Any) -> tuple[float, ...]:
+        if next(count) > most:
+            raise SymtopError(f"the damped top takes more than {most} evaluations: DOP853 is at t = {t:.3g} s")
+        return rates(t, y)
+
+    at = scene.start
+    start = (at.theta, at.phi, at.psi, scene.top.I1 * at.theta_dot)
+    return integrated(counted, start, times, "DOP853", 1e-13, _near_pole)[0]  # type: ignore[no-any-return]
