@@ -297,23 +297,23 @@ def inclination(chosen: Setup, friction: float) -> dict[str, Any]:
     """Theta in degrees with the torques -b phi'/2 and -b psi' for friction b, as base64 of float32 over ``time``.
 
     ``midpoint`` is the forced discrete Lagrangian, NaN after a failure; ``exact``, over ``exact_time``, ends where the
-    axis comes near a pole. `largest` has the largest difference in radians, `message` says what ended early.
+    axis comes near a pole. `largest` has the largest difference in degrees, `message` says what ended early.
     """
     scene, torque = chosen.scene, Friction(0.5 * friction, friction)
     steps = max(1, round(scene.horizon / (chosen.setting or scene.horizon)))
-    h, marks = (
-        scene.horizon / steps,
-        np.unique(np.rint(np.linspace(0, steps, min(chosen.samples, steps + 1)))).astype(int),
-    )
+    h, shown = scene.horizon / steps, np.linspace(0.0, steps, min(chosen.samples, steps + 1))
+    marks = np.unique(np.rint(shown).astype(int))
     run = damped_run(scene, torque, "midpoint", h, marks)
     times, theta = marks * h, run.states[:, 0]
     dense = np.union1d(times, np.linspace(0.0, scene.horizon, chosen.samples))
     exact = theta_before_pole(scene, torque, dense, MOST_TOP_EVALUATIONS)
     known = np.searchsorted(dense, times) < exact.size
-    off = np.abs(theta[known] - exact[np.searchsorted(dense, times[known])])
-    message = "" if run.outcome == 0 else f"midpoint {sentence(OUTCOMES[run.outcome], run.steps * h, scene.horizon)}"
+    off = np.degrees(np.abs(theta[known] - exact[np.searchsorted(dense, times[known])]))
+    ended = [f"midpoint: {OUTCOMES[run.outcome].replace('_', ' ')} at t = {run.steps * h:.3g} s"] if run.outcome else []
     if exact.size < dense.size:
-        message = f"within {NEAR} rad of a pole at t = {dense[exact.size]:.3g} s, where the angles and this view end"
+        ended.append(
+            f"the exact motion comes within {NEAR} rad of a pole at t = {dense[exact.size]:.3g} s and ends there"
+        )
     arrays = {
         "time": times,
         "midpoint": np.degrees(theta),
@@ -321,7 +321,7 @@ def inclination(chosen: Setup, friction: float) -> dict[str, Any]:
         "exact": np.degrees(exact),
     }
     return {
-        "message": message,
+        "message": "; ".join(ended),
         "largest": {"midpoint": float(np.nanmax(off))},
         "arrays": {name: _float32(values) for name, values in arrays.items()},
     }

@@ -81,7 +81,7 @@ def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Mar
     `rule` is a name of `discrete_lagrangian.RULES`. SymtopError for a start at a pole.
     """
     free, state = with_momenta(scene.top, scene.start)
-    return march(DampedTop(*free, *friction), quadrature(*RULES[rule][:2])[0], state, h, marks)
+    return march(DampedTop(free.I1, free.I3, free.mgl, *friction), quadrature(*RULES[rule][:2])[0], state, h, marks)
 
 
 def _six_equations(scene: Scene, friction: Friction) -> Rates:
@@ -99,8 +99,8 @@ def _six_equations(scene: Scene, friction: Friction) -> Rates:
     return rates
 
 
-def _four_equations(scene: Scene, friction: Friction) -> Rates:
-    """y' for y = (theta, phi, psi, p_theta), the momenta p = p0 - c (angle - angle0) eliminated."""
+def _four_equations(scene: Scene, friction: Friction) -> tuple[Rates, tuple[float, ...]]:
+    """y' for y = (theta, phi, psi, p_theta), the momenta p = p0 - c (angle - angle0) eliminated, and y at the start."""
     top, start = scene.top, scene.start
     momenta = top.momenta(start)
 
@@ -112,7 +112,7 @@ def _four_equations(scene: Scene, friction: Friction) -> Rates:
         turn = (p_phi - p_psi * c) / (top.I1 * s * s)
         return p_theta / top.I1, turn, p_psi / top.I3 - turn * c, s * (turn * (top.I1 * turn * c - p_psi) + top.mgl)
 
-    return rates
+    return rates, (start.theta, start.phi, start.psi, top.I1 * start.theta_dot)
 
 
 def six_variables(scene: Scene, friction: Friction, times: Array, solver: str, tolerance: float) -> Array:
@@ -123,10 +123,9 @@ def six_variables(scene: Scene, friction: Friction, times: Array, solver: str, t
 
 def damped_truth(scene: Scene, friction: Friction, times: Array) -> tuple[Array, float]:
     """The same at tolerance 1e-13, and its largest distance (rad) in any angle from the four equations' motion."""
-    at, solver = scene.start, ("DOP853", 1e-13)
+    solver = ("DOP853", 1e-13)
     six = six_variables(scene, friction, times, *solver)
-    start = (at.theta, at.phi, at.psi, scene.top.I1 * at.theta_dot)
-    four = integrated(_four_equations(scene, friction), start, times, *solver)
+    four = integrated(*_four_equations(scene, friction), times, *solver)
     return six, float(np.max(np.abs(six[:3] - four[:3])))
 
 
@@ -143,13 +142,11 @@ def theta_before_pole(scene: Scene, friction: Friction, times: Array, most: int)
 
     SymtopError if it takes more than `most` evaluations.
     """
-    rates, count = _four_equations(scene, friction), itertools.count(1)
+    (rates, start), count = _four_equations(scene, friction), itertools.count(1)
 
     def counted(t: float, y: Any) -> tuple[float, ...]:
         if next(count) > most:
             raise SymtopError(f"the damped top takes more than {most} evaluations: DOP853 is at t = {t:.3g} s")
         return rates(t, y)
 
-    at = scene.start
-    start = (at.theta, at.phi, at.psi, scene.top.I1 * at.theta_dot)
     return integrated(counted, start, times, "DOP853", 1e-13, _near_pole)[0]  # type: ignore[no-any-return]
