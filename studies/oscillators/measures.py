@@ -1,7 +1,7 @@
 """What is computed and stored of the damped oscillator and of the damped top.
 
 The oscillator (m = k = 1, released from x = 1 at rest; times in units of sqrt(m/k)) has an analytic solution. The
-damped top has none: its truth is a pair of integrations (see `damped_top`).
+damped top has none: its truth is a pair of integrations (see `symtop.methods.lagrangian.damped_top`).
 """
 
 from collections.abc import Sequence
@@ -21,9 +21,8 @@ from symtop.methods.lagrangian.damped_oscillator import (
     notebook_positions,
     rule_sums,
 )
+from symtop.methods.lagrangian.damped_top import Friction, damped_run, damped_truth, six_variables
 from symtop.model.scenes import Scene
-
-from .damped_top import Friction, damped_run, damped_truth, six_variables
 
 OSCILLATORS = {f"damping-{b:g}": Oscillator(damping=b) for b in (0.0, 0.1, 1.0, 2.0, 3.0, 4.0)}  # by scene
 AGAINST_RK45 = ("damping-0", "damping-0.1")

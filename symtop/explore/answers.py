@@ -1,4 +1,4 @@
-"""The explorer's answers: one run beside the exact motion, as a dataset, and as a script; a map; an oscillator.
+"""The explorer's answers: one run beside the exact motion, as a dataset, and as a script; a map; friction.
 
 The page sends a flat mapping of numbers and names, which `setup` reads. The script gives the numbers of the page to the
 last bit.
@@ -21,9 +21,10 @@ import xarray as xr
 from symtop import __version__
 from symtop.core.errors import SymtopError, finite, positive
 from symtop.measure.conservation import CONSTANTS, residuals
-from symtop.methods.framework.plan import sentence
+from symtop.methods.framework.plan import OUTCOMES, sentence
 from symtop.methods.framework.registry import Integrator, integrator, integrators
 from symtop.methods.lagrangian.damped_oscillator import Oscillator, discrete_path, notebook_positions, rule_sums
+from symtop.methods.lagrangian.damped_top import NEAR, Friction, damped_run, theta_before_pole
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.scenes import Scene, closed_form, horizon_of, scenes
@@ -45,6 +46,7 @@ COLUMNS, ROWS = 48, 32  # steps, spins
 MAP_SAMPLES = 9
 MOST_MAP_STEPS = 20_000_000  # of all cells: seconds of an implicit method
 OSCILLATOR_HORIZON, MOST_OSCILLATOR_STEPS = 25.0, 10_000
+MOST_TOP_STEPS, MOST_TOP_EVALUATIONS = 100_000, 50_000  # of the damped top: half a second for either
 RULES = ("midpoint", "trapezoidal")  # of the discrete Lagrangian of the oscillator
 
 
@@ -244,11 +246,16 @@ def outcome_map(chosen: Setup, steps: np.ndarray, spins: np.ndarray) -> dict[str
     }
 
 
-def damped(fields: Mapping[str, Any]) -> tuple[float, float]:
-    """Friction and step of the oscillator: `friction` (at least 0) and `oscillator_step`. SymtopError for others."""
-    friction, step = finite("friction", fields.get("friction")), positive("step", fields.get("oscillator_step"))
+def _friction(fields: Mapping[str, Any]) -> float:
+    friction = finite("friction", fields.get("friction"))
     if friction < 0.0:
         raise SymtopError(f"friction must be at least 0, not {friction!r}", "friction")
+    return friction
+
+
+def damped(fields: Mapping[str, Any]) -> tuple[float, float]:
+    """Friction and step of the oscillator: `friction` (at least 0) and `oscillator_step`. SymtopError for others."""
+    friction, step = _friction(fields), positive("step", fields.get("oscillator_step"))
     if not OSCILLATOR_HORIZON / MOST_OSCILLATOR_STEPS <= step <= OSCILLATOR_HORIZON / 2.0:
         least = OSCILLATOR_HORIZON / MOST_OSCILLATOR_STEPS
         raise SymtopError(f"step must be between {least} and {OSCILLATOR_HORIZON / 2.0}, not {step!r}", "step")
@@ -274,6 +281,48 @@ def oscillator(friction: float, step: float) -> dict[str, Any]:
     }  # fmt: skip
     return {
         "largest": {rule: float(np.max(np.abs(arrays[rule] - exact))) for rule in RULES},
+        "arrays": {name: _float32(values) for name, values in arrays.items()},
+    }
+
+
+def damped_top(fields: Mapping[str, Any]) -> tuple[Setup, float]:
+    """The midpoint rule on the page's top at its step, and the friction. Raises SymtopError as `setup` and `damped`."""
+    chosen, friction = setup({**fields, "integrator": "midpoint"}), _friction(fields)
+    if (steps := chosen.scene.horizon / (chosen.setting or 1.0)) > MOST_TOP_STEPS:
+        raise SymtopError(f"the damped top must have at most {MOST_TOP_STEPS} steps, not {steps:.3g}")
+    return chosen, friction
+
+
+def inclination(chosen: Setup, friction: float) -> dict[str, Any]:
+    """Theta in degrees with the torques -b phi'/2 and -b psi' for friction b, as base64 of float32 over ``time``.
+
+    ``midpoint`` is the forced discrete Lagrangian, NaN after a failure; ``exact``, over ``exact_time``, ends where the
+    axis comes near a pole. `largest` has the largest difference in degrees, `message` says what ended early.
+    """
+    scene, torque = chosen.scene, Friction(0.5 * friction, friction)
+    steps = max(1, round(scene.horizon / (chosen.setting or scene.horizon)))
+    h, shown = scene.horizon / steps, np.linspace(0.0, steps, min(chosen.samples, steps + 1))
+    marks = np.unique(np.rint(shown).astype(int))
+    run = damped_run(scene, torque, "midpoint", h, marks)
+    times, theta = marks * h, run.states[:, 0]
+    dense = np.union1d(times, np.linspace(0.0, scene.horizon, chosen.samples))
+    exact = theta_before_pole(scene, torque, dense, MOST_TOP_EVALUATIONS)
+    known = np.searchsorted(dense, times) < exact.size
+    off = np.degrees(np.abs(theta[known] - exact[np.searchsorted(dense, times[known])]))
+    ended = [f"midpoint: {OUTCOMES[run.outcome].replace('_', ' ')} at t = {run.steps * h:.3g} s"] if run.outcome else []
+    if exact.size < dense.size:
+        ended.append(
+            f"the exact motion comes within {NEAR} rad of a pole at t = {dense[exact.size]:.3g} s and ends there"
+        )
+    arrays = {
+        "time": times,
+        "midpoint": np.degrees(theta),
+        "exact_time": dense[: exact.size],
+        "exact": np.degrees(exact),
+    }
+    return {
+        "message": "; ".join(ended),
+        "largest": {"midpoint": float(np.nanmax(off))},
         "arrays": {name: _float32(values) for name, values in arrays.items()},
     }
 

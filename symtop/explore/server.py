@@ -1,9 +1,10 @@
-"""The explorer's server: a page with its files, and six actions, for this machine only.
+"""The explorer's server: a page with its files, and seven actions, for this machine only.
 
     GET  /  /style.css  /*.js           the page and its modules (HEAD: without the body; a query is ignored)
     GET  /catalogue                     scenes and integrators
     POST /run  /netcdf  /script         one run: as arrays, as a file, as a script
-    POST /map  /cost  /oscillator       a grid of runs; error against run time; the damped oscillator
+    POST /map  /cost                    a grid of runs; error against run time
+    POST /oscillator  /damped-top       the damped oscillator; the damped top
 
 It listens on 127.0.0.1. It answers only requests that name this machine as their host, and POST requests only if they
 send JSON and a browser names no other origin, so that a page from elsewhere cannot use it.
@@ -56,6 +57,11 @@ ACTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], bytes], str]] = {
     "/script": (answers.setup, lambda chosen: answers.script(chosen).encode(), "text/x-python; charset=utf-8"),
     "/cost": (cost.question, lambda asked: json.dumps(cost.chart(asked)).encode(), "application/json"),
     "/oscillator": (answers.damped, lambda asked: json.dumps(answers.oscillator(*asked)).encode(), "application/json"),
+    "/damped-top": (
+        answers.damped_top,
+        lambda asked: json.dumps(answers.inclination(*asked)).encode(),
+        "application/json",
+    ),
     "/map": (answers.grid, lambda grid: json.dumps(answers.outcome_map(*grid)).encode(), "application/json"),
 }
 

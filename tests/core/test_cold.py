@@ -84,7 +84,7 @@ def _kernels():
 
 def test_every_kernel_is_kept_on_disk():
     kernels = list(_kernels())
-    assert {"symtop.methods.runge_kutta.collective_gauss.march", "studies.oscillators.damped_top.march"} <= {
+    assert {"symtop.methods.runge_kutta.collective_gauss.march", "symtop.methods.lagrangian.damped_top.march"} <= {
         name for name, _ in kernels
     }
     assert {name for name, kernel in kernels if not hasattr(kernel._cache, "_cache_path")} == set()

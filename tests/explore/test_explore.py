@@ -24,6 +24,7 @@ from symtop.core.errors import SymtopError, SymtopWarning
 from symtop.explore import answers, cost
 from symtop.explore.server import STATIC, address
 from symtop.methods.framework.registry import engines
+from symtop.methods.lagrangian.damped_top import Friction, damped_truth
 from symtop.model import charts
 from symtop.model.scenes import closed_form
 from symtop.run.simulation import integrate
@@ -479,6 +480,39 @@ def test_the_oscillator_of_the_page_is_the_notebooks():
             answers.damped({"friction": 0.1, "oscillator_step": 0.5} | wrong)
 
 
+def top_with(friction, name="spheroid", **changes):
+    """The page's damped top: the answer with its arrays."""
+    answer = answers.inclination(*answers.damped_top(fields(name, friction=friction, **changes)))
+    return answer, {name: unpacked(text) for name, text in answer["arrays"].items()}
+
+
+def test_the_damped_top_of_the_page_is_the_studys():
+    """Order two with or without friction; the exact motion is the study's; it ends where the bearings meet."""
+    for friction in (0.0, 0.1, 0.3):
+        coarse, fine = (top_with(friction, step_size=step, horizon=3.0)[0]["largest"] for step in (0.01, 0.005))
+        assert coarse["midpoint"] / fine["midpoint"] == pytest.approx(4.0, rel=0.05)
+    answer, arrays = top_with(0.1)
+    scene, times = symtop.scene("spheroid"), np.linspace(0.0, 8.0, 9)
+    near = np.searchsorted(arrays["exact_time"], times.astype(np.float32))
+    truth = np.degrees(damped_truth(scene, Friction(0.05, 0.1), times)[0][0])
+    np.testing.assert_allclose(arrays["exact"][near], truth, atol=1e-4)
+    free = np.degrees(closed_form(scene)(times).theta)
+    np.testing.assert_allclose(top_with(0.0)[1]["exact"][near], free, atol=1e-4)
+    assert np.abs(truth - free).max() > 1.0  # friction does something
+    assert answer["message"] == ""
+    answer, arrays = top_with(1.0)
+    # of steps of 0.02 s the last inside the chart, and the pole
+    assert re.match(r"midpoint: left chart at t = 3.66 s; .* of a pole at t = 3.68 s", answer["message"])
+    assert arrays["exact"][-1] == pytest.approx(np.degrees(np.pi - 0.01), abs=1.0)
+    assert arrays["exact_time"][-1] < 3.68
+    for wrong, word in (
+        ({"friction": -0.1}, "friction must be at least 0"), ({"step_size": 1e-5}, "at most 100000 steps"),
+        ({"name": "sleeping", "step_size": 0.1}, "more than 50000 evaluations"), ({"theta": 0.0}, "must lie inside"),
+    ):  # fmt: skip
+        with pytest.raises(SymtopError, match=word):
+            top_with(**{"friction": 0.1} | wrong)
+
+
 def test_the_chart_of_costs_and_the_oscillator_are_on_the_page(site, tmp_path):
     with Browser(1280, 900) as browser:
         browser.open(address(site))
@@ -493,15 +527,19 @@ def test_the_chart_of_costs_and_the_oscillator_are_on_the_page(site, tmp_path):
         )
         answered(browser, lambda: browser.set("#step_size", 0.6))  # midpoint fails, strang does not
         browser.wait_for(f"{data}.points === '1'")
-        count, maps = browser.evaluate("+document.body.dataset.swings"), browser.evaluate("document.body.dataset.maps")
-        before = browser.evaluate(PLOT.format("oscillator"))
+        maps, names = browser.evaluate("document.body.dataset.maps"), ("oscillator", "damped-top")
+        counted = "+document.querySelector('#{}-key').dataset.answers".format
+        before = {name: (browser.evaluate(counted(name)), browser.evaluate(PLOT.format(name))) for name in names}
         browser.set("#friction-slider", 1.5)
-        browser.wait_for(f"+document.body.dataset.swings > {count}")
-        assert browser.evaluate(PLOT.format("oscillator")) != before
+        for name, (count, drawn) in before.items():
+            browser.wait_for(f"{counted(name)} > {count}")
+            assert browser.evaluate(PLOT.format(name)) != drawn
+        browser.wait_for("document.querySelector('#damped-top-key').textContent.includes('rad of a pole')")
         assert "friction=1.5" in browser.evaluate("location.hash")
         assert browser.evaluate("document.body.dataset.maps") == maps  # the top has not changed
         browser.set("#friction", -1)
-        browser.wait_for("document.querySelector('#oscillator-key').textContent.includes('at least 0')")
+        for name in names:
+            browser.wait_for(f"document.querySelector('#{name}-key').textContent.includes('at least 0')")
         for width in (1280, 390):
             browser.resize(width, 900)
             assert browser.too_wide == 0

@@ -7,7 +7,6 @@ import mpmath
 import numpy as np
 import pytest
 from symtop_studies.oscillators import facts, figures, study
-from symtop_studies.oscillators.damped_top import Friction, damped_run, damped_truth
 from symtop_studies.oscillators.measures import convergence, damped_top_table, decay, notebook_history
 from symtop_studies.oscillators.quartic_measures import QUARTICS
 
@@ -22,6 +21,7 @@ from symtop.methods.lagrangian.damped_oscillator import (
     notebook_positions,
     rule_sums,
 )
+from symtop.methods.lagrangian.damped_top import Friction, damped_run, damped_truth
 from symtop.runner.study import Case
 from tests.templates import checked
 

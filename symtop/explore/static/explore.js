@@ -14,15 +14,18 @@ const START = [
   ["theta_dot", "theta' (rad/s)", -2, 2, false], ["phi_dot", "phi' (rad/s)", -5, 5, false], ["psi_dot", "psi' (rad/s)", -10, 10, false],
 ];
 const SETTINGS = [["step_size", "step (s)", 1e-5, 1, true], ["tolerance", "tolerance", 1e-13, 1e-2, true], ["horizon", "time (s)", 0.5, 500, true]];
-const OSCILLATOR = [["friction", "friction b", 0, 4, false], ["oscillator_step", "step (s)", 0.0025, 2.5, true]];
-const SWINGS = { midpoint: "#0072b2", trapezoidal: "#e69f00", guess: "#cc79a7" };
+const OSCILLATOR = [["friction", "friction b", 0, 4, false], ["oscillator_step", "oscillator step (s)", 0.0025, 2.5, true]];
+const DAMPED = {  // the path of a question: the names that it depends on, and the curves of its answer
+  oscillator: { of: ["friction", "oscillator_step"], curves: { midpoint: "#0072b2", trapezoidal: "#e69f00", guess: "#cc79a7" } },
+  "damped-top": { of: ["friction", "step_size", "horizon", ...[...TOP, ...START].map(([name]) => name)], curves: { midpoint: "#0072b2" } },
+};
 const PLOTS = ["axis_error", "energy", "p_phi", "p_psi"];
 
 const values = {};
 const rows = {};
 const sphere = new Sphere($("sphere"));
 const outcomes = new OutcomeMap($("map"), (step, spin) => { rows.step_size.set(step); rows.psi_dot.set(spin); edited("start"); ask(); });
-let costs = null, swinging = null, costed = "", mapping = false, patient;
+let costs = null, costed = "", mapping = false, patient;
 let catalogue, run = null, second = null, mapped = "", place = 0, playing = !matchMedia("(prefers-reduced-motion: reduce)").matches, asking = false, stale = false, drawnAt = -1;
 
 function control([name, label, least, most, logarithmic], group) {
@@ -48,9 +51,9 @@ function control([name, label, least, most, logarithmic], group) {
   rows[name] = { row, set: (value) => { values[name] = value; span(value); show(value); } };
 }
 
-// The oscillator is no part of the run.
+// Friction is no part of the run.
 function changed(group) {
-  if (group === "oscillator") askOscillator(); else { edited(group); ask(); }
+  if (group === "friction-controls") { keep(); askDamped(); } else { edited(group); ask(); }
 }
 
 // A top or a start that was changed is no longer the scene's, and the page and the run say so.
@@ -194,18 +197,24 @@ async function askCost() {
   if (answer.missing) patient = setTimeout(askCost, 700);
 }
 
-// The damped oscillator by both rules of its discrete Lagrangian, and the notebook's guess.
-async function askOscillator() {
-  keep();
-  const question = JSON.stringify([values.friction, values.oscillator_step]);
-  const response = await post("oscillator").catch(() => null);
+// The damped oscillator by both rules of its discrete Lagrangian with the notebook's guess, and the damped top.
+const askDamped = () => Object.keys(DAMPED).forEach(askOneDamped);
+
+async function askOneDamped(name) {
+  const one = DAMPED[name], question = JSON.stringify(one.of.map((key) => values[key]));
+  if (one.asking || question === one.answered) return;
+  one.asking = true;
+  const response = await post(name).catch(() => null);
   const answer = response ? await response.json() : { error: "the explorer's server does not answer" };
-  if (question !== JSON.stringify([values.friction, values.oscillator_step])) return;
-  swinging = answer.error ? null : Object.fromEntries(Object.entries(answer.arrays).map(([key, text]) => [key, unpack(text)]));
-  const entry = (name, words, color) => { const mark = document.createElement("b"); mark.className = "swatch"; mark.style.borderColor = color; mark.textContent = words; return [mark, " "]; };
-  $("oscillator-key").replaceChildren(...(answer.error ? [answer.error] : Object.keys(SWINGS).flatMap((name) => entry(name, name in answer.largest ? `${name}, off by ${answer.largest[name].toExponential(1)}` : "the notebook's guess at the force", SWINGS[name]))));
+  one.asking = false;
+  one.answered = response && question;
+  one.arrays = answer.error ? null : Object.fromEntries(Object.entries(answer.arrays).map(([key, text]) => [key, unpack(text)]));
+  const entry = (words, color) => { const mark = document.createElement("b"); mark.className = "swatch"; mark.style.borderColor = color; mark.textContent = words; return [mark, " "]; };
+  const key = $(`${name}-key`);
+  key.replaceChildren(...(answer.error ? [answer.error] : Object.entries(one.curves).flatMap(([curve, color]) => entry(curve in answer.largest ? `${curve}, off by ${answer.largest[curve].toExponential(1)}` : "the notebook's guess at the force", color))), answer.message || "");
   drawPlots();
-  document.body.dataset.swings = +(document.body.dataset.swings || 0) + 1;
+  key.dataset.answers = +(key.dataset.answers || 0) + 1;
+  if (response) askOneDamped(name);  // with what was changed meanwhile
 }
 
 function unpack(text) {
@@ -268,6 +277,7 @@ function show(answer, other, began) {
   if (second) second.error = other.outcome === "ok" ? other.largest.axis_error : null;
   if (costs) costs.seconds = [];  // those of the runs before
   clearTimeout(patient);
+  askDamped();
   drawPlots();
   Object.assign(document.body.dataset, {
     answer: answer.outcome, answers: +(document.body.dataset.answers || 0) + 1, steps: answer.steps,
@@ -284,7 +294,7 @@ function drawPlots() {
   for (const name of PLOTS) plot($(`plot-${name}`), run.time, [{ values: run[name], color: run.color }, ...beside(name)], true, now);
   for (const [id, one] of [["swatch-1", run], ["swatch-2", second]]) if (one) $(id).style.borderColor = one.color;
   if (costs) drawCost($("cost"), costs, [run, second].flatMap((one, k) => (one ? [{ name: k ? values.second : values.integrator, seconds: costs.seconds[k], error: one.error, color: one.color }] : [])), catalogue.integrators);
-  if (swinging) plot($("plot-oscillator"), [0, 25], [{ values: swinging.exact, time: swinging.exact_time, color: "#9a9a9a", dash: [2, 3] }, ...Object.keys(SWINGS).map((name) => ({ values: swinging[name], time: swinging.time, color: SWINGS[name] }))], false, NaN);
+  for (const [name, { arrays, curves }] of Object.entries(DAMPED)) if (arrays) plot($(`plot-${name}`), arrays.time, [{ values: arrays.exact, time: arrays.exact_time, color: "#9a9a9a", dash: [2, 3] }, ...Object.entries(curves).map(([curve, color]) => ({ values: arrays[curve], color }))], false, NaN);
   portrait($("portrait"), second ? [run, second] : [run]);
   outcomes.draw({ step: values.step_size, spin: values.psi_dot });
   drawnAt = performance.now();
@@ -322,7 +332,7 @@ async function begin() {
   for (const entry of TOP) control(entry, "top");
   for (const entry of START) control(entry, "start");
   for (const entry of SETTINGS) control(entry, "settings");
-  for (const entry of OSCILLATOR) control(entry, "oscillator");
+  for (const entry of OSCILLATOR) control(entry, "friction-controls");
   for (const { name } of catalogue.scenes) $("scene").append(new Option(name, name));
   for (const family of new Set(catalogue.integrators.map((entry) => entry.family))) {
     const group = document.createElement("optgroup");
@@ -355,7 +365,7 @@ async function begin() {
   values.integrator = catalogue.integrators[0].name;
   values.second = "";
   if (!restore()) { chooseScene(catalogue.scenes[0].name); chooseIntegrator(values.integrator); }
-  askOscillator();
+  askDamped();
   requestAnimationFrame(frame);
 }
 

@@ -107,12 +107,17 @@ def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solve
     return solve
 
 
-def integrated(rates: Callable[..., Any], start: Sequence[float], times: Array, method: str, tolerance: float) -> Array:
-    """Equations by ``solve_ivp`` (rtol = atol) at times from 0 on: (variables, times). SymtopError if it fails."""
+def integrated(
+    rates: Callable[..., Any], start: Sequence[float], times: Array, method: str, tolerance: float, events: Any = None
+) -> Array:
+    """Equations by ``solve_ivp`` (rtol = atol) at times from 0 on: (variables, times). SymtopError if it fails.
+
+    A terminal event of `events` ends them: the times before it are answered.
+    """
     from scipy.integrate import solve_ivp  # 0.6 s to import
 
     span = (0.0, float(times[-1]))
-    done = solve_ivp(rates, span, start, method=method, rtol=tolerance, atol=tolerance, t_eval=times)
+    done = solve_ivp(rates, span, start, method=method, rtol=tolerance, atol=tolerance, t_eval=times, events=events)
     if not done.success:
         raise SymtopError(f"{method} cannot integrate to t = {times[-1]:g}: {done.message}")
     return done.y  # type: ignore[no-any-return]

@@ -16,12 +16,14 @@ Euler-Lagrange equations, the other the four that remain when both momenta are e
 Source: Marsden and West, Acta Numerica 10 (2001) 357, part three.
 """
 
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.angles import accelerations, with_rates
 from symtop.methods.framework.loop import March, Marks, kernel_loop
@@ -31,6 +33,7 @@ from symtop.methods.library.scipy_ivp import integrated
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 
+NEAR = 0.01  # rad from a pole, where the friction of precession, c_phi/(I1 sin^2 theta) a unit of time, is stiff
 Rates = Callable[[float, Any], tuple[float, ...]]
 
 
@@ -78,7 +81,7 @@ def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Mar
     `rule` is a name of `discrete_lagrangian.RULES`. SymtopError for a start at a pole.
     """
     free, state = with_momenta(scene.top, scene.start)
-    return march(DampedTop(*free, *friction), quadrature(*RULES[rule][:2])[0], state, h, marks)
+    return march(DampedTop(free.I1, free.I3, free.mgl, *friction), quadrature(*RULES[rule][:2])[0], state, h, marks)
 
 
 def _six_equations(scene: Scene, friction: Friction) -> Rates:
@@ -96,8 +99,8 @@ def _six_equations(scene: Scene, friction: Friction) -> Rates:
     return rates
 
 
-def _four_equations(scene: Scene, friction: Friction) -> Rates:
-    """y' for y = (theta, phi, psi, p_theta), the momenta p = p0 - c (angle - angle0) eliminated."""
+def _four_equations(scene: Scene, friction: Friction) -> tuple[Rates, tuple[float, ...]]:
+    """y' for y = (theta, phi, psi, p_theta), the momenta p = p0 - c (angle - angle0) eliminated, and y at the start."""
     top, start = scene.top, scene.start
     momenta = top.momenta(start)
 
@@ -109,7 +112,7 @@ def _four_equations(scene: Scene, friction: Friction) -> Rates:
         turn = (p_phi - p_psi * c) / (top.I1 * s * s)
         return p_theta / top.I1, turn, p_psi / top.I3 - turn * c, s * (turn * (top.I1 * turn * c - p_psi) + top.mgl)
 
-    return rates
+    return rates, (start.theta, start.phi, start.psi, top.I1 * start.theta_dot)
 
 
 def six_variables(scene: Scene, friction: Friction, times: Array, solver: str, tolerance: float) -> Array:
@@ -120,8 +123,30 @@ def six_variables(scene: Scene, friction: Friction, times: Array, solver: str, t
 
 def damped_truth(scene: Scene, friction: Friction, times: Array) -> tuple[Array, float]:
     """The same at tolerance 1e-13, and its largest distance (rad) in any angle from the four equations' motion."""
-    at, solver = scene.start, ("DOP853", 1e-13)
+    solver = ("DOP853", 1e-13)
     six = six_variables(scene, friction, times, *solver)
-    start = (at.theta, at.phi, at.psi, scene.top.I1 * at.theta_dot)
-    four = integrated(_four_equations(scene, friction), start, times, *solver)
+    four = integrated(*_four_equations(scene, friction), times, *solver)
     return six, float(np.max(np.abs(six[:3] - four[:3])))
+
+
+def _near_pole(_: float, y: Any) -> float:
+    """Falls through zero where the axis comes within `NEAR` of a pole."""
+    return math.sin(y[0]) - math.sin(NEAR)
+
+
+_near_pole.terminal, _near_pole.direction = True, -1.0  # type: ignore[attr-defined]
+
+
+def theta_before_pole(scene: Scene, friction: Friction, times: Array, most: int) -> Array:
+    """Theta (rad) at tolerance 1e-13, at the times before the axis comes within `NEAR` of a pole, perhaps all.
+
+    SymtopError if it takes more than `most` evaluations.
+    """
+    (rates, start), count = _four_equations(scene, friction), itertools.count(1)
+
+    def counted(t: float, y: Any) -> tuple[float, ...]:
+        if next(count) > most:
+            raise SymtopError(f"the damped top takes more than {most} evaluations: DOP853 is at t = {t:.3g} s")
+        return rates(t, y)
+
+    return integrated(counted, start, times, "DOP853", 1e-13, _near_pole)[0]  # type: ignore[no-any-return]
