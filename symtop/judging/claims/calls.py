@@ -36,6 +36,7 @@ MISSED = 0.2  # of a step: a method of several steps starts anew with less
 LATE = {False: (100_000, 6.0), True: (20_000, 0.5)}  # quick: steps before a late one, or as many as there are seconds
 # late runs, steps after each, and what may be missed where our loop remembers nothing
 LATER, AFTER, RECALLED = 4, 64, 1e-6
+BLOWN_UP = 1e6  # times the start
 ELSEWHERE = 0.3  # rad and units of the rates, from the start that is called
 
 
@@ -179,5 +180,5 @@ def _gap(first: Any, second: Any) -> float:
 
 def _apart(first: Any, second: Any) -> float:
     """Largest difference, relative to the largest number; infinite where it is none."""
-    apart = _gap(first, second) / max(float(np.max(np.abs(first))), 1e-300)
+    apart = _gap(first, second) / max(_largest(first), 1e-300)
     return apart if np.isfinite(apart) else math.inf
