@@ -313,7 +313,12 @@ FOLLOWS = {
     "one_newton": {"symplectic", "symmetric"},
     "coefficient_off": {"symmetric"},
     "verlet_swapped": {"symplectic", "symmetric", "energy"},
-    "leaking_chart": {"energy", "p_psi", "reported"},
+    "leaking_chart": {
+        "order",
+        "energy",
+        "p_psi",
+        "reported",
+    },  # a step misses by 1e-4 h, seen where a drawn start shows
     "copied_momenta": {"reported"},
     "leaking_momentum": {"order", "energy", "p_psi", "pole", "symmetric"},
 }
