@@ -18,8 +18,14 @@ BODIES = ("check-case-2", "heavy-brick")
 FIXED = {
     "rk4": (4, 40), "tsit5-fixed": (5, 30), "dop853-compiled-fixed": (8, 8), "series-general": (16, 5),
     "strang": (2, 40), "strang-drift-first": (2, 40), "yoshida-4": (4, 40), "suzuki-4": (4, 40), "kahan-li-6": (6, 20),
-    "kahan-li-8": (8, 10),
+    "kahan-li-8": (8, 10), "gauss-2": (2, 40), "gauss-4": (4, 40), "gauss-6": (6, 20), "gauss-8": (8, 10),
 }  # fmt: skip
+# what a method keeps of a free body, and of a heavy one; None for what it does not
+KEPT = {
+    "rk4": ((), ()), "strang": (("momentum",), ("p_phi",)), "gauss-4": (("energy",), ("energy",)),
+}  # fmt: skip
+TO_ROUNDING = ("strang", "kahan-li-8")  # the steps of the symmetric top
+TO_ORDER = {"gauss-4": 4}  # another method there, of the same order
 ADAPTIVE = ("rk45", "dop853", "rk45-compiled", "dop853-compiled", "tsit5", "vern9", "odex", "series-general-adaptive")
 ANGLE = math.radians(0.3)
 
@@ -47,14 +53,30 @@ def test_a_tight_tolerance_comes_to_the_true_motion(name: str, method: str) -> N
     assert error(name, method, tolerance=1e-11) < 1e-7
 
 
-def test_a_wrong_sign_in_the_inertia_is_seen() -> None:
-    # the same start on the mirrored body: I1 and I3 exchanged turn the gyroscopic torque around
-    scene = body_scenes()["check-case-2"]
-    body = scene.top
-    other = symtop.Scene("other", RigidBody(body.I3, body.I2, body.I1), scene.start, scene.horizon)
-    run = symtop.simulate(other, "series-general", step_size=0.1, samples=41)
+@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("method", FIXED)
+def test_a_wrong_sign_in_the_inertia_is_seen(name: str, method: str) -> None:
+    # the same momentum of the mirrored body: I1 and I3 exchanged turn the gyroscopic torque around
+    scene = body_scenes()[name]
+    body, M = scene.top, scene.top.momentum(scene.start)
+    mirrored = RigidBody(body.I3, body.I2, body.I1, body.mgl, body.centre)
+    rates = tuple(part / moment for part, moment in zip(M, mirrored.moments, strict=True))
+    other = symtop.Scene("other", mirrored, Attitude(scene.start.quaternion, rates), scene.horizon)
+    run = symtop.simulate(other, method, step_size=scene.nutation_period / 40, samples=41)
+    assert run.outcome == "ok"
     truth = symtop.reference(scene, run.time.values)
     assert attitude_distance(run["quaternion"].values, truth["quaternion"].values).max() > 0.1
+
+
+@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("method", KEPT)
+def test_a_method_keeps_what_it_must_and_nothing_else(name: str, method: str) -> None:
+    scene = body_scenes()[name]
+    step = scene.nutation_period / FIXED[method][1]
+    errors = symtop.errors(symtop.simulate(name, method, step_size=step, samples=101))
+    for quantity in ("energy", "p_phi") + ("momentum",) * scene.top.free:
+        kept = quantity in KEPT[method][not scene.top.free] or (quantity == "p_phi" and "momentum" in KEPT[method][0])
+        assert (float(errors[quantity].max()) < 2e-14) is kept, quantity
 
 
 @pytest.mark.parametrize("mgl", [0.0, 2.0])
@@ -90,20 +112,29 @@ def test_splittings_keep_what_they_must() -> None:
     assert grown[-1] > 1.7 * grown[len(grown) // 2]
 
 
-@pytest.mark.parametrize("method", ["strang", "kahan-li-8"])
-def test_a_splitting_makes_the_steps_of_the_symmetric_top(method: str) -> None:
-    """Two moments that are equal make the drift exact; two that are not make another method."""
+def gap(method: str, second: float, step: float) -> float:
+    """The largest angle between a symmetric top and a body whose second moment is `second`."""
     quaternion, rates = (0.8, 0.6, 0.0, 0.0), (0.2, 0.3, 3.0)
     start = symtop.Angles.from_quaternion(quaternion, omega_body=rates)
     top = symtop.Scene("top", symtop.SymmetricTop(2.0, 1.0, 2.0), start, 10.0)
-    gaps = []
-    for second in (2.0, 2.0 + 1e-6):
-        body = symtop.Scene("body", RigidBody(2.0, second, 1.0, 2.0), Attitude(quaternion, rates), 10.0)
-        runs = (symtop.simulate(one, f"{method}[{chart}]", step_size=0.1, guard=False)["quaternion"].values
-                for one, chart in ((top, "attitude"), (body, "body")))  # fmt: skip
-        gaps.append(attitude_distance(*runs).max())
-    assert gaps[0] < 2e-14
-    assert gaps[1] > 1e-7
+    body = symtop.Scene("body", RigidBody(2.0, second, 1.0, 2.0), Attitude(quaternion, rates), 10.0)
+    runs = (symtop.simulate(one, f"{method}[{chart}]", step_size=step, guard=False)["quaternion"].values
+            for one, chart in ((top, "attitude"), (body, "body")))  # fmt: skip
+    return float(attitude_distance(*runs).max())
+
+
+@pytest.mark.parametrize("method", TO_ROUNDING)
+def test_a_method_makes_the_steps_of_the_symmetric_top(method: str) -> None:
+    """Two moments that are equal make the drift exact; two that are not make another method."""
+    assert gap(method, 2.0, 0.1) < 2e-14
+    assert gap(method, 2.0 + 1e-6, 0.1) > 1e-7
+
+
+@pytest.mark.parametrize(("method", "order"), TO_ORDER.items())
+def test_another_method_comes_to_the_symmetric_top_by_its_order(method: str, order: int) -> None:
+    coarse, fine = gap(method, 2.0, 0.05), gap(method, 2.0, 0.025)
+    assert fine > 1e-9
+    assert abs(math.log2(coarse / fine) - order) < 0.3
 
 
 def test_energy_and_momentum_of_a_run_are_those_of_its_states() -> None:

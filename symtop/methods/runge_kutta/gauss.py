@@ -9,6 +9,8 @@ frame (e, L, a), where this still holds (see `space`). The methods are symmetric
 equations; these are Lie-Poisson equations, whose bracket depends on the state, and no Gauss method preserves it: the
 trait `symplectic` is false, although the motion stays on the coadjoint orbit and on the energy. `gauss-2` must not be
 confused with the `midpoint` discrete Lagrangian in angles, which is symplectic and keeps the energy only on average.
+Of a body without symmetry, in (q, M), |q| and the energy are quadratic and kept, and |M| of a free one; L_z is cubic
+and is not. There the sweeps are all, without Newton and without lanes.
 
 What makes this true to rounding over long runs (Hairer, McLachlan, Razakarivony, BIT 48 (2008) 231): conservation needs
 mu_ij + mu_ji = 1, and the table satisfies it *exactly* in doubles, whatever the rounding of b (Antonana, Makazaga,
@@ -51,7 +53,7 @@ import numpy as np
 
 from symtop.core.jit import register_jitable, set_item
 from symtop.core.numbers import context
-from symtop.methods.framework import space
+from symtop.methods.framework import body, space
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
@@ -60,6 +62,7 @@ from symtop.methods.framework.registry import Array, Integrator
 from symtop.methods.framework.space import SpaceTop, field_axis, field_frame, observe_axis
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate, zero
+from symtop.model.charts import BODY
 
 ENOUGH = 1e-9  # a correction in units of |e| = 1, whose square is below rounding
 NEAR = 0.1  # a correction after which the solution is followed to a longer step
@@ -267,7 +270,15 @@ def momentum_unit(par: Any, state: Any) -> float:
 
 
 @register_jitable
-def working_space(field: Any, par: Any, rule: Any, state: Any, h: float) -> Any:
+def _unit_of_body(par: Any, state: Any) -> float:
+    """The same of a body without symmetry, from M."""
+    pull = par.I2 * np.sqrt(par.c1**2 + par.c2**2 + par.c3**2)
+    momentum = np.sqrt(state[4] ** 2 + state[5] ** 2 + state[6] ** 2) + np.sqrt(pull)
+    return 1.0 / momentum if momentum > 0.0 else 1.0
+
+
+@register_jitable
+def working_space(field: Any, unit: Any, par: Any, rule: Any, state: Any, h: float) -> Any:
     """One array for all that a step reads and writes, because numba counts references to each.
 
     Of its rows 0 .. s-1 hold L_i and then h b_i; s .. 2s-1 are room for the prediction; 2s .. 3s-1 hold mu, and then
@@ -277,7 +288,7 @@ def working_space(field: Any, par: Any, rule: Any, state: Any, h: float) -> Any:
     stages, dimension = len(rule.b), len(state)
     work = np.empty((7 * stages + 1, max(dimension + 1, 3 * stages + 1)))
     stage_weights(rule, h, work[:stages, dimension])
-    work[4 * stages, 0] = momentum_unit(par, state)
+    work[4 * stages, 0] = unit(par, state)
     slope = field(par, state)
     for i in range(stages):
         for m in range(dimension):
@@ -294,69 +305,74 @@ def farthest(sweeps: int) -> float:
     return FARTHEST * PACE**sweeps
 
 
-@register_jitable
-def gauss_step(field: Any, par: Any, state: Any, work: Any) -> Any:  # noqa: C901  (one loop, read in one piece)
-    """Increment of one step, sweeps and iterations of Newton that it took, and the outcome.
+def _stepping(field: Any, first: int, still: int, solve: Any) -> Any:  # noqa: C901
+    """``(par, state, work)`` to the increment of a step, sweeps and iterations of Newton that it took, and the outcome.
 
-    All of it is one function, for an array that is handed to another one is counted once more. The largest correction
-    is kept for L and for the unit vectors, not for each component, for which there are not registers enough.
+    Three components from `first` on are a momentum; `still` has no slope. All of it is one function, for an array that
+    is handed to another one is counted once more. The largest correction is kept for the momentum and for the rest, not
+    for each component, for which there are not registers enough.
     """
-    stages, dimension = len(work) // 7, len(state)
-    nothing = zero(state)
-    for i in range(stages):  # the last step's polynomial, evaluated at this step's nodes
-        ahead = nothing
-        for j in range(stages):
-            weight = work[3 * stages + i, j]
-            for m in range(dimension):
-                if m != STILL:
-                    ahead = set_item(ahead, m, ahead[m] + weight * work[j, m])
-        for m in range(dimension):
-            work[stages + i, m] = ahead[m]
-    for i in range(stages):
-        for m in range(dimension):
-            work[i, m] = work[stages + i, m]
-    last, effort, outcome = np.inf, 0, NOT_CONVERGED
-    while effort < SWEEPS:
-        gap = gap_momentum = 0.0
-        for i in range(stages):
-            place = nothing
+
+    @register_jitable
+    def gauss_step(par, state, work):  # type: ignore[no-untyped-def]  # noqa: C901  (one loop, read in one piece)
+        stages, dimension = len(work) // 7, len(state)
+        nothing = zero(state)
+        for i in range(stages):  # the last step's polynomial, evaluated at this step's nodes
+            ahead = nothing
             for j in range(stages):
-                weight = work[2 * stages + i, j]
+                weight = work[3 * stages + i, j]
                 for m in range(dimension):
-                    if m != STILL:
-                        place = set_item(place, m, place[m] + weight * work[j, m])
+                    if m != still:
+                        ahead = set_item(ahead, m, ahead[m] + weight * work[j, m])
             for m in range(dimension):
-                place = set_item(place, m, state[m] + place[m])
-            slope = field(par, place)
+                work[stages + i, m] = ahead[m]
+        for i in range(stages):
             for m in range(dimension):
-                if m == STILL:
-                    continue
-                value = work[i, dimension] * slope[m]
-                change = abs(value - work[i, m])
-                if 3 <= m < 6:
-                    gap_momentum = max(gap_momentum, change)
-                else:
-                    gap = max(gap, change)
-                work[i, m] = value
-        effort += 1
-        correction = max(gap, gap_momentum * work[4 * stages, 0])
-        if not 0.0 < correction < last:
-            if correction < ROUND_OFF:
+                work[i, m] = work[stages + i, m]
+        last, effort, outcome = np.inf, 0, NOT_CONVERGED
+        while effort < SWEEPS:
+            gap = gap_momentum = 0.0
+            for i in range(stages):
+                place = nothing
+                for j in range(stages):
+                    weight = work[2 * stages + i, j]
+                    for m in range(dimension):
+                        if m != still:
+                            place = set_item(place, m, place[m] + weight * work[j, m])
+                for m in range(dimension):
+                    place = set_item(place, m, state[m] + place[m])
+                slope = field(par, place)
+                for m in range(dimension):
+                    if m == still:
+                        continue
+                    value = work[i, dimension] * slope[m]
+                    change = abs(value - work[i, m])
+                    if first <= m < first + 3:
+                        gap_momentum = max(gap_momentum, change)
+                    else:
+                        gap = max(gap, change)
+                    work[i, m] = value
+            effort += 1
+            correction = max(gap, gap_momentum * work[4 * stages, 0])
+            if not 0.0 < correction < last:
+                if correction < ROUND_OFF:
+                    outcome = OK
+                    break
+                if not correction <= farthest(effort):
+                    break
+            last = correction
+        if outcome != OK:
+            iterations, converged = solve(field, par, state, work, stages)
+            effort += iterations
+            if converged:
                 outcome = OK
-                break
-            if not correction <= farthest(effort):
-                break
-        last = correction
-    if outcome != OK:
-        iterations, converged = solve_stages(field, par, state, work, stages)
-        effort += iterations
-        if converged:
-            outcome = OK
-    step = nothing
-    for i in range(stages):
-        for m in range(dimension):
-            step = set_item(step, m, step[m] + work[i, m])
-    return step, effort, outcome if np.isfinite(step[0]) else NOT_CONVERGED
+        step = nothing
+        for i in range(stages):
+            for m in range(dimension):
+                step = set_item(step, m, step[m] + work[i, m])
+        return step, effort, outcome if np.isfinite(step[0]) else NOT_CONVERGED
+
+    return gauss_step
 
 
 Row = tuple[float, ...]
@@ -502,14 +518,18 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
     return Lanes(step, lay, read, lambda _: stages, SpaceTop, dimension, carry, room=lambda _: 4, begin=begin)
 
 
-def _loop(field: Any, dimension: int) -> Loop:
-    """The loop on states that move by `field`, with L in the components 3 to 5; it counts sweeps and iterations."""
+def _loop(
+    field: Any, dimension: int, first: int = 3, still: int = STILL, unit: Any = momentum_unit,
+    solve: Any = solve_stages, observe: Any = observe_axis,
+) -> Loop:  # fmt: skip
+    """The loop on states that move by `field`, a momentum from `first` on; it counts sweeps and iterations."""
+    gauss_step = _stepping(field, first, still, solve)
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        return working_space(field, par, rule, state, h)
+        return working_space(field, unit, par, rule, state, h)
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        step, effort, outcome = gauss_step(field, par, state, carry)
+        step, effort, outcome = gauss_step(par, state, carry)
         return step, carry, effort, outcome
 
     @functools.cache
@@ -517,14 +537,21 @@ def _loop(field: Any, dimension: int) -> Loop:
         return _swept(field, mu, predict, dimension)
 
     def in_lanes(rule: GaussRule) -> Lanes | None:
-        if len(rule.b) > IN_LANES[dimension]:
+        if len(rule.b) > IN_LANES.get(dimension, 0):
             return None
         return of_rows(*(tuple(map(tuple, rows.tolist())) for rows in (rule.mu, rule.predict)))
 
-    return kernel_loop(begin, increment, observe_axis, lanes=in_lanes)
+    return kernel_loop(begin, increment, observe, lanes=in_lanes)
+
+
+@register_jitable
+def _unsolved(field: Any, par: Any, state: Any, work: Any, stages: int) -> Any:
+    """In the place of Newton's iteration."""
+    return 0, False
 
 
 march_axis, march_frame = _loop(field_axis, 6), _loop(field_frame, 9)
+march_body = _loop(body.field_body, 7, 4, -1, _unit_of_body, _unsolved, body.observe_body)
 
 
 def gauss(stages: int) -> Integrator:
@@ -539,6 +566,7 @@ def gauss(stages: int) -> Integrator:
             "attitude": FixedStep(
                 march_frame, rule, space.on_frame, stages, implicit=True, present=space.frame_to_attitude
             ),
+            BODY: FixedStep(march_body, rule, body.on_body, stages, implicit=True),
         },
         order=2 * stages,
         explicit=False,
