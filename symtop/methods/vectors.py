@@ -30,17 +30,6 @@ def plus(a: Any, s: Any, b: Any) -> Any:
 
 
 @register_jitable
-def product(a: Any, b: Any) -> Any:
-    """The quaternion a b: b first, then a, where both are rotations in space."""
-    return (
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-    )
-
-
-@register_jitable
 def solve3(a: Any, b: Any, c: Any, y: Any) -> Any:
     """x of M x = y for the matrix with columns a, b and c, by Cramer's rule."""
     bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)

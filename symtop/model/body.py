@@ -194,14 +194,15 @@ class RigidBody:
         return (*self.moments, *self.torque, *at.quaternion, *self.momentum(at))
 
 
-def product(first: Sequence[float], second: Sequence[float]) -> tuple[float, float, float, float]:
-    """The product of two quaternions: the second turn first."""
-    a, b, c, d = first
-    w, x, y, z = second
+@inlined
+def product(a: Any, b: Any) -> tuple[float, float, float, float]:
+    """The product a b of two quaternions: b first, then a, where both are rotations in space."""
     return (
-        a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y,
-        a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w,
-    )  # fmt: skip
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    )
 
 
 def rotated(quaternion: Any, vectors: Any) -> Any:

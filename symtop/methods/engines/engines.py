@@ -71,7 +71,8 @@ from symtop.methods.framework.loop import FixedStep, Loop, as_stepped, kernel_lo
 from symtop.methods.framework.preparation import Body, Preparation
 from symtop.methods.framework.registry import ENGINE, Integrator
 from symtop.methods.framework.space import L_at, e_at, finite_outcome, observe_attitude, observe_axis, q_at
-from symtop.methods.vectors import cross, dot, plus, product, scaled
+from symtop.methods.vectors import cross, dot, plus, scaled
+from symtop.model.body import product
 
 
 class EngineTop(NamedTuple):

@@ -33,7 +33,7 @@ from symtop.methods.framework.preparation import Later
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group.loop import UNSPUN, in_both_charts, lie_loop
 from symtop.methods.runge_kutta.gauss import ROUND_OFF, SWEEPS, gauss_rule, packed, stage_weights
-from symtop.methods.vectors import product
+from symtop.model.body import product
 
 ORIGIN = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 

@@ -46,6 +46,7 @@ from numpy.typing import ArrayLike
 from symtop.core.errors import SymtopError
 from symtop.core.jit_functions import inlined, shared, two_product
 from symtop.core.numbers import real_numbers
+from symtop.model.body import product
 from symtop.model.charts import Array
 from symtop.model.exact.double_double import (
     ONE,
@@ -191,17 +192,6 @@ def _hyperbolic(c: Constants, nome: Nome, sn: DoubleDouble, cn: DoubleDouble, sp
 
 
 @inlined
-def _product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """p q of quaternions."""
-    return (
-        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
-        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
-        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
-        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
-    )
-
-
-@inlined
 def _in_body(c: Constants, x: float, y: float, z: float) -> Vector:
     """A vector in the body's axes from the canonical ones: exact."""
     return (
@@ -336,7 +326,7 @@ def _moving(c: Constants, gap: DoubleDouble, inertia: Vector, m: Momentum, given
     c[RATE_ERROR] = RATE * (fixed[0] + swung[0] + 2.0 * math.pi * rate[0])
     _, real, imag, lag = _orbit(c, begin[0] if c[KIND] == SEPARATRIX else _reduced(c, PHASE, 0.0)[0])
     w, x, y, z = _turned(c, (m1[0], m2[0], m3[0]), lag, real, imag)
-    c[START], c[START + 1], c[START + 2], c[START + 3] = _product(given, (w, -x, -y, -z))
+    c[START], c[START + 1], c[START + 2], c[START + 3] = product(given, (w, -x, -y, -z))
 
 
 @shared
@@ -396,7 +386,7 @@ def _sample(c: Constants, time: float) -> tuple[Quaternion, Vector]:
         m = _in_body(c, m1, m2, m3)
     unit = c[UNIT]
     w, x, y, z = c[START], c[START + 1], c[START + 2], c[START + 3]
-    quaternion = _product((sign * w, sign * x, sign * y, sign * z), turned)
+    quaternion = product((sign * w, sign * x, sign * y, sign * z), turned)
     return quaternion, (unit * m[0], unit * m[1], unit * m[2])
 
 
