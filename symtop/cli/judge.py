@@ -21,7 +21,13 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 @click.argument("target")
 @click.option("--form", type=click.Choice(FORMS), help="What TARGET is, if not clear.")
 @click.option("--chart", default="axis", show_default=True, help="What a state is: axis, attitude or angles.")
-@click.option("--scene", default="spheroid", show_default=True, shell_complete=completing("scenes"), help="The top.")
+@click.option(
+    "--scene",
+    default="spheroid",
+    show_default=True,
+    shell_complete=completing("scenes"),
+    help="The top; of a trajectory, a body, too.",
+)
 @click.option("--order", type=int, help="Claim an order.")
 @click.option("--symplectic/--not-symplectic", default=None, help="Claim that the step is symplectic, or not.")
 @click.option("--symmetric/--not-symmetric", default=None, help="Claim that a step of -h undoes one of h, or not.")
@@ -65,6 +71,7 @@ def judge(
     symtop judge ./my.so --chart axis --order 2
     symtop judge "./my_engine --top" --form program --quick
     symtop judge run.csv --scene spheroid --conserves p_phi
+    symtop judge brick.csv --scene check-case-2
     """
     from symtop.judging import findings
     from symtop.judging.judge_step import judge as judged

@@ -68,6 +68,11 @@ class Finding(NamedTuple):
         return self._asdict() | {"measured": str(self.measured)} | finite
 
 
+def error_units(name: str) -> str:
+    """The unit of an error of a trajectory, rad of angles."""
+    return {"momentum": " times |L|", "rates": " rad per unit time"}.get(name, " rad")
+
+
 def yes_no(value: bool | int | None) -> str:
     """A claim in a word: yes, no, a number, or nothing."""
     if value is None:
@@ -196,7 +201,7 @@ def line(finding: Finding, width: int = WIDTH) -> str:
     says = SAYS.get(f"{claim} {measured.kind}") or ("{1}" if measured.text else SAYS.get(measured.kind, "{1}"))
     number = value if math.isnan(measured.number) else measured.number
     words = says.format(number, measured).replace(" 0e+00", " 0").replace("0.0e+00", "0") if measured else verdict
-    text = f"{claim_name(claim):<13}{words}"
+    text = f"{claim_name(claim):<12} {words}"
     if declared:
         text += f" (claimed: {declared}{f'; {verdict}' if measured else ''})"
     if verdict in ("confirmed", "measured") and claim != "calls":
@@ -208,7 +213,9 @@ def description(findings: Sequence[Finding]) -> str:
     """What the method is, whatever is claimed of it: "order 2, symplectic, reversible, keeps p_phi; not p_psi"."""
     measured = {one.claim: one.measured for one in findings}
     errors = {one.claim.removesuffix("_error"): one.value for one in findings if one.claim.endswith("_error")}
-    words = [f"{name} within {value:.1e} rad of the truth" for name, value in errors.items()]  # of a trajectory
+    words = [
+        f"{name} within {value:.1e}{error_units(name)} of the truth" for name, value in errors.items()
+    ]  # of a trajectory
     if order := measured.get("order"):
         wrong, p = order.kind == "wrong limit", order.number
         whole = not wrong and abs(p - round(p)) < 0.3

@@ -8,14 +8,17 @@ the angular momentum L in space is there, energy and momenta are recomputed from
 
     E = |L|^2/2 I1 + (L.e)^2 (1/I3 - 1/I1)/2 + mgl e_z,      p_phi = L_z,      p_psi = L.e,
 
-and else they are those of the file. A text file has a line of names and then numbers, with commas or blanks between:
-time, elapsed since the start of the scene, and any of
+and else they are those of the file. Rates beside an attitude are a momentum, too. On a body without symmetry E is that
+of `symtop.model.body`, there is no p_psi, and the momentum and the rates have errors of their own: rates may be right
+where the attitude is wrong. A text file has a line of names and then numbers, with commas or blanks between: time,
+elapsed since the start of the scene, and any of
 
     ex ey ez           the axis, a unit vector in space, z up       theta phi psi         Euler angles (z-x-z), rad
     qw qx qy qz        the attitude, body to space                  energy p_phi p_psi
-    Lx Ly Lz           the angular momentum in space
+    Lx Ly Lz           the angular momentum in space                wx wy wz              rates in body axes, rad
 
-A netCDF file has time, axis (n, 3), quaternion (n, 4), momentum (n, 3) and the same scalars, or is one of `simulate`.
+A netCDF file has time, axis (n, 3), quaternion (n, 4), momentum (n, 3), omega_body (n, 3) and the same scalars, or is
+one of `simulate`.
 """
 
 import functools
@@ -31,22 +34,29 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, whole
+from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import heartbeat
 from symtop.judging.battery import Stage, measure, stages, unmeasured
 from symtop.judging.claims.constants import KEPT, Constant
 from symtop.judging.claims.subject import Subject, open_target, timed
-from symtop.judging.findings import NOTHING, About, Finding, Ledger, Measured, StepLedger, undecided
+from symtop.judging.findings import NOTHING, About, Finding, Ledger, Measured, StepLedger, error_units, undecided
 from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
 from symtop.measure.conservation import CONSTANTS, constant_of
-from symtop.measure.errors import completed, errors, refuse_other_scene, sampled
+from symtop.measure.errors import checked, completed, errors, refuse_other_scene, sampled
 from symtop.methods.framework.registry import ENERGY_ERRORS, Integrator
-from symtop.model.charts import CHARTS, space_energy
+from symtop.model.body import rotated
+from symtop.model.charts import CHARTS, body_energy, space_energy
 from symtop.model.scenes import Scene, scene as find_scene
+from symtop.run.reference.truth import reference
 from symtop.run.trajectory import Trajectory
 
 FILES = (".csv", ".txt", ".dat", ".nc")
-VECTORS = {"axis": ("ex", "ey", "ez"), "quaternion": ("qw", "qx", "qy", "qz"), "momentum": ("Lx", "Ly", "Lz")}
+VECTORS = {
+    "axis": ("ex", "ey", "ez"), "quaternion": ("qw", "qx", "qy", "qz"), "momentum": ("Lx", "Ly", "Lz"),
+    "omega_body": ("wx", "wy", "wz"),
+}  # fmt: skip
 SCALARS = ("time", "theta", "phi", "psi", *CONSTANTS)
+OF_STATES = ("axis", "attitude", "theta", "momentum", "rates")
 FEWEST = 100  # samples by which a law of growth is judged
 SEEDS = 1_000_000_000
 OPENING = 60.0  # seconds for loading a file and its imports
@@ -94,7 +104,9 @@ def judge(
     one_of("chart", chart, CHARTS)
     if not isinstance(energy, str | None) or energy not in ENERGY_ERRORS:
         raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {shown(energy)}", "energy")
-    chosen, listen = find_scene(scene), tell or (lambda _: None)
+    file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES)
+    states = form is None and (file or isinstance(target, (xr.Dataset, Mapping)))
+    chosen, listen = find_scene(scene, bodies=states), tell or (lambda _: None)
     told = {"adaptive": adaptive, "autonomous": autonomous, "quick": quick}
     for name, flag in told.items():
         boolean(name, flag)
@@ -103,8 +115,7 @@ def judge(
     claims = structure | {"conserves": conserves, "energy_error": energy}
     made = Integrator("claims", "other", "", {chart: _no_solver}, **claims)  # checked before anything is loaded
     kept = made.conserves or frozenset()
-    file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES)
-    if form is None and (file or isinstance(target, (xr.Dataset, Mapping))):
+    if states:
         if set(structure.values()) != {None}:
             raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
         constants = tuple(of_trajectory(target, chosen, kept, energy))
@@ -171,7 +182,7 @@ def read(target: Any) -> dict[str, Any]:
 def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy: str | None) -> list[Finding]:
     """A finding for each error and each constant that the samples show, or that is claimed: then it is undecided.
 
-    Raises SymtopError for data that are no trajectory of a top, or name another top or start than the scene's.
+    Raises SymtopError for data that are no trajectory, or name another top or start than the scene's.
     """
     if isinstance(target, (str, Path)) and str(target).lower().endswith(".nc"):
         target = netcdf.read(target)
@@ -179,11 +190,21 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
         refuse_other_scene(target, scene)
         target = sampled(target)
     given = read(target)
-    momentum = given.pop("momentum", None)
+    rates, states = given.pop("omega_body", None), completed(checked(given))
+    if rates is not None:
+        rates = np.asarray(rates, dtype=float)
+        if states.quaternion is None or rates.shape != (states.time.size, 3):
+            raise SymtopError(f"omega_body must be {states.time.size} rows of 3 beside an attitude, not {rates.shape}")
+        if states.momentum is None:
+            moments = scene.top.moments if scene.of_body else (scene.top.I1, scene.top.I1, scene.top.I3)
+            states = states._replace(momentum=rotated(states.quaternion, rates * np.array(moments)))
+            given["momentum"] = states.momentum
     apart = errors(given, scene)
     time = apart["time"].values
-    shown = [_error(name, time, apart) for name in ("axis", "attitude", "theta") if name in apart]
-    own = _from_states(scene, given, momentum)
+    if rates is not None and scene.of_body:
+        apart = apart.assign({name: ("time", values) for name, values in _of_rates(scene, time, rates).items()})
+    shown = [_error(name, time, apart) for name in OF_STATES if name in apart]
+    own = _from_states(scene, states)
     for name in (*CONSTANTS, *sorted({*conserves} - {*CONSTANTS})):
         values = own.get(name, given.get(name))
         declared = energy if name == "energy" and energy else "kept" if name in conserves else ""
@@ -196,15 +217,22 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
     return shown
 
 
-def _from_states(scene: Scene, given: Mapping[str, Any], momentum: Any) -> dict[str, np.ndarray]:
+def _of_rates(scene: Scene, time: np.ndarray, rates: np.ndarray) -> dict[str, np.ndarray]:
+    """The error of the rates (n, 3) of a body, rad per unit time, and its bound."""
+    truth, moments = reference(scene, time), np.array(scene.top.moments)
+    inside = rotated(truth["quaternion"].values * [1.0, -1.0, -1.0, -1.0], truth["momentum"].values)
+    bound = scene.momentum_scale / moments.min() * (truth["attitude_error_bound"].values + 4.0 * EPSILON)
+    return {"rates": np.linalg.norm(rates - inside / moments, axis=1), "rates_bound": bound}
+
+
+def _from_states(scene: Scene, states: Trajectory) -> dict[str, np.ndarray]:
     """Energy and momenta by the angular momentum and the axis; nothing where one of them is not there."""
-    if momentum is None:
+    axis, L, q = states.axis, states.momentum, states.quaternion
+    if L is None or axis is None or (scene.of_body and q is None):
         return {}
-    axis, L = completed(Trajectory.of_data(given)).axis, np.asarray(momentum, dtype=float)
-    if axis is None:
-        return {}
-    if L.shape != axis.shape:
-        raise SymtopError(f"momentum must have the shape {axis.shape}, one row for each time, not {L.shape}")
+    if scene.of_body:
+        inside = rotated(q * [1.0, -1.0, -1.0, -1.0], L)
+        return {"energy": body_energy(scene.top, np.concatenate([q, inside], axis=1)), "p_phi": L[:, 2]}
     p_psi = np.sum(L * axis, axis=1)
     return {"energy": space_energy(scene.top, axis, L, p_psi), "p_phi": L[:, 2], "p_psi": p_psi}
 
@@ -215,11 +243,12 @@ def _error(name: str, time: np.ndarray, apart: xr.Dataset) -> Finding:
     growth = constant_of(time, values) if time.size >= FEWEST else None
     largest = float(np.nanmax(values)) if np.isfinite(values).any() else math.nan
     bound = float(np.nanmax(apart[f"{name}_bound"].values))
-    why = f"largest error {largest:.1e} rad in {time.size} samples up to t = {time[-1]:.4g}"
+    unit = error_units(name)
+    why = f"largest error {largest:.1e}{unit} in {time.size} samples up to t = {time[-1]:.4g}"
     if growth is not None and math.isfinite(growth.exponent):
         why += f", growing as t^{growth.exponent:.2f} +- {growth.exponent_interval:.2f} ({growth.law})"
     law = growth.law if growth is not None and growth.law not in ("undecided", "not judged") else ""
-    measured = Measured(law, largest, text=f"{largest:.0e} rad{law and ', '}{law}")
+    measured = Measured(law, largest, text=f"{largest:.0e}{unit}{law and ', '}{law}")
     return Finding(f"{name}_error", "", measured, "measured", why, largest, bound)
 
 

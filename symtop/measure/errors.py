@@ -73,7 +73,8 @@ def errors(
         quaternion   (n, 4)  w, x, y, z from body to space, either sign; the body's third axis is the top's
         theta        (n,)    inclination in [0, pi], rad; with phi, and psi, the other two Euler angles (z-x-z)
 
-    and, where there are any, ``energy``, ``p_phi``, ``p_psi`` (n,), in the units of the scene's top.
+    and, where there are any, ``energy``, ``p_phi``, ``p_psi`` (n,), in the units of the scene's top; of a body without
+    symmetry ``momentum`` (n, 3) in space, too.
 
     Returns a Dataset over ``time`` with those of ``axis``, ``attitude``, ``theta`` (rad), ``energy``, ``p_phi``,
     ``p_psi`` (relative, see above) that the data show. ``NAME_bound`` (n,) is the least error that can be told from
@@ -180,7 +181,7 @@ def errors_against(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str
                 attitude = charts.quaternion_from_angles(run.theta, run.phi, run.psi)
             low = true.get("quaternion_lo", 0.0)
             columns["attitude"] = charts.attitude_distance(attitude, true["quaternion"], low)
-        if run.momentum is not None:
+        if run.momentum is not None and "momentum" in true:
             columns["momentum"] = np.linalg.norm(run.momentum - true["momentum"], axis=1) / scene.momentum_scale
     return columns
 
@@ -189,7 +190,7 @@ LENGTH = 1e-3  # how far from one the length of an axis or a quaternion may be: 
 FAR, NEAR = 0.1, 0.01  # rad from the true attitude: another order of a quaternion, and the right one
 BEYOND = 100.0  # horizons: milliseconds for seconds are a thousand
 CONSTANTS = ("energy", "p_phi", "p_psi")
-SHAPES = {"axis": (3,), "quaternion": (4,), **dict.fromkeys(("theta", "phi", "psi", *CONSTANTS), ())}
+SHAPES = {"axis": (3,), "quaternion": (4,), "momentum": (3,), **dict.fromkeys(("theta", "phi", "psi", *CONSTANTS), ())}
 ENOUGH = ("axis", "quaternion", "theta")  # one of them there must be
 
 
@@ -302,16 +303,20 @@ def _numbers(name: str, values: Any) -> charts.Array:
 
 
 def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
-    """Refuse quaternions whose first sample is the true attitude only when it is read in another convention."""
-    finite = np.flatnonzero(np.isfinite(quaternion).all(axis=1))
-    if not finite.size:
+    """Refuse quaternions that are the true attitude only when they are read in another convention.
+
+    That is judged where they are first `FAR` from the truth: a scene may begin where two conventions agree.
+    """
+    true = truth["quaternion"].values
+    far = np.flatnonzero(charts.attitude_distance(quaternion, true) > FAR)
+    if not far.size:
         return
-    first, true = quaternion[finite[0]], truth["quaternion"].values[finite[0]]
-    as_given = float(charts.attitude_distance(first, true))
-    for other, moved in (("x, y, z, w", np.roll(first, 1)), ("from space to body", first * [1.0, -1.0, -1.0, -1.0])):
-        if as_given > FAR and float(charts.attitude_distance(moved, true)) < NEAR:
+    given, k = quaternion[far[0]], far[0]
+    for other, moved in (("x, y, z, w", np.roll(given, 1)), ("from space to body", given * [1.0, -1.0, -1.0, -1.0])):
+        if float(charts.attitude_distance(moved, true[k])) < NEAR:
             raise SymtopError(
-                "quaternion must be in the order w, x, y, z and from body to space, but its first sample is the true "
+                "quaternion must be in the order w, x, y, z and from body to space, but its "
+                f"{'first sample' if k == 0 else f'sample at t = {truth.time.values[k]:.6g}'} is the true "
                 f"one if it is read as {other}"
             )
 

@@ -12,6 +12,7 @@ from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.judging.claims.subject import open_target
 from symtop.methods.framework.equations import FORMULATIONS
+from symtop.model.body import product, rotated
 from tests.judging.blind.right import midpoint
 
 SPHEROID = symtop.scene("spheroid")
@@ -139,6 +140,73 @@ def test_what_is_no_trajectory_is_told(tmp_path, content, words):
     (tmp_path / "run.csv").write_text(content, encoding="utf-8")
     with pytest.raises(symtop.SymtopError, match=words):
         symtop.judge(str(tmp_path / "run.csv"))
+
+
+def of_body(scene, change=1.0):
+    """Time, attitudes and rates of the exact motion of a body, the rates in units of `change` rad per unit time."""
+    truth = symtop.reference(scene, np.linspace(0.0, 20.0, 101))
+    q, moments = truth["quaternion"].values, symtop.scene(scene, bodies=True).top.moments
+    rates = rotated(q * CONJUGATE, truth["momentum"].values) / np.array(moments)
+    return np.column_stack([truth["time"].values, q, change * rates])
+
+
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+OF_BODY = "time,qw,qx,qy,qz,wx,wy,wz"
+
+
+@pytest.mark.parametrize("scene", ["check-case-2", "heavy-brick", "tennis-racket"])
+def test_a_body_is_judged_by_attitudes_and_rates(scene, tmp_path):
+    file, true = tmp_path / "run.csv", of_body(scene)
+    file.write_text(text(true, OF_BODY), encoding="utf-8")
+    ledger = symtop.judge(file, scene=scene, conserves=["p_phi"], energy="kept")
+    assert {"attitude_error", "momentum_error", "rates_error", "energy", "p_phi"} <= {*ledger}
+    assert "p_psi" not in ledger
+    assert max(one.value for one in ledger.findings if one.claim.endswith("_error")) < 1e-13
+    assert [ledger[name].verdict for name in ("energy", "p_phi")] == ["confirmed"] * 2
+    turned = true.copy()  # an attitude that creeps, and rates that are right
+    turned[:, 1:5] = [product(rows[1:5], (1.0, 1e-4 * rows[0], 0.0, 0.0)) for rows in true]
+    file.write_text(text(turned, OF_BODY), encoding="utf-8")
+    off = symtop.judge(file, scene=scene)
+    assert off["attitude_error"].value == pytest.approx(4e-3, rel=1e-3)
+    assert off["rates_error"].value < 1e-13
+    assert off["momentum_error"].value > 1e-5
+    file.write_text(text(of_body(scene, 1.001), OF_BODY), encoding="utf-8")
+    assert symtop.judge(file, scene=scene)["rates_error"].value == pytest.approx(
+        1e-3 * np.linalg.norm(true[:, 5:], axis=1).max(), rel=1e-9
+    )
+
+
+def test_a_conjugate_attitude_of_a_body_is_refused_although_it_starts_right(tmp_path):
+    """The scene starts where body and space axes agree."""
+    file, wrong = tmp_path / "run.csv", of_body("check-case-2")
+    wrong[:, 1:5] *= CONJUGATE
+    file.write_text(text(wrong, OF_BODY), encoding="utf-8")
+    done = CliRunner().invoke(main, ["judge", str(file), "--scene", "check-case-2"])
+    assert done.exit_code == 2
+    assert "its sample at t = 0.2 is the true one if it is read as from space to body" in done.stderr
+    axis, late = text(wrong[:, [0, 5, 6, 7]], "time,wx,wy,wz"), np.copy(wrong[:, :5])
+    for content, words in [
+        (axis, "one of axis, quaternion, theta"),
+        (text(late[::-1], OF_BODY[:16]), "increase from sample to sample"),
+        (text(late * [1.0, 2.0, 2.0, 2.0, 2.0], OF_BODY[:16]), "quaternion must be of length 1 within 0.001"),
+        (text(wrong[:, [0, 3, 5, 6, 7]], "time,theta,wx,wy,wz").replace(",-0.", ",0."), "rows of 3 beside an attitude"),
+    ]:
+        file.write_text(content, encoding="utf-8")
+        with pytest.raises(symtop.SymtopError, match=words):
+            symtop.judge(str(file), scene="check-case-2")
+    with pytest.raises(symtop.SymtopError, match="scene must be one of a SymmetricTop here, not check-case-2"):
+        symtop.judge("my.py:step", scene="check-case-2")
+
+
+def test_rates_of_a_top_are_its_momentum():
+    top = SPHEROID.top
+    run = symtop.simulate(SPHEROID, "strang[attitude]", step_size=1e-3, horizon=3.0, samples=31)
+    q, axis = run["quaternion"].values, run["axis"].values
+    rates = np.ones((len(q), 3)) * [0.3, -0.2, 0.5]
+    given = {"time": run["time"].values, "quaternion": q, "omega_body": rates, "axis": axis}
+    energy = symtop.judge(given)["energy"]
+    moving = 0.5 * (top.I1 * 0.13 + top.I3 * 0.25) + top.mgl * axis[:, 2]
+    assert energy.value == pytest.approx(np.abs(moving - moving[0]).max() / SPHEROID.energy_scale, rel=1e-9)
 
 
 def test_a_trajectory_has_no_order():
