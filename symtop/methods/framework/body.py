@@ -4,13 +4,20 @@
 
 q turns body vectors into space vectors, M is the angular momentum in body axes (`symtop.model.body`). f is quadratic in
 the state. |q| stays one only as far as a method keeps it; p_phi = L_z = M.Gamma is read off the state.
+
+Seen from the body, space turns by q*, and Gamma takes the place of a top's axis, M that of its L:
+
+    Gamma' = w x Gamma,     M' = w x M + f x Gamma,     w = -omega,   f = -c,     (q*)' = w q*/2
+
+are the equations of (e, L) with another element (w, f) of se(3). So a kernel on (q, L) of a top that makes its step of
+e and L alone steps (q*, M) of a body (`turned`), and what it keeps of L.e it keeps of p_phi.
 """
 
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.preparation import Preparation
-from symtop.methods.framework.space import finite_outcome
+from symtop.methods.framework.preparation import Preparation, Shown
+from symtop.methods.framework.space import finite_outcome, observe_attitude
 from symtop.model.body import vertical
 
 
@@ -66,7 +73,16 @@ class _OfBody(Preparation):
         return self.numbers(*self.opened(top.flat(at)))
 
 
+def _turned(body: Any, at: Any) -> Any:
+    return body, (at.w, -at.x, -at.y, -at.z, at.M1, at.M2, at.M3)
+
+
+def _turned_back(par: Any, t: float, y: Any) -> Any:
+    return y[0], -y[1], -y[2], -y[3], y[4], y[5], y[6]
+
+
 on_body = _OfBody(_on_body, 7, opened=opened, momenta=_momenta)
+turned, turned_back = _OfBody(_turned, 7, opened=opened, momenta=_momenta), Shown(_turned_back, 7)
 
 
 @register_jitable
@@ -100,3 +116,9 @@ def observe_body(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any
     M1, M2, M3 = before[4] + dstate[4], before[5] + dstate[5], before[6] + dstate[6]
     g1, g2, g3 = vertical(before[0] + dstate[0], before[1] + dstate[1], before[2] + dstate[2], before[3] + dstate[3])
     return M1 * g1 + M2 * g2 + M3 * g3, M3
+
+
+def observe_turned(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+    """The same of (q*, M): M3 stands where L_z does, and M.Gamma where L.e does."""
+    M3, L_z = observe_attitude(par, rule, before, dstate, h)
+    return L_z, M3

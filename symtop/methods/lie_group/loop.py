@@ -14,6 +14,8 @@ step, with an error that grows with the spin.
 
 p - 1 in place of p keeps increments free of cancellation. What |q| lacks is added to m in every step.
 
+A body without symmetry is stepped as (q*, M), for which a map sees Gamma and M (`framework.body`), alone, not in lanes.
+
 In lanes the shares stand outside and the lanes inside. A family writes what stands between, as one loop over the lanes
 or several (`stepped`), or as the parts of an iteration (`iterated`). The table holds the numbers of the top, those of
 the rule and those of each share: one kernel for compositions of any length, and for both charts. An iteration runs
@@ -26,6 +28,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
+from symtop.methods.framework.body import observe_turned, turned, turned_back
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
@@ -33,6 +36,7 @@ from symtop.methods.framework.preparation import Body, Preparation, Shown, as_it
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, observe_attitude, on_attitude, with_spin
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate, cross, dot, plus, scaled
+from symtop.model.charts import BODY
 
 _attitude_numbers = on_attitude.numbers
 
@@ -113,7 +117,7 @@ def ended(step: Any) -> int:
 
 def lie_loop(
     turn: Callable[..., Any], begin: Callable[..., Any] = no_carry,
-    lanes: Callable[[Any], Lanes | None] = lambda _: None,
+    lanes: Callable[[Any], Lanes | None] = lambda _: None, observe: Callable[..., Any] = observe_attitude,
 ) -> Loop:  # fmt: skip
     """The loop on (q, L) around a map; `lanes` is how it steps many, by its rule."""
     register_jitable(turn)
@@ -132,7 +136,7 @@ def lie_loop(
             outcome = ended(step)
         return step, carry, effort, outcome
 
-    return kernel_loop(begin, increment, observe_attitude, lanes=lanes)
+    return kernel_loop(begin, increment, observe, lanes=lanes)
 
 
 def in_both_charts(loop: Loop, rule: Any, carried: Carried, forces: int, *, implicit: bool) -> dict[str, FixedStep]:
@@ -141,6 +145,16 @@ def in_both_charts(loop: Loop, rule: Any, carried: Carried, forces: int, *, impl
         chart: FixedStep(loop, rule, carried.prepare, forces, implicit=implicit, present=shown)
         for chart, shown in (("axis", _AXIS), ("attitude", carried.present))
     }
+
+
+def body_loop(turn: Callable[..., Any], begin: Callable[..., Any] = no_carry) -> Loop:
+    """The loop on (q*, M) of a body without symmetry around ``turn(par, rule, Gamma, M, carry, h)``."""
+    return lie_loop(turn, begin, observe=observe_turned)
+
+
+def on_body(loop: Loop, rule: Any, forces: int, *, implicit: bool) -> dict[str, FixedStep]:
+    """The solver of a body without symmetry."""
+    return {BODY: FixedStep(loop, rule, turned, forces, implicit=implicit, present=turned_back)}
 
 
 @register_jitable

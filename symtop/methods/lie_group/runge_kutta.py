@@ -19,7 +19,8 @@ of them; p_phi = L_z and the energy drift. With F_j the algebra element at stage
 
 The last is a method for the element U that the solution is the exponential of, U' = dexp^-1_U F; of dexp^-1 two
 brackets suffice for order 4. A table is rows of weights, one row an exponential, so that one kernel steps all three.
-The engines' `rkmk4` acts with another group, SO(3) x R^3, on body rates and turns the spin in its stages.
+The engines' `rkmk4` acts with another group, SO(3) x R^3, on body rates and turns the spin in its stages. A body
+without symmetry moves by an element of se(3), too, and q* with it (`framework.body`): p_phi is the Casimir kept there.
 
 In lanes a kernel compiles for each shape of a table: how many exponentials each stage has, and whether slopes are bent
 back (Munthe-Kaas). The weights are numbers in the table, and those that are 0 are carried out too, in the order of the
@@ -40,6 +41,7 @@ from symtop.core.jit import register_jitable
 from symtop.methods.framework.lanes import Lanes, W, column
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.registry import Integrator
+from symtop.methods.lie_group import loop
 from symtop.methods.lie_group.loop import UNSPUN, entered, give_up, in_both_charts, left, lie_loop, moved, stepped
 from symtop.methods.simd import wide_vectors
 from symtop.methods.splitting.rotor import COSINE, SINE, series
@@ -206,31 +208,47 @@ def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return np.empty((len(rule.counts), 6))
 
 
-def turn(par: Any, rule: Any, e: Any, L: Any, slopes: Any, h: float) -> Any:
-    """One step; the work counted is the number of force evaluations."""
-    stages, row = len(rule.counts), 0
-    f0 = 0.0, 0.0, par.mgl
-    _store(slopes, 0, scaled(1.0 / par.I1, L), f0)
-    made = 0.0, NOUGHT, e, NOUGHT
-    for i in range(1, stages + 1):
-        made, w, f = (0.0, NOUGHT, e, NOUGHT), NOUGHT, NOUGHT
-        for _ in range(int(rule.counts[i - 1])):
-            w, f = NOUGHT, NOUGHT
-            for j in range(i):
-                weight = h * rule.weights[row + j]
-                w = plus(w, weight, (slopes[j, 0], slopes[j, 1], slopes[j, 2]))
-                f = plus(f, weight, (slopes[j, 3], slopes[j, 4], slopes[j, 5]))
-            row += stages
-            made = acted(made, L, w, f, any_angle(half_square(w)))
-        if i < stages:
-            slope, g = scaled(1.0 / par.I1, plus(L, 1.0, made[3])), f0
-            if rule.bent != 0.0:
-                slope, g = bent_back(w, f, slope, g)
-            _store(slopes, i, slope, g)
-    return made[0], made[1], made[3], stages, OK
+@register_jitable
+def _of_top(par: Any, L: Any) -> Any:
+    """The element of se(3) that the field is at L."""
+    return scaled(1.0 / par.I1, L), (0.0, 0.0, par.mgl)
 
 
-march = lie_loop(turn, _begin, lambda rule: _of_shape(tuple(map(int, rule.counts)), rule.bent != 0.0))
+@register_jitable
+def _of_body(par: Any, M: Any) -> Any:
+    """That of a body, seen from itself."""
+    return (-par.a1 * M[0], -par.a2 * M[1], -par.a3 * M[2]), (-par.c1, -par.c2, -par.c3)
+
+
+def _turning(element: Callable[..., Any]) -> Callable[..., Any]:
+    """One step, with ``element(par, L)`` of se(3); the work counted is the number of force evaluations."""
+
+    def turn(par, rule, e, L, slopes, h):  # type: ignore[no-untyped-def]
+        stages, row = len(rule.counts), 0
+        _store(slopes, 0, *element(par, L))
+        made = 0.0, NOUGHT, e, NOUGHT
+        for i in range(1, stages + 1):
+            made, w, f = (0.0, NOUGHT, e, NOUGHT), NOUGHT, NOUGHT
+            for _ in range(int(rule.counts[i - 1])):
+                w, f = NOUGHT, NOUGHT
+                for j in range(i):
+                    weight = h * rule.weights[row + j]
+                    w = plus(w, weight, (slopes[j, 0], slopes[j, 1], slopes[j, 2]))
+                    f = plus(f, weight, (slopes[j, 3], slopes[j, 4], slopes[j, 5]))
+                row += stages
+                made = acted(made, L, w, f, any_angle(half_square(w)))
+            if i < stages:
+                slope, g = element(par, plus(L, 1.0, made[3]))
+                if rule.bent != 0.0:
+                    slope, g = bent_back(w, f, slope, g)
+                _store(slopes, i, slope, g)
+        return made[0], made[1], made[3], stages, OK
+
+    return turn
+
+
+march = lie_loop(_turning(_of_top), _begin, lambda rule: _of_shape(tuple(map(int, rule.counts)), rule.bent != 0.0))
+march_body = loop.body_loop(_turning(_of_body), _begin)
 
 
 def lie_runge_kutta(
@@ -244,7 +262,9 @@ def lie_runge_kutta(
     return Integrator(
         name=name, family="lie-group", summary=summary, reference=reference, order=order, explicit=True,
         symplectic=False, symmetric=False, conserves=frozenset({"p_psi", "axis_length"}),
-        solvers=in_both_charts(march, rule, UNSPUN, 1, implicit=False), needs="group", general=True,
+        solvers=in_both_charts(march, rule, UNSPUN, 1, implicit=False)
+        | loop.on_body(march_body, rule, 1, implicit=False),
+        needs="group", general=True,
     )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ i u' + d x u' x e = n a', and what is left is an equation for one number,
     Moser-Veselov     n = 1 + u^2,     i = I1,       j = I3          Newton's from n = 1, monotone
     Euler-Poincare    k = u.J u,       i = I1 + k,   j = I3 + k,     n = 1         from k = 0, in an interval
 
+A body without symmetry leaves three equations for u, in its own axes, and Newton's method from u = J^-1 a.
 The first has no solution where a body with I1 = I3 would have to turn by more than a right angle, h|L| > I1, and a run
 ends there as `not_converged`; the second has one at any step. Both are symplectic, symmetric and of order 2; p_phi and
 p_psi are kept by Noether's theorem. Five steps with Suzuki's shares are of order 4. The body's spin is turned in the
@@ -33,11 +34,14 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
+from symtop.methods.framework.body import torque
 from symtop.methods.framework.loop import Loop
+from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
+from symtop.methods.lie_group import loop
 from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, iterated_loop, moved
 from symtop.methods.splitting.coefficients import SUZUKI_4
-from symtop.methods.vectors import cross, dot, plus, scaled
+from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
 MOST = 60  # iterations of a step; 2 to 5 are the rule
 ENOUGH = 1e-10  # a relative correction whose square is below rounding
@@ -150,12 +154,48 @@ def _loop(first: Callable[..., Any], after: Callable[..., Any], rates: Callable[
 MARCH = {MOSER_VESELOV: _loop(*RIGID_BODY, 1), EULER_POINCARE: _loop(*RETRACTION, 3)}
 
 
+@register_jitable
+def _image(par: Any, kind: float, a: Any, u: Any, Ju: Any, d: Any) -> Any:
+    """The derivative along d of J u + u x J u + kind (u.J u) u - (1 - kind) u^2 a, J in the axes of the body."""
+    Jd = par.I1 * d[0], par.I2 * d[1], par.I3 * d[2]
+    image = plus(plus(Jd, 1.0, cross(d, Ju)), 1.0, cross(u, Jd))
+    image = plus(plus(image, kind * dot(u, Ju), d), 2.0 * kind * dot(u, Jd), u)
+    return plus(image, -2.0 * (1.0 - kind) * dot(u, d), a)
+
+
+def turn_body(par: Any, rule: Any, g: Any, M: Any, carry: Any, h: float) -> Any:
+    """One step of a body without symmetry, by Newton's method for u in its axes; the work is the number of passes."""
+    half, kind = 0.5 * h, rule.kind
+    kicked = plus(M, half, torque(par, *g))
+    a = scaled(half, kicked)
+    u, work, ended, lost = (par.a1 * a[0], par.a2 * a[1], par.a3 * a[2]), 0, False, False
+    while not (ended or lost) and work < MOST:
+        Ju = par.I1 * u[0], par.I2 * u[1], par.I3 * u[2]
+        rest = plus(scaled(1.0 + (1.0 - kind) * dot(u, u), a), -1.0, Ju)
+        rest = plus(plus(rest, -1.0, cross(u, Ju)), -kind * dot(u, Ju), u)
+        first = _image(par, kind, a, u, Ju, (1.0, 0.0, 0.0))
+        second = _image(par, kind, a, u, Ju, (0.0, 1.0, 0.0))
+        third = _image(par, kind, a, u, Ju, (0.0, 0.0, 1.0))
+        change = solve3(first, second, third, rest)
+        u = plus(u, 1.0, change)
+        ended, lost = dot(change, change) <= ENOUGH * ENOUGH * dot(u, u), not dot(first, cross(second, third)) > 0.0
+        work += 1
+    m, v = cayley(scaled(-1.0, u))  # space turns the other way
+    kick = plus(torque(par, *g), 1.0, torque(par, *plus(g, 1.0, moved(m, v, g))))
+    return m, v, plus(moved(m, v, kicked), half, kick), work, OK if ended and not lost else NOT_CONVERGED
+
+
+march_body = loop.body_loop(turn_body)
+
+
 def lie_variational(name: str, rule: Variational, order: int, summary: str, reference: str) -> Integrator:
     """The variational integrator of a discrete Lagrangian and a composition."""
     return Integrator(
         name=name, family="discrete-lagrangian", summary=summary, reference=reference, order=order, explicit=False,
         symplectic=True, symmetric=True, conserves=frozenset({"p_phi", "p_psi", "axis_length"}),
-        solvers=in_both_charts(MARCH[rule.kind], rule, SPUN, 1, implicit=True), needs="kicks", general=True,
+        solvers=in_both_charts(MARCH[rule.kind], rule, SPUN, 1, implicit=True)
+        | loop.on_body(march_body, rule, 1, implicit=True),
+        needs="kicks", general=True,
     )  # fmt: skip
 
 
