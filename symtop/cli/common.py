@@ -1,10 +1,12 @@
 """What the commands share: options, plug-ins, files to write, errors without a traceback, text that fits."""
 
 import contextlib
+import dataclasses
 import errno
 import functools
 import importlib
 import json
+import math
 import shutil
 import sys
 import tempfile
@@ -12,7 +14,7 @@ import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
@@ -29,13 +31,18 @@ from symtop.core.errors import (
 from symtop.core.progress import telling
 from symtop.core.signals import INTERRUPTED, told_apart
 
+if TYPE_CHECKING:
+    from symtop.model.scenes import Scene
+
 LONGEST_NAME = 80  # characters of the name of a file that are shown
 ENDINGS = {"figure": (".png", ".svg", ".pdf"), "card": (".html", ".htm"), "badge": (".svg",)}  # by option
 NAMES = {  # what the shell completes: the module and its function
-    "scenes": ("symtop.model.scenes", "scenes"), "studies": ("symtop.runner.scripts", "names"),
+    "scenes": ("symtop.model.scenes", "scenes"), "all scenes": ("symtop.model.scenes", "all_scenes"),
+    "studies": ("symtop.runner.scripts", "names"),
     "integrators": ("symtop.methods.framework.registry", "integrators"),
     "variants": ("symtop.methods.framework.registry", "variants"),
 }  # fmt: skip
+BODY, PERIODS = "body", 20.0  # the scene of the options of a body, and its horizon
 SILENT = ("explore",)  # commands that work until they are ended
 PLUGINS = "symtop.plugins"  # in the context of a command: plug-ins were given
 
@@ -79,7 +86,64 @@ def completing(kind: str) -> Callable[[click.Context, click.Parameter, str], lis
     return complete
 
 
-def step_of(scene: str, settings: dict[str, Any]) -> float | None:
+def _numbers(count: int) -> Callable[[click.Context, click.Parameter, str | None], tuple[float, ...] | None]:
+    """The callback of an option of so many numbers with commas between."""
+
+    def read(_: click.Context, option: click.Parameter, text: str | None) -> tuple[float, ...] | None:
+        try:
+            values = None if text is None else tuple(map(float, text.split(",")))
+        except ValueError:
+            values = ()
+        if values is not None and len(values) != count:
+            raise SymtopError(f"--{option.name} must be {count} numbers with commas between, not {text!r}")
+        return values
+
+    return read
+
+
+OF_BODY = {  # options of a body: how many numbers, and what they are
+    "body": (3, "I1,I2,I3", f"Principal moments of a body of your own, which is then the scene {BODY}."),
+    "mgl": (1, "NUMBER", "Its weight times the distance of its centre; free without."),
+    "centre": (3, "X,Y,Z", "The direction of its centre in body axes; the third axis by default."),
+    "attitude": (4, "W,X,Y,Z", "Its quaternion at the start, body to space; 1,0,0,0 by default."),
+    "rates": (3, "W1,W2,W3", "Its angular velocity at the start, in body axes."),
+}
+
+
+def body_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of a body of the user's own; its scene, if that is `BODY`, is then made of them."""
+
+    @functools.wraps(command)
+    def with_body(**settings: Any) -> None:
+        given = {name: value for name in OF_BODY if (value := settings.pop(name)) is not None}
+        scene = "scene" if "scene" in settings else "name"
+        if given:
+            if "body" not in given or settings[scene] != BODY:
+                options = ", ".join(f"--{name}" for name in given)
+                raise SymtopError(
+                    f"{options} must come with --body I1,I2,I3 on the scene {BODY}, not {settings[scene]}"
+                )
+            settings[scene] = _own_body(given)
+        command(**settings)
+
+    for name, (count, metavar, words) in reversed(OF_BODY.items()):
+        with_body = click.option(f"--{name}", metavar=metavar, callback=_numbers(count), help=words)(with_body)
+    return with_body
+
+
+def _own_body(given: dict[str, Any]) -> "Scene":
+    from symtop.model import body, scenes
+
+    top = body.RigidBody(*given["body"], *given.get("mgl", ()))
+    top = dataclasses.replace(top, centre=given.get("centre", top.centre))
+    start = body.Attitude(given.get("attitude", (1.0, 0.0, 0.0, 0.0)), given.get("rates", (0.0, 0.0, 0.0)))
+    period = top.nutation_period(start)
+    if not math.isfinite(period):
+        raise SymtopError("--body without a weight needs --rates: it does not move")
+    return scenes.Scene(BODY, top, start, PERIODS * period, f"a body of your own, over {PERIODS:g} natural periods")
+
+
+def step_of(scene: "str | Scene", settings: dict[str, Any]) -> float | None:
     """The step of the options --step-size and --per-nutation, of which the second is taken out of `settings`."""
     step, count = settings.get("step_size"), settings.pop("per_nutation")
     if step is not None and count is not None:
@@ -145,10 +209,10 @@ def _in_options(error: SymtopError, command: click.Command | None) -> str:
     if not isinstance(error, UnknownNameError) or error.parameters[0] not in ("scene", "integrator"):
         return sentence
     from symtop.methods.framework.registry import integrators, split_name
-    from symtop.model.scenes import scenes
+    from symtop.model.scenes import all_scenes
 
     (kind,), name = error.parameters, str(error.value)
-    if name in scenes() or split_name(name)[0] in integrators():
+    if name in all_scenes() or split_name(name)[0] in integrators():
         other = "an integrator" if kind == "scene" else "a scene"
         both = {"scene", "integrator"} <= {one.name for one in parameters if isinstance(one, click.Argument)}
         order = ", and the scene comes first" if both else ""

@@ -8,6 +8,7 @@ import click
 from symtop.cli.common import (
     File,
     as_text,
+    body_options,
     check_outputs,
     completing,
     json_option,
@@ -28,7 +29,7 @@ COLUMNS = ("step_size", "tolerance", "steps_per_nutation", "error", "seconds", "
 
 
 @click.command(short_help="Compare methods on one scene: error against run time.")
-@click.argument("scene", shell_complete=completing("scenes"))
+@click.argument("scene", shell_complete=completing("all scenes"))
 @click.argument("methods", nargs=-1, required=True, shell_complete=completing("integrators"))
 @click.option("--quantity", default="axis", show_default=True, help="Error of what: axis, attitude, theta, energy, ...")
 @click.option("--cost", default="time", show_default=True, help="time, or evaluations, and nothing is timed.")
@@ -37,10 +38,11 @@ COLUMNS = ("step_size", "tolerance", "steps_per_nutation", "error", "seconds", "
 @click.option("--budget", type=float, help="Most force evaluations of a run; 3e6 by default, 5e4 of plain Python.")
 @click.option("--output", "-o", type=File(), help="Write all runs to this netCDF file.")
 @click.option("--figure", type=File(), help="Draw error against cost: .png, .svg or .pdf.")
+@body_options
 @plugin_option
 @json_option
 def compare(
-    scene: str, methods: tuple[str, ...], output: str | None, figure: str | None, as_json: bool, **options: Any
+    scene: Any, methods: tuple[str, ...], output: str | None, figure: str | None, as_json: bool, **options: Any
 ) -> None:
     """Compare METHODS on one SCENE: which is cheapest for an error of 1e-3, 1e-6 and 1e-9?
 
@@ -71,8 +73,9 @@ def compare(
     places = {target: comparison.cheapest(data, target).tolist() for target in TARGETS}
     cells = [data.isel(variant=k) for k in range(data.sizes["variant"])]
     records = [[_record(cell, target, places[target][k]) for target in TARGETS] for k, cell in enumerate(cells)]
+    name = getattr(scene, "name", scene)
     if as_json:
-        facts = {name: (data.attrs | {"scene": scene})[name] for name in FACTS}
+        facts = {name: (data.attrs | {"scene": name})[name] for name in FACTS}
         click.echo(
             as_text(
                 facts
@@ -81,7 +84,7 @@ def compare(
         )
         return
     timed, end, count = options["cost"] == "time", data.attrs["horizon"], data.attrs["nutations"]
-    say(f"{scene} to t = {end:.6g} ({count:.3g} nutations): the cheapest run by {options['cost']}")
+    say(f"{name} to t = {end:.6g} ({count:.3g} nutations): the cheapest run by {options['cost']}")
     say(f"steps a nutation or tolerance{', time' * timed}, force evaluations; error of {data.attrs['quantity']}")
     rows = [[str(data["variant"].values[k]), *(_cell(one, timed) for one in own)] for k, own in enumerate(records)]
     click.echo(table(["variant", *map("error {:.0e}".format, TARGETS)], rows))

@@ -22,12 +22,9 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 @click.option("--form", type=click.Choice(FORMS), help="What TARGET is, if not clear.")
 @click.option("--chart", default="axis", show_default=True, help="What a state is: axis, attitude or angles.")
 @click.option(
-    "--scene",
-    default="spheroid",
-    show_default=True,
-    shell_complete=completing("scenes"),
+    "--scene", default="spheroid", show_default=True, shell_complete=completing("all scenes"),
     help="The top; of a trajectory, a body, too.",
-)
+)  # fmt: skip
 @click.option("--order", type=int, help="Claim an order.")
 @click.option("--symplectic/--not-symplectic", default=None, help="Claim that the step is symplectic, or not.")
 @click.option("--symmetric/--not-symmetric", default=None, help="Claim that a step of -h undoes one of h, or not.")
@@ -45,10 +42,11 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 @click.option("--card", type=File(dir_okay=False), help="Write a page with two figures and the ledger (HTML).")
 @click.option("--badge", type=File(dir_okay=False), help="Write a badge for a README (SVG).")
 @click.option("--figure", type=File(dir_okay=False), help="Draw its error against evaluations, beside four methods.")
+@common.body_options
 @plugin_option
 @json_option
 def judge(
-    target: str, scene: str, output: str | None, card: str | None, badge: str | None, figure: str | None, as_json: bool,
+    target: str, scene: Any, output: str | None, card: str | None, badge: str | None, figure: str | None, as_json: bool,
     **options: Any,
 ) -> None:  # fmt: skip
     """Judge TARGET: its order, structure, invariants and drift on the top, beside what you claim of it.
@@ -78,7 +76,7 @@ def judge(
 
     def tell(event: Any) -> None:
         if isinstance(event, findings.About):
-            click.echo(findings.heading(event, scene))
+            click.echo(findings.heading(event, getattr(scene, "name", scene)))
         elif line := findings.line(event, common.terminal_width()):
             click.echo(line)
 

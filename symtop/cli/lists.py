@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from symtop import __version__
-from symtop.cli.common import File, as_text, completing, facts, json_option, plugin_option, table, terminal_width
+from symtop.cli.common import (
+    File,
+    as_text,
+    body_options,
+    completing,
+    facts,
+    json_option,
+    plugin_option,
+    table,
+    terminal_width,
+)
 from symtop.core.errors import SymtopError
 from symtop.report import formats
 
@@ -115,20 +125,22 @@ def _integrator_page(described: Record) -> str:
 
 
 @click.command(short_help="List the scenes, or show one in full.")
-@click.argument("name", required=False, shell_complete=completing("scenes"))
+@click.argument("name", required=False, shell_complete=completing("all scenes"))
 @wide_option
 @json_option
+@body_options
 @plugin_option
-def scenes(name: str | None, wide: bool, as_json: bool) -> None:
+def scenes(name: Any, wide: bool, as_json: bool) -> None:
     """List every scene with its purpose, or show the one called NAME: its top, start, horizon and motion.
 
     \b
     symtop scenes
     symtop scenes spheroid
+    symtop scenes body --body 1,2,3 --rates 0.01,1,0
     """
     from symtop.model import scenes as catalogue
 
-    listed = [*catalogue.scenes().values(), *catalogue.body_scenes().values()]
+    listed = list(catalogue.all_scenes().values())
     chosen = [catalogue.scene(name, bodies=True)] if name is not None else listed
     records: list[Record] = [scene.record() for scene in chosen]
     keys = {"name": "name", "horizon": "horizon (s)", "nutation": "nutation period (s)", "purpose": "purpose"}

@@ -29,7 +29,7 @@ EXECUTION = {
 
 
 @click.command(short_help="Run one integrator on one scene; show its errors.")
-@click.argument("scene", shell_complete=completing("scenes"))
+@click.argument("scene", shell_complete=completing("all scenes"))
 @click.argument("integrator", shell_complete=completing("integrators"))
 @click.option("--step-size", type=float, help="Step of a fixed-step method.")
 @common.per_nutation_option
@@ -41,10 +41,11 @@ EXECUTION = {
 @click.option("--guard/--no-guard", default=True, help="Warn before the run if a large error is expected.")
 @click.option("--output", type=File(), help="Write the run to this netCDF file.")
 @click.option("--figure", type=File(), help="Draw the run and its errors: .png, .svg or .pdf.")
+@common.body_options
 @common.plugin_option
 @common.json_option
 def run(
-    scene: str, integrator: str, guard: bool, output: str | None, figure: str | None, as_json: bool, **settings: Any
+    scene: Any, integrator: str, guard: bool, output: str | None, figure: str | None, as_json: bool, **settings: Any
 ) -> None:
     """Run one INTEGRATOR on one SCENE and compare it with the exact motion.
 
@@ -55,6 +56,7 @@ def run(
     symtop run spheroid midpoint --step-size 0.01
     symtop run spheroid "rk4[axis]" --step-size 0.01
     symtop run goldstein rk45 --tolerance 1e-9 --horizon 200 --output run.nc --figure run.png
+    symtop run body rk4 --body 1,2,3 --rates 0.01,1,0 --step-size 0.01
     """
     check_outputs(output=output, figure=figure)
     with ticking("loading"):

@@ -355,11 +355,17 @@ def body_scenes() -> dict[str, Scene]:
 
 
 @by_name
+def all_scenes() -> dict[str, Scene]:
+    """All known scenes, those of tops first, by name."""
+    return _Scenes(scenes() | body_scenes())
+
+
+@by_name
 def scene(name: "str | Scene", *, bodies: bool = False) -> Scene:
     """The scene of that name; a Scene is returned as it is. One of a body is refused unless `bodies` is true."""
     chosen = name
     if not isinstance(chosen, Scene):
-        catalogue = scenes() | body_scenes()
+        catalogue = all_scenes()
         chosen = catalogue[one_of("scene", name, catalogue)]
     if chosen.of_body and not bodies:
         raise SymtopError(f"scene must be one of a SymmetricTop here, not {chosen.name}, a body without symmetry")

@@ -248,6 +248,7 @@ def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_pa
     ("begun", "offered"),
     [
         ("symtop run sph", "spheroid"),
+        ("symtop run tennis", "tennis-racket"),
         ("symtop run spheroid midp", "midpoint"),
         ("symtop study cl", "claims"),
         ("symtop run spheroid rk4[", "rk4[axis]"),

@@ -216,6 +216,43 @@ def test_the_command_line_takes_a_body() -> None:
     assert "I2=1.2" in shown.output
 
 
+OWN = ["--body", "1,2,3", "--rates", "0.01,1,0"]
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["run", "body", "rk4", "--step-size", "0.1", "--mgl", "3"], "--mgl must come with --body I1,I2,I3 on the sce"),
+        (["run", "spheroid", "rk4", *OWN], "--body, --rates must come with --body I1,I2,I3 on the scene body, not sph"),
+        (["scenes", "body", "--body", "1,2"], "--body must be 3 numbers with commas between, not '1,2'"),
+        (["scenes", "body", "--body", "1,2,x"], "--body must be 3 numbers with commas between, not '1,2,x'"),
+        (["scenes", "body", "--body", "1,2,3"], "--body without a weight needs --rates"),
+        (["scenes", "body", "--body", "1,2,4", "--mgl", "1"], "I3 must be at most the sum of the other moments"),
+        (["run", "rk4", "tennis-racket"], "scene 'rk4' is unknown; it is the name of an integrator, and the scene"),
+        (["run", "heavy-brick", "tennis-racket"], "integrator 'tennis-racket' is unknown; it is the name of a scene"),
+    ],
+)  # fmt: skip
+def test_a_body_of_ones_own_that_is_none(words: list[str], sentence: str) -> None:
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 2
+    assert sentence in done.stderr
+
+
+def test_a_body_of_ones_own_on_the_command_line() -> None:
+    body, at = RigidBody(1.0, 1.2, 0.6, 1.0, (0.1, 0.0, 1.0)), Attitude((0.8, 0.6, 0.0, 0.0), (0.2, 0.3, 3.0))
+    options = "--body 1,1.2,0.6 --mgl 1 --centre 0.1,0,1 --attitude 0.8,0.6,0,0 --rates 0.2,0.3,3".split()
+    shown = CliRunner().invoke(main, ["scenes", "body", "--json", *options])
+    stored = json.loads(shown.stdout)[0]
+    assert stored["top"]["centre"] == list(body.centre)
+    assert float(stored["nutation period (s)"]) == pytest.approx(body.nutation_period(at), rel=1e-5)
+    ran = ["run", "body", "rk4", "--step-size", "0.05", "--horizon", "20", "--json"]
+    own, named = (
+        json.loads(CliRunner().invoke(main, [*words, *more]).stdout)
+        for words, more in ((ran, options), ([*ran[:1], "heavy-brick", *ran[2:]], []))
+    )
+    assert own["errors"] == named["errors"]
+
+
 def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     turn = np.array([0.5, -0.5, 0.1, 0.7])
     turn /= np.linalg.norm(turn)
