@@ -240,7 +240,18 @@ def test_a_body_of_ones_own_that_is_none(words: list[str], sentence: str) -> Non
 
 def test_a_body_of_ones_own_on_the_command_line() -> None:
     body, at = RigidBody(1.0, 1.2, 0.6, 1.0, (0.1, 0.0, 1.0)), Attitude((0.8, 0.6, 0.0, 0.0), (0.2, 0.3, 3.0))
-    options = "--body 1,1.2,0.6 --mgl 1 --centre 0.1,0,1 --attitude 0.8,0.6,0,0 --rates 0.2,0.3,3".split()
+    options = [
+        "--body",
+        "1,1.2,0.6",
+        "--mgl",
+        "1",
+        "--centre",
+        "0.1,0,1",
+        "--attitude",
+        "0.8,0.6,0,0",
+        "--rates",
+        "0.2,0.3,3",
+    ]
     shown = CliRunner().invoke(main, ["scenes", "body", "--json", *options])
     stored = json.loads(shown.stdout)[0]
     assert stored["top"]["centre"] == list(body.centre)
