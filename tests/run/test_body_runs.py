@@ -35,7 +35,8 @@ TO_ORDER = {
     "crouch-grossman-3": 3,
     "commutator-free-4": 4,
 }  # another method there, of the same order
-ADAPTIVE = ("rk45", "dop853", "rk45-compiled", "dop853-compiled", "tsit5", "vern9", "odex", "series-general-adaptive")
+ADAPTIVE = ("rk45", "dop853", "rk45-compiled", "dop853-compiled", "tsit5", "vern9", "series-general-adaptive",
+            "extrapolation", "adams", "taylor", "taylor-longdouble")  # fmt: skip
 ANGLE = math.radians(0.3)
 
 

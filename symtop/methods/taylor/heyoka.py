@@ -2,6 +2,7 @@
 
     axis:      e' = L x e / I1,  L' = mgl k x e                      six variables, every term quadratic
     attitude:  q' = (L q / I1 + (1/I3 - 1/I1) p_psi q k)/2,  L' as above with e = q k q*    seven variables
+    body:      q and M in body axes, of a body without symmetry (`heavy_body`)               seven variables
     angles:    the Euler-Lagrange equations, with poles (see `euler_lagrange`)               six variables
 
 The order follows from the tolerance (about 20 in double), the step from the size of the series' last terms. Asking for
@@ -22,10 +23,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.numbers import EPSILON, context
+from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.plan import Plan, Run
 from symtop.methods.framework.registry import Array, Integrator, Solver
 from symtop.model import charts
-from symtop.model.charts import space_momenta
+from symtop.model.charts import BODY, space_momenta
+from symtop.model.exact import heavy_body
 from symtop.model.top import Angles, SymmetricTop
 
 START_DIGITS = 60  # of the multiprecision that a start is converted in
@@ -33,9 +36,11 @@ MOST_STEPS = {"double": 30_000_000, "longdouble": 5_000_000, "quad": 100_000}  #
 
 
 def equations(chart: str) -> list[Any]:
-    """heyoka's system of a chart; par[0] = 1/I1, par[1] = mgl, par[2] = p_psi (1/I3 - 1/I1), or I3 in angles."""
+    """heyoka's system of a chart; of tops par = 1/I1, mgl, and p_psi (1/I3 - 1/I1), or I3 in angles."""
     import heyoka as hy  # Linux only
 
+    if chart == BODY:
+        return heavy_body.equations()
     if chart == "angles":
         theta, phi, psi, *rates = hy.make_vars("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
         theta_dot, phi_dot, psi_dot = rates
@@ -98,9 +103,13 @@ def _idle(chart: str, precision: str, tolerance: float) -> list[Any]:
 
 
 @functools.lru_cache(maxsize=256)
-def start_numbers(chart: str, precision: str, top: SymmetricTop, at: Angles) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+def start_numbers(chart: str, precision: str, top: Any, at: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """State and parameters of a start, correctly rounded; in double theta(8) would move by 5e-15."""
     kind, mp = arithmetic(precision).kind, context(START_DIGITS)
+    if chart == BODY:
+        momentum = [mp.mpf(moment) * rate for moment, rate in zip(top.moments, at.omega_body, strict=True)]
+        numbers = *(1 / mp.mpf(moment) for moment in top.moments), *map(mp.mpf, top.torque)
+        return _rounded(kind, mp, (*map(mp.mpf, at.quaternion), *momentum)), _rounded(kind, mp, numbers)
     theta, phi, psi, *rates = (mp.mpf(getattr(at, name)) for name in at.__slots__)
     if chart == "angles":
         numbers = 1 / mp.mpf(top.I1), mp.mpf(top.mgl), mp.mpf(top.I3)
@@ -147,7 +156,7 @@ def propagate(
 
 
 def solver(chart: str, precision: str, read: Callable[..., tuple[Array, Array, Array]] | None = None) -> Solver:
-    """A solver of one chart and precision, samples in double; in angles, `read(top, times, states)` adds momenta."""
+    """A solver of one chart and precision, samples in double; ``read(top, times, states)`` adds momenta where it is."""
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         most = max(1, int(min(plan.most(MOST_STEPS[precision]), sys.maxsize)))  # infinity is a budget, too
@@ -185,6 +194,10 @@ _SUMMARIES = {
 }
 
 
+def _body_read(_top: Any, _times: Array, states: Array) -> tuple[Array, Array, Array]:
+    return states, *FORMS[BODY].momenta(None, states)
+
+
 def built_in() -> list[Integrator]:
     """heyoka's integrator in three arithmetics, where heyoka is installed."""
     try:
@@ -197,7 +210,8 @@ def built_in() -> list[Integrator]:
         Integrator(
             name="taylor" if precision == "double" else f"taylor-{precision}",
             family="taylor", summary=_SUMMARIES[precision],
-            solvers={chart: solver(chart, precision) for chart in ("axis", "attitude")},
+            solvers={chart: solver(chart, precision) for chart in ("axis", "attitude")}
+            | {BODY: solver(BODY, precision, _body_read)},
             control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
             least_tolerance=arithmetic(precision).epsilon / 1000.0,
             default_tolerance=arithmetic(precision).epsilon / 100.0,

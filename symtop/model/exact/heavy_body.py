@@ -36,16 +36,15 @@ MOST_STEPS = 100_000  # of one run: 10 s, in quadruple precision 6 min
 START_DIGITS = 60
 
 
-@functools.lru_cache(maxsize=4)
-def _stepper(run: int) -> Any:
-    """heyoka's integrator of a body, to be copied: the state belongs to a run."""
+def equations() -> list[Any]:
+    """heyoka's system of (q, M) of a body; par[0], .. par[2] = 1/I1, .., par[3], .. par[5] = c."""
     import heyoka as hy  # Linux only
 
     w, x, y, z, m1, m2, m3 = hy.make_vars("w", "x", "y", "z", "m1", "m2", "m3")
     a1, a2, a3, c1, c2, c3 = (hy.par[i] for i in range(6))
     o1, o2, o3 = a1 * m1, a2 * m2, a3 * m3
     g1, g2, g3 = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z
-    system = [
+    return [
         (w, -0.5 * (x * o1 + y * o2 + z * o3)),
         (x, 0.5 * (w * o1 + y * o3 - z * o2)),
         (y, 0.5 * (w * o2 - x * o3 + z * o1)),
@@ -54,9 +53,18 @@ def _stepper(run: int) -> Any:
         (m2, m3 * o1 - m1 * o3 + g3 * c1 - g1 * c3),
         (m3, m1 * o2 - m2 * o1 + g1 * c2 - g2 * c1),
     ]
+
+
+@functools.lru_cache(maxsize=4)
+def _stepper(run: int) -> Any:
+    """heyoka's integrator of a body, to be copied: the state belongs to a run."""
+    import heyoka as hy
+
     kind = np.longdouble if run < 3 else hy.real128
     zero, tolerance = [kind("0")] * 7, kind(repr(TOLERANCES[run]))
-    return hy.taylor_adaptive(system, zero, tol=tolerance, fp_type=kind, compact_mode=True)  # unrolled: 5 s to compile
+    return hy.taylor_adaptive(
+        equations(), zero, tol=tolerance, fp_type=kind, compact_mode=True
+    )  # unrolled: 5 s to compile
 
 
 class HeavyBody:
