@@ -1,4 +1,4 @@
-"""Splitting in the chart `body` (q, M): kicks of the weight between free motions of order two, for any three moments.
+"""Splitting in the chart `body` (q, M): kicks of the weight between free motions, for any three moments.
 
     kick(b h):   M += b h Gamma x c
     drift(a h):  R3(a h/2)  R1(a h)  R3(a h/2)  S(a h)
@@ -8,28 +8,37 @@ left of the kinetic energy, (1/I1 - 1/I2) M1^2/2 + (1/I3 - 1/I2) M3^2/2, has two
 body: R1 by the angle (1/I1 - 1/I2) M1 a h, and R3 likewise. R1 is the identity for I1 = I2, and the drift exact.
 
 A drift is symmetric and of order two, so that kick-drift-kick is, too, and a composition of such steps has the order
-that it has elsewhere. Tables that are not, for exact free motions only, fall to order two here and are left out. Every
-flow is one of the Hamiltonian: symplectic on T*SO(3), L_z moves by rounding alone, and without a weight all of L.
+that it has elsewhere. Other tables take the free motion for exact and fall to order two with this one. They drift by a
+composition of turns R3 and R1 of the order p that they have themselves, S once at its end (`free_motion`); of the
+(8, 6, 4) of a generalised order the last is left. With tau = Gamma x c the force gradient is that of W = {V, {V, T}}:
+
+    W = tau.(J^-1 tau),     M += Gamma x (b h c + 2 g h^3 c x J^-1 tau)
+
+Every flow is one of the Hamiltonian: symplectic on T*SO(3), L_z moves by rounding alone, and without a weight all of L.
+A processor, the flow of omega.tau, is not elementary here.
 
 With s, c = sin, cos of a half angle and m = c - 1 = -2 sin^2 of its half, no increment is a difference of large
 numbers; the turn S gives q the length that rounding has taken.
 Source: Touma, Wisdom, Astron. J. 107 (1994) 1189; Fasso, J. Comput. Phys. 189 (2003) 527.
 """
 
+import functools
 import math
 from typing import Any
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework import body
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import Loop, kernel_loop
 from symtop.methods.framework.preparation import Scaled
+from symtop.methods.splitting.coefficients import BLANES_MOAN_6, METHODS, STRANG, Table
 from symtop.methods.splitting.loop import Composition, compose, packed, stages
+from symtop.methods.vectors import cross, plus
 from symtop.model.body import vertical
 
 
 @register_jitable
 def _scale(rule: Any, top: Any, at: Any, h: float) -> Any:
-    return stages(rule, h, h, 0.0, 0.0)
+    return stages(rule, h, h, 2.0 * h * h * h, 0.0)
 
 
 def scaled(rule: Composition) -> Scaled:
@@ -37,11 +46,16 @@ def scaled(rule: Composition) -> Scaled:
     return Scaled(rule, _scale, packed, body.opened)
 
 
-def of_strang_steps(rule: Composition) -> bool:
-    """Is it a composition of kick-drift-kick steps, or drift-kick-drift, so that its order needs no exact drift?"""
+_FREE = {4: BLANES_MOAN_6, 6: METHODS["kahan-li-6"].table, 8: METHODS["kahan-li-8"].table}  # kicks R3, drifts R1
+
+
+def free_motion(rule: Composition, order: int | None) -> Table | None:
+    """The turns of a drift: of order two in kick-drift-kick and drift-kick-drift steps, or of the order of the rule."""
     half = [0.0, *(0.5 * a for a in rule.drift), 0.0]
     steps = all(abs(b - x - y) < 1e-14 for b, x, y in zip(rule.kick, half, half[1:], strict=False))
-    return not any(rule.gradient) and (steps or (rule.drift, rule.kick) == ((0.5, 0.5), (0.0, 1.0, 0.0)))
+    if not any(rule.gradient) and (steps or (rule.drift, rule.kick) == ((0.5, 0.5), (0.0, 1.0, 0.0))):
+        return STRANG
+    return _FREE.get(order or 0)
 
 
 @register_jitable
@@ -52,7 +66,11 @@ def _force(par: Any, state: Any, step: Any) -> Any:
 @register_jitable
 def _kick(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any:
     x, y, z = body.torque(par, *force)
-    return (*step[:4], step[4] + pull * x, step[5] + pull * y, step[6] + pull * z)
+    kick = pull * x, pull * y, pull * z
+    if bend != 0.0:
+        slope = cross((par.c1, par.c2, par.c3), (par.a1 * x, par.a2 * y, par.a3 * z))
+        kick = plus(kick, bend, cross(force, slope))
+    return (*step[:4], step[4] + kick[0], step[5] + kick[1], step[6] + kick[2])
 
 
 @register_jitable
@@ -97,20 +115,26 @@ def _about_momentum(state: Any, d: Any, turn: float) -> Any:
     )  # fmt: skip
 
 
-@register_jitable
-def _drift(par: Any, rule: Any, state: Any, step: Any, time: float) -> Any:
-    half, whole = 0.5 * time * (par.a3 - par.a2), time * (par.a1 - par.a2)
-    step = _about_first(state, _about_third(state, step, half), whole)
-    return _about_momentum(state, _about_third(state, step, half), time * par.a2)
-
-
 def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return _force(par, state, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def _increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    step, force = compose(_force, _kick, _drift, par, rule, state, carry)
-    return step, force, rule.forces, body.ended_body(step)
+@functools.cache
+def march(free: Table) -> Loop:
+    """The loop of the tables whose drift is this composition of turns about the third axis and the first."""
+    third, first = free.kick, free.drift
 
+    @register_jitable
+    def drift(par, rule, state, step, time):  # type: ignore[no-untyped-def]
+        about_third, about_first = time * (par.a3 - par.a2), time * (par.a1 - par.a2)
+        step = _about_third(state, step, third[0] * about_third)
+        for i in range(len(first)):
+            step = _about_first(state, step, first[i] * about_first)
+            step = _about_third(state, step, third[i + 1] * about_third)
+        return _about_momentum(state, step, time * par.a2)
 
-march_body = kernel_loop(_begin, _increment, body.observe_body)
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        step, force = compose(_force, _kick, drift, par, rule, state, carry)
+        return step, force, rule.forces, body.ended_body(step)
+
+    return kernel_loop(_begin, increment, body.observe_body)

@@ -77,6 +77,9 @@ BLANES_MOAN_11 = kick_first(
     (0.0414649985182624, 0.198128671918067, -0.0400061921041533, 0.0752539843015807, -0.0115113874206879),
 )
 
+BLANES_MOAN_6 = kick_first(  # for two parts of any kind
+    4, (0.209515106613362, -0.143851773179818), (0.0792036964311957, 0.353172906049774, -0.0420650803577195))
+
 METHODS = {
     "stormer-verlet": Splitting(
         STRANG, "hairer-lubich-wanner-2003", "kick-drift-kick splitting of the reduced Hamiltonian", "angles"),

@@ -4,7 +4,7 @@ A composition alternates kicks b_0 .. b_n with drifts a_1 .. a_n (`loop`). The c
 
     angles          free flight of theta; centrifugal and gravity kicks, singular at the poles (`angles`)
     axis, attitude  the exact free symmetric top; gravity kicks, singular nowhere (`space`)
-    body            a free motion of order two, for tables of Strang steps (`body`)
+    body            a free motion of the order of the table, or of order two between Strang's kicks (`body`)
 
 Every method here is explicit, symplectic and symmetric, and keeps p_phi and p_psi. `stormer-verlet` and its
 compositions live in the angles chart, all others in the space frame.
@@ -73,8 +73,9 @@ def composition(
         shown: FixedStep(march, stages, prepare, 1, implicit=False)
         for shown, (march, prepare) in _KERNELS[chart].items()
     }
-    if chart == "space" and rotation == "exact" and not boost and body.of_strang_steps(rule):
-        solvers[BODY] = FixedStep(body.march_body, body.scaled(table), on_body, 1, implicit=False)
+    free = body.free_motion(rule, order) if chart == "space" and rotation == "exact" and not boost else None
+    if free is not None:
+        solvers[BODY] = FixedStep(body.march(free), body.scaled(table), on_body, 1, implicit=False)
     closed_forms = _KICK_DRIFT_KICK.get((chart, rotation)) if one_drift and rule.kick == (0.5, 0.5) else None
     modified, sleeps = closed_forms or (None, None)
     return Integrator(
