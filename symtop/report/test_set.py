@@ -1,0 +1,138 @@
+"""A test set for any language: motions of 30 bodies at 100 times to 30 digits, with checkers in Python and in C.
+
+Two free bodies of each of five strata, ten heavy ones, five of them chaotic (`symtop.run.ensemble.bodies`), and ten
+symmetric tops as bodies. The states are those of `symtop.model.exact.body_digits`, whose numbers are whole: the same
+input makes the same files. A state of 17 digits is what doubles hold.
+"""
+
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError, file_path
+from symtop.core.progress import post
+from symtop.model.exact.body_digits import Digits, body_digits
+from symtop.model.scenes import Scene
+from symtop.run.ensemble.bodies import random_bodies
+
+SEED, TIMES, PERIODS = 48, 100, 5.0
+SHARES = {"short-axis": 2, "long-axis": 2, "near-separatrix": 2, "near-symmetric": 2, "needle": 2, "regular": 5,
+          "chaotic": 5, "lagrange": 10}  # fmt: skip
+GIVEN = ("I1", "I2", "I3", "mgl", "cx", "cy", "cz", "qw", "qx", "qy", "qz", "wx", "wy", "wz")
+STATE = ("qw", "qx", "qy", "qz", "Lx", "Ly", "Lz")
+ROUNDED = {17: 4.5e-16, 30: 1e-29}  # rad, and of |L|: two states of so many digits may be so far apart
+CHECKERS = ("check.py", "check.c")
+README = """\
+# A test set for integrators of rigid bodies
+
+{count} bodies with a fixed point, {times} times each: attitude and angular momentum, with a bound on the error.
+
+- `problems.csv`: principal moments of inertia `I1`, `I2`, `I3`; `mgl`, weight times distance of the centre of mass, 0
+  of a free body; its direction `cx`, `cy`, `cz` in principal axes; the attitude `qw`, `qx`, `qy`, `qz` and the angular
+  velocity `wx`, `wy`, `wz` in principal axes at time 0. Read each number as the nearest double. The weight times the
+  direction is rounded to doubles; the quaternion is to be scaled to length one. Units are any consistent set.
+- `states-17.csv`, `states-30.csv`: `name`, `time`, the attitude, the angular momentum `Lx`, `Ly`, `Lz` in space, and
+  `bound`, to so many digits. `states.nc` holds the same as pairs of doubles: a value is `NAME + NAME_lo`.
+- `check.py`, `check.c`: checkers without any package. `python check.py MINE.csv states-17.csv` prints for each problem
+  the largest errors of your file, and how many samples are beyond the bound. Your file has the lines of the reference,
+  without `bound` or with it, in the same order. Doubles hold no 30 digits: `check.c` is for `states-17.csv`.
+
+**Conventions.** A quaternion (w, x, y, z) turns body vectors into space vectors, v -> q v q*; both signs are right. The
+z axis of space points up, gravity pulls down. With omega in body axes, M = (I1 wx, I2 wy, I3 wz), q' = q omega/2,
+M' = M x omega + mgl Gamma x c, Gamma = q* z q, and L = q M q*. The error of an attitude is the angle of the turn
+between two, in radians, that of the momentum |L - L'|/|L|.
+
+**How it was made.** Taylor series of order 56 in whole numbers of 190 bits; a second run with fewer bits, of a lower
+order and with longer steps is at most {gap:.0e} away. The first {free} bodies are free; of the others {chaotic}
+are chaotic: a disturbance grows more than a thousandfold in ten natural periods.
+Made by symtop, BSD-3-Clause.
+"""
+
+
+def problems() -> list[Scene]:
+    """The bodies and their starts."""
+    return [scene for kind, count in SHARES.items() for scene in random_bodies(count, seed=SEED, kind=kind)]
+
+
+def times_of(scene: Scene) -> list[float]:
+    """The times of a problem, six digits each."""
+    return [float(f"{PERIODS * scene.nutation_period * k / TIMES:.6g}") for k in range(1, TIMES + 1)]
+
+
+def write(folder: str | Path, chosen: Sequence[Scene] | None = None) -> Path:
+    """Write the test set into a folder, which must be new or empty; a minute. `chosen` are other problems."""
+    path, scenes = file_path("folder", folder), list(chosen or problems())
+    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+        raise SymtopError(f"the test set needs a folder that is new or empty, not {str(folder)!r}")
+    motions = list[Digits]()
+    for scene in scenes:
+        post(f"test set: {len(motions)} of {len(scenes)} motions")
+        motions.append(body_digits(scene.top, scene.start, times_of(scene)))
+    path.mkdir(parents=True, exist_ok=True)
+    files = {"problems.csv": _problems_csv(scenes)}
+    files |= {f"states-{digits}.csv": _states_csv(scenes, motions, digits) for digits in ROUNDED}
+    kinds = [scene.name.rpartition("-")[0] for scene in scenes]
+    files["README.md"] = README.format(
+        count=len(scenes), times=TIMES, gap=max(motion.bound for motion in motions), chaotic=kinds.count("chaotic"),
+        free=sum(scene.top.free for scene in scenes),
+    )  # fmt: skip
+    for name, text in files.items():
+        (path / name).write_text(text, encoding="utf-8", newline="\n")
+    for name in CHECKERS:
+        (path / name).write_bytes(resources.files("symtop.report").joinpath("templates", f"{name}.txt").read_bytes())
+    netcdf.write(states(scenes, motions), path / "states.nc")
+    return path
+
+
+def _given(scene: Scene) -> list[float]:
+    body, start = scene.top, scene.start
+    return [*body.moments, body.mgl, *body.centre, *start.quaternion, *start.omega_body]
+
+
+def _problems_csv(scenes: Sequence[Scene]) -> str:
+    rows = [",".join([scene.name, *map(repr, _given(scene))]) for scene in scenes]
+    return "\n".join([",".join(["name", *GIVEN]), *rows, ""])
+
+
+def _states_csv(scenes: Sequence[Scene], motions: Sequence[Digits], digits: int) -> str:
+    from mpmath import nstr
+
+    lines = [",".join(["name", "time", *STATE, "bound"])]
+    for scene, motion in zip(scenes, motions, strict=True):
+        bound = f"{ROUNDED[digits] + motion.bound:.2g}"
+        for time, q, L in zip(times_of(scene), motion.quaternion, motion.momentum, strict=True):
+            numbers = [nstr(value, digits, min_fixed=0, max_fixed=0, strip_zeros=False) for value in (*q, *L)]
+            lines.append(",".join([scene.name, repr(time), *numbers, bound]))
+    return "\n".join([*lines, ""])
+
+
+def states(scenes: Sequence[Scene], motions: Sequence[Digits]) -> xr.Dataset:
+    """The states as pairs of doubles over ``problem`` and ``sample``, and what was given over ``problem``."""
+    variables: dict[str, Any] = {"time": (("problem", "sample"), [times_of(scene) for scene in scenes])}
+    parts = {"quaternion": ("part", "1"), "momentum": ("component", "1")}
+    for name, (dimension, units) in parts.items():
+        exact = np.array([getattr(motion, name) for motion in motions], dtype=object)
+        high = exact.astype(float)
+        words = {"quaternion": "attitude, body to space", "momentum": "angular momentum, space frame"}[name]
+        dims, low = ("problem", "sample", dimension), (exact - high).astype(float)
+        variables[name] = dims, high, {"long_name": words, "units": units}
+        variables[f"{name}_lo"] = dims, low, {"long_name": f"what {name} lacks, to be added", "units": units}
+    numbers = np.array([_given(scene) for scene in scenes])
+    for k, name in enumerate(GIVEN):
+        about = {"long_name": f"{name} of the problem, as in problems.csv", "units": "1"}
+        variables[f"given_{name}"] = "problem", numbers[:, k], about
+    bounds = [motion.bound + ROUNDED[30] for motion in motions]
+    words = "bound on the error of the attitude, rad, and of the momentum, relative"
+    variables["bound"] = "problem", bounds, {"long_name": words, "units": "1"}
+    names = ("problem", [scene.name for scene in scenes], {"long_name": "name of the problem"})
+    data = xr.Dataset(variables, {"problem": names, "component": list("xyz"), "part": list("wxyz")})
+    data["time"].attrs.update(long_name="elapsed time", units="1")
+    data["component"].attrs["long_name"] = "component of a vector in the space frame"
+    data["part"].attrs["long_name"] = "part of a quaternion"
+    data.attrs["title"] = f"states of {len(scenes)} rigid bodies to 30 digits"
+    return data

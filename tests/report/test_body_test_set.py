@@ -1,0 +1,170 @@
+"""The test set of rigid bodies: its states by other ways, its checkers, and a method that is wrong by a sign."""
+
+import csv
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import symtop
+from symtop.cli.main import main
+from symtop.core import netcdf
+from symtop.model.body import Attitude, RigidBody
+from symtop.model.exact.body_digits import body_digits
+from symtop.report import test_set
+from symtop.run.ensemble.bodies import STRATA, growth, random_bodies
+from tests.model.bodies import PreciseBody
+
+KINDS = ("near-separatrix", "regular", "lagrange")
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A test set of three problems over one natural period, and their scenes."""
+    patch = pytest.MonkeyPatch()
+    patch.setattr(test_set, "PERIODS", 1.0)
+    scenes = [random_bodies(1, seed=3, kind=kind)[0] for kind in KINDS]
+    folder = test_set.write(tmp_path_factory.mktemp("set") / "bodies", scenes)
+    patch.undo()
+    return folder, scenes
+
+
+def read(file):
+    with file.open(encoding="utf-8") as text:
+        return list(csv.DictReader(text))
+
+
+def checked(folder, mine, reference="states-17.csv"):
+    """Of each problem the largest errors of attitude and momentum and the number beyond the bound."""
+    words = [sys.executable, str(folder / "check.py"), str(mine), str(folder / reference)]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    rows = [line.split() for line in done.stdout.splitlines()]
+    return {row[0]: (float(row[2]), float(row[5]), int(row[6])) for row in rows}, done.stdout
+
+
+def own_file(path, scenes, times, change=lambda body: body):
+    """States of `series-general` on the bodies, `change` made to each."""
+    lines = [",".join(("name", "time", *test_set.STATE))]
+    for scene in scenes:
+        other = symtop.Scene(scene.name, change(scene.top), scene.start, scene.horizon)
+        at = np.array([float(row["time"]) for row in times if row["name"] == scene.name])
+        run = symtop.simulate(other, "dop853", tolerance=1e-12, horizon=float(at[-1]), samples=2001)
+        q = [np.interp(at, run.time.values, column) for column in run["quaternion"].values.T]
+        L = [np.interp(at, run.time.values, column) for column in run["momentum"].values.T]
+        q /= np.linalg.norm(q, axis=0)
+        lines += [",".join([scene.name, *map(repr, row)]) for row in np.stack([at, *q, *L], axis=1).tolist()]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_the_reference_has_nothing_beyond_its_bounds(written):
+    folder, scenes = written
+    for reference in ("states-17.csv", "states-30.csv"):
+        found, _ = checked(folder, folder / reference, reference)
+        assert [*found] == [scene.name for scene in scenes]
+        assert all(beyond == 0 and attitude == momentum == 0.0 for attitude, momentum, beyond in found.values())
+    found, _ = checked(folder, folder / "states-30.csv")  # rounding to 17 digits is within the bound
+    assert all(beyond == 0 and 0.0 < attitude < 2e-16 for attitude, _, beyond in found.values())
+    with pytest.raises(subprocess.CalledProcessError):
+        checked(folder, folder / "problems.csv")
+
+
+def test_a_sign_in_the_inertia_is_found_by_both_checkers(written, tmp_path):
+    folder, scenes = written
+    times = read(folder / "states-17.csv")
+    right = own_file(tmp_path / "right.csv", scenes, times)
+    wrong = own_file(tmp_path / "wrong.csv", scenes, times, lambda b: RigidBody(*b.moments[::-1], b.mgl, b.centre))
+    near, _ = checked(folder, right)
+    far, shown = checked(folder, wrong)
+    assert max(attitude for attitude, _, _ in near.values()) < 1e-5  # of the lines between its samples
+    assert all(attitude > 0.01 and beyond == test_set.TIMES for attitude, _, beyond in far.values())
+    if (compiler := shutil.which("cc")) is None:
+        pytest.skip("no compiler of C")
+    subprocess.run([compiler, str(folder / "check.c"), "-o", str(tmp_path / "check"), "-lm"], check=True)
+    for mine, answer in ((wrong, shown), (folder / "states-17.csv", None)):
+        words = [str(tmp_path / "check"), str(mine), str(folder / "states-17.csv")]
+        done = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+        assert done == answer if answer else done.count(" 0 beyond the bound") == len(scenes)
+
+
+def test_the_digits_are_those_of_other_ways(written):
+    """A free body by its closed form in 50 digits, heavy ones in quadruple precision; the pairs of doubles likewise."""
+    pytest.importorskip("heyoka")
+    folder, scenes = written
+    data, rows = netcdf.read(folder / "states.nc"), read(folder / "states-30.csv")
+    for scene in scenes:
+        times = data["time"].sel(problem=scene.name).values
+        own = [row for row in rows if row["name"] == scene.name]
+        if scene.top.free:
+            true = PreciseBody(scene.top.moments, scene.start.quaternion, exact_momentum(scene))
+            for row, state in zip(own, true.states(times), strict=True):
+                q = [true.mp.mpf(row[name]) for name in ("qw", "qx", "qy", "qz")]
+                gap = min(true.mp.norm([a - s * b for a, b in zip(q, state[:4], strict=True)]) for s in (1, -1))
+                assert gap < 3e-30
+        else:
+            truth = symtop.reference(scene, times, "quad")
+            high, low = (data[f"quaternion{end}"].sel(problem=scene.name).values for end in ("", "_lo"))
+            gap = (high - truth["quaternion"].values) + (low - truth["quaternion_lo"].values)
+            assert 2.0 * np.abs(gap).max() < float(truth["attitude_error_bound"].max()) < 1e-26
+
+
+def exact_momentum(scene):
+    """M as exact numbers: products of two doubles."""
+    from symtop.core.numbers import context
+
+    mp = context(100)
+    return [mp.mpf(a) * mp.mpf(b) for a, b in zip(scene.top.moments, scene.start.omega_body, strict=True)]
+
+
+def test_a_start_that_is_moved_by_a_rounding_is_another_motion(monkeypatch):
+    scene = random_bodies(1, seed=3, kind="regular")[0]
+    one, again = (body_digits(scene.top, scene.start, [0.5]) for _ in range(2))
+    assert one == again
+    w1, w2, w3 = scene.start.omega_body
+    moved = body_digits(scene.top, Attitude(scene.start.quaternion, (np.nextafter(w1, 9.0), w2, w3)), [0.5])
+    assert 1e-18 < abs(moved.momentum[0][0] - one.momentum[0][0]) < 1e-14
+    monkeypatch.setattr("symtop.model.exact.body_digits.LONGEST", 5)
+    with pytest.raises(symtop.SymtopError, match="times must be within 5 steps of the series, not reach 1000"):
+        body_digits(scene.top, scene.start, [1000.0])
+
+
+def test_random_bodies_are_of_their_strata():
+    drawn = random_bodies(2 * len(STRATA), seed=7)
+    assert drawn[: len(STRATA)] == random_bodies(len(STRATA), seed=7)
+    assert [scene.name for scene in drawn[: len(STRATA)]] == [f"{kind}-0" for kind in STRATA]
+    of = {kind: [scene for scene in drawn if scene.name.startswith(kind)] for kind in STRATA}
+    for scene in drawn:
+        low, middle, high = sorted(scene.top.moments)
+        at = dict(zip(scene.top.moments, scene.top.momentum(scene.start), strict=True))
+        kind = scene.name.rpartition("-")[0]
+        size, twice = scene.momentum_scale, 2.0 * scene.top.energy(scene.start)
+        if kind in ("short-axis", "long-axis"):
+            assert abs(at[high if kind == "short-axis" else low]) > 0.87 * size
+        elif kind == "near-separatrix":
+            assert abs(twice * middle / size**2 - 1.0) < 0.1
+        elif kind == "near-symmetric":
+            assert min(middle / low, high / middle) - 1.0 < 2.0**-5
+        elif kind == "needle":
+            assert low < 2.0**-4 * middle
+    assert all(growth(scene) > 1000.0 for scene in of["chaotic"])
+    assert all(growth(scene) < 1000.0 for scene in of["regular"])
+    assert all(scene.top.I1 == scene.top.I2 and scene.top.centre == (0.0, 0.0, 1.0) for scene in of["lagrange"])
+    assert random_bodies(1, seed=8)[0] != drawn[0]
+    for words, sentence in (
+        ({"kind": "odd"}, "kind 'odd' is unknown"),
+        ({"seed": -1}, "seed"),
+        ({"n": 0}, "n must be"),
+    ):
+        with pytest.raises(symtop.SymtopError, match=sentence):
+            random_bodies(**{"n": 1} | words)
+
+
+def test_the_command_refuses_a_folder_that_holds_something(tmp_path):
+    (tmp_path / "test-set").mkdir()
+    (tmp_path / "test-set" / "mine").touch()
+    done = CliRunner().invoke(main, ["archive", "--test-set", "--results", str(tmp_path)])
+    assert done.exit_code == 2
+    assert "the test set needs a folder that is new or empty" in done.stderr
