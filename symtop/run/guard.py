@@ -1,8 +1,9 @@
 """The guard: one sentence with a remedy before a run whose error is expected to be large, nothing before any other.
 
-*The forecast.* The method itself is run for two nutations or a tenth of the run, and compared with the closed form. A
-nutation is a closed orbit of the reduced top; its return map is 1 + N with N^2 = 0 (the motion is integrable: errors
-shear, they do not grow exponentially), so that an error e_1 of one piece becomes after n pieces
+*The forecast.* The method itself is run for two nutations or a tenth of the run, and compared with the true motion
+(`symtop.run.motion`): the closed form of a top, or an integration of high order. A nutation is a closed orbit of the
+reduced top; its return map is 1 + N with N^2 = 0 (the motion is integrable: errors shear, they do not grow
+exponentially), so that an error e_1 of one piece becomes after n pieces
 
     e_n = n e_1 + n (n-1)/2 N e_1,      N e_1 = e_2 - 2 e_1.
 
@@ -28,7 +29,6 @@ the same phases of the nutation. Source: Hairer, Lubich, Wanner, Geometric Numer
 
 import functools
 import math
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,18 +37,17 @@ from symtop.core.numbers import EPSILON, GOLDEN
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan, sentence
 from symtop.methods.framework.registry import Integrator, integrator
-from symtop.model.charts import Array, axes
-from symtop.model.scenes import Scene, closed_form
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.charts import Array
+from symtop.model.scenes import Scene
 from symtop.run.linear_stability import Growth, nutation_growth, trace
-from symtop.run.reference.sensitivity import SMALL, displacement
+from symtop.run.motion import MOST_FOLDS, MOVED, Exact, Integrated, Landmarks, Motion
+from symtop.run.reference.sensitivity import SMALL
 
 STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take these
 AT_LEAST = 0.25  # of them a probe takes in any case, up to the whole run
-SHARE = 0.1  # of the run, which a probe may always take, but no more than the next two:
-MOST_NUTATIONS = 20.0
+SHARE = 0.1  # of the run, which a probe may always take, but no more than so many nutations (`Motion`) and steps:
 MOST_PROBED = 20_000  # steps
-POINTS = 300  # of a probe that are compared with the closed form
+POINTS = 300  # of a probe that are compared with the true motion
 ROUNDED = 1e-13  # rad; a probe that is closer than this shows rounding, which grows as n^1.5
 PARTIAL = 10.0  # distrust of a probe shorter than a nutation: it may have missed where errors are made, or stretched
 AFFORDED = {"compiled": 12_000, "python": 1200}  # evaluations of a longer probe of an adaptive method
@@ -69,54 +68,19 @@ GROWS = 1e-3  # a step that multiplies small nutations by more than 1 + GROWS lo
 NO_GROWTH = 3e-8  # rounding of the growth of a step
 NONLINEAR = 0.03  # of the nutation that a method adds of its own may pass for growth: 8e-6 at 4e-4 rad
 BESIDE = 1e-2  # rad
-MOST_FOLDS = 100.0  # e times that a nutation grows: any is too much
 NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a resonance
 COARSE = 1.0  # rad of precession in a step
+OWN = 10.0  # times that steps of a probe multiply a change more than the motion does: less is a transient
 PRECESSED = 0.1  # the same, of a step that is tried past a pole
 TRIES, LESS = 8, 0.6  # steps that are tried, each at most so much of the one before
 MOST_STEPS = 20_000_000_000  # of a run: ten minutes of the fastest kernel
 
 
-class Landmarks(NamedTuple):
-    """What is known exactly about a motion before it is computed."""
-
-    period: float  # of the nutation
-    frequency: float  # of small nutations about the steady precession with the same momenta
-    width: float  # of the nutation, rad
-    gap: float  # closest approach to a pole, rad
-    pole: str  # upper or lower
-    rate: float  # of precession there, rad per unit time
-    shear: float  # relative change of the period when the start is moved by rounding
-
-
-@functools.lru_cache(maxsize=256)
-def _landmarks(top: SymmetricTop, at: Angles) -> Landmarks:
-    scene, momenta = Scene("landmarks", top, at, 1.0), top.momenta(at)
-    form = closed_form(scene)
-    highest, lowest = form.theta_range
-    upper = highest <= math.pi - lowest
-    gap = highest if upper else math.pi - lowest
-    near, far = (momenta.north, momenta.south) if upper else (momenta.south, momenta.north)
-    sine = math.sin(0.5 * gap) ** 2
-    rate = abs(far / math.cos(0.5 * gap) ** 2 + (near / sine if sine > 0.0 else 0.0)) / (4.0 * top.I1)
-    rounded = (replace(at, phi_dot=at.phi_dot * (1.0 + turn)) for turn in (-4e-16, 4e-16))
-    moved = [scene.nutation_period, *map(top.nutation_period, rounded)]
-    spread = max(moved) - min(moved)
-    shear = spread / max(moved) if math.isfinite(spread) else 1.0
-    pole, frequency = "upper" if upper else "lower", top.nutation_frequency(momenta)
-    return Landmarks(form.nutation_period, frequency, lowest - highest, gap, pole, rate, shear)
-
-
-def landmarks(scene: Scene) -> Landmarks:
-    """The landmarks of a scene's motion; made once and kept."""
-    return _landmarks(scene.top, scene.start)
-
-
 class Probe(NamedTuple):
-    """A short run compared with the closed form."""
+    """A short run compared with the true motion."""
 
     times: Array
-    error: Array  # of the axis, rad; inf where the run had failed
+    error: Array  # of the axis, or of the attitude of a body, rad; inf where the run had failed
     outcome: str
     reached: float  # time of the run, not of the probe
     evaluations: int  # of the force
@@ -134,6 +98,7 @@ class Forecast(NamedTuple):
     marks: Landmarks
     unstable: float = 0.0  # what the motion makes of an error of the tolerance, rad; 0 where a probe shows it
     whole: bool = False  # the probe was as long as the run
+    growth: float = 1.0  # how many times more than the motion the steps of a probe multiply a small change
 
 
 @functools.cache
@@ -151,20 +116,17 @@ def _marks(steps: int) -> Any:
 
 
 def _probe(
-    scene: Scene, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
+    motion: Motion, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
 ) -> Probe:
     """Run `method` from the time `since` of the true motion for `duration`, with `step` or the plan's tolerance."""
-    form, start = closed_form(scene), scene.start
-    if since:
-        start = Angles(*(float(value) for value in form(since)))
     if method.fixed_step:
         piece = Plan.steps(step, _marks(max(1, round(duration / step))))
     else:
         most = min(plan.most(math.inf), MOST_WORK[method.implementation])
         piece = Plan.until(duration * (_places() / POINTS), plan.tolerance, most)
-    run = solve(method, chart, scene.top, start, piece)
+    run = solve(method, chart, motion.scene.top, motion.start(since), piece)
     with np.errstate(all="ignore"):
-        error = form.axis_distance(since + piece.times if since else piece.times, axes(chart, run.states))
+        error = motion.error(piece.times, chart, run.states, since)
     outcome = run.outcome
     if not math.isfinite(error.sum()):  # no angle is more than pi
         error[~np.isfinite(error)] = math.inf
@@ -187,50 +149,46 @@ def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
     return n * first + 0.5 * max(abs(whole - 2.0 * first), LEAST_GROWTH * whole) * n * (n - 1.0)
 
 
-def _amplifies(scene: Scene, change: float, horizon: float, marks: Landmarks) -> bool:
+def _amplifies(motion: Motion, change: float, horizon: float) -> bool:
     """Whether the motion multiplies a change of its start by far more than the shear of a stable one does."""
-    return displacement(scene, change, horizon) > change * UNSTABLE * (1.0 + horizon / marks.period)
+    return motion.displacement(change, horizon) > change * UNSTABLE * (1.0 + horizon / motion.marks.period)
 
 
-def _fixed(scene: Scene, method: Integrator, probe: Probe, horizon: float, marks: Landmarks) -> float:
-    """The largest error of a probe of steps, grown to the horizon.
+def _amplified(motion: Motion, probe: Probe, horizon: float) -> float:
+    """What the motion makes of the largest error of a probe, if it is not known to add errors up by the law."""
+    return motion.amplified(float(probe.error.max()), float(probe.times[-1]), horizon)
+
+
+def _fixed(motion: Motion, method: Integrator, probe: Probe, horizon: float) -> float:
+    """The largest error of a probe of steps, grown to the horizon by its law and by what the motion makes of it.
 
     What rounding, or the end of an iteration, leaves is not symmetric, and an unstable motion makes it grow in every
     nutation: there a symmetric method is no better than others.
     """
     straight = bool(method.symplectic or method.symmetric)
-    expected = grown(probe, horizon, straight=straight)
+    expected = max(grown(probe, horizon, straight=straight), _amplified(motion, probe, horizon))
     if not straight or not expected < WORTH:
         return expected
     bent = grown(probe, horizon, straight=False)
-    return bent if bent > WORTH and _amplifies(scene, SMALL, horizon, marks) else expected
+    return bent if bent > WORTH and _amplifies(motion, SMALL, horizon) else expected
 
 
-def _grown_tolerance(scene: Scene, method: Integrator, plan: Plan, marks: Landmarks) -> float:
+def _grown_tolerance(motion: Motion, method: Integrator, plan: Plan) -> float:
     """What becomes of the errors of an adaptive method by the horizon, rad; 0 if the motion is stable.
 
     A method in Python is probed for less than the run, and an unstable motion amplifies what it does elsewhere: in 44
     wrong runs of SciPy's methods, up to 3600 times the displacement by one tolerance, and up to 1.6e6 times for LSODA,
     which takes long steps of a high order while the top stands almost still.
     """
-    if not _amplifies(scene, plan.tolerance, plan.horizon, marks):
+    if not _amplifies(motion, plan.tolerance, plan.horizon):
         return 0.0
     committed = COMMITTED[method.order is None] * plan.tolerance
     changes = (plan.tolerance, committed)
-    return max(float(np.nan_to_num(displacement(scene, change, plan.horizon))) for change in changes)
-
-
-def _closest_time(scene: Scene, period: float) -> float:
-    """When the axis first comes closest to a pole."""
-    form, middle, width = closed_form(scene), 0.5 * period, period
-    for _ in range(4):
-        times = middle + width * np.linspace(-0.5, 0.5, 129)
-        middle, width = float(times[int(np.argmin(np.sin(form(times).theta)))]), width / 40.0
-    return middle
+    return max(float(np.nan_to_num(motion.displacement(change, plan.horizon))) for change in changes)
 
 
 def _adaptive_forecast(
-    scene: Scene, method: Integrator, chart: str, plan: Plan, period: float, share: float, twice: float
+    motion: Motion, method: Integrator, chart: str, plan: Plan, period: float, share: float, twice: float
 ) -> tuple[float, Probe]:
     """The same of an adaptive method, whose work is known when a first piece has been probed.
 
@@ -242,9 +200,10 @@ def _adaptive_forecast(
 
     def probed(piece: float) -> tuple[float, Probe]:
         partial = piece < min(period, 0.5 * plan.horizon)
-        since = max(0.0, _closest_time(scene, period) - 0.5 * piece) if partial else 0.0
-        probe = _probe(scene, cheap, chart, plan, piece, math.nan, since)
-        return grown(probe, plan.horizon, straight=False) * (PARTIAL if partial else 1.0), probe
+        since = max(0.0, motion.closest() - 0.5 * piece) if partial else 0.0
+        probe = _probe(motion, cheap, chart, plan, piece, math.nan, since)
+        expected = max(grown(probe, plan.horizon, straight=False), _amplified(motion, probe, plan.horizon))
+        return expected * (PARTIAL if partial else 1.0), probe
 
     piece = max(share, least)
     expected, probe = probed(piece)
@@ -255,52 +214,69 @@ def _adaptive_forecast(
     return expected if probe.times[-1] >= plan.horizon else max(expected, plan.tolerance), probe
 
 
-def _expected(scene: Scene, method: Integrator, chart: str, plan: Plan, marks: Landmarks) -> tuple[float, Probe]:
+def _expected(motion: Motion, method: Integrator, chart: str, plan: Plan) -> tuple[float, Probe]:
     """The largest axis error to expect, and the probe that says so."""
-    straight = bool(method.symplectic or method.symmetric)
+    straight, marks = bool(method.symplectic or method.symmetric), motion.marks
     period = marks.period if math.isfinite(marks.period) else plan.horizon
-    share, twice = min(SHARE * plan.horizon, MOST_NUTATIONS * period), min(2.0 * period, plan.horizon)
+    share, twice = min(SHARE * plan.horizon, motion.longest * period), min(2.0 * period, plan.horizon)
     if method.adaptive:
-        return _adaptive_forecast(scene, method, chart, plan, period, share, twice)
+        return _adaptive_forecast(motion, method, chart, plan, period, share, twice)
     step = plan.step_size
     share = min(share, MOST_PROBED * step)
     allowed = max(STEPS[method.implementation] * step, share)
     if twice <= allowed:
-        piece = max(twice, share, AT_LEAST * STEPS[method.implementation] * step)
-        probe = _probe(scene, method, chart, plan, min(plan.horizon, piece), step)
-        return _fixed(scene, method, probe, plan.horizon, marks), probe
+        piece = max(twice, share, min(AT_LEAST * STEPS[method.implementation] * step, motion.reach * period))
+        probe = _probe(motion, method, chart, plan, min(plan.horizon, piece), step)
+        return _fixed(motion, method, probe, plan.horizon), probe
     coarse = twice / round(allowed / step)
-    probe = _probe(scene, method, chart, plan, twice, coarse)
+    probe = _probe(motion, method, chart, plan, twice, coarse)
     finer: float = (step / coarse) ** (method.order or 1)
-    expected = _fixed(scene, method, probe, plan.horizon, marks) * finer
+    expected = _fixed(motion, method, probe, plan.horizon) * finer
     if chart == "angles" and marks.rate * coarse > RESOLVED:
-        since = max(0.0, _closest_time(scene, period) - 0.5 * allowed)
+        since = max(0.0, motion.closest() - 0.5 * allowed)
         if since < plan.horizon:
-            probe = _probe(scene, method, chart, plan, min(allowed, plan.horizon - since), step, since)
+            probe = _probe(motion, method, chart, plan, min(allowed, plan.horizon - since), step, since)
             passages = max(1.0, plan.horizon / period)
             expected = float(np.max(probe.error)) * (passages if straight else passages**2)
     return expected, probe
 
 
-def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Forecast:
+def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: Motion | None = None) -> Forecast:
     """Forecast the error of a run from a short run (a probe) of the same method; the run itself is not changed.
 
-    A method without a step or a tolerance, such as the closed form, is not probed.
+    A method without a step or a tolerance, such as the closed form, is not probed. By default the motion of a top is
+    its closed form, and that of a body integrated.
     """
-    marks = landmarks(scene)
+    motion = motion or (Integrated if scene.of_body else Exact)(scene)
+    marks = motion.marks
     steps, passage = marks.period / plan.step_size, marks.rate * plan.step_size
     if method.control is None:
         return Forecast(0.0, 0.0, steps, passage, "ok", plan.horizon, marks)
-    error, probe = _expected(scene, method, chart, plan, marks)
+    error, probe = _expected(motion, method, chart, plan)
     partly = method.adaptive and method.implementation == "python" and not probe.times[-1] >= plan.horizon
     if partly and chart == "angles" and marks.gap < CLOSE:
-        error = max(error, float(np.nan_to_num(displacement(scene, PASSING * plan.tolerance, plan.horizon))))
-    unstable = _grown_tolerance(scene, method, plan, marks) if partly else 0.0
-    turns = plan.horizon / marks.period
-    rounding = marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0
+        error = max(error, float(np.nan_to_num(motion.displacement(PASSING * plan.tolerance, plan.horizon))))
+    unstable = _grown_tolerance(motion, method, plan) if partly else 0.0
     whole = bool(probe.times[-1] >= plan.horizon * (1.0 - 1e-9))
-    ended = probe.outcome, probe.reached
-    return Forecast(max(error, unstable), rounding, steps, passage, *ended, marks, unstable, whole)
+    growth = 1.0
+    if isinstance(motion, Integrated) and not whole and plan.step_size * marks.frequency > SMALL_TURN:
+        growth = _own_growth(motion, method, chart, plan, float(probe.times[-1]))
+        pieces = plan.horizon / float(probe.times[-1]) - 1.0
+        error = max(error, float(probe.error.max()) * math.exp(min(pieces * math.log(growth), MOST_FOLDS)))
+    ended, rounding = (probe.outcome, probe.reached), motion.rounding(plan.horizon)
+    return Forecast(max(error, unstable), rounding, steps, passage, *ended, marks, unstable, whole, growth)
+
+
+def _own_growth(motion: Integrated, method: Integrator, chart: str, plan: Plan, piece: float) -> float:
+    """How many times more than the motion itself a method's steps multiply a small change in a piece; 1 if no more."""
+    steps = max(1, round(min(piece, STEPS[method.implementation] * plan.step_size) / plan.step_size))
+    top, marks = motion.scene.top, Plan.steps(plan.step_size, _marks(steps))
+    pair = [solve(method, chart, top, start, marks).states for start in (motion.scene.start, motion.moved())]
+    with np.errstate(all="ignore"):
+        apart = float(np.max(motion.apart(*((chart, one) for one in pair)))) / MOVED
+    natural = motion.amplification(float(marks.times[-1]), plan.horizon)
+    excess = apart / (natural * natural) if math.isfinite(apart) else math.inf
+    return excess ** (piece / float(marks.times[-1])) if excess > OWN else 1.0
 
 
 class Trouble(NamedTuple):
@@ -311,22 +287,24 @@ class Trouble(NamedTuple):
     otherwise: str = ""  # what may be done instead of it
 
 
-def warning(scene: Scene, method: Integrator, chart: str, plan: Plan) -> str:
+def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, *, series: bool = False) -> str:
     """Warn before the run if a large error is expected: one sentence with a remedy, else an empty one.
 
-    A step is advised if the guard would be silent about it, and otherwise named as one to try.
+    A step is advised if the guard would be silent about it, and otherwise named as one to try. With `series` a top's
+    motion is integrated, too, as that of a body is.
     """
     if method.control is None:
         return ""
-    expected = forecast(scene, method, chart, plan)
-    trouble = _trouble(scene, method, chart, plan, expected)
+    motion: Motion = Integrated(scene) if series or scene.of_body else Exact(scene)
+    expected = forecast(scene, method, chart, plan, motion)
+    trouble = _trouble(motion, method, chart, plan, expected)
     if trouble is None:
         return ""
-    remedy = "" if math.isnan(trouble.step) else f"; {_remedy(scene, method, chart, plan, trouble)}"
+    remedy = "" if math.isnan(trouble.step) else f"; {_remedy(motion, method, chart, plan, trouble)}"
     return f"{method.name} on {scene.name}: {trouble.reason}{remedy}"
 
 
-def _remedy(scene: Scene, method: Integrator, chart: str, plan: Plan, trouble: Trouble) -> str:
+def _remedy(motion: Motion, method: Integrator, chart: str, plan: Plan, trouble: Trouble) -> str:
     """A step of two digits of which nothing is expected to go wrong: the first try, or the next smaller ones."""
     step, word, others = trouble.step, "try", f", or {trouble.otherwise}" if trouble.otherwise else ""
     for _ in range(TRIES):
@@ -334,17 +312,18 @@ def _remedy(scene: Scene, method: Integrator, chart: str, plan: Plan, trouble: T
             return f"take {trouble.otherwise or 'another method'}: more than {MOST_STEPS:.0e} steps would be needed"
         step = float(f"{step:.2g}")
         tried = plan._replace(step_size=step)  # a forecast looks at the step and the horizon
-        expected = forecast(scene, method, chart, tried)
-        if expected.outcome == "ok" and _trouble(scene, method, chart, tried, expected) is None:
+        expected = forecast(motion.scene, method, chart, tried, motion)
+        if expected.outcome == "ok" and _trouble(motion, method, chart, tried, expected) is None:
             word = "take"
             break
         step = min(LESS * step, _smaller(method, tried, expected))
     return f"{word} a step of about {step:.2g}{others}"
 
 
-def _trouble(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
+def _trouble(motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
     """Why a run will go wrong; None if it will not."""
-    return _instability(scene, method, chart, plan, expected) or _cause(scene, method, chart, plan, expected)
+    known = isinstance(motion, Exact) and _instability(motion.scene, method, chart, plan, expected)
+    return known or _cause(motion, method, chart, plan, expected)
 
 
 def _growth(scene: Scene, method: Integrator, chart: str, step: float, frequency: float) -> Growth:
@@ -383,9 +362,14 @@ def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expec
     )  # fmt: skip
 
 
-def _cause(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
+def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
     """The first of the other causes."""
     marks = expected.marks
+    if expected.rounding > EXPECTED and isinstance(motion, Integrated):
+        return Trouble(
+            f"the motion multiplies a change of its start by {expected.rounding / EPSILON:.1g} by t = "
+            f"{plan.horizon:.4g}, so that rounding alone decides; no method and no step help, shorten the horizon"
+        )
     if expected.rounding > EXPECTED and expected.rounding >= min(expected.axis_error, 1.0):
         return Trouble(
             "the motion passes so close to a separatrix that rounding alone decides when it falls; no method and no "
@@ -393,8 +377,8 @@ def _cause(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: F
         )
     if not expected.axis_error > EXPECTED:
         return None
-    size = f"expect an axis error of {min(expected.axis_error, math.pi):.1g} rad by t = {plan.horizon:.4g}"
-    if (coarse := _coarse(scene, method, chart, plan, expected, size)) is not None:
+    size = f"expect an {motion.watches} error of {min(expected.axis_error, math.pi):.1g} rad by t = {plan.horizon:.4g}"
+    if (coarse := _coarse(motion, method, chart, plan, expected, size)) is not None:
         return coarse
     if expected.outcome != "ok":
         return Trouble(f"expect the run to be {sentence(expected.outcome, expected.reached, plan.horizon)}")
@@ -414,9 +398,14 @@ def _cause(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: F
     )  # fmt: skip
 
 
-def _coarse(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: Forecast, size: str) -> Trouble | None:
+def _coarse(
+    motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast, size: str
+) -> Trouble | None:
     """A step that is too long for a pole or for the nutation, or in resonance with it."""
     marks, step, frequency = expected.marks, plan.step_size, expected.marks.frequency
+    if expected.growth > 1.0:
+        words = f"steps of {step:.4g} multiply a small change {expected.growth:.1g} times as much as the motion does"
+        return Trouble(f"{size}: {words} in a short run", SMALL_TURN / frequency)
     if chart == "angles" and expected.passage > COARSE:
         return Trouble(
             f"{size}: the axis passes the {marks.pole} pole at {marks.gap:.2g} rad and precesses there by "
@@ -426,8 +415,8 @@ def _coarse(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: 
     if expected.steps_per_nutation < 2.0:
         words = f"a step of {step:.4g} jumps over the nutation, whose period is {marks.period:.4g}"
         return Trouble(f"{size}: {words}", marks.period / 20.0)
-    if step * frequency > SMALL_TURN:
-        turn = trace(method, scene, step, chart).turn
+    if step * frequency > SMALL_TURN and isinstance(motion, Exact):
+        turn = trace(method, motion.scene, step, chart).turn
         for order in (3, 4):
             if abs(order * turn - 2.0 * math.pi) < NEAR * order:
                 return Trouble(

@@ -214,8 +214,6 @@ def _guarded(
     scene: Scene, method: Integrator, chart: str, plan: Plan, guard: Callable[[str], object] | None
 ) -> tuple[Trajectory, str]:
     """Make a run, after the guard's sentence if there is one; "off" is the sentence of no guard."""
-    if chart == BODY:  # nothing forecasts a run of a body
-        guard = None
     caution = "off" if guard is None else warning(scene, method, chart, plan)
     if caution and guard is not None:
         guard(caution)

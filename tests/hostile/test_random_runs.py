@@ -12,8 +12,9 @@ import pytest
 
 import symtop
 from symtop.model.scenes import steady
-from symtop.run.guard import forecast, landmarks
+from symtop.run.guard import forecast
 from symtop.run.linear_stability import nutation_growth, trace
+from symtop.run.motion import landmarks
 from symtop.run.simulation import make_plan
 from tests.hostile.random_runs import LONGEST, NEWER, drawn, one, run_all, told
 

@@ -17,8 +17,9 @@ from symtop.model import charts
 from symtop.model.charts import axes
 from symtop.model.scenes import closed_form, grazing, steady
 from symtop.run import guard
-from symtop.run.guard import EXPECTED, Probe, grown, landmarks
+from symtop.run.guard import EXPECTED, Probe, grown
 from symtop.run.linear_stability import trace
+from symtop.run.motion import landmarks
 from symtop.run.simulation import make_plan
 
 REMEDIED = ("spheroid", "goldstein", "cusp", "loop", "fast", "hairer-lubich-wanner", "grazing")

@@ -1,0 +1,235 @@
+"""The true motion beside a probe of the guard: by the closed form, or integrated where there is none.
+
+`Exact` knows a top's motion for ever. `Integrated` needs the equations alone, and so takes bodies too: a Taylor series
+at rounding, of order 19, whose own error is its distance from one of order 16. What the motion makes of an error is
+
+    A(t) = max over s <= t of |y~(s) - y(s)|/delta,      |y~(0) - y(0)| = delta,
+
+of two integrations over the whole run: shear makes A grow with t, chaos and unstable motions by exponentials. A piece
+of the run does not show it, because a chaotic motion looks regular on many a piece.
+"""
+
+import functools
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from symtop.core.numbers import EPSILON
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import integrator
+from symtop.model.body import Attitude, RigidBody
+from symtop.model.charts import BODY, Array, attitude_distance, axes, axis_distance
+from symtop.model.scenes import Scene, closed_form
+from symtop.model.top import Angles, SymmetricTop
+from symtop.run.reference.sensitivity import displacement
+
+SERIES, PAIR = "series-general-adaptive", "dop853-compiled"
+FINE, CHECK, ROUGH = 1e-15, 1e-13, 1e-9  # tolerances: of the true motion, of its check, of two motions side by side
+MOVED = 1e-8  # of the natural frequency: small enough to show how much a regular motion beside a separatrix shears
+SATURATED = 0.1  # rad; two motions that are farther apart no longer show how fast they part
+WATCHED = 100  # points of A
+MOST_POWER = 20.0  # of the time by which A grows beyond what is watched
+MOST_FOLDS = 100.0  # e times that anything grows: any is too much
+MOST_WORK = 1e6  # steps of an integration
+
+
+class Landmarks(NamedTuple):
+    """What is known about a motion before it is computed."""
+
+    period: float  # of the nutation; of a motion that is integrated the natural one
+    frequency: float  # of small nutations about the steady precession with the same momenta
+    width: float  # of the nutation, rad
+    gap: float  # closest approach to a pole, rad; infinite where it is not known
+    pole: str  # upper or lower
+    rate: float  # of precession there, rad per unit time
+    shear: float  # relative change of the period when the start is moved by rounding
+
+
+@functools.lru_cache(maxsize=256)
+def _landmarks(top: SymmetricTop, at: Angles) -> Landmarks:
+    scene, momenta = Scene("landmarks", top, at, 1.0), top.momenta(at)
+    form = closed_form(scene)
+    highest, lowest = form.theta_range
+    upper = highest <= math.pi - lowest
+    gap = highest if upper else math.pi - lowest
+    near, far = (momenta.north, momenta.south) if upper else (momenta.south, momenta.north)
+    sine = math.sin(0.5 * gap) ** 2
+    rate = abs(far / math.cos(0.5 * gap) ** 2 + (near / sine if sine > 0.0 else 0.0)) / (4.0 * top.I1)
+    rounded = (replace(at, phi_dot=at.phi_dot * (1.0 + turn)) for turn in (-4e-16, 4e-16))
+    moved = [scene.nutation_period, *map(top.nutation_period, rounded)]
+    spread = max(moved) - min(moved)
+    shear = spread / max(moved) if math.isfinite(spread) else 1.0
+    pole, frequency = "upper" if upper else "lower", top.nutation_frequency(momenta)
+    return Landmarks(form.nutation_period, frequency, lowest - highest, gap, pole, rate, shear)
+
+
+def landmarks(scene: Scene) -> Landmarks:
+    """The landmarks of a scene's motion, by its closed form; made once and kept."""
+    return _landmarks(scene.top, scene.start)
+
+
+class Motion(Protocol):
+    """What the guard asks the true motion of a scene."""
+
+    scene: Scene
+    marks: Landmarks
+    watches: str  # axis or attitude
+    longest: float  # nutations of a piece that is a share of the run
+    reach: float  # nutations of any piece that is not the run
+
+    def error(self, times: Array, chart: str, states: Array, since: float, /) -> Array:
+        """Rad (n,) by which states (n, dimension) of a run from the time `since` on are off at `times` (n,)."""
+
+    def start(self, since: float, /) -> Any:
+        """The state at a time, as a start."""
+
+    def closest(self) -> float:
+        """A time at which a method may have the most to do: when the axis first comes closest to a pole."""
+
+    def displacement(self, change: float, horizon: float) -> float:
+        """How far the run is off by the horizon, rad, if the start is changed by so little."""
+
+    def amplified(self, error: float, since: float, horizon: float, /) -> float:
+        """What the motion makes by the horizon of an error at the time `since`, rad; 0 if its law is known."""
+
+    def rounding(self, horizon: float) -> float:
+        """What rounding alone makes of a run, rad: large on a separatrix and in chaos, whatever the method."""
+
+
+class Exact:
+    """The motion of a top by its closed form."""
+
+    watches, longest, reach = "axis", 20.0, math.inf
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.marks, self.form = scene, landmarks(scene), closed_form(scene)
+
+    def error(self, times: Array, chart: str, states: Array, since: float) -> Array:
+        """Of the axis; see `Motion`."""
+        return self.form.axis_distance(since + times if since else times, axes(chart, states))
+
+    def start(self, since: float) -> Any:
+        """See `Motion`."""
+        return Angles(*(float(value) for value in self.form(since))) if since else self.scene.start
+
+    def closest(self) -> float:
+        """See `Motion`."""
+        middle, width = 0.5 * self.marks.period, self.marks.period
+        for _ in range(4):
+            times = middle + width * np.linspace(-0.5, 0.5, 129)
+            middle, width = float(times[int(np.argmin(np.sin(self.form(times).theta)))]), width / 40.0
+        return middle
+
+    def displacement(self, change: float, horizon: float) -> float:
+        """See `symtop.run.reference.sensitivity`."""
+        return displacement(self.scene, change, horizon)
+
+    def amplified(self, _: float, __: float, ___: float) -> float:
+        """0: errors of an integrable motion shear, which the law of the guard has."""
+        return 0.0
+
+    def rounding(self, horizon: float) -> float:
+        """See `Motion`."""
+        marks, turns = self.marks, horizon / self.marks.period
+        return marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0
+
+
+class Integrated:
+    """The motion of a body, or of a top as if it had no closed form, by Taylor series."""
+
+    longest, reach = 5.0, 10.0
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.known = scene, dict[float, tuple[Array, Array]]()
+        self.chart, self.watches = (BODY, "attitude") if scene.of_body else ("axis", "axis")
+        self.watched = 200.0 if scene.of_body else 20.0  # natural periods: the motion of a top is integrable
+        period = _natural_period(scene)
+        self.marks = Landmarks(period, 2.0 * math.pi / period, math.nan, math.inf, "upper", 0.0, 0.0)
+
+    def states(self, times: Array, tolerance: float, start: Any = None, method: str = SERIES) -> Array:
+        """States (n, dimension) at `times` (n,), NaN from where the work is too much."""
+        plan = Plan.until(times, tolerance, MOST_WORK)
+        return solve(integrator(method), self.chart, self.scene.top, start or self.scene.start, plan).states
+
+    def apart(self, first: tuple[str, Array], second: tuple[str, Array]) -> Array:
+        """Rad (n,) between states (n, dimension) of two charts."""
+        if self.chart == BODY:
+            return attitude_distance(first[1][:, :4], second[1][:, :4])
+        return axis_distance(axes(*first), axes(*second))
+
+    def error(self, times: Array, chart: str, states: Array, _: float) -> Array:
+        """See `Motion`; with what two orders differ by."""
+        true, check = (self.states(times, tolerance) for tolerance in (FINE, CHECK))
+        gap = np.abs(check - true)[:, : 4 if self.chart == BODY else 3].max(initial=0.0)
+        error: Array = self.apart((chart, states), (self.chart, true)) + gap
+        return error
+
+    def start(self, _: float) -> Any:
+        """The start itself: a piece begins nowhere else."""
+        return self.scene.start
+
+    def closest(self) -> float:
+        """0; see `start`."""
+        return 0.0
+
+    def moved(self) -> Any:
+        """A start that differs by `MOVED`, of the natural frequency."""
+        at, rate = self.scene.start, MOVED * 2.0 * math.pi / self.marks.period
+        if self.chart == BODY:
+            x, y, z = at.omega_body
+            return replace(at, omega_body=(x + 0.6 * rate, y - 0.48 * rate, z + 0.64 * rate))
+        return replace(at, theta_dot=at.theta_dot + 0.6 * rate, phi_dot=at.phi_dot + 0.8 * rate)
+
+    def growth(self, horizon: float) -> tuple[Array, Array]:
+        """Times (n,) and A (n,) up to the horizon, or as far as it is watched; made once.
+
+        From where two motions are too far apart to show it, A grows by the exponential that it has reached.
+        """
+        until = min(horizon, self.watched * self.marks.period)
+        if until not in self.known:
+            times = until / WATCHED * np.arange(1.0, WATCHED + 1.0)
+            near, far = (self.states(times, ROUGH, start, PAIR) for start in (self.scene.start, self.moved()))
+            gap, place = far - near, 4 if self.chart == BODY else 3
+            turned = (2.0 if self.chart == BODY else 1.0) * np.linalg.norm(gap[:, :place], axis=1)
+            apart = np.fmax(turned, np.linalg.norm(gap[:, place:], axis=1) / self.scene.momentum_scale)
+            grown = np.maximum.accumulate(np.maximum(np.nan_to_num(apart, nan=math.inf) / MOVED, 1.0))
+            last = int(np.searchsorted(grown, SATURATED / MOVED))
+            if last < WATCHED:
+                folds = math.log(SATURATED / MOVED) * times[last:] / times[last]
+                grown[last:] = np.exp(np.minimum(folds, MOST_FOLDS))
+            self.known[until] = times, grown
+        return self.known[until]
+
+    def amplification(self, until: float, horizon: float) -> float:
+        """A at a time of a run to the horizon."""
+        times, grown = self.growth(horizon)
+        if until <= times[-1]:
+            return float(grown[min(int(np.searchsorted(times, until)), WATCHED - 1)])
+        last, power = float(grown[-1]), math.log2(float(grown[-1] / grown[WATCHED // 2 - 1]))
+        return last * math.pow(until / float(times[-1]), min(max(power, 1.0), MOST_POWER))
+
+    def displacement(self, change: float, horizon: float) -> float:
+        """See `Motion`."""
+        return min(change * self.amplification(horizon, horizon), math.pi)
+
+    def amplified(self, error: float, since: float, horizon: float) -> float:
+        """See `Motion`."""
+        return error * self.amplification(horizon, horizon) / self.amplification(since, horizon)
+
+    def rounding(self, horizon: float) -> float:
+        """See `Motion`."""
+        return self.displacement(EPSILON, horizon)
+
+
+def _natural_period(scene: Scene) -> float:
+    """That of a body (`symtop.model.body`), which needs no closed form, of a top too."""
+    if scene.of_body:
+        return scene.time_scale()
+    top, at = scene.top, scene.start
+    across = top.I1 * math.hypot(at.theta_dot, at.phi_dot * math.sin(at.theta))
+    body = RigidBody(top.I1, top.I1, top.I3, top.mgl)
+    period = body.nutation_period(Attitude(omega_body=(across / top.I1, 0.0, top.momenta(at).p_psi / top.I3)))
+    return min(period, scene.horizon)
