@@ -30,6 +30,14 @@ def plus(a: Any, s: Any, b: Any) -> Any:
 
 
 @register_jitable
+def rotated(q: Any, v: Any) -> Any:
+    """q v q* of a unit quaternion."""
+    u = q[1], q[2], q[3]
+    c = cross(u, v)
+    return plus(v, 2.0, plus(cross(u, c), q[0], c))
+
+
+@register_jitable
 def solve3(a: Any, b: Any, c: Any, y: Any) -> Any:
     """x of M x = y for the matrix with columns a, b and c, by Cramer's rule."""
     bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)

@@ -200,7 +200,9 @@ def test_a_run_in_stretches_has_the_bits_of_the_run_in_one(name):
     np.testing.assert_array_equal(rest.states, whole.states)
 
 
-@pytest.mark.parametrize("name", ["jsbsim-buss2[axis]", "jolt-float32[attitude]", "rapier[axis]", "no-squish"])
+@pytest.mark.parametrize(
+    "name", ["jsbsim-buss2[axis]", "jolt-float32[attitude]", "rapier[axis]", "no-squish[attitude]"]
+)
 def test_a_member_of_an_ensemble_has_the_bits_of_the_run_alone(name):
     numbers = np.array([flat(scene.top, scene.start) for scene in (GOLDSTEIN, *random_scenes(4, seed=5))])
     h, marks = np.linspace(0.01, 0.02, len(numbers)), np.tile([0, 30, 77], (len(numbers), 1))

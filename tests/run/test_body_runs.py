@@ -1,6 +1,7 @@
 """Runs of a body without symmetry: orders, conserved quantities, errors against the truth, and what is refused."""
 
 import dataclasses
+import itertools
 import json
 import math
 
@@ -23,36 +24,29 @@ FIXED = {
     "strang": (2, 40), "strang-drift-first": (2, 40), "yoshida-4": (4, 40), "suzuki-4": (4, 40), "kahan-li-6": (6, 20),
     "kahan-li-8": (8, 10), "gauss-2": (2, 40), "gauss-4": (4, 40), "gauss-6": (6, 20), "gauss-8": (8, 10),
     "chin-4a": (4, 30), "srkn-6-4": (4, 30), "srkn-11-6": (6, 12), "srkn-14-6": (6, 16), "srkn-19-8": (8, 10),
-    "aba-8-6-4": (4, 20), "lie-variational": (2, 40), "lie-variational-suzuki-4": (4, 40), "euler-poincare": (2, 40),
-    "rkmk-se3-2": (2, 80), "rkmk-se3-4": (4, 40), "crouch-grossman-3": (3, 40), "commutator-free-4": (4, 40),
+    "aba-8-6-4": (4, 20), "five-rotations": (2, 40), "no-squish": (2, 40), "lie-variational": (2, 40),
+    "lie-variational-suzuki-4": (4, 40), "euler-poincare": (2, 40), "rkmk-se3-2": (2, 80), "rkmk-se3-4": (4, 40),
+    "crouch-grossman-3": (3, 40), "commutator-free-4": (4, 40),
 }  # fmt: skip
-# what a method keeps of a free body, and of a heavy one; None for what it does not
+# what a method keeps of a free body, and of a heavy one
 KEPT = {
     "rk4": ((), ()), "strang": (("momentum",), ("p_phi",)), "chin-4a": (("momentum",), ("p_phi",)),
-    "gauss-4": (("energy",), ("energy",)),
+    "gauss-4": (("energy",), ("energy",)), "five-rotations": (("momentum",), ("p_phi",)),
     "lie-variational": (("momentum", "energy"), ("p_phi",)), "euler-poincare": (("momentum",), ("p_phi",)),
     "commutator-free-4": (("momentum",), ("p_phi",)), "rkmk-se3-4": (("momentum",), ("p_phi",)),
 }  # fmt: skip
-TO_ROUNDING = (
-    "strang",
-    "kahan-li-8",
-    "chin-4a",
-    "srkn-11-6",
-    "lie-variational",
-    "euler-poincare",
-)  # the steps of the symmetric top
-TO_ORDER = {
-    "gauss-4": 4,
-    "rkmk-se3-4": 4,
-    "crouch-grossman-3": 3,
-    "commutator-free-4": 4,
-}  # another method there, of the same order
+# the steps of the symmetric top, and another method there, of the same order
+TO_ROUNDING = ("strang", "kahan-li-8", "chin-4a", "srkn-11-6", "lie-variational", "euler-poincare", "five-rotations",
+               "no-squish")  # fmt: skip
+TO_ORDER = {"gauss-4": 4, "rkmk-se3-4": 4, "crouch-grossman-3": 3, "commutator-free-4": 4}
 ADAPTIVE = ("rk45", "dop853", "rk45-compiled", "dop853-compiled", "tsit5", "vern9", "series-general-adaptive",
             "extrapolation", "adams", "taylor", "taylor-longdouble")  # fmt: skip
 ANGLE = math.radians(0.3)
 
 
-def error(name: str, method: str | symtop.Integrator, quantity: str = "attitude", **settings: float) -> float:
+def error(
+    name: str | symtop.Scene, method: str | symtop.Integrator, quantity: str = "attitude", **settings: float
+) -> float:
     """Largest error of a run."""
     run = symtop.simulate(name, method, samples=41, **settings)
     assert run.outcome == "ok"
@@ -143,6 +137,16 @@ def test_splittings_keep_what_they_must() -> None:
         assert energy[half:].max() < 1.3 * energy[:half].max()  # it swings, and does not grow
     grown = symtop.errors(symtop.simulate("heavy-brick", "rk4", step_size=0.05, horizon=2000.0))["energy"].values
     assert grown[-1] > 1.7 * grown[len(grown) // 2]
+
+
+@pytest.mark.parametrize("mgl", [0.0, 1.0])
+@pytest.mark.parametrize("moments", list(itertools.permutations((0.25, 0.75, 1.0))))
+def test_five_rotations_are_of_order_four_on_one_free_body_in_one_order(moments: tuple[float, ...], mgl: float) -> None:
+    start = Attitude((0.8, 0.6, 0.0, 0.0), (0.5, 0.7, 1.1))
+    scene = symtop.Scene("of-fasso", RigidBody(*moments, mgl, (0.3, 0.2, 1.0)), start, 10.0)
+    coarse, fine = (error(scene, "five-rotations", step_size=h) for h in (0.025, 0.0125))
+    special = mgl == 0.0 and moments == (0.25, 0.75, 1.0)
+    assert abs(math.log2(coarse / fine) - (4 if special else 2)) < 0.1
 
 
 def test_a_variational_step_that_has_no_solution_ends_the_run() -> None:

@@ -71,8 +71,10 @@ from symtop.methods.framework.loop import FixedStep, Loop, as_stepped, kernel_lo
 from symtop.methods.framework.preparation import Body, Preparation
 from symtop.methods.framework.registry import ENGINE, Integrator
 from symtop.methods.framework.space import L_at, e_at, finite_outcome, observe_attitude, observe_axis, q_at
+from symtop.methods.splitting.body import SORTED, five_rotations
 from symtop.methods.vectors import cross, dot, plus, scaled
 from symtop.model.body import product
+from symtop.model.charts import BODY
 
 
 class EngineTop(NamedTuple):
@@ -531,7 +533,7 @@ march_no_squish = kernel_loop(no_carry, _increment_no_squish, observe_attitude)
 def _entry(
     name: str, loops: dict[str, Loop], order: int | None, summary: str, reference: str, keeps: str = "", *,
     carried: Mapping[str, Carried] = VELOCITY, rule: Any = None, forces: int = 1, symplectic: bool = False,
-    energy_error: str | None = None, precision: str = "double", needs: str = "group",
+    energy_error: str | None = None, precision: str = "double", needs: str = "group", on_body: FixedStep | None = None,
 ) -> Integrator:  # fmt: skip
     """The record of a map from its loops, by chart; `keeps` names the momenta that it conserves."""
     return Integrator(
@@ -541,7 +543,7 @@ def _entry(
         solvers={
             chart: FixedStep(loop, rule or Substeps(), carried[chart].prepare, forces, implicit=False)
             for chart, loop in loops.items()
-        },
+        } | ({} if on_body is None else {BODY: on_body}),
     )  # fmt: skip
 
 
@@ -594,7 +596,8 @@ def built_in() -> list[Integrator]:
         _engine("lammps-rigid", richardson, 2, "LAMMPS fix rigid: half kicks around an extrapolated rotation",
                 "lammps", "p_phi", carried=ANGULAR_MOMENTUM),
         _entry("no-squish", {"attitude": march_no_squish}, 2, "LAMMPS fix rigid/nve: turns about the body's axes",
-               "miller-2002 lammps", "p_phi", carried=ANGULAR_MOMENTUM, symplectic=True, needs="kicks"),
+               "miller-2002 lammps", "p_phi", carried=ANGULAR_MOMENTUM, symplectic=True, needs="kicks",
+               on_body=five_rotations(SORTED)),
         _engine("yade", _leapfrog(published=False), 1, "YADE: rotational leapfrog with the axes of the start of a step",
                 "yade", "p_phi", carried=ANGULAR_MOMENTUM),
         _engine("fincham", _leapfrog(published=True), 2, "the rotational leapfrog as published", "fincham-1992",

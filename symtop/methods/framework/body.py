@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.preparation import Preparation, Shown
-from symtop.methods.framework.space import finite_outcome, observe_attitude
+from symtop.methods.framework.space import L_at, finite_outcome, observe_attitude, q_at
+from symtop.methods.vectors import rotated
 from symtop.model.body import vertical
 
 
@@ -81,6 +82,19 @@ def _turned_back(par: Any, t: float, y: Any) -> Any:
     return y[0], -y[1], -y[2], -y[3], y[4], y[5], y[6]
 
 
+def _of_top(top: Any, at: Any) -> Any:
+    w, x, y, z = q_at(at)
+    a1, a3 = 1.0 / top.I1, 1.0 / top.I3
+    body = General(a1, a1, a3, top.I1, top.I1, top.I3, 0.0, 0.0, top.mgl)
+    return body, (w, x, y, z, *rotated((w, -x, -y, -z), L_at(top, at)))
+
+
+def _in_space(par: Any, t: float, y: Any) -> Any:
+    q = y[0], y[1], y[2], y[3]
+    return (*q, *rotated(q, (y[4], y[5], y[6])))
+
+
+of_top, in_space = Preparation(_of_top, 7), Shown(_in_space, 7)  # a top as (q, M), shown as (q, L)
 on_body = _OfBody(_on_body, 7, opened=opened, momenta=_momenta)
 turned, turned_back = _OfBody(_turned, 7, opened=opened, momenta=_momenta), Shown(_turned_back, 7)
 

@@ -238,7 +238,7 @@ class Integrator:
 
 _BUILT_IN = (
     "lagrangian.discrete_lagrangian", "lagrangian.unreduced", "lagrangian.galerkin", "lagrangian.exact_discrete",
-    "lie_group.variational", "splitting.composition", "splitting.reversible", "runge_kutta.explicit",
+    "lie_group.variational", "splitting.composition", "splitting.body", "splitting.reversible", "runge_kutta.explicit",
     "runge_kutta.pairs", "runge_kutta.extrapolation", "runge_kutta.nystrom", "runge_kutta.adams", "runge_kutta.gauss",
     "runge_kutta.kahan", "lie_group.runge_kutta", "lie_group.energy_momentum", "lie_group.generalised_alpha",
     "runge_kutta.collective_gauss", "library.scipy_ivp", "taylor.heyoka", "taylor.series", "taylor.series_general",
