@@ -124,7 +124,7 @@ def judge(
         for finding in constants:
             listen(finding)
         return StepLedger(about.name, chosen.name, constants, {}, about)
-    implied = {"time": not autonomous, "energy": energy is None and "energy" not in kept}
+    implied = {"time": not autonomous, "energy": energy is None and "energy" not in kept, "order": order is None}
     heartbeat.reset(quick=quick)
     began, findings = time.monotonic(), list[Finding]()
     load = functools.partial(open_target, target, form, chart, adaptive=adaptive)

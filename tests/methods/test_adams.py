@@ -135,3 +135,12 @@ def test_nothing_that_belongs_to_the_map_of_one_step_is_claimed():
     method = symtop.integrator("adams")
     assert (method.order, method.symplectic, method.symmetric) == (None, None, None)
     assert math.isclose(method.least_tolerance, symtop.integrator("dop853-compiled").least_tolerance)
+
+
+def test_a_run_of_ten_trillion_seconds_begins():
+    """Its first step is far below the spacing of numbers at its end, on whose grid steps lie: it stood still for ever."""
+    top = symtop.SymmetricTop(5.8e10, 5.6e10, -7.2e-12)
+    scene = symtop.Scene("slow", top, symtop.Angles(1.7, 1.6, 2.8, 4.7e-12, -2.4e-11, -4.6e-11), 1.1e13)
+    run = symtop.simulate(scene, "adams", tolerance=1e-9, samples=11, budget=1e5)
+    assert run.attrs["outcome"] == "ok"
+    assert float(symtop.errors(run)["axis"].max()) < 1e-3

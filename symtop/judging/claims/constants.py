@@ -7,7 +7,8 @@ than `KEPT`, relative, or than the random walk that the rounding seen in one ste
 beyond a thousandth of that rounding is visible in a million steps. A drift that hides below a bounded oscillation shows
 in the means of 24 equal stretches, and counts if the line through them exceeds `SURE` of its own intervals. A random
 walk passes a plain test of the slope in one case in three, and not this one; at the size of rounding only the size is
-judged.
+judged. While it has changed little, no constant changes from one sample to the next by `SUDDEN` times what as many of
+the largest steps at the beginning add up to: else the step is another one somewhere, whatever is claimed of it.
 
 A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 tau, whatever its tau: c is fitted, and it
 is the rest of the fit that must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
@@ -51,6 +52,7 @@ ROUNDING_OF_A_STEP = 2e-13  # a change in one step that may be rounding, where |
 BOUNDED = 0.25  # an exponent that exceeds it with its whole interval is growth
 SURE = 8.0
 VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
+SUDDEN, LITTLE, FROM = 100.0, 1e-2, "changes as it begins"
 OF_A_RUN = (*CONSTANTS, "reported", "invariant", "explicit", "work")
 KINDS = ("kept", "bounded", "random walk", "growing", "drift")  # from best to worst
 OWN = "its states'"  # what every run says of the momenta that it reports
@@ -68,6 +70,7 @@ class Constant(NamedTuple):
     a_step: float  # largest change in one step
     floor: float  # a smaller change is rounding
     grain: float = 1.0  # rounding of the constant, in units of the machine's
+    sudden: str = ""  # from when on it changes so much more than by its first steps
 
     @property
     def kind(self) -> str:
@@ -250,7 +253,13 @@ def change_of(time: Array, values: Array, every_step: Array, steps: int, grain: 
     jumps = np.abs(np.diff(every_step))
     a_step = float(np.max(jumps[np.isfinite(jumps)])) if np.isfinite(jumps).any() else math.nan
     rounding = a_step * math.sqrt(steps) if a_step <= ROUNDING_OF_A_STEP * grain else 0.0
-    return Constant(constant_of(time, values), a_step, max(KEPT * grain, rounding), grain)
+    floor = max(KEPT * grain, rounding)
+    with np.errstate(all="ignore"):  # a run may blow up
+        ratio = np.abs(np.diff(values)) / max(a_step * steps / (time.size - 1), floor)
+        jump = np.flatnonzero((ratio[1:] > SUDDEN) & (ratio[:-1] < SUDDEN / 10.0) & (np.abs(values[1:-1]) < LITTLE))
+    words = "after t = {:.4g} it changes {:.0e} times as much as by its first steps"
+    sudden = words.format(time[jump[0] + 1], ratio[jump[0] + 1]) if jump.size else ""
+    return Constant(constant_of(time, values), a_step, floor, grain, sudden)
 
 
 def measure(subject: Subject) -> list[Finding]:
@@ -271,7 +280,7 @@ def measure(subject: Subject) -> list[Finding]:
 
 def of_run(method: Integrator, run: LongRun) -> list[Finding]:
     """What one long run shows of each claim of `OF_A_RUN`."""
-    motion = [_constant(one, declared(method, one), run, run.constants.get(one)) for one in CONSTANTS]
+    motion = [_constant(method, one, declared(method, one), run, run.constants.get(one)) for one in CONSTANTS]
     return [*motion, _reported(run), _invariant(method, run), *_costs(method, run)]
 
 
@@ -287,7 +296,7 @@ def _badness(one: Finding) -> tuple[int, int, float]:
     return BADNESS.index(one.verdict), growth, one.value if math.isfinite(one.value) else -1.0
 
 
-def _constant(claim: str, claimed: str, run: LongRun, constant: Constant | None) -> Finding:
+def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, constant: Constant | None) -> Finding:
     if constant is None:
         return inapplicable(claim, f"the {run.chart} chart has no such constant", claimed)
     kind, changed, verdict = constant.kind, constant.changed, "undecided"
@@ -302,6 +311,8 @@ def _constant(claim: str, claimed: str, run: LongRun, constant: Constant | None)
     steady = kind in ("kept", "bounded")
     if run.outcome not in ("ok", "not_finite", "not_normalised") or (steady and run.outcome != "ok"):
         why += f"; but the run {run.message}"
+    elif method.fixed_step and constant.sudden:
+        verdict, claimed, why = "refuted", claimed or FROM, f"{constant.sudden}; {why}"
     elif kind == "unknown":
         why = f"the run {run.message}" if run.outcome != "ok" else f"{why}: no exponent to judge it by"
     elif claimed == "bounded" and constant.grows is None and changed.largest > most:
@@ -339,7 +350,7 @@ def _invariant(method: Integrator, run: LongRun) -> Finding:
     if unknown:
         return undecided("invariant", claimed, f"the battery has no formula for {unknown}")
     worst = max(names, key=lambda name: run.constants[name].changed.largest)
-    return _constant("invariant", "kept", run, run.constants[worst])._replace(declared=claimed)
+    return _constant(method, "invariant", "kept", run, run.constants[worst])._replace(declared=claimed)
 
 
 def _costs(method: Integrator, run: LongRun) -> list[Finding]:

@@ -18,7 +18,8 @@ slope does, but not what a run carries from step to step.
 d (w h)^k to a step, w = 2 pi/nutation, beside d' (w h)^(p+1), which a method of order p has anyway: a slope shows it
 below w h = (d/d')^(1/(p + 1 - k)), often a step that is so small that rounding is larger.
 
-A map of (theta, p_theta) is judged by its error of theta.
+A map of (theta, p_theta) is judged by its error of theta. A step that chooses its order and its steps, and claims no
+order, is to come as near to the motion as its tolerance asks: its error is rounding at the least tolerance, or falls.
 
 *Time.* The top's equations are autonomous: a method whose f is called at wrong times, the nodes c of its tableau, is
 right on them. In a frame that turns about a horizontal axis at a rate w, z = R(t)^T y moves by
@@ -39,7 +40,7 @@ import numpy as np
 from symtop.core.errors import SymtopError
 from symtop.judging.claims.structure import ONE_MAP, map_of
 from symtop.judging.claims.subject import FINEST, Subject
-from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, yes_no
+from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, undecided, yes_no
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order_verdict
 from symtop.measure.order_conditions import Conditions, conditions, splitting_conditions, triangle
@@ -75,6 +76,7 @@ LARGE, SEEN = 1e-3, 1e-11  # a miss beyond the first is of no power, below the s
 TURNS = 0.7  # of the frame in a nutation
 BEGIN = 0.23  # of a nutation: t0
 CLEAR = 1e-9  # noise of the h^1 term: a step that is rounded to single precision leaves 1e-8
+CONVERGES, ROUNDED, FALLS = "converges", 1e-10, (1e4, 10.0)  # an error that falls to a tenth over four decades
 ABOVE, FINEST_RUNS, SPREAD = 10.0, 5, 10.0  # errors beyond so many bounds, of so many runs, fall as h^p to this factor
 
 
@@ -207,6 +209,7 @@ class Order(NamedTuple):
 
     scene: str
     step_size: Array
+    tolerance: Array  # NaN at fixed steps
     error: Array  # of the attitude, or of the axis where the chart has no attitude
     bound: Array
     fits: dict[str, Fit]  # attitude (or axis), theta, energy
@@ -253,7 +256,7 @@ def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool, fin
     step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
     fits = {name: order_fit(scene, method, table, name, horizon) for name in (main, "theta", "energy")}
     error, bound = table[main].values, table[f"{main}_bound"].values
-    return Order(scene.name, step, error, bound, fits, main, method.fixed_step)
+    return Order(scene.name, step, table["tolerance"].values, error, bound, fits, main, method.fixed_step)
 
 
 def _by_steps(subject: Subject) -> Finding:
@@ -286,7 +289,27 @@ def _by_steps(subject: Subject) -> Finding:
             why = f"as its step goes to zero it goes to a motion that is wrong by {wrong:.1e} ({slopes})"
             verdict = "measured" if claim is None else "refuted"
             return Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)
+    if claim is None and subject.stepper is not None and method.adaptive:
+        return _converges(fitted, slopes)
     return weighed(claim, fitted, series, slopes)
+
+
+def _converges(fitted: Order, slopes: str) -> Finding:
+    """Does the error fall with the tolerance, down to rounding?"""
+    good = np.isfinite(fitted.error)
+    if not good.any():
+        return undecided("order", CONVERGES, fitted.main.reason)
+    rank = np.flatnonzero(good)[np.argsort(fitted.tolerance[good])]
+    tolerances, errors = fitted.tolerance[rank], fitted.error[rank]
+    last, (decades, less) = float(errors[0]), FALLS
+    coarser = errors[tolerances > 0.99 * decades * tolerances[0]]
+    why = f"an error of {last:.1e} at a tolerance of {tolerances[0]:.0e}, from {errors[-1]:.1e} at {tolerances[-1]:.0e}"
+    if last <= ROUNDED or (coarser.size and last < coarser.min() / less):
+        measured = fitted.measured or Measured("converges", last, text="converges as its tolerance falls")
+        return Finding("order", CONVERGES, measured, "confirmed", f"{why}; {slopes}", last, ROUNDED)
+    if not coarser.size:
+        return undecided("order", CONVERGES, f"{why}: too few runs ended")
+    return Finding("order", CONVERGES, Measured("wrong limit", last), "refuted", f"it stays at {why}", last, ROUNDED)
 
 
 def weighed(claim: int | None, fitted: Order, series: ChartSeries | None, slopes: str) -> Finding:

@@ -2,7 +2,8 @@
 
 What a step does to the bracket, and whether it retraces itself, is measured by `symtop.measure.step_map` in every chart
 of a method. A chart says no if the defect stands out of what the differencing leaves in doubt, yes if it is none, and
-nothing between. The answer is no if any chart says no, yes if one says yes and none no.
+nothing between. The answer is no if any chart says no, yes if one says yes and none no. A no is asked again at half the
+step, where it is smaller by a power of two: one that has all but gone was of an iteration that did not converge.
 
 At the pole the axis passes theta = 0 exactly, and must come out right on the other side. A method in the space frame
 claims to pass, one in angles claims nothing; both are run, with a step and with half of it.
@@ -13,8 +14,9 @@ momentum.
 
 import contextlib
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,6 +36,7 @@ MET = 1e-8  # a larger one is one, if it stands out of its noise
 STANDS = 0.2  # the raw defect of a symplectic map falls to 1/256 over the widths
 RETURNED = 1e-10  # a return as close as this is exact
 MISSED = 1e-8
+GONE = 4096.0  # times smaller at half the step, as of order 12: no step of this
 ONE_MAP = 1e-9  # two steps are twice one step within this
 DRAWS, DRAWING = (8, 4), (10.0, 2.0)  # starts that are drawn, and seconds for them; the second with --quick
 POLE_STEPS = 400
@@ -53,10 +56,8 @@ def measure(subject: Subject) -> list[Finding]:
         answers: list[Answer] = []
         try:
             step, start = map_of(subject, chart)
-            defect, gap = maps.symplectic_defect(step, start), maps.restart_gap(step, start)
-            answers.append(_bracket(chart, defect, gap))
-            subject.traces.update(defect_width=defect.widths, bracket_defect=defect.raw)
-            answers.append(_returned(maps.return_miss(step, start), gap))
+            answers.append(_asked(_bracket, step, start, subject.traces))
+            answers.append(_asked(_returned, step, start))
             if subject.method.fixed_step and not subject.in_plane:
                 answers = _elsewhere(subject, step, answers)
         except SymtopError as error:
@@ -111,13 +112,26 @@ def _badness(one: Finding) -> tuple[int, float]:
     return ("", "yes", "no").index(one.measured.kind), one.value if math.isfinite(one.value) else -1.0
 
 
-def _bracket(chart: str, defect: maps.Defect, gap: float) -> Answer:
+def _asked(ask: Callable[..., Answer], step: maps.StepMap, start: Angles, *traces: dict[str, Any]) -> Answer:
+    """What `ask` answers at a step; at half of it where a no all but goes: its own iteration has not converged."""
+    answer = ask(step, start, *traces)
+    if answer[0] is False and step.method.fixed_step:
+        with contextlib.suppress(SymtopError):
+            finer = ask(replace(step, h=0.5 * step.h), start)
+            return finer if finer[0] and GONE * finer[1] < answer[1] else answer
+    return answer
+
+
+def _bracket(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None = None) -> Answer:
+    defect, gap = maps.symplectic_defect(step, start), maps.restart_gap(step, start)
+    if traces is not None:
+        traces.update(defect_width=defect.widths, bracket_defect=defect.raw)
     floor = max(3.0 * defect.noise, 1e-12)
     shrinks = f"from {defect.raw[0]:.0e} to {defect.raw[-1]:.0e} as the differencing width shrinks 16 times"
     if defect.size <= SYMPLECTIC and defect.noise <= SYMPLECTIC:
         return True, defect.size, floor, f"defect of the bracket {defect.size:.0e} (it falls {shrinks})"
     if gap > ONE_MAP:
-        if chart != "axis" and defect.rest <= max(3.0 * defect.noise, SYMPLECTIC):
+        if step.chart != "axis" and defect.rest <= max(3.0 * defect.noise, SYMPLECTIC):
             why = f"one number that a run takes from its start explains the defect ({defect.rest:.0e} is left)"
             return True, defect.rest, floor, why
         return None, defect.size, floor, f"two steps differ from twice one step by {gap:.0e}: no one map"
@@ -126,26 +140,22 @@ def _bracket(chart: str, defect: maps.Defect, gap: float) -> Answer:
     return False if met else None, defect.size, floor, f"defect of the bracket {defect.size:.1e} (it goes {shrinks})"
 
 
-def _returned(miss: float, gap: float) -> Answer:
-    if miss > RETURNED and gap > ONE_MAP:
+def _returned(step: maps.StepMap, start: Angles) -> Answer:
+    miss = maps.return_miss(step, start)
+    if miss > RETURNED and (gap := maps.restart_gap(step, start)) > ONE_MAP:
         return None, miss, RETURNED, f"two steps differ from twice one step by {gap:.0e}: no one map"
     why = f"a step forth and back misses the start by {miss:.1e}"
     return True if miss <= RETURNED else False if miss > MISSED else None, miss, RETURNED, why
 
 
 def _elsewhere(subject: Subject, step: maps.StepMap, answers: list[Answer]) -> list[Answer]:
-    """The answers, or a no that a step gives at a start, on a top, that is drawn at random."""
-    for name, scene in subject.elsewhere(DRAWS, DRAWING):
+    """The answers, or a no that a step gives at a start, on a top, that is drawn at random, where they are yes."""
+    for name, scene in subject.elsewhere(DRAWS, DRAWING) if answers[0][0] or answers[1][0] else ():
         with contextlib.suppress(SymtopError):
             other = maps.moved(step, scene)
-            gap = maps.restart_gap(other, scene.start)
-            pair = (
-                _bracket(step.chart, maps.symplectic_defect(other, scene.start), gap),
-                _returned(maps.return_miss(other, scene.start), gap),
-            )
-            for i, (yes, value, resolution, why) in enumerate(pair):
-                if yes is False and answers[i][0]:
-                    answers[i] = yes, value, resolution, f"{why} ({name})"
+            for i, ask in enumerate((_bracket, _returned)):
+                if answers[i][0] and (drawn := _asked(ask, other, scene.start))[0] is False:
+                    answers[i] = *drawn[:3], f"{drawn[3]} ({name})"
     return answers
 
 

@@ -85,7 +85,8 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
         k, failures, evaluations, step = max(int(memory[LAST, ORDER]), 1), 0, 0, max(step, least)
         settled = memory[LAST, SETTLED] != 0.0
         while step >= least:
-            h = max(least, (grid + step) - grid)  # so that t + h is exact and steps of one length stay so
+            h = (grid + step) - grid  # so that t + h is exact and steps of one length stay so
+            h = max(least, h if h > 0.0 else step)
             after = min(t + h, end)
             h = h if after < end else end - t
             same = memory[LAST, SAME] + 1.0 if h == memory[LAST, LENGTH] else 1.0
