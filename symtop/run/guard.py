@@ -393,11 +393,14 @@ def _cause(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: F
         )
     if not expected.axis_error > EXPECTED:
         return None
-    size = f"expect an axis error of {min(expected.axis_error, math.pi):.1g} rad by t = {plan.horizon:.4g}"
+    size = (
+        f"expect an axis error of {min(expected.axis_error, math.pi):.1g} rad by t = {plan.horizon:.4g}{scene.second}"
+    )
     if (coarse := _coarse(scene, method, chart, plan, expected, size)) is not None:
         return coarse
     if expected.outcome != "ok":
-        return Trouble(f"expect the run to be {sentence(expected.outcome, expected.reached, plan.horizon)}")
+        end = sentence(expected.outcome, expected.reached, plan.horizon, scene.second)
+        return Trouble(f"expect the run to be {end}")
     if method.adaptive:
         advice = (
             f"try tolerance {max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance):.1g}"
