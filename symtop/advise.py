@@ -26,12 +26,14 @@ stands it is mostly the fastest way, and the advice says so with its time.
 """
 
 import math
+import re
 import shlex
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from symtop.core import files
 from symtop.core.errors import SymtopError, boolean, one_of, positive
 from symtop.core.progress import post
 from symtop.judging.claims.subject import declared
@@ -60,7 +62,9 @@ from symtop.run.simulation import simulate
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
 THIS_TOP = ("this-top", "solution")  # needs of what is named beside the answer, unless it is asked for
 OF_ANY = tuple(need for need in NEEDS if need not in THIS_TOP)  # of what is the answer, unless others are asked for
+COMMA = re.compile(r",\s*(?![^(]*\))")  # between words of `NEEDS`, one of which is f(t, y)
 KEPT = {"energy": ("energy",), "momenta": ("p_phi", "p_psi")}  # claims, by what a user wants kept
+KERNELS = 0.65  # of a method: some have one in common
 CANDIDATES = 8  # methods of the stored study that are tried
 FEW = 5  # methods of the table that are tried
 AGREED = 3  # of them meet the accuracy at least, and the fastest is one of so many first
@@ -181,8 +185,9 @@ def recommend(
     `accuracy` is the largest error of `quantity` over the run: radians for ``axis``, ``attitude`` and ``theta``, and
     relative for others, energy and momenta by the scales of `symtop.errors`. `horizon` is the scene's own by default.
     `results` is a folder with a stored ``cost.nc``; without it a table made from one says what is tried. `needs` leaves
-    out methods that need something else (`Integrator.needs`), for example ``("derivative", "kicks")`` where there is no
-    formula; without them, what is made for this very top is not the answer but named beside it (`Advice.beside`).
+    out methods that need something else (`Integrator.needs`), for example ``("derivative", "kicks")``, or by what you
+    can supply, ``"f(t, y), torque, free motion"``; without them, what is made for this very top is not the answer but
+    named beside it (`Advice.beside`).
 
     `step_size` is the step that you have: every method of fixed step runs with it, and the fastest that is good enough
     is the answer. `max_step` is the longest step, `time_a_step` the most seconds of one on this machine. `general`
@@ -192,7 +197,7 @@ def recommend(
     a minute.
     """
     scene = scenes.scene(scene)
-    allowed = tuple(one_of("needs", need, NEEDS) for need in ([needs] if isinstance(needs, str) else needs))
+    allowed = _needs([needs] if isinstance(needs, str) else needs)
     accuracy = positive("accuracy", accuracy)
     one_of("quantity", quantity, KNOWN_QUANTITIES)
     if quantity in settings.ANGLES and accuracy >= math.pi:
@@ -225,6 +230,18 @@ def recommend(
         fails["Not tried, as only compiled methods are timed"] = own
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
     return _advice(question, ranked, sentences, source, near, beside)
+
+
+def _needs(given: Collection[str]) -> tuple[str, ...]:
+    """Names of `NEEDS`, by these or by words: a word that completes no need stands for all that have it."""
+    parts = {name: set(COMMA.split(words)) for name, words in NEEDS.items()}
+    known = dict.fromkeys([*NEEDS, *sorted(set().union(*parts.values()))])
+    words = {
+        one_of("needs", word, known) for word in COMMA.split(", ".join(str(one).strip() for one in given)) if given
+    }
+    whole = [name for name in NEEDS if name in words or parts[name] <= words]
+    rest = words.difference(NEEDS, *(parts[name] for name in whole))
+    return tuple(name for name in NEEDS if name in whole or parts[name] & rest)
 
 
 class _Search:
@@ -261,8 +278,9 @@ class _Search:
 
     def _try(self, names: Collection[str]) -> None:
         """Those of high order first: they are the cheapest at most accuracies, and their cost ends other searches."""
+        files.expected[0] = math.ceil(KERNELS * len(names))
         for number, method in enumerate(sorted(map(integrator, names), key=lambda method: -(method.order or 0)), 1):
-            post(f"trying method {number} of {len(names)}; the first time each is compiled")
+            post(f"trying method {number} of {len(names)}")
             rivals = (one.met.evaluations for one in self.trials if one.met.integrator.needs not in THIS_TOP)
             patience = TOO_DEAR * min(rivals, default=math.inf)
             self._sort_in(_try(self.question, method, self.guesses.get(method.name), patience), self.trials, method)
@@ -408,7 +426,7 @@ def _advice(
     beside: Sequence[_Trial] = (),
 ) -> Advice:  # fmt: skip
     scene, accuracy, quantity, horizon = question[:4]
-    goal = f"{quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}"
+    goal = f"{quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}{scene.second}"
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}."
         without = _without_steps(question, math.nan)

@@ -14,7 +14,7 @@ from symtop import advise
 from symtop.cli.main import main
 from symtop.measure import settings
 from symtop.measure.ranking import regime
-from symtop.methods.framework.registry import methods
+from symtop.methods.framework.registry import NEEDS, methods
 from symtop.model.exact import closed_form
 
 
@@ -304,6 +304,10 @@ def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
     assert "it needs f as a formula (expression)" in advice.reason
     with pytest.raises(symtop.SymtopError, match="needs 'luck' is unknown"):
         symtop.recommend("spheroid", accuracy=1e-6, needs=["luck"])
+    words = {("torque",): "kicks group", ("torque", " free motion"): "kicks", ("inertia, torque",): "group", (): "",
+             ("f(t", " y)", "group"): "derivative group", ("kicks", "a Lagrangian"): "lagrangian kicks"}  # fmt: skip
+    assert {given: " ".join(advise._needs(given)) for given in words} == words
+    assert [advise._needs([words]) for words in NEEDS.values()] == [(name,) for name in NEEDS]
 
 
 def test_what_is_made_for_this_top_is_named_beside_the_answer():

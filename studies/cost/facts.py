@@ -8,7 +8,7 @@ import pandas as pd
 import xarray as xr
 
 from symtop.judging.claims.subject import declared
-from symtop.methods.framework.registry import integrator
+from symtop.methods.framework.registry import NEEDS, integrator
 from symtop.report.formats import duration, number
 
 from . import cells, far
@@ -24,10 +24,6 @@ LEFT_OUT = {  # methods, by the reason, which the page states
     "a step of any size is the motion itself": ("exact-discrete",),
 }  # fmt: skip
 NOTHING = "none within the budget"
-HAVE = {  # what each class needs, in a table
-    "derivative": "f(t, y)", "expression": "f as a formula", "lagrangian": "a Lagrangian",
-    "kicks": "torque, free motion", "group": "torque, inertia", "this-top": "this top's equations",
-}  # fmt: skip
 STEPS = (4.37, 17.48, 69.92)  # a nutation, of the table of silent failures
 QUOTED, FINE = "rk4[axis]", 69.92  # whose wrong runs the page quotes, at so many steps a nutation
 KNOWN = (
@@ -177,7 +173,7 @@ def use(data: xr.DataTree) -> pd.DataFrame:
     """The safe choice of each class at each error, over the shorter runs, and what that at `AT` keeps."""
     rows = []
     for needs in CLASSES[:-1]:
-        line = {"you can supply": HAVE[needs]}
+        line = {"you can supply": NEEDS[needs]}
         kept = ""
         for target in cells.targets(data):
             one = cells.winner(data, Cell("short", "axis", target, NATURAL, needs))

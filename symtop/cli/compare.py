@@ -60,7 +60,7 @@ def compare(
         from symtop.core import netcdf
         from symtop.judging import comparison
         from symtop.judging.findings import pace
-        from symtop.measure.sweep import failed_setting
+        from symtop.measure.sweep import failed_setting, titled
         from symtop.measure.timing import NOISY
 
     data = comparison.compare(scene, methods, **options)
@@ -84,9 +84,10 @@ def compare(
         )
         return
     timed, end, count = options["cost"] == "time", data.attrs["horizon"], data.attrs["nutations"]
-    say(f"{name} to t = {end:.6g} ({count:.3g} nutations): the cheapest run by {options['cost']}")
+    unit = " s" if "units" in data.attrs else ""
+    say(f"{name} to t = {end:.6g}{unit} ({count:.3g} nutations): the cheapest run by {options['cost']}")
     say(f"steps a nutation or tolerance{', time' * timed}, force evaluations; error of {data.attrs['quantity']}")
-    rows = [[str(data["variant"].values[k]), *(_cell(one, timed) for one in own)] for k, own in enumerate(records)]
+    rows = [[titled(cell), *(_cell(one, timed) for one in own)] for cell, own in zip(cells, records, strict=True)]
     click.echo(table(["variant", *map("error {:.0e}".format, TARGETS)], rows))
     for cell in cells:
         least = cell["error"].min().item()

@@ -172,7 +172,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
 @common.per_nutation_option
 @click.option("--max-step", type=float, help="The longest step that you can take.")
 @click.option("--time-a-step", type=float, help="The most seconds that a step may take here, for example 1e-6.")
-@click.option("--needs", callback=common.separated, help="What methods may need, for example derivative,kicks.")
+@click.option("--needs", callback=common.separated, help="What you can supply: derivative,kicks or torque,inertia.")
 @click.option("--general", is_flag=True, help="Only what exists for a body without symmetry.")
 @click.option("--keeps", help="Only what does not let it drift: energy or momenta.")
 @click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")

@@ -89,8 +89,8 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, eng
         }
         for method in methods
     ]  # fmt: skip
-    needs = "; ".join(f"{name}, {words}" for name, words in registry.NEEDS.items())
-    note = f"flags: {FLAGS}. needs, the weakest thing that suffices: {needs}."
+    needs = "; ".join(f"{name}: {words}" for name, words in registry.NEEDS.items())
+    note = f"flags: {FLAGS}. What a method needs of you (needs) is one of {needs}."
     note += " One in full: symtop integrators NAME; in one chart: NAME[CHART]."
     one = None if name is None else _described(methods[0])
     _print(records, short, note, one, _integrator_page, wide=wide, as_json=as_json)
@@ -143,7 +143,7 @@ def scenes(name: Any, wide: bool, as_json: bool) -> None:
     listed = list(catalogue.all_scenes().values())
     chosen = [catalogue.scene(name, bodies=True)] if name is not None else listed
     records: list[Record] = [scene.record() for scene in chosen]
-    keys = {"name": "name", "horizon": "horizon (s)", "nutation": "nutation period (s)", "purpose": "purpose"}
+    keys = {"name": "name", "horizon": "horizon", "nutation": "nutation period", "purpose": "purpose"}
     short: list[Record] = [{column: record[key] for column, key in keys.items()} for record in records]
     times = "horizon: the time a run covers; nutation: one period of it, of a body its natural period."
     note = f"{times} One in full: symtop scenes NAME."

@@ -29,7 +29,7 @@ def main() -> None:
 
     def announce() -> None:  # once, before the first kernel is compiled
         files.on_cold.clear()
-        (warn if files.is_terminal(sys.stderr) else post)(files.COMPILING)
+        (warn if files.is_terminal(sys.stderr) else post)(files.compiling())
 
     files.on_cold[:] = [announce]
 

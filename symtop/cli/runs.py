@@ -12,12 +12,14 @@ import click
 
 from symtop.cli import common
 from symtop.cli.common import File, as_text, check_outputs, completing, say, say_written, separated, table, warn
+from symtop.core import files
 from symtop.core.errors import SymtopError, whole
 from symtop.core.progress import post, ticking
 
 FEWEST, FEW, MANY = 1000, 100_000, 20  # steps that are timed before a run of many times as many
 LONG_ENOUGH = 0.5  # seconds of steps that are timed, beside those of a run of few
 SAME = 0.01  # relative difference of the step used from --step-size that is printed
+KERNELS = 5  # of an ensemble: periods, samples, starts, the step in lanes and alone
 COMPARED = 100_000  # tops whose errors are shown, the first of the population: those of a million take 1 GB
 
 OUTCOME = {"ok": "reached the horizon"}  # which says nothing yet of their errors
@@ -99,6 +101,8 @@ def run(
         other = wanted is not None and abs(used / wanted - 1.0) > SAME
         of = f" of {used:.6g}, for a whole number of them fills the horizon" if other else ""
         say(f"{facts['steps']} steps{of}, {facts['force_evaluations']} force evaluations")
+        if facts["sampling"] == "dithered":
+            say("samples are not evenly spaced, so that they show all phases of the nutation")
         if facts["outcome"] == "ok":
             say(f"judged against the truth: {verdict.words()}")
         for name, values in largest.items():
@@ -226,6 +230,7 @@ def ensemble(
     compared = [name for name in QUANTITIES if variables is None or name in variables]
     if figure is not None and not compared:
         raise SymtopError("--figure needs axis or energy among --variables, whose errors it shows")
+    files.expected[0] = KERNELS
     post(f"running {members} tops")
     try:
         data = runs.ensemble(tops, integrator, variables=variables, path=output, **settings)

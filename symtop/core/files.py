@@ -23,7 +23,8 @@ from symtop.core.errors import SymtopError, SymtopWarning, at_home
 DAY = 86_400.0  # seconds
 UNUSED = 30  # days
 
-COMPILING = "compiling what runs for the first time; the next time it is found on disk"
+A_KERNEL, CLOSED_FORM = 3.0, 7  # seconds of a core to compile one; the closed form takes as long as so many
+expected = [1]  # kernels that what runs now may have to compile
 
 
 def is_terminal(stream: TextIO | None) -> bool:
@@ -31,11 +32,17 @@ def is_terminal(stream: TextIO | None) -> bool:
     return stream is not None and stream.isatty()
 
 
+def compiling() -> str:
+    """What a command says before it compiles."""
+    count = f"up to {expected[0]} kernels" if expected[0] > 1 else "a kernel"
+    return f"compiling {count}, about {A_KERNEL * expected[0]:.0f} s on one core, once"
+
+
 def _tell() -> None:
-    """Say once, to somebody who is watching, that kernels are being compiled, which takes one second to twenty."""
+    """Say once, to somebody who is watching, that kernels are being compiled."""
     on_cold.remove(_tell)
     if "ipykernel" in sys.modules or is_terminal(sys.stderr):
-        print(f"symtop: {COMPILING}", file=sys.stderr, flush=True)  # noqa: T201  (no warning: nothing is wrong)
+        print(f"symtop: {compiling()}", file=sys.stderr, flush=True)  # noqa: T201  (no warning: nothing is wrong)
 
 
 on_cold: list[Callable[[], object]] = [_tell]  # called when a kernel is not in the cache and has to be compiled

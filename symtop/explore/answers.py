@@ -180,7 +180,7 @@ def answer(chosen: Setup) -> dict[str, Any]:
         coded = {name: _float32(values) for name, values in arrays.items()}
     return {
         "outcome": run.outcome,
-        "message": sentence(run.outcome, run.reached_time, chosen.scene.horizon),
+        "message": sentence(run.outcome, run.reached_time, chosen.scene.horizon, chosen.scene.second),
         "warnings": warnings,
         "steps": int(run.steps),
         "force_evaluations": int(run.force_evaluations),

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from symtop.core.errors import SymtopError
 from symtop.judging.claims import calls, constants, order, structure
 from symtop.judging.claims.subject import Subject, declared
-from symtop.judging.findings import Finding, Ledger, inapplicable, undecided
+from symtop.judging.findings import AS, Finding, Ledger, claim_name, inapplicable, undecided
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 
@@ -68,8 +68,9 @@ def measure(stage: Stage, subject: Subject) -> list[Finding]:
 
 
 def unmeasured(stage: Stage, method: Integrator, why: str) -> list[Finding]:
-    """The findings of a stage that could not be measured."""
-    return [undecided(claim.name, declared(method, claim.name), why) for claim in stage]
+    """The findings of a stage that could not be measured: why not is said once."""
+    reasons = [why, *(AS + claim_name(stage[0].name) for _ in stage[1:])]
+    return [undecided(one.name, declared(method, one.name), words) for one, words in zip(stage, reasons, strict=True)]
 
 
 def judge(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:

@@ -1,6 +1,6 @@
 """compare(): what methods cost on one scene for the error that they make, as one dataset.
 
-The setting of each method is results for at each target (`symtop.measure.settings.seek`), from loose targets to tight
+The setting of each method is sought for each target (`symtop.measure.settings.seek`), from loose targets to tight
 ones, until one is not met; then steps are doubled until a run fails or has a few steps. Every run is kept. Runs that
 ended well are timed afterwards, against each other (`symtop.measure.timing`): a slow spell of the machine hits all
 methods alike.
@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 from tqdm import tqdm
 
-from symtop.core import netcdf
+from symtop.core import files, netcdf
 from symtop.core.errors import SymtopError, boolean, one_of, positive
 from symtop.core.parallel import cores, in_threads
 from symtop.core.progress import beating, post
@@ -24,6 +24,7 @@ from symtop.measure.accuracy import as_table, blank_row
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.sweep import RAISED, SPENT, TIMED, error_row_or_message, listed, timed_rows
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
+from symtop.model.exact import closed_form
 from symtop.model.scenes import Scene, horizon_of, scene as find_scene
 from symtop.run.simulation import chart_of, likely_step
 
@@ -83,7 +84,9 @@ def compare(
     exact = find_integrator("exact")
     with beating(tqdm(total=len(names), desc="compare", disable=boolean("quiet", quiet) or None, leave=False)) as bar:
         results = []
-        post(f"running {len(names)} methods, which are compiled the first time")
+        kernels = [one for one in variants if one.implementation == "compiled"]
+        files.expected[0] = len(kernels) + (0 if closed_form.load() else files.CLOSED_FORM)
+        post(f"running {len(names)} methods")
         for one in in_threads(tried, variants, min(cores(), len(variants))):
             results.append(one)
             bar.update()

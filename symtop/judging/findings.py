@@ -161,7 +161,7 @@ class StepLedger(Ledger):
         return super().dataset().assign_attrs(self.about._asdict(), scene=self.scene)
 
 
-WIDTH = 100
+WIDTH, AS = 100, "as with "  # how the reason begins of a claim that was not judged for the same as another
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (0.0, "ns"))
 KEPT = {"energy": "the energy", "p_phi": "p_phi", "p_psi": "p_psi", "axis_length": "|e|"}
 SAYS = {  # of what was measured: {0} is its number, {1} its text
@@ -173,8 +173,9 @@ SAYS = {  # of what was measured: {0} is its number, {1} its text
     "symmetric yes": "yes, a step back returns to the start to {0:.0e}",
     "symmetric no": "no, a step back misses the start by {0:.1e}",
     "work work": "{1} force evaluations a step", "time order": "order {1} where f depends on the time",
-    "pole passes": "passes theta = 0, the axis off by {0:.0e} rad", "pole ends there": "ends at theta = 0",
-    "pole wrong": "comes out of theta = 0 off by {0:.0e} rad",
+    "pole passes": "a run through the upright axis (theta = 0) ends {0:.0e} rad off",
+    "pole ends there": "a run ends where the axis is upright (theta = 0)",
+    "pole wrong": "a run through the upright axis (theta = 0) comes out wrong, {0:.0e} rad off",
 }  # fmt: skip
 
 
@@ -200,12 +201,14 @@ def line(finding: Finding, width: int = WIDTH) -> str:
         return ""
     says = SAYS.get(f"{claim} {measured.kind}") or ("{1}" if measured.text else SAYS.get(measured.kind, "{1}"))
     number = value if math.isnan(measured.number) else measured.number
-    words = says.format(number, measured).replace(" 0e+00", " 0").replace("0.0e+00", "0") if measured else verdict
-    text = f"{claim_name(claim):<12} {words}"
+    words = says.format(number, measured).replace("to 0e+00", "to the last bit") if measured else verdict
+    text = f"{claim_name(claim):<14} {words}"
     if declared:
         text += f" (claimed: {declared}{f'; {verdict}' if measured else ''})"
     if verdict in ("confirmed", "measured") and claim != "calls":
         return text
+    if why.startswith(AS):
+        return f"{text}, {why}"
     return text + "\n" + textwrap.indent(textwrap.fill(f"{why}.", width - 4), "    ")
 
 

@@ -26,6 +26,7 @@ import math
 import secrets
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,10 @@ OPENING = 60.0  # seconds for loading a file and its imports
 # seconds for the claims of one stage: at most, for all stages together, and at least however many were spent
 PLUGIN = 600.0  # of a registered integrator
 VERDICT, QUICK_VERDICT = (45.0, 120.0, 15.0), (12.0, 40.0, 6.0)
+SHORTER = (
+    4.0  # times: the runs of a stage that took too long are shortened by so much beyond their pace, and made again
+)
+SLOW = "; make a step faster", "; judge it without --quick, or make a step faster"  # the second with --quick
 
 
 def judge(
@@ -203,7 +208,7 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
     time = apart["time"].values
     if rates is not None and scene.of_body:
         apart = apart.assign({name: ("time", values) for name, values in _of_rates(scene, time, rates).items()})
-    shown = [_error(name, time, apart) for name in OF_STATES if name in apart]
+    shown = [_error(name, scene, time, apart) for name in OF_STATES if name in apart]
     own = _from_states(scene, states)
     for name in (*CONSTANTS, *sorted({*conserves} - {*CONSTANTS})):
         values = own.get(name, given.get(name))
@@ -237,14 +242,14 @@ def _from_states(scene: Scene, states: Trajectory) -> dict[str, np.ndarray]:
     return {"energy": space_energy(scene.top, axis, L, p_psi), "p_phi": L[:, 2], "p_psi": p_psi}
 
 
-def _error(name: str, time: np.ndarray, apart: xr.Dataset) -> Finding:
+def _error(name: str, scene: Scene, time: np.ndarray, apart: xr.Dataset) -> Finding:
     """The largest error of a quantity and its law of growth."""
     values = apart[name].values
     growth = constant_of(time, values) if time.size >= FEWEST else None
     largest = float(np.nanmax(values)) if np.isfinite(values).any() else math.nan
     bound = float(np.nanmax(apart[f"{name}_bound"].values))
     unit = error_units(name)
-    why = f"largest error {largest:.1e}{unit} in {time.size} samples up to t = {time[-1]:.4g}"
+    why = f"largest error {largest:.1e}{unit} in {time.size} samples up to t = {time[-1]:.4g}{scene.second}"
     if growth is not None and math.isfinite(growth.exponent):
         why += f", growing as t^{growth.exponent:.2f} +- {growth.exponent_interval:.2f} ({growth.law})"
     law = growth.law if growth is not None and growth.law not in ("undecided", "not judged") else ""
@@ -277,13 +282,19 @@ def _measured(
     most, together, least = limits
     todo: list[Stage] = stages(kind)
     for stage in todo:
-        process.allow(max(least, min(most, together - (time.monotonic() - began))))
-        try:
-            findings = measure(stage, subject)
-        except SymtopError:
-            if not process.lost:
-                raise
+        tried = subject
+        for _ in range(2):
+            process.allow(max(least, min(most, together - (time.monotonic() - began))))
+            try:
+                findings = measure(stage, tried)
+            except SymtopError:
+                if not process.lost:
+                    raise
+            if not (process.late and subject.seconds_a_step):
+                break
+            tried = replace(subject, seconds_a_step=SHORTER * max(subject.seconds_a_step, process.late))
         first = stage[0].name == "calls"
+        process.lost += SLOW[subject.quick] if process.late else ""
         if process.lost:
             left = [claim for one in (todo if first else [stage]) for claim in one]
             findings = unmeasured(tuple(left), subject.method, process.lost)

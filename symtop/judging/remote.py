@@ -46,6 +46,7 @@ class Process:
 
     def __init__(self, make: Callable[[], Table]) -> None:
         self.make, self.lost, self.limit, self.began = make, "", 0.0, 0.0
+        self.calls, self.late = 0, 0.0  # calls of a step before `limit` began to count; seconds of one, if it passed
         self.forked = "fork" in multiprocessing.get_all_start_methods() and THREADED not in sys.modules
         self.table: Table | None = None
         self.process: Any = None
@@ -69,6 +70,7 @@ class Process:
     def allow(self, seconds: float) -> None:
         """What is called from now on may take so long together; what was lost may be tried again."""
         self.lost, self.limit, self.began = "", seconds, clock(self.process.pid if self.process else 0)
+        self.calls, self.late = heartbeat.calls, 0.0
 
     def call(self, name: str, *args: Any) -> Any:
         """What a function of the table returns; SymtopError if it raises, or once its process has ended."""
@@ -117,7 +119,8 @@ class Process:
             if now - since > heartbeat.allowed:
                 raise _LostError(f"a step of h = {heartbeat.step:.3g} had not returned after {now - since:.0f} s")
             if now - self.began > self.limit:
-                raise _LostError(f"it was not judged within {self.limit:.0f} s")
+                self.late = self.limit / max(heartbeat.calls - self.calls, 1)
+                raise _LostError(f"it was not judged within {self.limit:.0f} s, at {1e3 * self.late:.2g} ms a call")
         try:
             return json.loads(self.pipe.recv_bytes())
         except (EOFError, OSError, ValueError):

@@ -24,7 +24,7 @@ from symtop.core.progress import beating
 from symtop.measure import columns
 from symtop.measure.accuracy import as_table, blank_row, enough_samples, error_row
 from symtop.measure.timing import bare_run, timings
-from symtop.methods.framework.registry import Integrator, integrator as find_integrator
+from symtop.methods.framework.registry import Integrator, integrator as find_integrator, integrators, split_name
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.simulation import chart_of, make_plan
 
@@ -270,6 +270,15 @@ def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Data
                 pairs.append((scene, name))
                 tables[digest] = own.isel(setting=np.flatnonzero(run))
     return pairs, tables
+
+
+def titled(cell: xr.Dataset) -> str:
+    """The name of a variant, and of one that is not compiled through what it runs: "dop853[axis] (SciPy)"."""
+    name = str(cell["variant"].item())
+    if "python" not in cell["implementation"].values:
+        return name
+    method = integrators().get(split_name(name)[0])
+    return f"{name} ({'SciPy' if method and method.family == 'library' else 'Python'})"
 
 
 def failed_setting(cell: xr.Dataset) -> str:

@@ -79,7 +79,9 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         return Judgement(ended, float(run.attrs["reached_time"]), str(run.attrs["outcome_message"]))
     truth, worst = barriers(scene), float(np.max(axis_error))
     if worst <= truth.accurate:
-        return Judgement("accurate", float(times[-1]), f"accurate to {worst:.2g} rad up to t = {times[-1]:.6g}")
+        return Judgement(
+            "accurate", float(times[-1]), f"accurate to {worst:.2g} rad up to t = {times[-1]:.6g}{scene.second}"
+        )
     theta, energy = run["theta"].values, np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
     beyond = ~((theta >= truth.highest - truth.margin) & (theta <= truth.lowest + truth.margin))
     strays = beyond | pole_passed(scene, run["p_phi"].values, run.get("p_psi", run["p_phi"]).values)
@@ -91,12 +93,13 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         if beyond[first]:
             bounds = f"{truth.highest:.4g} to {truth.lowest:.4g}"
             sentence = f"theta was {theta[first]:.4g} rad, where the true motion never goes ({bounds})"
-        sentence = f"at t = {times[first]:.6g} {sentence}"
+        sentence = f"at t = {times[first]:.6g}{scene.second} {sentence}"
     elif not (late <= DRIFT or late <= GROWING * early):
         word, first = "drifting", int(np.argmax(~(energy <= DRIFT)))
-        sentence = f"the energy error passed {DRIFT:.0%} at t = {times[first]:.6g} and grew on, to {energy.max():.2g}"
+        at = f"{times[first]:.6g}{scene.second}"
+        sentence = f"the energy error passed {DRIFT:.0%} at t = {at} and grew on, to {energy.max():.2g}"
     else:
         word, first = "bounded_but_wrong", int(np.argmax(~(axis_error <= truth.accurate)))
         energies = f"while the energy stayed within {energy.max():.2g}"
-        sentence = f"the axis error passed {truth.accurate:.2g} rad at t = {times[first]:.6g} {energies}"
+        sentence = f"the axis error passed {truth.accurate:.2g} rad at t = {times[first]:.6g}{scene.second} {energies}"
     return Judgement(word, float(times[first]), sentence)

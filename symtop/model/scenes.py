@@ -85,6 +85,11 @@ class Scene:
         object.__setattr__(self, "tags", tuple(sorted({one_of("tags", tag, TAGS) for tag in self.tags})))
 
     @property
+    def second(self) -> str:
+        """What follows a time: " s" of a scene in SI, nothing of one without units."""
+        return " s" if self.units else ""
+
+    @property
     def of_body(self) -> bool:
         """Is it of a body without symmetry?"""
         return isinstance(self.top, RigidBody)
@@ -128,7 +133,7 @@ class Scene:
     def record(self) -> dict[str, str]:
         """What tables show of this scene, by column."""
         period = f"{self.nutation_period:.6g}" if math.isfinite(self.nutation_period) else "infinite"
-        times = {"horizon (s)": f"{self.horizon:g}", "nutation period (s)": period}
+        times = {"horizon": f"{self.horizon:g}{self.second}", "nutation period": f"{period}{self.second}"}
         return {"name": self.name, **times, "observes": self.observes, "purpose": self.purpose}
 
 

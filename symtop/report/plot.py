@@ -15,7 +15,7 @@ import xarray as xr
 from symtop.core.errors import SymtopError, at_home, one_of
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES, errors
-from symtop.measure.sweep import failed_setting
+from symtop.measure.sweep import failed_setting, titled
 from symtop.model.scenes import Scene
 from symtop.report import spread
 from symtop.report.figures import error_band, name_ends
@@ -138,10 +138,11 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
             cell = data.sel(scene=scene, variant=name)
             variant = name if "chart" not in cell or name.endswith("]") else f"{name}[{cell['chart'].item()}]"
             options = line(variant) | ({"ls": LINES[number % len(LINES)]} if data.sizes["scene"] > 1 else {})
-            label = variant if data.sizes["scene"] == 1 else f"{variant} on {scene}"
+            label = titled(cell.assign_coords(variant=variant))
+            label = label if data.sizes["scene"] == 1 else f"{label} on {scene}"
             across, errors = cell[x].values, np.maximum(cell[quantity].values, LEAST)
             good = np.flatnonzero(np.isfinite(across) & np.isfinite(errors))
-            good = good[np.argsort(across[good])]
+            good = good if compared else good[np.argsort(across[good])]  # which goes from coarse to fine, time or not
             ax.plot(across[good], errors[good], lw=1.4, label=label, **options)
             failed = across[(cell["outcome"].values != "ok") & np.isfinite(across)]
             ax.scatter(failed, np.full(failed.size, 0.985), 22.0, options["color"], marker="x", lw=1.0, **edge)

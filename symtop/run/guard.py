@@ -377,11 +377,14 @@ def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected:
         )
     if not expected.axis_error > EXPECTED:
         return None
-    size = f"expect an {motion.watches} error of {min(expected.axis_error, math.pi):.1g} rad by t = {plan.horizon:.4g}"
+    second = motion.scene.second
+    reached = min(expected.axis_error, math.pi)
+    size = f"expect an {motion.watches} error of {reached:.1g} rad by t = {plan.horizon:.4g}{second}"
     if (coarse := _coarse(motion, method, chart, plan, expected, size)) is not None:
         return coarse
     if expected.outcome != "ok":
-        return Trouble(f"expect the run to be {sentence(expected.outcome, expected.reached, plan.horizon)}")
+        end = sentence(expected.outcome, expected.reached, plan.horizon, second)
+        return Trouble(f"expect the run to be {end}")
     if method.adaptive:
         advice = (
             f"try tolerance {max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance):.1g}"

@@ -160,8 +160,8 @@ def long_run(
         data = netcdf.describe(
             _windowed(rows, ends), title=f"{title}, {count} steps", units=chosen.units, integrator=method.name,
             scene=chosen.name, step_size=h, horizon=count * h, compensated=str(compensated).lower(),
-            outcome=OUTCOMES[outcome], outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h),
-            reached_time=reached * h,
+            outcome=OUTCOMES[outcome], reached_time=reached * h,
+            outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h, chosen.second),
         )  # fmt: skip
         if result is not None:
             checkpoints.write(data, result)

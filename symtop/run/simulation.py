@@ -180,7 +180,7 @@ def simulate(
         implementation=method.implementation, horizon=plan.horizon, step_size=plan.step_size, tolerance=plan.tolerance,
         steps=trajectory.steps, force_evaluations=trajectory.force_evaluations,
         newton_iterations=trajectory.newton_iterations, outcome=trajectory.outcome,
-        outcome_message=sentence(trajectory.outcome, trajectory.reached_time, plan.horizon),
+        outcome_message=sentence(trajectory.outcome, trajectory.reached_time, plan.horizon, chosen.second),
         reached_time=trajectory.reached_time, guard=caution, sampling="dithered" if dithered else "uniform",
         top=_json(chosen.top), start=_json(chosen.start),
     )  # fmt: skip

@@ -1,6 +1,7 @@
 """Adapters: what fits is judged; what hangs, crashes, raises or keeps something is reported and stops nothing else."""
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -17,6 +18,7 @@ from scipy.spatial.transform import Rotation
 import symtop
 from symtop.cli.judge import FORMS as OFFERED
 from symtop.cli.main import main
+from symtop.judging import judge_step
 from symtop.judging.adapters.adapter import heartbeat, integrator, label_of
 from symtop.judging.adapters.python_step import PythonStep, RotationStep, SeparableStep, to_body, to_space
 from symtop.judging.battery import CLAIMS, TABLE
@@ -369,13 +371,13 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset():
     )
     assert all(len(line) <= 100 for line in screen)
     assert sum(bool(line) for line in screen) <= 18
-    told_of = {line[:13].strip(): line[13:] for line in screen}
+    told_of = {line[:15].strip(): line[15:] for line in screen}
     assert told_of["order"].startswith("1.0")
     assert told_of["symplectic"].startswith("no, a step misses the Poisson bracket by ")
     assert told_of["p_phi"].startswith("kept, to ")
     assert told_of["energy"].startswith("drifts, by ")
     assert told_of["work"] == "2.0 force evaluations a step"
-    assert told_of["pole"].startswith("passes theta = 0, the axis off by ")
+    assert told_of["pole"].startswith("a run through the upright axis (theta = 0) ends ")
     steps, nutations = float(data["steps_run"]), float(data["nutations_run"])
     length = f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation) for the constants;"
     assert length in str(ledger)
@@ -384,12 +386,12 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset():
 def test_a_line_says_what_was_measured_and_of_a_claim_that_fails_why():
     wrong = Finding("order", "2", Measured("wrong limit", 3e-4), "refuted", "it stops short", 3e-4, 1e-11)
     assert line(wrong).splitlines() == [
-        "order        as h -> 0 it goes to another motion, 3.0e-04 away (claimed: 2; refuted)", "    it stops short.",
+        "order          as h -> 0 it goes to another motion, 3.0e-04 away (claimed: 2; refuted)", "    it stops short.",
     ]  # fmt: skip
     assert line(Finding("p_psi", "kept", Measured("kept", 0.0), "confirmed", "")) == (
-        "p_psi        kept, to 0 (claimed: kept; confirmed)"
+        "p_psi          kept, to the last bit (claimed: kept; confirmed)"
     )
-    assert line(undecided("energy", "", "it stopped")).splitlines()[0] == "energy       undecided"
+    assert line(undecided("energy", "", "it stopped")).splitlines()[0] == "energy         undecided"
     assert line(Finding("calls", "", Measured("a function"), "measured", "", 0.0, 1e-13)) == ""
     failed = {"step_size": np.array([0.01, 0.1, np.nan]), "error": np.array([1e-6, np.nan, np.nan])}
     ledger = StepLedger("mine", "spheroid", (wrong,), failed, About("mine", "axis", "python", 2e-5, 3, 1.0))
@@ -588,3 +590,42 @@ def _lives(pid: int) -> bool:
     except ProcessLookupError:
         return False
     return True
+
+
+def test_a_matrix_step_that_raises_shows_its_own_error():
+    def misspelled(R, w, h, inertia, torque):
+        return R[:, :3] @ Rotation.from_rotvec(hat(w)).as_matrix(), w  # noqa: F821
+
+    def of_a_quaternion(q, w, h, inertia, torque):
+        if len(q) == 4:
+            raise ValueError("too long" if h > 0.005 else "short")
+        return q[3], w
+
+    with pytest.raises(
+        symtop.SymtopError, match=r"IndexError.*given q = .*given a matrix, it raises NameError: name 'hat'"
+    ):
+        of_rotation(misspelled, 0.01, 0.1)
+    with pytest.raises(symtop.SymtopError, match=r"ValueError: too long, given q = \(w, x, y, z\); given a matrix"):
+        of_rotation(of_a_quaternion, 0.01, 0.1)
+
+
+def test_a_step_that_slows_down_is_judged_on_shorter_runs_and_one_that_stops_says_why_once(only, monkeypatch):
+    """A step takes 2 ms from t = 20 on, which its first ones do not tell; or 10 ms, always."""
+    only("energy", "p_phi", "p_psi")
+    monkeypatch.setattr(judge_step, "QUICK_VERDICT", (3.0, 9.0, 3.0))
+
+    def slow_from(since, seconds):
+        def step(f, t, y, h):
+            time.sleep(seconds * (t >= since))
+            return y + h * f(t, y)
+
+        return symtop.judge(step, quick=True)
+
+    slow, stuck = slow_from(20.0, 2e-3), slow_from(0.0, 1e-2)
+    assert slow["energy"].measured.kind in ("drift", "growing")
+    assert 300 < slow.traces["steps_run"] < 5000
+    assert [stuck[claim].verdict for claim in stuck] == ["undecided"] * 3
+    assert re.search(r"not judged within 3 s, at \d+ ms a call; judge it without --quick", stuck["energy"].why)
+    screen = str(stuck).splitlines()
+    assert sum("not judged" in line for line in screen) == 1
+    assert "p_psi          undecided, as with energy" in screen

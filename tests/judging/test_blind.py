@@ -231,7 +231,9 @@ def test_without_a_claim_it_says_the_order_that_a_step_has_and_not_the_slope(onl
     only("order")
     ledger = symtop.judge(wrong.rounded_triple, quick=True)
     assert ledger.refuted == []
-    assert str(ledger["order"].measured) == "2, a step wrong from its h^3 term on"
+    text, _, doubt = str(ledger["order"].measured).partition(" +- ")
+    assert text == "2, a step wrong from its h^3 term on, by 1e-07"
+    assert 0.0 < float(doubt.removesuffix(" of it")) < 1e-9
     assert description(ledger.findings) == "order 2"
 
 

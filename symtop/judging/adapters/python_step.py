@@ -255,11 +255,17 @@ class RotationStep(FunctionStep):
 
     def __init__(self, function: Callable[..., Any], name: str = "") -> None:
         super().__init__(function, name)
-        with contextlib.suppress(Exception), heartbeat.call(PROBE):
-            first = function(
-                np.eye(3), np.array([0.1, 0.2, 0.3]), PROBE, np.array([1.0, 1.0, 0.5]), lambda _: np.zeros(3)
-            )
-            self.form = MATRIX if np.shape(first[0]) == (3, 3) and np.size(first[1]) == 3 else ROTATION
+        self.of_matrix = ""  # what it raises if it is given one, until it has made a step
+        try:
+            with heartbeat.call(PROBE):
+                first = function(
+                    np.eye(3), np.array([0.1, 0.2, 0.3]), PROBE, np.array([1.0, 1.0, 0.5]), lambda _: np.zeros(3)
+                )
+        except SymtopError as error:
+            self.of_matrix = str(error)
+        else:
+            with contextlib.suppress(Exception):
+                self.form = MATRIX if np.shape(first[0]) == (3, 3) and np.size(first[1]) == 3 else ROTATION
 
     def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks."""
@@ -279,7 +285,14 @@ class RotationStep(FunctionStep):
                 raise SymtopError(f"step must return q = (w, x, y, z) and w, a pair, not {type(after).__name__}")
             return np.concatenate([state_like(q, after[0]).ravel(), state_like(y[-3:], after[1])])
 
-        states = self.steps(once, 0.0, y, h, marks)
+        try:
+            states = self.steps(once, 0.0, y, h, marks)
+        except SymtopError as error:
+            other = self.of_matrix.partition("raises ")[2]
+            if not other or str(error).endswith(other):
+                raise
+            raise SymtopError(f"{error}, given q = (w, x, y, z); given a matrix, it raises {other}") from None
+        self.of_matrix = ""
         return March(states, calls)
 
 

@@ -188,8 +188,12 @@ class ChartSeries(NamedTuple):
     @property
     def measured(self) -> Measured:
         """The order that is seen, or the least that it can be."""
-        exact, term = self.series.is_exact, self.order + 1
-        text = f"{self.order}, a step wrong from its h^{term} term on" if exact else f"{self.order} or more"
+        text = f"{self.order} or more"
+        if self.series.is_exact:
+            defect, noise = self.series.defect[self.order + 1], self.series.noise[self.order + 1]
+            text = (
+                f"{self.order}, a step wrong from its h^{self.order + 1} term on, by {defect:.1g} +- {noise:.0g} of it"
+            )
         return Measured("by a term", self.order, text=text)
 
 

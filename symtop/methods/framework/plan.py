@@ -98,8 +98,8 @@ def off_length(chart: str, states: Array) -> NDArray[np.bool_]:
     return np.logical_or.accumulate(np.isfinite(length) & (np.abs(length - 1.0) > LENGTH), axis=-1)
 
 
-def sentence(outcome: str, reached: float, horizon: float) -> str:
-    """One sentence on how a run ended, at what time and why."""
+def sentence(outcome: str, reached: float, horizon: float, unit: str = "") -> str:
+    """One sentence on how a run ended, at what time (`unit` follows it: " s") and why."""
     if outcome == "ok":
-        return f"reached t = {reached:.6g}"
-    return f"stopped at t = {reached:.6g} of {horizon:.6g}: {_CAUSES[outcome]}"
+        return f"reached t = {reached:.6g}{unit}"
+    return f"stopped at t = {reached:.6g} of {horizon:.6g}{unit}: {_CAUSES[outcome]}"

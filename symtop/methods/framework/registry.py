@@ -42,15 +42,11 @@ FAMILIES = (
 )  # fmt: skip
 IMPLEMENTATIONS = ("compiled", "python")
 ENERGY_ERRORS = ("kept", "bounded", None)
-NEEDS = {  # the weakest thing that suffices for a method, whatever its kernel makes use of
-    "derivative": "f(t, y) at any state",
-    "expression": "f as a formula",
-    "lagrangian": "the Lagrangian of coordinates and velocities",
-    "kicks": "the torque at an attitude, and the free motion",
-    "group": "the torque, the inertia and the group of rotations",
-    "this-top": "the equations or constants of this very top",
+NEEDS = {  # the weakest thing that suffices for a method, whatever its kernel makes use of, and what a user says of it
+    "derivative": "f(t, y)", "expression": "f as a formula", "lagrangian": "a Lagrangian",
+    "kicks": "torque, free motion", "group": "torque, inertia", "this-top": "this top's equations",
     "solution": "the motion itself",
-}
+}  # fmt: skip
 INNER_LOOPS = ("scalar", "vector registers", "heyoka", "Python", None)
 ALLOWED: dict[str, tuple[Any, ...]] = {
     **dict.fromkeys(("explicit", "symplectic", "symmetric"), (True, False, None)), "exact_steps": (True, False),
