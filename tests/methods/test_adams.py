@@ -138,7 +138,7 @@ def test_nothing_that_belongs_to_the_map_of_one_step_is_claimed():
 
 
 def test_a_run_of_ten_trillion_seconds_begins():
-    """Its first step is far below the spacing of numbers at its end, on whose grid steps lie: it stood still for ever."""
+    """Its first step is far below the spacing of numbers at its end, on whose grid steps lie: it stood still."""
     top = symtop.SymmetricTop(5.8e10, 5.6e10, -7.2e-12)
     scene = symtop.Scene("slow", top, symtop.Angles(1.7, 1.6, 2.8, 4.7e-12, -2.4e-11, -4.6e-11), 1.1e13)
     run = symtop.simulate(scene, "adams", tolerance=1e-9, samples=11, budget=1e5)
