@@ -48,7 +48,7 @@ def error(
     name: str | symtop.Scene, method: str | symtop.Integrator, quantity: str = "attitude", **settings: float
 ) -> float:
     """Largest error of a run."""
-    run = symtop.simulate(name, method, samples=41, **settings)
+    run = symtop.simulate(name, method, samples=41, guard=False, **settings)
     assert run.outcome == "ok"
     return float(symtop.errors(run)[quantity].max())
 
@@ -89,7 +89,7 @@ def test_a_wrong_sign_in_the_inertia_is_seen(name: str, method: str) -> None:
     mirrored = RigidBody(body.I3, body.I2, body.I1, body.mgl, body.centre)
     rates = tuple(part / moment for part, moment in zip(M, mirrored.moments, strict=True))
     other = symtop.Scene("other", mirrored, Attitude(scene.start.quaternion, rates), scene.horizon)
-    run = symtop.simulate(other, method, step_size=scene.nutation_period / 40, samples=41)
+    run = symtop.simulate(other, method, step_size=scene.nutation_period / 40, samples=41, guard=False)
     assert run.outcome == "ok"
     truth = symtop.reference(scene, run.time.values)
     assert attitude_distance(run["quaternion"].values, truth["quaternion"].values).max() > 0.1
@@ -100,7 +100,7 @@ def test_a_wrong_sign_in_the_inertia_is_seen(name: str, method: str) -> None:
 def test_a_method_keeps_what_it_must_and_nothing_else(name: str, method: str) -> None:
     scene = body_scenes()[name]
     step = scene.nutation_period / FIXED[method][1]
-    errors = symtop.errors(symtop.simulate(name, method, step_size=step, samples=101))
+    errors = symtop.errors(symtop.simulate(name, method, step_size=step, samples=101, guard=False))
     for quantity in ("energy", "p_phi") + ("momentum",) * scene.top.free:
         kept = quantity in KEPT[method][not scene.top.free] or (quantity == "p_phi" and "momentum" in KEPT[method][0])
         assert (float(errors[quantity].max()) < 2e-14) is kept, quantity
@@ -117,7 +117,7 @@ def test_a_symmetric_body_moves_as_the_top_does(mgl: float) -> None:
     times = np.linspace(0.0, 10.0, 21)
     one, other = (symtop.reference(scene, times)["quaternion"].values for scene in (top, body))
     assert attitude_distance(one, other).max() < 2e-14
-    run = symtop.simulate(body, "series-general", step_size=0.05, samples=21)
+    run = symtop.simulate(body, "series-general", step_size=0.05, samples=21, guard=False)
     assert (
         attitude_distance(run["quaternion"].values, symtop.reference(top, run.time.values)["quaternion"].values).max()
         < 1e-12
@@ -127,15 +127,20 @@ def test_a_symmetric_body_moves_as_the_top_does(mgl: float) -> None:
 
 
 def test_splittings_keep_what_they_must() -> None:
-    run = symtop.errors(symtop.simulate("check-case-2", "kahan-li-6", step_size=0.3, samples=101))
+    run = symtop.errors(symtop.simulate("check-case-2", "kahan-li-6", step_size=0.3, samples=101, guard=False))
     assert run["momentum"].max() < 4e-15
     assert 1e-10 < run["attitude"].max() < 1e-4  # and yet it has an error
-    heavy = [symtop.errors(symtop.simulate("heavy-brick", "strang", step_size=h, horizon=2000.0)) for h in (0.1, 0.05)]
+    heavy = [
+        symtop.errors(symtop.simulate("heavy-brick", "strang", step_size=h, horizon=2000.0, guard=False))
+        for h in (0.1, 0.05)
+    ]
     for one in heavy:
         energy, half = one["energy"].values, one.sizes["time"] // 2
         assert one["p_phi"].max() < 2e-14
         assert energy[half:].max() < 1.3 * energy[:half].max()  # it swings, and does not grow
-    grown = symtop.errors(symtop.simulate("heavy-brick", "rk4", step_size=0.05, horizon=2000.0))["energy"].values
+    grown = symtop.errors(symtop.simulate("heavy-brick", "rk4", step_size=0.05, horizon=2000.0, guard=False))[
+        "energy"
+    ].values
     assert grown[-1] > 1.7 * grown[len(grown) // 2]
 
 
@@ -150,10 +155,15 @@ def test_five_rotations_are_of_order_four_on_one_free_body_in_one_order(moments:
 
 
 def test_a_variational_step_that_has_no_solution_ends_the_run() -> None:
-    ended = symtop.simulate("check-case-2", "lie-variational", step_size=6.0)
+    ended = symtop.simulate("check-case-2", "lie-variational", step_size=6.0, guard=False)
     assert ended.outcome == "not_converged"
     assert (
-        float(symtop.errors(symtop.simulate("check-case-2", "euler-poincare", step_size=6.0))["momentum"].max()) < 2e-14
+        float(
+            symtop.errors(symtop.simulate("check-case-2", "euler-poincare", step_size=6.0, guard=False))[
+                "momentum"
+            ].max()
+        )
+        < 2e-14
     )
 
 
@@ -183,7 +193,7 @@ def test_another_method_comes_to_the_symmetric_top_by_its_order(method: str, ord
 
 
 def test_energy_and_momentum_of_a_run_are_those_of_its_states() -> None:
-    run = symtop.simulate("heavy-brick", "rk4", step_size=0.2, samples=11)
+    run = symtop.simulate("heavy-brick", "rk4", step_size=0.2, samples=11, guard=False)
     truth, errors = symtop.reference("heavy-brick", run.time.values), symtop.errors(run)
     assert {*errors.data_vars} >= {"attitude", "axis", "theta", "momentum", "energy", "p_phi", "attitude_bound"}
     assert "p_psi" not in run
@@ -205,7 +215,7 @@ def test_a_trajectory_of_another_program_is_judged() -> None:
 
 
 def test_a_run_knows_its_body_from_its_file(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    run = symtop.simulate("heavy-brick", "rk4", step_size=0.05, samples=11)
+    run = symtop.simulate("heavy-brick", "rk4", step_size=0.05, samples=11, guard=False)
     run.to_netcdf(tmp_path / "run.nc")
     import xarray as xr
 
@@ -283,7 +293,7 @@ def test_a_body_of_ones_own_on_the_command_line() -> None:
     shown = CliRunner().invoke(main, ["scenes", "body", "--json", *options])
     stored = json.loads(shown.stdout)[0]
     assert stored["top"]["centre"] == list(body.centre)
-    assert float(stored["nutation period (s)"]) == pytest.approx(body.nutation_period(at), rel=1e-5)
+    assert float(stored["nutation period"]) == pytest.approx(body.nutation_period(at), rel=1e-5)
     ran = ["run", "body", "rk4", "--step-size", "0.05", "--horizon", "20", "--json"]
     own, named = (
         json.loads(CliRunner().invoke(main, [*words, *more]).stdout)

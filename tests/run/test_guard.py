@@ -19,7 +19,7 @@ from symtop.model.scenes import closed_form, grazing, steady
 from symtop.run import guard
 from symtop.run.guard import EXPECTED, Probe, grown
 from symtop.run.linear_stability import trace
-from symtop.run.motion import landmarks
+from symtop.run.motion import Exact, Integrated, landmarks
 from symtop.run.simulation import make_plan
 
 REMEDIED = ("spheroid", "goldstein", "cusp", "loop", "fast", "hairer-lubich-wanner", "grazing")
@@ -227,3 +227,38 @@ def test_every_method_can_be_probed_and_is_told_what_it_can_do():
         found = guard.forecast(where, method, method.charts()[0], plan)
         assert found.outcome == "ok"
         assert found.axis_error < 1e-2
+
+
+# ---- without a closed form -------------------------------------------------------------------------------------------
+
+
+BODIES = [
+    ("heavy-brick", "rk4", 0.05, False), ("heavy-brick", "strang", 0.3, True), ("heavy-brick", "gauss-4", 0.1, False),
+    ("tennis-racket", "strang", 0.3, True), ("tennis-racket", "kahan-li-8", 0.05, False),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("scene", "name", "step", "wrong"), BODIES)
+def test_a_run_of_a_body_is_warned_of_where_its_attitude_is_lost(scene, name, step, wrong):
+    heard = []
+    run = symtop.simulate(scene, name, step_size=step, guard=heard.append)
+    assert run.attrs["outcome"] != "ok" or bool(symtop.errors(run)["attitude"].max() > EXPECTED) is wrong
+    assert bool(heard) is wrong
+    assert not wrong or re.search("expect an attitude error|expect the run to be", heard[0])
+
+
+@pytest.mark.parametrize("name", ["rk4", "strang", "gauss-4", "midpoint"])
+@pytest.mark.parametrize("scene", ["spheroid", "goldstein", "loop"])
+def test_a_top_that_is_integrated_is_forecast_as_by_its_closed_form(scene, name):
+    scene, method = symtop.scene(scene), symtop.integrator(name)
+    chart, period = method.chart_for("axis"), scene.nutation_period
+    plan, _ = make_plan(scene, method, step_size=period / 40.0, horizon=50.0 * period, samples=101)
+    exact, series = (guard.forecast(scene, method, chart, plan, kind(scene)).axis_error for kind in (Exact, Integrated))
+    assert 0.25 < series / exact < 4.0
+
+
+def test_what_a_motion_makes_of_a_change_tells_chaos_from_order():
+    scenes = (symtop.model.scenes.scene(name, bodies=True) for name in ("heavy-chaotic", "heavy-brick"))
+    grown = [Integrated(one).amplification(50.0, 50.0) for one in scenes]
+    assert grown[0] > 1e4
+    assert grown[1] < 1e3
