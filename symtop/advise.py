@@ -546,11 +546,13 @@ class EngineAdvice:
     best: str
     gain: float
     advice: Advice | None
+    unit: str = ""  # of time, as it follows a number
 
     def __str__(self) -> str:
         default, maps = next(iter(self.errors)), _settings()[self.engine]
         lines = [
-            f"{self.engine} on {self.scene}, step {self.step_size:g}, to t = {self.horizon:g}: the axis is off by",
+            f"{self.engine} on {self.scene}, step {self.step_size:g}{self.unit}, to t = {self.horizon:g}{self.unit}: "
+            "the axis is off by",
             *(f"    {value:.2e} rad  {name} ({maps[name]})" for name, value in self.errors.items()),
         ]
         near = self.errors[self.best] <= WORST
@@ -603,11 +605,13 @@ def i_use(
     sought = accuracy is not None or error <= WORST
     advice = recommend(start, accuracy=target, horizon=end, **limits) if sought else None
     if advice is None or advice.integrator is None:
-        return EngineAdvice(start.name, engine, h, end, off, best, math.nan, None if accuracy is None else advice)
+        return EngineAdvice(
+            start.name, engine, h, end, off, best, math.nan, None if accuracy is None else advice, start.second
+        )
     setting: dict[str, Any] = {"step_size": advice.step_size, "tolerance": advice.tolerance}
     needed = simulate(start, advice.integrator, **setting, horizon=end, guard=False, observe="axis")
     gain = forces / float(needed.attrs["force_evaluations"])
-    return EngineAdvice(start.name, engine, h, end, off, best, gain, advice)
+    return EngineAdvice(start.name, engine, h, end, off, best, gain, advice, start.second)
 
 
 def _error_and_forces(start: Scene, method: str, h: float, horizon: float) -> tuple[float, float]:

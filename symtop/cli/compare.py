@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 TARGETS = (1e-3, 1e-6, 1e-9)  # whose cheapest runs are shown
-FACTS = ("scene", "quantity", "horizon", "nutations", "cost", "timed", "budget")
+FACTS = ("quantity", "horizon", "nutations", "cost", "timed", "budget")
 COLUMNS = ("step_size", "tolerance", "steps_per_nutation", "error", "seconds", "seconds_spread", "force_evaluations")
 
 
@@ -73,19 +73,15 @@ def compare(
     places = {target: comparison.cheapest(data, target).tolist() for target in TARGETS}
     cells = [data.isel(variant=k) for k in range(data.sizes["variant"])]
     records = [[_record(cell, target, places[target][k]) for target in TARGETS] for k, cell in enumerate(cells)]
-    name = getattr(scene, "name", scene)
+    exact = data["exact_seconds"].item()  # NaN for a body without symmetry
     if as_json:
-        facts = {name: (data.attrs | {"scene": name})[name] for name in FACTS}
-        click.echo(
-            as_text(
-                facts
-                | {"exact_seconds": data["exact_seconds"].item(), "cheapest": [one for own in records for one in own]}
-            )
-        )
+        facts = {name: data.attrs[name] for name in FACTS}
+        every = [one for own in records for one in own]
+        click.echo(as_text({"scene": data["scene"].item(), **facts, "exact_seconds": exact, "cheapest": every}))
         return
     timed, end, count = options["cost"] == "time", data.attrs["horizon"], data.attrs["nutations"]
-    unit = " s" if "units" in data.attrs else ""
-    say(f"{name} to t = {end:.6g}{unit} ({count:.3g} nutations): the cheapest run by {options['cost']}")
+    unit = " s" if data["reached_time"].attrs["units"] == "s" else ""
+    say(f"{data['scene'].item()} to t = {end:.6g}{unit} ({count:.3g} nutations): the cheapest run by {options['cost']}")
     say(f"steps a nutation or tolerance{', time' * timed}, force evaluations; error of {data.attrs['quantity']}")
     rows = [[titled(cell), *(_cell(one, timed) for one in own)] for cell, own in zip(cells, records, strict=True)]
     click.echo(table(["variant", *map("error {:.0e}".format, TARGETS)], rows))
@@ -96,7 +92,6 @@ def compare(
         if any(words):
             say(f"{cell['variant'].item()}: {'; '.join(filter(None, words))}")
     if timed:
-        exact = data["exact_seconds"].item()  # NaN for a body without symmetry
         motion = f"The exact motion takes {pace(exact)}. " if math.isfinite(exact) else ""
         say(f"{motion}A time is that of one call of the solver, with nothing around it.")
         if float((data["seconds_spread"] > NOISY).sum() / data["seconds_spread"].notnull().sum()) > 0.5:

@@ -120,7 +120,10 @@ def _draw_beside(target: str, scene: str, file: str | None, quiet: bool, options
         draw_compare(data, file)
     most, errors = ranked(data)
     if not quiet and errors:
-        words = ", ".join(f"{name} {error:.0e}" for name, error in errors.items())
+        rest = [str(name) for name in data["variant"].values if name not in errors]
+        words = ", ".join(
+            [*(f"{name} {error:.0e}" for name, error in errors.items()), *(f"{name} none" for name in rest)]
+        )
         say(f"Axis error (rad) for {most:.0f} force evaluations in {NUTATIONS:g} nutations: {words}.")
 
 

@@ -179,6 +179,8 @@ def _scene_page(numbers: Record) -> str:
         lines["theta"] = (
             f"from {low:.6g} to {high:.6g} rad ({math.degrees(low):.4g} to {math.degrees(high):.4g} degrees)"
         )
+    for key in ("horizon", "nutation period"):
+        numbers[key] += " s" if numbers["units"] == "SI" else ""
     title = textwrap.fill(f"{name}: {purpose}" if purpose else name, terminal_width())
     return f"{title}\n\n{facts(lines | numbers, terminal_width())}"
 

@@ -133,7 +133,7 @@ class Scene:
     def record(self) -> dict[str, str]:
         """What tables show of this scene, by column."""
         period = f"{self.nutation_period:.6g}" if math.isfinite(self.nutation_period) else "infinite"
-        times = {"horizon": f"{self.horizon:g}{self.second}", "nutation period": f"{period}{self.second}"}
+        times = {"horizon": f"{self.horizon:g}", "nutation period": period, "units": self.units or "any consistent"}
         return {"name": self.name, **times, "observes": self.observes, "purpose": self.purpose}
 
 

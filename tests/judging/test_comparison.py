@@ -207,7 +207,8 @@ def test_the_command_prints_a_line_for_each_variant(tmp_path):
         "variant": "midpoint[angles]", "target": 1e-9, "reached": False, "reason": "budget"
     }  # fmt: skip
     assert runs["rk4[axis]", 1e-6]["force_evaluations"] == least(stored, 1e-6)["rk4[axis]"]
-    assert told["cost"] == "evaluations"
+    assert [told[name] for name in ("scene", "cost")] == ["spheroid", "evaluations"]
+    assert done.stdout.startswith("spheroid to t = 1.18017 s (1 nutations): ")
     assert call("spheroid", "rk5").exit_code == 2
     assert call("spheroid").exit_code == 2
     assert call("spheroid", "rk4", "--figure", "c.doc").exit_code == 2

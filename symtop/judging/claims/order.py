@@ -346,8 +346,7 @@ def _claimed(power: int, fitted: Order, series: ChartSeries | None, slopes: str)
         early = bool(measured) and main.slope > power and all(not fit.slope < power - BESIDE for fit in fits)
         if early or (not measured and _agree(fitted, power)):
             why = f"{why} ({main.reason or 'at steps too long for a slope'})"
-            measured = Measured("order", power, text=str(power))
-            return Finding("order", str(power), measured, "confirmed", why, *series.term(power))
+            return Finding("order", str(power), series.measured, "confirmed", why, *series.term(power))
     if verdict == "refuted":
         why = f"the error falls with another power of the step: {why}"
     elif series is not None and series.order < min(power, series.series.resolved):
