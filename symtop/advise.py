@@ -550,9 +550,9 @@ class EngineAdvice:
 
     def __str__(self) -> str:
         default, maps = next(iter(self.errors)), _settings()[self.engine]
+        run = f"step {self.step_size:g}{self.unit}, to t = {self.horizon:g}{self.unit}"
         lines = [
-            f"{self.engine} on {self.scene}, step {self.step_size:g}{self.unit}, to t = {self.horizon:g}{self.unit}: "
-            "the axis is off by",
+            f"{self.engine} on {self.scene}, {run}: the axis is off by",
             *(f"    {value:.2e} rad  {name} ({maps[name]})" for name, value in self.errors.items()),
         ]
         near = self.errors[self.best] <= WORST
