@@ -9,7 +9,8 @@ exponentially), so that an error e_1 of one piece becomes after n pieces
 
 Symplectic and symmetric methods commit no error along which N shears, and theirs grows linearly. Where two nutations
 cost too much, the probe takes a coarser step and scales its error by the declared order; the passage of a pole is
-then probed by itself at the step of the run.
+then probed by itself at the step of the run. A probe in angles whose steps are long beside a pole takes in as many
+passages as it may: what a passage adds depends on where the steps fall in it, and over few of them it cancels.
 
 *The cause* is read from exact landmarks of the motion, in this order:
 
@@ -18,7 +19,7 @@ then probed by itself at the step of the run.
     pole          the axis precesses by a radian or more in one step at its closest approach to a pole (angles only)
     aliasing      fewer than two steps a nutation
     resonance     a step turns the nutation by a third or a quarter of a turn (Verlet at h omega = sqrt 3)
-    early end     the short run ended early
+    early end     the short run ended early, or the run will at the limit of its work
     no order      the error need not fall with the step: a term is left out, or rounding decides
     departure     an adaptive method's errors of its tolerance grow with the motion, which is unstable
     growth        the errors of the nutations add up until the horizon
@@ -83,7 +84,7 @@ class Probe(NamedTuple):
     error: Array  # of the axis, or of the attitude of a body, rad; inf where the run had failed
     outcome: str
     reached: float  # time of the run, not of the probe
-    evaluations: int  # of the force
+    evaluations: int  # of the force, at the step of the run
 
 
 class Forecast(NamedTuple):
@@ -218,7 +219,9 @@ def _expected(motion: Motion, method: Integrator, chart: str, plan: Plan) -> tup
     """The largest axis error to expect, and the probe that says so."""
     straight, marks = bool(method.symplectic or method.symmetric), motion.marks
     period = marks.period if math.isfinite(marks.period) else plan.horizon
-    share, twice = min(SHARE * plan.horizon, motion.longest * period), min(2.0 * period, plan.horizon)
+    twice = min(2.0 * period, plan.horizon)
+    long_steps = chart == "angles" and marks.rate * plan.step_size > RESOLVED
+    share = min(SHARE * plan.horizon, (math.inf if long_steps else motion.longest) * period)
     if method.adaptive:
         return _adaptive_forecast(motion, method, chart, plan, period, share, twice)
     step = plan.step_size
@@ -230,6 +233,7 @@ def _expected(motion: Motion, method: Integrator, chart: str, plan: Plan) -> tup
         return _fixed(motion, method, probe, plan.horizon), probe
     coarse = twice / round(allowed / step)
     probe = _probe(motion, method, chart, plan, twice, coarse)
+    probe = probe._replace(evaluations=round(probe.evaluations * coarse / step))
     finer: float = (step / coarse) ** (method.order or 1)
     expected = _fixed(motion, method, probe, plan.horizon) * finer
     if chart == "angles" and marks.rate * coarse > RESOLVED:
@@ -264,6 +268,11 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: M
         pieces = plan.horizon / float(probe.times[-1]) - 1.0
         error = max(error, float(probe.error.max()) * math.exp(min(pieces * math.log(growth), MOST_FOLDS)))
     ended, rounding = (probe.outcome, probe.reached), motion.rounding(plan.horizon)
+    limit = getattr(method.solvers[chart], "limit", None)
+    if limit is not None and probe.outcome == "ok" and probe.times[-1] >= min(marks.period, plan.horizon):
+        reached = float(probe.times[-1]) * limit(plan) / max(probe.evaluations, 1)
+        if reached < plan.horizon:
+            error, ended = math.inf, ("out_of_budget", reached)
     return Forecast(max(error, unstable), rounding, steps, passage, *ended, marks, unstable, whole, growth)
 
 

@@ -229,6 +229,38 @@ def test_every_method_can_be_probed_and_is_told_what_it_can_do():
         assert found.axis_error < 1e-2
 
 
+def needle():
+    """A needle whose tip passes its lower pole at 0.05 rad and precesses there by 178 rad per unit of time."""
+    top = symtop.SymmetricTop(0.849078125775395, 9.310032999140425e-10, 12.174462255412678)
+    start = symtop.Angles(0.23767446382442953, 1.8454010471293447, -0.6343726115524877, -4.183433893022597,
+                          7.857719085937337, 22.33007075682596)  # fmt: skip
+    return symtop.Scene("needle", top, start, 706.2087736496838)
+
+
+def test_what_passages_of_a_pole_add_is_seen_over_many_of_them():
+    """At 206 steps a nutation the errors of 20 passages nearly cancel, and the run is lost."""
+    scene, name = needle(), "stormer-verlet-blanes-moan-6"
+    for step, lost in ((0.004708058490997893, True), (0.0015, False)):
+        run = symtop.simulate(scene, name, step_size=step, guard=False)
+        assert (float(symtop.errors(run)["axis"].max()) > EXPECTED) is lost
+        assert bool(said(scene, name, step_size=step)) is lost
+
+
+def test_the_end_of_a_run_at_the_limit_of_its_work_is_announced():
+    """Steps that shrink towards a pole: 2e8 of them end at t = 2361.6; half the horizon is within the limit."""
+    top = symtop.SymmetricTop(0.8710803565723452, 0.49843955501086307, 0.13722107388085694)
+    start = symtop.Angles(3.1410985154196807, -0.08304298101407426, -2.291165214843636, psi_dot=1.1036538264419726)
+    method = symtop.integrator("stormer-verlet-reversible")
+    for horizon, ends in ((3821.2117810193176, True), (1900.0, False)):
+        scene = symtop.Scene("hanging", top, start, horizon)
+        plan, _ = make_plan(scene, method, step_size=0.029862566198022588, horizon=horizon, samples=11)
+        warned = guard.warning(scene, method, "angles", plan)
+        if ends:
+            assert float(re.search(r"stopped at t = ([\d.]+) of", warned)[1]) == pytest.approx(2361.6, rel=0.01)
+        else:
+            assert warned == ""
+
+
 # ---- without a closed form -------------------------------------------------------------------------------------------
 
 

@@ -44,6 +44,10 @@ class Adaptive:
         steps, evaluations, outcome, reached = made
         return Run(states, momenta[:, 0], momenta[:, 1], steps, evaluations, 0, OUTCOMES[outcome], reached)
 
+    def limit(self, plan: Plan) -> float:
+        """The force evaluations at which a run is stopped."""
+        return plan.most(self.most * self.unit(plan.tolerance))
+
     def many(
         self, numbers: Array, tolerance: Array, times: Array, counts: Whole, budget: float | None = None
     ) -> tuple[Many, Array]:

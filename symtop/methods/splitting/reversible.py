@@ -76,11 +76,16 @@ def march(par, k, eps, turn, times, budget, seen, place, states, momenta):  # ty
     return seen, steps, outcome, (state, low, force, clock, rest, rho)
 
 
+def _limit(asked: int) -> int:
+    """The steps at which a run is stopped that was asked for so many."""
+    return max(min(BLOCK + SHARE * asked, STEPS), 8 * asked)
+
+
 def _run(top: SymmetricTop, start: Angles, k: float, parts: Sequence[tuple[float, Array]], asked: int) -> Run:
     """The samples of the last part, each part with an eps and times of its own."""
     par, state = on_angles(top, start)
     place: Any = (state, NONE, NONE[:3], NONE[:1], NONE[:1], 1.0 / math.sin(start.theta) ** k)
-    done, outcome, before, turn, most = 0, OK, 0.0, BEGIN, max(min(BLOCK + SHARE * asked, STEPS), 8 * asked)
+    done, outcome, before, turn, most = 0, OK, 0.0, BEGIN, _limit(asked)
     for eps, times in parts:
         seen, before, turn = 0, eps, RETRACE if eps * before < 0.0 else turn
         states, momenta = np.full((times.size, 4), np.nan), np.full((2, times.size), np.nan)
@@ -102,6 +107,10 @@ class Reversible:
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         """The run of a plan, whose step size is eps."""
         return _run(top, start, self.k, [(plan.step_size, plan.times)], int(plan.marks[-1]))
+
+    def limit(self, plan: Plan) -> float:
+        """The force evaluations at which a run is stopped."""
+        return float(_limit(int(plan.marks[-1])))
 
     def onward(self, top: SymmetricTop, start: Angles, lengths: Sequence[float]) -> Run:
         """A step of each length from where the last one stood, with its rho: a negative one retraces what was made."""
