@@ -132,14 +132,14 @@ class Growth(NamedTuple):
 def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, frequency: float) -> Growth:
     """By what a method multiplies small nutations about the steady precession of these momenta in a step.
 
-    It need not be symmetric. Two starts on both sides of the steady precession are stepped, and their difference obeys
-    delta_{k+1} = t delta_k - d delta_{k-1}: what both drift by in a step, which `trace` takes for growth, and what is
-    even in the distance cancels. Beside a pole the difference is that of e_x + i e_y, and t and d are complex. Some
-    steps of a fine h are one of the recurrence, so that it turns by a good part of a radian; `frequency` is that of
-    small nutations. Where the difference does not obey it (a method with more roots than two, say), its size is
-    followed for longer. Rounding of each step adds up, as a random walk, until that of the first has grown by e. Where
-    so many steps of a fine h turn it by a small angle a, the two terms are nearly one, and rounding e of the difference
-    leaves a doubt of e/a^2 in their roots.
+    It need not be symmetric. Two starts on both sides of the steady precession are stepped, and their difference
+    obeys delta_{k+1} = t delta_k - d delta_{k-1}: what both drift by in a step, which `trace` takes for growth, and
+    what is even in the distance cancels. Beside a pole the difference is that of e_x + i e_y, and t and d are
+    complex. Some steps of a fine h are one of the recurrence, so that it turns by a good part of a radian;
+    `frequency` is that of small nutations. Where the difference does not obey it (a method with more roots than two,
+    or one in single precision, whose rounding hides it), its size is followed for longer. Rounding of each step adds
+    up, as a random walk, until that of the first has grown by e. Where so many steps of a fine h turn it by a small
+    angle a, the two terms are nearly one, and rounding e of the difference leaves a doubt of e/a^2 in their roots.
     """
     stride = max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))  # steps
     runs, delta, off = _apart(method, scene, h, chart, NUDGE, stride)
@@ -150,7 +150,7 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
         nudge, rounding = SINGLE_NUDGE, SINGLE_EPSILON
         delta, off = _apart(method, scene, h, chart, nudge, stride)[1], 0.0
     factor = _root(delta, RESIDUAL if method.order else RESIDUAL_WITHOUT_ORDER)
-    if math.isnan(factor) and method.order:
+    if math.isnan(factor) and (method.order or single):
         long = np.abs(_apart(method, scene, h, chart, nudge, stride, LONG)[1])
         third = long.size // 3
         with np.errstate(all="ignore"):

@@ -117,7 +117,8 @@ class Exact:
 
     def closest(self) -> float:
         """See `Motion`."""
-        middle, width = 0.5 * self.marks.period, self.marks.period
+        width = self.marks.period if math.isfinite(self.marks.period) else self.scene.horizon
+        middle = 0.5 * width
         for _ in range(4):
             times = middle + width * np.linspace(-0.5, 0.5, 129)
             middle, width = float(times[int(np.argmin(np.sin(self.form(times).theta)))]), width / 40.0

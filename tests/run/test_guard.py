@@ -237,6 +237,17 @@ def needle():
     return symtop.Scene("needle", top, start, 706.2087736496838)
 
 
+@pytest.mark.parametrize(("step", "grows"), [(1.6908950574495778e-3, True), (1e-4, False)])
+def test_nutations_that_grow_out_of_single_precision_are_announced(step, grows):
+    """They begin as 3e-7 rad, below the rounding of a state, and grow by 0.9 % a step: 316 periods of them."""
+    top = symtop.SymmetricTop(4.112429602183333, 3.7094398007298763, 0.5522711835332078)
+    start = symtop.Angles(0.6475464513889042, 0.9948511184094544, -0.5379337072832797, psi_dot=803.5159571744858)
+    scene = symtop.Scene("fast", top, start, 2.7371364869033403)
+    run = symtop.simulate(scene, "jolt-float32", step_size=step, guard=False)
+    assert (float(symtop.errors(run)["axis"].max()) > EXPECTED) is grows
+    assert ("small nutations" in said(scene, "jolt-float32", step_size=step)) is grows
+
+
 def test_what_passages_of_a_pole_add_is_seen_over_many_of_them():
     """At 206 steps a nutation the errors of 20 passages nearly cancel, and the run is lost."""
     scene, name = needle(), "stormer-verlet-blanes-moan-6"
