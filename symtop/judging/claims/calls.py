@@ -33,7 +33,7 @@ FAR = 200.0  # times the step: one that most methods do not survive
 PARTS = ((20, 20), (64, 64), (100, 157), (311, 500), (1000, 1000))  # runs that are cut in two
 REMEMBERED = 1e-9  # of a step: a last slope that is kept, and not computed anew, makes 1e-10 in 2000 steps
 MISSED = 0.2  # of a step: a method of several steps starts anew with less
-LATE = {False: (100_000, 6.0), True: (20_000, 0.5)}  # quick: steps before a late one, or as many as there are seconds
+LATE = {False: (100_000, 3.0), True: (20_000, 0.5)}  # quick: steps before a late one, or as many as there are seconds
 # late runs, steps after each, and what may be missed where our loop remembers nothing
 LATER, AFTER, RECALLED = 4, 64, 1e-6
 BLOWN_UP = 1e6  # times the start
