@@ -48,7 +48,6 @@ STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take th
 AT_LEAST = 0.25  # of them a probe takes in any case, up to the whole run
 SHARE = 0.1  # of the run, which a probe may always take, but no more than so many nutations (`Integrated`) and steps:
 MOST_PROBED = 20_000  # steps
-POINTS = 300  # of a probe that are compared with the true motion
 ROUNDED = 1e-13  # rad; a probe that is closer than this shows rounding, which grows as n^1.5
 PARTIAL = 10.0  # distrust of a probe shorter than a nutation: it may have missed where errors are made, or stretched
 AFFORDED = {"compiled": 12_000, "python": 1200}  # evaluations of a longer probe of an adaptive method
@@ -103,17 +102,17 @@ class Forecast(NamedTuple):
 
 
 @functools.cache
-def _places() -> Array:
-    """Where a probe of length `POINTS` is sampled: not commensurate with the nutation."""
-    place = np.arange(1.0, POINTS + 1.0)
+def _places(points: int) -> Array:
+    """Where a probe of so long is sampled: not commensurate with the nutation."""
+    place = np.arange(1.0, points + 1.0)
     place[:-1] += np.mod(GOLDEN * place[:-1], 1.0) - 0.5
     return place
 
 
 @functools.lru_cache(maxsize=256)
-def _marks(steps: int) -> Any:
+def _marks(steps: int, points: int) -> Any:
     """The same in whole steps of a probe; there are few such numbers of steps (`STEPS`)."""
-    return np.unique(np.maximum(np.rint(_places() * (steps / POINTS)).astype(np.int64), 1))
+    return np.unique(np.maximum(np.rint(_places(points) * (steps / points)).astype(np.int64), 1))
 
 
 def _probe(
@@ -121,10 +120,10 @@ def _probe(
 ) -> Probe:
     """Run `method` from the time `since` of the true motion for `duration`, with `step` or the plan's tolerance."""
     if method.fixed_step:
-        piece = Plan.steps(step, _marks(max(1, round(duration / step))))
+        piece = Plan.steps(step, _marks(max(1, round(duration / step)), motion.points))
     else:
         most = min(plan.most(math.inf), MOST_WORK[method.implementation])
-        piece = Plan.until(duration * (_places() / POINTS), plan.tolerance, most)
+        piece = Plan.until(duration * (_places(motion.points) / motion.points), plan.tolerance, most)
     run = solve(method, chart, motion.scene.top, motion.start(since), piece)
     with np.errstate(all="ignore"):
         error = motion.error(piece.times, chart, run.states, since)
@@ -267,7 +266,7 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: I
         growth = _own_growth(motion, method, chart, plan, float(probe.times[-1]))
         pieces = plan.horizon / float(probe.times[-1]) - 1.0
         error = max(error, float(probe.error.max()) * math.exp(min(pieces * math.log(growth), MOST_FOLDS)))
-    ended, rounding = (probe.outcome, probe.reached), motion.rounding(plan.horizon)
+    ended, rounding = (probe.outcome, probe.reached), motion.rounding(plan.horizon, whole=whole)
     limit = getattr(method.solvers[chart], "limit", None)
     if limit is not None and probe.outcome == "ok" and probe.times[-1] >= min(marks.period, plan.horizon):
         reached = float(probe.times[-1]) * limit(plan) / max(probe.evaluations, 1)
@@ -279,7 +278,7 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: I
 def _own_growth(motion: Integrated, method: Integrator, chart: str, plan: Plan, piece: float) -> float:
     """How many times more than the motion itself a method's steps multiply a small change in a piece; 1 if no more."""
     steps = max(1, round(min(piece, STEPS[method.implementation] * plan.step_size) / plan.step_size))
-    top, marks = motion.scene.top, Plan.steps(plan.step_size, _marks(steps))
+    top, marks = motion.scene.top, Plan.steps(plan.step_size, _marks(steps, motion.points))
     pair = [solve(method, chart, top, start, marks).states for start in (motion.scene.start, motion.moved())]
     with np.errstate(all="ignore"):
         apart = float(np.max(motion.apart(*((chart, one) for one in pair)))) / MOVED

@@ -25,14 +25,14 @@ from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.reference.sensitivity import displacement
 
-SERIES, PAIR = "series-general-adaptive", "dop853-compiled-fixed"
+SERIES, PAIR = {BODY: "series-general-adaptive", "axis": "series-adaptive"}, "dop853-compiled-fixed"
 FINE, CHECK = 1e-15, 1e-13  # tolerances: of the true motion, and of its check at one of so many times, the last first:
 CHECKED = 10
-PAIR_STEPS = 8  # of two motions side by side, in a period of the fastest turn
-MOVED = 1e-8  # of the natural frequency: small enough to show how much a regular motion beside a separatrix shears
+PAIR_STEPS = 5  # of two motions side by side, in a period of the fastest turn
+MOVED = 1e-10  # of the natural frequency: small enough to show how much a motion beside a separatrix shears
 SATURATED = 0.1  # rad; two motions that are farther apart no longer show how fast they part
 WATCHED = {BODY: 200.0, "axis": 20.0}  # natural periods of a run: the motion of a top is integrable
-MOST_WATCHED = 10_000  # steps
+MOST_WATCHED = 5000  # steps
 POINTS = 100  # of A
 MOST_POWER = 20.0  # of the time by which A grows beyond what is watched
 MOST_FOLDS = 100.0  # e times that anything grows: any is too much
@@ -77,7 +77,8 @@ def landmarks(scene: Scene) -> Landmarks:
 class Integrated:
     """The motion of a body, or of a top as if it had no closed form, by Taylor series; what the guard asks of any."""
 
-    longest, reach = 5.0, 10.0  # natural periods of a piece that is a share of the run, and of any other
+    longest, reach = 20.0, 40.0  # natural periods of a piece that is a share of the run, and of any other
+    points = 100  # of a piece that are compared
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.known = scene, dict[float, tuple[Array, Array]]()
@@ -88,7 +89,7 @@ class Integrated:
     def states(self, times: Array, tolerance: float) -> Array:
         """States (n, dimension) at `times` (n,), NaN from where the work is too much."""
         plan = Plan.until(times, tolerance, MOST_WORK)
-        return solve(integrator(SERIES), self.chart, self.scene.top, self.scene.start, plan).states
+        return solve(integrator(SERIES[self.chart]), self.chart, self.scene.top, self.scene.start, plan).states
 
     def apart(self, first: tuple[str, Array], second: tuple[str, Array]) -> Array:
         """Rad (n,) between states (n, dimension) of two charts."""
@@ -159,32 +160,38 @@ class Integrated:
 
     def amplified(self, error: float, since: float, horizon: float, /) -> float:
         """What the motion makes by the horizon of an error at the time `since`, rad; 0 if its law is known."""
+        if since >= horizon:
+            return error
         return error * self.amplification(horizon, horizon) / self.amplification(since, horizon)
 
-    def rounding(self, horizon: float) -> float:
-        """What rounding alone makes of a run, rad: large on a separatrix and in chaos, whatever the method."""
-        return self.displacement(EPSILON, horizon)
+    def rounding(self, horizon: float, *, whole: bool) -> float:
+        """What rounding alone makes of a run, rad: large on a separatrix and in chaos, whatever the method.
+
+        0 if a piece was the `whole` run: what two orders differ by shows it.
+        """
+        return 0.0 if whole else self.displacement(EPSILON, horizon)
 
 
 def _frequencies(scene: Scene) -> tuple[float, float, float]:
     """That of the natural period (`symtop.model.body`), one that no turn exceeds by much, and the inertia of both.
 
-    What turns the body about an axis of little inertia is the part of the weight across it, and the spin of the start.
+    What turns a body about an axis of little inertia is the part of the weight across it, and the spin of the start.
     """
-    top, at, least = scene.top, scene.start, 2.0 * math.pi / scene.horizon
+    top, at, slowest = scene.top, scene.start, 2.0 * math.pi / scene.horizon
     if not scene.of_body:
         rates = at.theta_dot, at.phi_dot * math.sin(at.theta), top.momenta(at).p_psi / top.I1
-        slow = max(math.hypot(*rates, math.sqrt(abs(top.mgl) / top.I1)), least)
+        slow = max(math.hypot(*rates, math.sqrt(abs(top.mgl) / top.I1)), slowest)
         return slow, slow, top.I1
-    slow = max(2.0 * math.pi / top.nutation_period(at), least)
-    pull = abs(top.mgl) * float(np.sum(np.sqrt(1.0 - np.minimum(np.square(top.centre), 1.0)) / top.moments))
-    return slow, math.hypot(slow, *at.omega_body, math.sqrt(pull)), sorted(top.moments)[1]
+    slow = max(2.0 * math.pi / top.nutation_period(at), slowest)
+    least, along = min(zip(top.moments, top.centre, strict=True))
+    swung = 2.0 * math.sqrt(abs(top.mgl) * math.sqrt(max(1.0 - along * along, 0.0)) / least)
+    return slow, max(math.hypot(slow, *at.omega_body), swung), sorted(top.moments)[1]
 
 
 class Exact(Integrated):
     """The same of a top by its closed form, which knows it for ever."""
 
-    watches, longest, reach = "axis", 20.0, math.inf
+    watches, longest, reach, points = "axis", 20.0, math.inf, 300
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.marks, self.form = scene, landmarks(scene), closed_form(scene)
@@ -214,7 +221,7 @@ class Exact(Integrated):
         """0: errors of an integrable motion shear, which the law of the guard has."""
         return 0.0
 
-    def rounding(self, horizon: float) -> float:
-        """See `Integrated`."""
+    def rounding(self, horizon: float, *, whole: bool) -> float:  # noqa: ARG002
+        """See `Integrated`; of the whole run, too."""
         marks, turns = self.marks, horizon / self.marks.period
         return marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0
