@@ -12,7 +12,7 @@ of the run does not show it, because a chaotic motion looks regular on many a pi
 import functools
 import math
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -74,6 +74,30 @@ def landmarks(scene: Scene) -> Landmarks:
     return _landmarks(scene.top, scene.start)
 
 
+class Growth(NamedTuple):
+    """A, at `times` (n,)."""
+
+    times: Array
+    size: Array
+
+    @classmethod
+    def of(cls, times: Array, apart: Array, most: float) -> Self:
+        """From a distance in units of the first one; beyond `most`, which shows no A, it grows on exponentially."""
+        size = np.maximum.accumulate(np.maximum(np.nan_to_num(apart, nan=math.inf), 1.0))
+        last = int(np.searchsorted(size, most))
+        if last < size.size:
+            size[last:] = np.exp(np.minimum(math.log(most) * times[last:] / times[last], MOST_FOLDS))
+        return cls(times, size)
+
+    def at(self, until: float) -> float:
+        """A at any time; later than the last one by the power of the time that it grew with in the second half."""
+        last, count = float(self.times[-1]), self.size.size
+        if until <= last:
+            return float(self.size[min(int(np.searchsorted(self.times, until)), count - 1)])
+        power = math.log2(float(self.size[-1] / self.size[count // 2 - 1]))
+        return float(self.size[-1]) * math.pow(until / last, min(max(power, 1.0), MOST_POWER))
+
+
 class Integrated:
     """The motion of a body, or of a top as if it had no closed form, by Taylor series; what the guard asks of any."""
 
@@ -81,7 +105,7 @@ class Integrated:
     points = 100  # of a piece that are compared
 
     def __init__(self, scene: Scene) -> None:
-        self.scene, self.known = scene, dict[float, tuple[Array, Array]]()
+        self.scene, self.known = scene, dict[float, Growth]()
         self.chart, self.watches = (BODY, "attitude") if scene.of_body else ("axis", "axis")
         slow, self.fast, self.inertia = _frequencies(scene)
         self.marks = Landmarks(2.0 * math.pi / slow, slow, math.nan, math.inf, "upper", 0.0, 0.0)
@@ -120,11 +144,10 @@ class Integrated:
             return replace(at, omega_body=(x + 0.6 * rate, y - 0.48 * rate, z + 0.64 * rate))
         return replace(at, theta_dot=at.theta_dot + 0.6 * rate, phi_dot=at.phi_dot + 0.8 * rate)
 
-    def growth(self, horizon: float) -> tuple[Array, Array]:
-        """Times (n,) and A (n,) up to the horizon, or as far as it is watched; made once.
+    def growth(self, horizon: float) -> Growth:
+        """A up to the horizon, or as far as it is watched; made once.
 
-        From where two motions are too far apart to show it, A grows by the exponential that it has reached. Both take
-        the same steps, so that their errors do not hide it.
+        Both motions take the same steps, so that their errors do not hide it.
         """
         step = 2.0 * math.pi / self.fast / PAIR_STEPS
         until = min(horizon, WATCHED[self.chart] * self.marks.period, MOST_WATCHED * step)
@@ -138,21 +161,12 @@ class Integrated:
             gap, place = far - near, 4 if self.chart == BODY else 3
             turned = (2.0 if self.chart == BODY else 1.0) * np.linalg.norm(gap[:, :place], axis=1)
             apart = np.fmax(turned, np.linalg.norm(gap[:, place:], axis=1) / (self.inertia * self.marks.frequency))
-            grown = np.maximum.accumulate(np.maximum(np.nan_to_num(apart, nan=math.inf) / MOVED, 1.0))
-            last = int(np.searchsorted(grown, SATURATED / MOVED))
-            if last < POINTS:
-                folds = math.log(SATURATED / MOVED) * plan.times[last:] / plan.times[last]
-                grown[last:] = np.exp(np.minimum(folds, MOST_FOLDS))
-            self.known[until] = plan.times, grown
+            self.known[until] = Growth.of(plan.times, apart / MOVED, SATURATED / MOVED)
         return self.known[until]
 
     def amplification(self, until: float, horizon: float) -> float:
         """A at a time of a run to the horizon."""
-        times, grown = self.growth(horizon)
-        if until <= times[-1]:
-            return float(grown[min(int(np.searchsorted(times, until)), POINTS - 1)])
-        last, power = float(grown[-1]), math.log2(float(grown[-1] / grown[POINTS // 2 - 1]))
-        return last * math.pow(until / float(times[-1]), min(max(power, 1.0), MOST_POWER))
+        return self.growth(horizon).at(until)
 
     def displacement(self, change: float, horizon: float) -> float:
         """How far the run is off by the horizon, rad, if the start is changed by so little."""
