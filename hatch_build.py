@@ -34,6 +34,12 @@ recommend spheroid --accuracy 1e-9
 recommend goldstein --accuracy 1e-3 --quantity attitude
 recommend spheroid --accuracy 1e-6 --needs derivative
 compare goldstein stormer-verlet midpoint rk4 dop853 taylor
+long spheroid stormer-verlet --steps 1e5
+run spheroid chin-4a[axis] --step-size 0.01
+run spheroid cayley-tuned[axis] --step-size 0.01
+run spheroid gauss-12[axis] --step-size 0.01
+run spheroid series-adaptive[axis] --tolerance 1e-9
+run spheroid rk45-compiled --tolerance 1e-6
 ensemble strang --members 100 --per-nutation 100 --nutations 10 --output runs.nc
 """
 
@@ -51,6 +57,6 @@ class KernelsAndStudies(BuildHookInterface):
             folder = Path(self._made.name)
             environment = os.environ | {"PYTHONPATH": self.root, "SYMTOP_CACHE": str(folder)}
             command = [python, "-c", FIRST, str(folder)]
-            subprocess.run(command, input=COMMANDS, text=True, env=environment, check=True)
+            subprocess.run(command, input=COMMANDS, text=True, env=environment, check=True)  # noqa: S603
             for file in (folder / "kernels").rglob("*.bitcode"):
                 build_data["force_include"][str(file)] = str(Path("symtop", file.relative_to(folder)))
