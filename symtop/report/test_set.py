@@ -56,7 +56,8 @@ Made by symtop, BSD-3-Clause.
 
 def problems() -> list[Scene]:
     """The bodies and their starts."""
-    return [scene for kind, count in SHARES.items() for scene in scenes_of(body_population(count, seed=SEED, kind=kind))]
+    each = (body_population(count, seed=SEED, kind=kind) for kind, count in SHARES.items())
+    return [scene for members in each for scene in scenes_of(members)]
 
 
 def times_of(scene: Scene) -> list[float]:

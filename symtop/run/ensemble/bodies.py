@@ -98,9 +98,8 @@ def scenes_of(members: xr.Dataset) -> list[Scene]:
 
 
 def _scene(row: Array, name: str = "drawn", purpose: str = "") -> Scene:
-    numbers = row.tolist()
-    body = RigidBody(*numbers[:4], tuple(numbers[4:7]))
-    start = Attitude(tuple(numbers[7:11]), tuple(numbers[11:]))
+    I1, I2, I3, mgl, c1, c2, c3, w, x, y, z, *rates = row.tolist()
+    body, start = RigidBody(I1, I2, I3, mgl, (c1, c2, c3)), Attitude((w, x, y, z), (rates[0], rates[1], rates[2]))
     return Scene(name, body, start, PERIODS * body.nutation_period(start), purpose)
 
 
