@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from symtop.model.top import Angles as Angles, Momenta as Momenta, SymmetricTop as SymmetricTop
     from symtop.report.card import card as card
     from symtop.report.plot import plot as plot
+    from symtop.run.ensemble.bodies import body_population as body_population
     from symtop.run.ensemble.ensemble import ensemble as ensemble
     from symtop.run.ensemble.population import population as population
     from symtop.run.long_run import long_run as long_run
@@ -72,6 +73,7 @@ _NAMES = {  # by the module that holds them
     "model.body": "Attitude RigidBody",
     "model.scenes": "Scene body_scenes register_scene scene scenes",
     "model.top": "Angles Momenta SymmetricTop",
+    "run.ensemble.bodies": "body_population",
     "run.ensemble.ensemble": "ensemble",
     "run.long_run": "long_run",
     "run.ensemble.population": "population",
