@@ -482,7 +482,8 @@ def _the_motion(question: _Question, limit: float) -> Advice:
     lines = _lines(question, exact, None)
     reason = (
         f"exact, the closed form, meets {quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}: error below "
-        f"{limit:.2g} in {seconds:.2g} s, without steps; it needs {NEEDS['solution']} (solution).{_carries(question, exact)}"
+        f"{limit:.2g} in {seconds:.2g} s, without steps; it needs {NEEDS['solution']} (solution)."
+        f"{_carries(question, exact)}"
     )
     return Advice(
         scene.name, quantity, accuracy, horizon, exact.name, expected_error=limit, seconds=seconds,

@@ -45,7 +45,7 @@ def _variants(asked: list[Setup]) -> dict[str, Integrator]:
 
 
 def _line(scene: Scene, variant: Integrator) -> dict[str, Any]:
-    """Seconds and largest errors (rad) of the axis, of a body of its attitude, of the runs that ended well, and how many did not."""
+    """Seconds and largest errors (rad) of the axis, or of a body's attitude, of good runs, and how many failed."""
     budget = SHARE * BUDGET[variant.implementation] * min(variant.speed, 1.0)
     try:
         quantity = "attitude" if scene.of_body else "axis"

@@ -318,7 +318,7 @@ function drawPlots() {
   for (const [id, one] of [["swatch-1", run], ["swatch-2", second]]) if (one) $(id).style.borderColor = one.color;
   if (costs) drawCost($("cost"), costs, [run, second].flatMap((one, k) => (one ? [{ name: k ? values.second : values.integrator, seconds: costs.seconds[k], error: one.error, color: one.color }] : [])), catalogue.integrators);
   for (const [name, { arrays, curves }] of Object.entries(DAMPED)) if (arrays) plot($(`plot-${name}`), arrays.time, [{ values: arrays.exact, time: arrays.exact_time, color: "#9a9a9a", dash: [2, 3] }, ...Object.entries(curves).map(([curve, color]) => ({ values: arrays[curve], color }))], false, NaN);
-  if (!ofBody()) {
+  if (run.true_theta) {  // and not of the body that was shown before
     portrait($("portrait"), second ? [run, second] : [run]);
     outcomes.draw({ step: values.step_size, spin: values.psi_dot });
   }
