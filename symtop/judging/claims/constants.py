@@ -114,7 +114,7 @@ class LongRun(NamedTuple):
     iterations: float  # of a solver, a step
     steady_cost: bool  # every run of the same number of steps cost the same, at two step sizes
     reported: Difference | None  # of the momenta from those of the states; None where the states show none
-    energy: tuple[Array, Array]  # times, in nutations, and the largest relative change around each, shape (WINDOWS,)
+    energy: Array  # times, in nutations, and the largest relative change around each, shape (2, WINDOWS)
 
     @property
     def span(self) -> str:
@@ -167,24 +167,25 @@ def long_run(
     _, other, _ = _run(method, scene, inside, PILOT, 0.21 * step, PILOT + 1)
     steady = len({one.force_evaluations / max(one.steps, 1) for one in (first, other)}) == 1
     reported = None
-    if inside != "angles":
-        reported = _difference(scene, shown, run)
-    elif chart != PLANE and method.fixed_step:
-        reported = from_increments(method, scene, plan)
-    if method.fixed_step and not isinstance(method.solvers[inside], AdapterSolver):
-        reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
-    changes, every_step = (
-        {name: values for name, values in constants(scene, one).items() if chart != PLANE or name == "energy"}
-        for one in (shown, pilot)
-    )
+    if not isinstance(method.solvers[inside], AdapterSolver):  # whose momenta are those of its states
+        reported = _reported(method, scene, chart, shown, (run, plan))
+        if method.fixed_step:
+            reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
+    changes, every_step = constants(scene, shown), constants(scene, pilot)
     made, grains = max(run.steps, 1), {"energy": scene.energy_grain}
     kept = {
-        name: change_of(plan.times, changes[name], every_step[name], made, grains.get(name, 1.0)) for name in changes
+        name: change_of(plan.times, changes[name], every_step[name], made, grains.get(name, 1.0))
+        for name in (changes if chart != PLANE else ("energy",))
     }
     message, nutations = sentence(run.outcome, run.reached, float(plan.times[-1])), run.reached / unit
     costs = run.force_evaluations / made, run.newton_iterations / made, steady
-    energy = windows(plan.times / unit, changes["energy"])
-    return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *costs, reported, energy)
+    # the largest |change| in windows of the logarithm of time, for a figure; NaN where there is no sample
+    shape, times = np.full((2, WINDOWS), math.nan), plan.times / unit
+    for row, values in zip(
+        shape, tops(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS), strict=True
+    ):
+        row[: len(values)] = values
+    return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *costs, reported, shape)
 
 
 def _contradiction(
@@ -204,16 +205,13 @@ def _contradiction(
     return None
 
 
-def windows(nutations: Array, change: Array) -> tuple[Array, Array]:
-    """The largest |change| in windows of the logarithm of time, with their middles; NaN where there is no sample."""
-    middles, largest = np.full((2, WINDOWS), math.nan)
-    times, values = tops(nutations, change, math.log10(nutations[-1] / nutations[1]), WINDOWS)
-    middles[: len(times)], largest[: len(values)] = times, values
-    return middles, largest
-
-
-def _difference(scene: Scene, shown: Trajectory, run: Run) -> Difference:
+def _reported(
+    method: Integrator, scene: Scene, chart: str, shown: Trajectory, long: tuple[Run, Plan]
+) -> Difference | None:
     """How far the reported momenta are from those of the states, over the long run."""
+    run, plan = long
+    if chart == "angles":
+        return from_increments(method, scene, plan) if method.fixed_step else None
     apart = {}
     for name in ("p_phi", "p_psi"):
         gap = np.abs(getattr(run, name) - getattr(shown, name)) / scene.momentum_scale
@@ -281,7 +279,7 @@ def measure(subject: Subject) -> list[Finding]:
 def of_run(method: Integrator, run: LongRun) -> list[Finding]:
     """What one long run shows of each claim of `OF_A_RUN`."""
     motion = [_constant(method, one, declared(method, one), run, run.constants.get(one)) for one in CONSTANTS]
-    return [*motion, _reported(run), _invariant(method, run), *_costs(method, run)]
+    return [*motion, _of_states(run), _invariant(method, run), *_costs(method, run)]
 
 
 def _named(finding: Finding, chart: str) -> Finding:
@@ -323,21 +321,24 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
     return Finding(claim, claimed, measured, verdict, why, changed.largest, constant.floor)
 
 
-def _reported(run: LongRun) -> Finding:
-    """Are the momenta that the run reports those that its states have?"""
+def _of_states(run: LongRun) -> Finding:
+    """Are the momenta that the run reports those that its states have, and is it a part of longer ones?"""
     other = run.reported
     if other is None:
         return inapplicable("reported", f"the {run.chart} chart shows no momenta beside the reported")
+    size = f"{other.size:.1e}"
     if other.size <= other.floor:
-        why = f"they differ from those of the states by {other.size:.1e} at most"
-        return Finding("reported", "", Measured(OWN), "measured", why, other.size, other.floor)
-    if other.name == OF_RUN:
-        why = (
-            f"a run contradicts itself, as if the method knew of it: the state differs by {other.size:.1e} {other.how}"
+        why, declared, kind, verdict = f"they differ from those of the states by {size} at most", "", OWN, "measured"
+    else:
+        why, kind = (
+            f"it reports other momenta than its states have: {other.name} differs by {size} {other.how}",
+            "others",
         )
-        return Finding("reported", OWN, Measured("another run", other.size), "refuted", why, other.size, other.floor)
-    why = f"it reports other momenta than its states have: {other.name} differs by {other.size:.1e} {other.how}"
-    return Finding("reported", OWN, Measured("others", other.size), "refuted", why, other.size, other.floor)
+        declared, verdict = OWN, "refuted"
+    if other.name == OF_RUN:
+        why = f"a run contradicts itself, as if the method knew of it: the state differs by {size} {other.how}"
+        kind = "another run"
+    return Finding("reported", declared, Measured(kind), verdict, why, other.size, other.floor)
 
 
 def _invariant(method: Integrator, run: LongRun) -> Finding:
