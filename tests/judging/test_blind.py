@@ -16,6 +16,7 @@ import symtop
 from symtop.judging import battery
 from symtop.judging.claims import order
 from symtop.judging.findings import description
+from symtop.judging.remote import Remote
 from tests.judging.blind import right, wrong
 
 BLIND = Path(__file__).parent / "blind"
@@ -202,6 +203,12 @@ def test_a_step_that_tires_after_a_hundred_thousand_is_found_in_full():
 def test_random_noise_is_no_memory(name, only):
     only("calls")
     assert symtop.judge(step_of(name, wrong, right), quick=True)["calls"].measured.kind == "not repeatable"
+
+
+def test_what_remembers_a_state_is_caught_where_no_process_is_new(only, monkeypatch):
+    only("calls")
+    monkeypatch.setattr(Remote, "renew", lambda _: None)
+    assert symtop.judge(wrong.adams_from_memory, quick=True, order=2).refuted == ["calls"]
 
 
 def test_without_a_claim_it_says_the_order_that_a_step_has_and_not_the_slope(only):

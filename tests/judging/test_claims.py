@@ -18,7 +18,7 @@ from symtop.judging.battery import CLAIMS, judge
 from symtop.judging.claims import constants, constants as long, order, structure
 from symtop.judging.claims.subject import Subject
 from symtop.judging.findings import NOTHING, VERDICTS, Finding
-from symtop.measure.conservation import behaviour
+from symtop.measure.conservation import Changed, behaviour
 from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
 from symtop.methods.framework.plan import Run
 from symtop.methods.framework.registry import Integrator
@@ -142,6 +142,22 @@ def test_residuals_are_classified_by_how_they_grow(residual, kind):
 )
 def test_a_law_is_named_only_if_the_interval_excludes_its_neighbours(size, slope, interval, kind):
     assert behaviour(size, slope, interval, rounding=1e-11) == kind
+
+
+def test_what_changes_at_once_is_said_unless_the_run_has_blown_up():
+    jump = np.where(TIME > 4000.0, 1e-6, 0.0) + 1e-12 * np.sin(TIME)
+    assert long.change_of(TIME, jump, WAVE[:9] * 1e-10, 1000).sudden.startswith("after t = 4000 it changes ")
+    assert long.change_of(TIME, jump, WAVE[:9] * 1e-10, 1000, energy=np.where(TIME > 3000.0, 1e5, 0.0)).sudden == ""
+
+
+@pytest.mark.parametrize(("largest", "verdict"), [(0.9, "confirmed"), (3.2, "refuted")])
+def test_an_energy_that_sinks_to_its_least_and_stays_there_is_not_bounded(largest, verdict):
+    """As the implicit Euler method has it: no longer growth, and more than 0.008 a step come to in a nutation."""
+    run = long.long_run(symtop.integrator("rk4"), SPHEROID, "axis", quick=True, most=1000)
+    sunk = long.Constant(Changed(largest, 0.0, 1.0, 0.0, 0.2, 0.01, ""), 0.008, 1e-11)
+    run = run._replace(outcome="ok", steps=32_000, nutations=271.0, constants={"energy": sunk})
+    claiming = dataclasses.replace(symtop.integrator("rk4"), energy_error="bounded", conserves=None)
+    assert constants.of_run(claiming, run)[0].verdict == verdict
 
 
 def test_a_run_too_short_for_an_exponent_is_not_called_bounded():

@@ -8,6 +8,7 @@ import ctypes
 import math
 import mmap
 import re
+import time
 from collections.abc import Callable, Sequence
 from ctypes import c_bool, c_double, c_long
 from dataclasses import dataclass
@@ -47,6 +48,7 @@ class Stepper:
     takes_field = False  # is it given a right-hand side (`along`)?
     since = 0.0  # the time at which runs begin
     wrote = False  # has it changed its input?
+    clock: Callable[[], float] = staticmethod(time.perf_counter)  # by which its steps are timed
 
     def renew(self) -> None:
         """Forget whatever it may keep, where that is possible."""

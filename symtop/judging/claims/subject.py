@@ -135,9 +135,9 @@ def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
     start, run = stepper.from_start(scene.top, generic_start(scene), scene.time_scale() / STEPS_A_NUTATION)
 
     def seconds(steps: int) -> tuple[float, bool]:
-        began = time.perf_counter()
+        began = stepper.clock()
         end = run(start, steps)
-        return time.perf_counter() - began, bool(np.isfinite(end).all())
+        return stepper.clock() - began, bool(np.isfinite(end).all())
 
     first, steps = min(seconds(1)[0], seconds(1)[0]), 1
     while True:
