@@ -41,8 +41,10 @@ def step_of(name, *modules):
 
 
 def confirmed(ledger, *claims):
-    """Nothing is refuted, and these claims are confirmed."""
+    """Nothing is refuted, these claims are confirmed, and the order in time is that of the claim if it is."""
     assert ledger.refuted == [], str(ledger)
+    time = [one for one in ledger.findings if one.claim == "time" and one.verdict == "confirmed"]
+    assert all(str(one.measured.number) == one.declared for one in time)
     assert {ledger[claim].verdict for claim in claims} <= {"confirmed"}, str(ledger)
 
 
