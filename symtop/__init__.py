@@ -9,7 +9,7 @@ Names are imported on first use, so that ``import symtop`` costs nothing; type c
 import importlib
 from typing import TYPE_CHECKING
 
-from symtop.core import old_paths as old_paths
+from symtop.core import __version__ as __version__, old_paths as old_paths
 
 if TYPE_CHECKING:
     from symtop.advise import Advice as Advice, recommend as recommend
@@ -53,8 +53,6 @@ if TYPE_CHECKING:
     from symtop.run.reference.truth import reference as reference
     from symtop.run.simulation import simulate as simulate
     from symtop.runner.study import Case as Case, Picture as Picture, Study as Study
-
-__version__ = "0.3.0"
 
 _NAMES = {  # by the module that holds them
     "advise": "Advice recommend",
