@@ -338,7 +338,7 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
         (lambda: symtop.simulate("heavy-brick", "stormer-verlet", step_size=1), "integrator must have a chart for"),
         (lambda: symtop.simulate("heavy-brick", "rk4", step_size=1, observe="nutation"), "known: axis, attitude"),
         (lambda: symtop.long_run("heavy-brick", "rk4", step_size=0.1, steps=9), "scene must be one of a SymmetricTop"),
-        (lambda: symtop.recommend("heavy-chaotic", accuracy=1e-3, horizon=99.0), "horizon must be below 5"),
+        (lambda: symtop.recommend("heavy-chaotic", accuracy=1e-3, horizon=99.0), "horizon must be below"),
         (lambda: symtop.reference("heavy-brick", [1.0], certify="digits"), "certify must be None on heavy-brick"),
     ],
 )  # fmt: skip
