@@ -86,7 +86,9 @@ def test_a_solver_does_not_reach_the_plan_or_an_earlier_run(misbehaving):
 
 def test_a_solver_whose_states_are_not_finite_has_not_ended_well(misbehaving):
     scene, plan = symtop.scene("spheroid"), Plan.steps(0.01, np.arange(5))
-    ends = [solve(symtop.integrator(name), "angles", scene.top, scene.start, plan).outcome for name in misbehaving.BROKEN]
+    ends = [
+        solve(symtop.integrator(name), "angles", scene.top, scene.start, plan).outcome for name in misbehaving.BROKEN
+    ]
     assert set(ends) == {"not_finite"}
 
 

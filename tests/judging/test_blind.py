@@ -213,8 +213,7 @@ def test_what_knows_every_state_again_is_caught_by_its_last_bit(only, monkeypatc
     slopes = {}
 
     def remembers(f, t, y, h):
-        slope, before = f(t, y), slopes.get(y.tobytes())
-        after = y + h / 2 * (slope + f(t + h, y + h * slope) if before is None else 3 * slope - before)
+        slope, after = wrong.adams(f, t, y, h, slopes.get(y.tobytes()))
         slopes[after.tobytes()] = slope
         return after
 
