@@ -1,15 +1,15 @@
 """The guard with and without the truth on the same runs: hits against false alarms, and silent wrong runs of bodies.
 
-    python -m benchmarks.guard tops 9000        random tops of each stratum, by every method, over 10, 100, 1000 nutations
-    python -m benchmarks.guard bodies 5000      the bodies of `symtop.run.ensemble.bodies`, over 1 to 100 natural periods
-    python -m benchmarks.guard hostile 5000     thin, flat and nearly spherical bodies, at rest and spinning, in any units
-    python -m benchmarks.guard page             results/guard.json and the figure of what was run
+    python -m benchmarks.guard tops 3600        random tops, every method in its charts, over 10, 100 or 1000 nutations
+    python -m benchmarks.guard bodies 5000      bodies of `symtop.run.ensemble.bodies`, over 1 to 100 natural periods
+    python -m benchmarks.guard hostile 5000     thin, flat and almost round bodies, at rest and spinning, in any units
+    python -m benchmarks.guard page             of the runs that were made: results/guard.json and its figure
 
 Run k is drawn from a seed of its own; runs are kept in results/tables/guard-NAME.csv and not made again. The score of a
-run is what the guard expects, infinite where it warns of something else; it warns from `EXPECTED` on, and another limit
-gives another point of the curve. A run is wrong beyond `EXPECTED`, and grossly wrong beyond ten times that. A run that
-ends early tells so itself and is counted apart. The truth is the closed form of a top, and of a body heyoka's series in
-long double, which shares nothing with the guard.
+run is what the guard expects, infinite where it warns of something else; it warns from `EXPECTED` on, and another
+limit gives another point of the curve. A run is wrong beyond `EXPECTED`. A run that ends early tells so itself and is
+counted apart. SciPy's methods and those in software arithmetic run over ten periods at most. The truth is the closed
+form of a top, and of a body heyoka's series in long double.
 """
 
 import argparse
@@ -24,6 +24,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks import measured, pages
+from benchmarks.pages import Table
+from symtop.core import netcdf
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator, integrator, integrators
@@ -31,8 +34,9 @@ from symtop.model.body import Attitude, RigidBody
 from symtop.model.charts import BODY, attitude_distance, axes, axis_distance
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
+from symtop.report import style
 from symtop.run import guard
-from symtop.run.ensemble.bodies import random_bodies
+from symtop.run.ensemble.bodies import body_population, scenes_of
 from symtop.run.ensemble.population import STRATA, population
 from symtop.run.motion import Exact, Integrated
 from symtop.run.simulation import make_plan
@@ -79,14 +83,14 @@ def _population(stratum: str, block: int) -> Any:
 
 @functools.lru_cache(maxsize=2)
 def _bodies(block: int) -> list[Scene]:
-    return random_bodies(CHUNK, seed=SEED + block)
+    return scenes_of(body_population(CHUNK, seed=SEED + block))
 
 
 def bodies(k: int) -> tuple[Scene, random.Random]:
     """Body k of the sampler of symtop."""
     scene = _bodies(k // CHUNK)[k % CHUNK]
-    return Scene(scene.name.replace("-" + scene.name.split("-")[-1], f".{k}"), scene.top, scene.start, 1.0), \
-        random.Random(f"{SEED}/{k}")
+    named = f"{scene.name.rpartition('-')[0]}.{k}"
+    return Scene(named, scene.top, scene.start, 1.0), random.Random(f"{SEED}/{k}")
 
 
 def hostile(k: int) -> tuple[Scene, random.Random]:
@@ -203,28 +207,122 @@ def make(name: str, count: int) -> None:
             file.flush()
 
 
-def told(runs: list[Run], guarded: str) -> dict[str, int]:
-    """Counts: runs beyond the limit and beyond ten times it, those within, and what was said of each."""
+PARTS = {  # of runs, by their error; ended early is none of these
+    "beyond 10 limits": (10.0 * guard.EXPECTED, math.inf), "1 to 10 limits": (guard.EXPECTED, 10.0 * guard.EXPECTED),
+    "a tenth to 1": (0.1 * guard.EXPECTED, guard.EXPECTED), "below a tenth": (-1.0, 0.1 * guard.EXPECTED),
+}  # fmt: skip
+
+
+def counts(runs: list[Run], guarded: str) -> list[str]:
+    """Warned of and all, of runs that ended early and of each part."""
     ended = [run for run in runs if run.outcome != "ok"]
-    wrong = [run for run in runs if run.outcome == "ok" and not run.error <= guard.EXPECTED]
-    gross = [run for run in wrong if not run.error <= 10.0 * guard.EXPECTED]
-    right = [run for run in runs if run.outcome == "ok" and run.error <= guard.EXPECTED]
-    clear = [run for run in right if run.error <= 0.1 * guard.EXPECTED]
-    parts = {"ended": ended, "wrong": wrong, "gross": gross, "right": right, "clear": clear}
-    counts = {part: len(some) for part, some in parts.items()}
-    warned = {f"{part}_warned": sum(getattr(run, guarded) > guard.EXPECTED for run in some) for part, some in parts.items()}
-    return counts | warned
+    rest = [run for run in runs if run.outcome == "ok"]
+    parts = [ended, *([run for run in rest if low < run.error <= high] for low, high in PARTS.values())]
+    return [f"{sum(getattr(run, guarded) > guard.EXPECTED for run in part)} of {len(part)}" for part in parts]
+
+
+def curve(runs: list[Run], guarded: str) -> tuple[Any, Any]:
+    """Shares of right runs that are warned of, and of wrong ones, for every limit of the score."""
+    rest = [run for run in runs if run.outcome == "ok"]
+    score_of, wrong = np.array([[getattr(run, guarded), run.error > guard.EXPECTED] for run in rest]).T
+    order = np.argsort(-score_of, kind="stable")
+    wrong = wrong[order] > 0.0
+    return np.cumsum(~wrong) / max((~wrong).sum(), 1), np.cumsum(wrong) / max(wrong.sum(), 1)
+
+
+def grouped(runs: list[Run], by: str) -> dict[str, list[Run]]:
+    """Runs by a column, by whether the trial was the whole run, or by the control."""
+    parts: dict[str, list[Run]] = {}
+    for run in runs:
+        value = getattr(run, by)
+        name = ("whole run tried" if value else "a piece tried") if by == "whole" else str(value)
+        parts.setdefault(f"{value:g}" if by == "periods" else name, []).append(run)
+    return dict(sorted(parts.items()))
+
+
+def draw(known: dict[str, list[Run]], target: Path) -> None:
+    """Curves of tops with and without the truth, one panel a horizon, and of bodies; a dot is the guard as it is."""
+    style.use()
+    figure, axes = style.panels(1, 4, height=2.6, sharey=True)
+    tops_by = grouped([run for run in known["tops"] if run.periods in NUTATIONS], "periods")
+    panels: list[tuple[str, list[tuple[str, list[Run], str, str]]]] = [
+        (f"tops, {float(name):g} nutations",
+         [("closed form", runs, "exact", style.BLUE), ("integration", runs, "series", style.VERMILLION)])
+        for name, runs in sorted(tops_by.items(), key=lambda item: float(item[0]))
+    ]  # fmt: skip
+    bodies_shown = [
+        ("symtop's", known["bodies"], "series", style.BLUE),
+        ("hostile", known["hostile"], "series", style.VERMILLION),
+    ]
+    for axis, (title, lines) in zip(axes.flat, [*panels, ("bodies", bodies_shown)], strict=True):
+        for label, runs, guarded, color in lines:
+            false, hits = curve(runs, guarded)
+            axis.plot(np.maximum(false, 1e-4), hits, color=color, label=label)
+            rest = [run for run in runs if run.outcome == "ok"]
+            last = sum(getattr(run, guarded) > guard.EXPECTED for run in rest) - 1
+            axis.plot(max(false[last], 1e-4), hits[last], "o", color=color)
+        axis.set(xscale="log", xlim=(1e-4, 1.0), ylim=(0.9, 1.003), title=title)
+        axis.legend(loc="lower right")
+    axes[0, 0].set_ylabel("wrong runs warned of")
+    figure.supxlabel("right runs warned of", fontsize=8)
+    style.save(figure, target)
+
+
+def page(results: Path) -> None:
+    """Write what was found: counts by population, and by stratum, class of method, horizon and control."""
+    facts, known = measured.circumstances(), {name: kept(name) for name in SAMPLERS}
+    header = ["runs", "guard", "ended early", *PARTS]
+    rows = list[list[str]]()
+    for name, every in known.items():
+        parts = {"all": every}
+        for by in ("whole", "control", *(("periods",) if name == "tops" else ()), "stratum", "needs"):
+            parts |= {f"{by} {value}": some for value, some in grouped(every, by).items()}
+        for guarded in ("exact", "series") if name == "tops" else ("series",):
+            rows += [[f"{name}: {part}", guarded, *counts(runs, guarded)] for part, runs in parts.items()]
+    table = Table("Runs that the guard warned of, of all, by the error that they had", header, rows)
+    print("\n".join(" | ".join(row) for row in [header, *rows]))
+    sentences = []
+    for name, runs in known.items():
+        for guarded in ("exact", "series") if name == "tops" else ("series",):
+            wrong = [run for run in runs if run.outcome == "ok" and run.error > guard.EXPECTED]
+            right = [run for run in runs if run.outcome == "ok" and run.error <= guard.EXPECTED]
+            silent = [run for run in wrong if not getattr(run, guarded) > guard.EXPECTED]
+            false = sum(getattr(run, guarded) > guard.EXPECTED for run in right)
+            words = {"tops": f"tops, guard {guarded!r}", "bodies": "bodies", "hostile": "hostile bodies"}[name]
+            sentences.append(
+                f"{len(runs)} runs of {words}: of {len(wrong)} wrong ones {len(silent)} were silent, the worst off by "
+                f"{max((run.error for run in silent), default=0.0):.2g} rad; of {len(right)} right ones {false} were "
+                f"warned of ({100.0 * false / max(len(right), 1):.2g} %)."
+            )
+    title, alt = "hits against false alarms", "Curves of wrong runs warned of against right runs warned of, near one."
+    caption = "Each limit of the forecast gives a point; the dot is the guard as it is."
+    draw(known, results / "figures" / "guard-curves.png")
+    words = pages.findings(
+        "guard", "The guard without the truth", "Does the guard need to know the solution?", sentences,
+        f"Wrong: off by more than {guard.EXPECTED} rad at some sample.", [table],
+        captions={"curves": (f"{title[0].upper()}{title[1:]}. {caption}", alt)}, cases=sum(map(len, known.values())),
+        measured=measured.sentence(facts, "python -m benchmarks.guard"),
+        provenance={key: facts[key] for key in facts if key not in ("measured", "cores", "load_before")},
+    )  # fmt: skip
+    counted = [dict(zip(header, row, strict=True)) for row in rows]
+    pictures = [{"name": "curves", "file": "guard-curves.png"}]
+    netcdf.write_json(results / "guard.json", words | {"pictures": pictures, "counts": counted})
+
+
+def main() -> None:
+    """Make runs, or the page of those that were made."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("name", choices=[*SAMPLERS, "page"])
+    parser.add_argument("count", type=int, nargs="?", default=CHUNK)
+    asked = parser.parse_args()
+    if asked.name == "page":
+        page(Path("results"))
+        return
+    make(asked.name, asked.count)
+    for run in kept(asked.name):
+        if run.outcome == "ok" and run.error > 10.0 * guard.EXPECTED and not run.series > guard.EXPECTED:
+            print("silent and grossly wrong:", run)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("name", choices=[*SAMPLERS])
-    parser.add_argument("count", type=int)
-    asked = parser.parse_args()
-    make(asked.name, asked.count)
-    runs = kept(asked.name)
-    for guarded in ("exact", "series"):
-        print(guarded, told(runs, guarded))
-        bad = [run for run in runs if run.outcome == "ok" and run.error > 10 * guard.EXPECTED and not getattr(run, guarded) > guard.EXPECTED]
-        for run in bad[:40]:
-            print("  ", run)
+    main()

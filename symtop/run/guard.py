@@ -41,7 +41,7 @@ from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.run.linear_stability import Growth, nutation_growth, trace
-from symtop.run.motion import MOST_FOLDS, MOVED, Exact, Integrated, Landmarks
+from symtop.run.motion import MOST_FOLDS, MOVED, UNSTABLE, Exact, Integrated, Landmarks
 from symtop.run.reference.sensitivity import SMALL
 
 STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take these
@@ -57,7 +57,6 @@ LOOSE = 1e-4  # tolerance from which a method in Python is probed for a whole nu
 LEAST_GROWTH = 0.05  # of the error of a piece: less growth from the first to the second is luck
 COMMITTED = 1e4, 1e7  # tolerances: an error that an adaptive method commits now and then, and one of variable order
 CLOSE, PASSING = 0.2, 100.0  # rad from a pole; tolerances that a step past it in the angles chart commits now and then
-UNSTABLE = 50.0  # times that a stable motion may amplify a change of its start in a nutation
 WORTH = 1e-2  # rad: a law that grows an error faster is looked into where it leads beyond this
 RESOLVED = 0.3  # rad that the axis may precess in one step at a pole: coarser probes say nothing about the passage
 

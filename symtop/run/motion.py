@@ -35,6 +35,8 @@ WATCHED = {BODY: 200.0, "axis": 20.0}  # natural periods of a run: the motion of
 MOST_WATCHED = 5000  # steps
 POINTS = 100  # of A
 MOST_POWER = 20.0  # of the time by which A grows beyond what is watched
+UNSTABLE = 50.0  # times that a stable motion may amplify a change of its start more than the time goes on
+LATER = 30.0  # of the errors of a piece: those that a method commits later in an unstable motion
 MOST_FOLDS = 100.0  # e times that anything grows: any is too much
 MOST_WORK = 1e6  # steps of an integration
 
@@ -176,7 +178,8 @@ class Integrated:
         """What the motion makes by the horizon of an error at the time `since`, rad; 0 if its law is known."""
         if since >= horizon:
             return error
-        return error * self.amplification(horizon, horizon) / self.amplification(since, horizon)
+        times = self.amplification(horizon, horizon) / self.amplification(since, horizon)
+        return error * times * (LATER if times > UNSTABLE * horizon / since else 1.0)
 
     def rounding(self, horizon: float, *, whole: bool) -> float:
         """What rounding alone makes of a run, rad: large on a separatrix and in chaos, whatever the method.

@@ -6,7 +6,7 @@ of `symtop.run.motion`, whichever is more; two motions are watched as far as `WA
 
     stiffness      f has rates far above that of the motion, and they limit an explicit step
     instability    steps multiply a small change more than the motion does, or the motion itself is unstable
-    rounding       the piece is as close as doubles are
+    rounding       the piece is as close as DOP853 can tell
     step           errors of the step or of the tolerance add up
 
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, sections II.4 and II.10; II, section IV.2.
@@ -127,8 +127,8 @@ def _outlook(
         if rule:
             marks = np.unique(np.rint(np.linspace(0.0, min(round(piece / setting), PROBED), POINTS + 1)[1:]).clip(1.0))
             return marks * setting, _stepped(f, rule, t, start, setting, marks), setting
-        name, cost = SCIPY[method]
-        run = solve_ivp(f, (t, t + piece), start, name, t + piece * seen / watched, rtol=setting, atol=setting)
+        (name, cost), shown = SCIPY[method], np.minimum(t + piece * seen / watched, t + piece)
+        run = solve_ivp(f, (t, t + piece), start, name, shown, rtol=setting, atol=setting)
         return run.t - t, run.y.T, piece * cost / run.nfev
 
     times, states, mean = made(y)
@@ -159,7 +159,7 @@ def _outlook(
         why = f"the motion multiplies a small change {total:.1g} times; " + (
             "rounding alone decides, shorten the horizon" if lost else f"try a {kind} of {better:.1g}"
         )
-    elif float(error.max()) < 100.0 * EPSILON * float(np.abs(true).max()):
+    elif float(error.max()) < 10.0 * FINE * float(np.abs(true).max()):
         cause, better, why = "rounding", math.nan, f"rounding adds up, and no {kind} helps"
     return Outlook(
         expected, better, cause, total, f"{method}: expect an error of {expected:.1g} by t = {t + end:.4g}: {why}"
