@@ -261,8 +261,8 @@ def draw(known: dict[str, list[Run]], target: Path) -> None:
             rest = [run for run in runs if run.outcome == "ok"]
             last = sum(getattr(run, guarded) > guard.EXPECTED for run in rest) - 1
             axis.plot(max(false[last], 1e-4), hits[last], "o", color=color)
-        axis.set(xscale="log", xlim=(1e-4, 1.0), ylim=(0.9, 1.003), title=title)
-        axis.legend(loc="lower right")
+        axis.set(xscale="log", xlim=(1e-4, 1.2), ylim=(0.9, 1.003), title=title)
+        axis.legend(loc="lower left")
     axes[0, 0].set_ylabel("wrong runs warned of")
     figure.supxlabel("right runs warned of", fontsize=8)
     style.save(figure, target)

@@ -68,7 +68,7 @@ def guard(
     def rate(t: float, y: Array) -> Array:
         value = np.asarray(f(t, y), dtype=float)
         if value.shape != start.shape:
-            raise SymtopError(f"it must return {start.size} numbers, not an array of shape {value.shape}")
+            raise SymtopError(f"f must return {start.size} numbers, not an array of shape {value.shape}")
         return value
 
     with foreign_code("f"), np.errstate(all="ignore"):
@@ -99,7 +99,7 @@ def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
         times.append(solver.t)
         parts.append(solver.dense_output())
     if not parts:
-        raise SymtopError(f"DOP853 makes no step from t0 = {t!r}")
+        raise SymtopError(f"f must let DOP853 make a step from t0 = {t!r}, and does not")
     return OdeSolution(times, parts), times[-1] - t
 
 
