@@ -21,6 +21,7 @@ from symtop.measure.settings import TARGETS
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import Array, attitude_distance
+from symtop.model.exact.heavy_body import HeavyBody
 from symtop.run.ensemble.bodies import body_population, growth, scenes_of
 
 from .bodies import FREE, SYMMETRIC, Bodies, as_tops, grain, run_level, unit

@@ -15,7 +15,7 @@ epsilon v off the third axis, |v| up to 1, rates across it up to 3/2. Attitudes 
     chaotic          and those whose grow more: by an exponent of 0.69 a natural period
     lagrange         heavy with epsilon = 0: a symmetric top as a body
 
-The growth is that of the largest of two disturbances of `SMALL`, by the Taylor series `series-general-adaptive`; of a rotation
+The growth is that of the largest of two disturbances of `SMALL`, by the series `series-general-adaptive`; of a rotation
 that is not unstable it grows with the time, and not by as much. Drawn numbers have nine digits, so that sines of
 another machine change nothing; directions are then brought to length one. The first n members of more are those of
 fewer, and member i of `heavy` is drawn from the same numbers for each epsilon.
