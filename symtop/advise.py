@@ -453,9 +453,8 @@ def _advice(
     if need := best.met.integrator.needs:
         worth += f"; it needs {NEEDS[need]} ({need})"
     if fixed:
-        period = "natural period" if scene.of_body else "nutation"
-        a_step = f"{scene.time_scale(horizon) / best.met.setting:.3g} a {period}, {1e6 * best.a_step:.2g} us each"
-        worth += f"; steps are {a_step}"
+        count = scene.time_scale(horizon) / best.met.setting
+        worth += f"; steps are {count:.3g} a {scene.period_word}, {1e6 * best.a_step:.2g} us each"
     runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
     served = _same(name, list(near.served)) if near is not None else None  # None: the study has no chart of it
     setting = {str(best.met.integrator.control): best.met.setting}
@@ -565,7 +564,7 @@ class EngineAdvice:
         run = f"step {self.step_size:g}{self.unit}, to t = {self.horizon:g}{self.unit}"
         lines = [
             f"{self.engine} on {self.scene}, {run}: the axis is off by",
-            *(f"    {value:.2e} rad  {name} ({maps[name]})" for name, value in self.errors.items()),
+            *(f"    {_off(value)}  {name} ({maps[name]})" for name, value in self.errors.items()),
         ]
         near = self.errors[self.best] <= WORST
         if self.best != default and near:
@@ -582,6 +581,11 @@ class EngineAdvice:
         much = f"{self.gain:.3g} times fewer" if self.gain >= 1.0 else f"{1.0 / self.gain:.3g} times more"
         lines.append(f"As near as {self.best} with {much} force evaluations: {self.advice.reason}")
         return "\n".join(lines)
+
+
+def _off(error: float) -> str:
+    """An axis error of an engine's map, or that its run ended early."""
+    return f"{error:.2e} rad" if error < math.pi else "ended early "
 
 
 def _settings() -> dict[str, dict[str, str]]:

@@ -15,7 +15,7 @@ import xarray as xr
 from symtop.core.errors import SymtopError, at_home, one_of
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES, errors
-from symtop.measure.sweep import failed_setting, titled
+from symtop.measure.sweep import failed_setting, period_word, titled
 from symtop.model.scenes import Scene
 from symtop.report import spread
 from symtop.report.figures import SMALLEST, error_band, name_ends
@@ -152,8 +152,7 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
     ax.set_ylim(bottom=0.1 * level)
     if compared:
         nutations, end = data.attrs["nutations"], data.attrs["horizon"]
-        unit = "natural periods" if str(data["variant"].values[0]).endswith("[body]") else "nutations"
-        runs = f"{nutations:.3g} {unit}" if nutations > 0.0 else f"t = {end:g}"
+        runs = f"{nutations:.3g} {period_word(data)}s" if nutations > 0.0 else f"t = {end:g}"
         ax.set_title(f"{data['scene'].item()}, {runs}", loc="left", weight="bold")
         if x == "seconds" and data["exact_seconds"].notnull():
             ax.axvline(exact := data["exact_seconds"].item(), color="0.35", ls=(0, (1, 2)), lw=1.0)
