@@ -13,7 +13,7 @@ from symtop.measure.accuracy import error_table
 from symtop.measure.conservation import trend
 from symtop.measure.order import order, power_law
 from symtop.measure.settings import ladder
-from symtop.measure.timing import Timing, timings
+from symtop.measure.timing import Timing, agree, timings
 from symtop.runner.study import Case
 
 STEPS = 0.1 / 1.5 ** np.arange(16)
@@ -132,6 +132,22 @@ def test_a_function_that_has_taken_long_is_asked_no_more_but_twice_at_least():
     for patience, counts in ((math.inf, [4, 4, 4]), (0.05, [4, 3, 2])):
         taken = timings([nap(1e-3), nap(0.02), nap(0.06)], 4, 5e-3, warm=True, patience=patience)
         assert [len(timing.samples) for timing in taken] == counts
+
+
+def test_a_function_whose_three_least_samples_agree_is_asked_no_more(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr("symtop.measure.timing.time.perf_counter", lambda: clock[0])
+    for close, count in ((0.5, 6), (0.0, 8)):
+        seconds = iter((0.01, 0.011, 0.03, 0.03, 0.03, 0.012, 0.03, 0.03))
+
+        def call(seconds=seconds):
+            clock[0] += next(seconds)
+
+        (timing,) = timings([call], 8, 2e-3, warm=True, close=close, exact=False)
+        assert len(timing.samples) == count
+    assert agree([1.0, 3.0, 1.005, 3.0, 1.009], 0.01)
+    assert not agree([1.0, 3.0, 1.005, 3.0, 1.02], 0.01)
+    assert not agree([1.0, 1.0, 1.0, 1.0], 0.01)
 
 
 def test_timings_know_when_they_are_noisy():
