@@ -109,7 +109,7 @@ def timings(
     for number in range(batches):
         for index in draw.sample(range(len(functions)), len(functions)):
             taken = samples[index]
-            done = len(taken) >= least and calls[index] * sum(taken) >= patience or agree(taken, close)
+            done = (len(taken) >= least and calls[index] * sum(taken) >= patience) or agree(taken, close)
             if len(taken) <= number and not done:
                 taken.append(_batch(functions[index], calls[index]) / calls[index])
     return [Timing(tuple(taken), first) for taken, first in zip(samples, firsts, strict=True)]
