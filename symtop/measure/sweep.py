@@ -30,7 +30,7 @@ from symtop.run.simulation import chart_of, make_plan
 
 KEEP_EVERY = 5.0  # seconds between two writings of the file
 RAISED = "raised"  # outcome of a run whose integrator raised an exception
-BATCHES, BATCH, PATIENCE = 15, 0.0005, 0.2  # of timings: samples of a run, seconds of one, seconds of all
+BATCHES, BATCH, PATIENCE = 15, 0.0005, 0.1  # of timings: samples of a run, seconds of one, seconds of all
 CLOSE = 0.01  # between the three least, with which there are enough
 SPENT = {"seconds": math.nan, "seconds_spread": math.nan}
 TIMED = (
