@@ -281,6 +281,11 @@ def titled(cell: xr.Dataset) -> str:
     return f"{name} ({'SciPy' if method and method.family == 'library' else 'Python'})"
 
 
+def period_word(data: xr.Dataset) -> str:
+    """What ``steps_per_nutation`` of a comparison counts in."""
+    return "natural period" if str(data["variant"].values.flat[0]).endswith("[body]") else "nutation"
+
+
 def failed_setting(cell: xr.Dataset) -> str:
     """Where a variant on a scene fails, "fails at 5.3 steps a nutation": the finest of its coarsest failed runs."""
     control = cell["step_size" if cell["step_size"].notnull().any() else "tolerance"].values
@@ -295,4 +300,4 @@ def failed_setting(cell: xr.Dataset) -> str:
     if "steps_per_nutation" not in cell or cell["step_size"].isnull().all():
         return f"fails at {control[k]:.2g}, {word}"
     steps = cell["steps_per_nutation"].values[k]
-    return f"fails at {steps if steps < 100.0 else round(steps):.4g} steps a nutation, {word}"
+    return f"fails at {steps if steps < 100.0 else round(steps):.4g} steps a {period_word(cell)}, {word}"
