@@ -144,6 +144,19 @@ def fincham(attitude, w, h, inertia, tau):
     return _leapfrog(attitude, w, h, inertia, tau, published=True)
 
 
+def _three_stages(attitude, b, h, inertia, tau):
+    k1 = h * _rates(attitude, b, inertia, tau)
+    k2 = h * _rates(attitude, b + k1, inertia, tau)
+    k3 = h * _rates(attitude, b + (k1 + k2) / 4.0, inertia, tau)
+    return b + (k1 + k2 + 4.0 * k3) / 6.0
+
+
+def spiral(attitude, w, h, inertia, tau):
+    b = _three_stages(attitude, attitude.inv().apply(w), h / 2.0, inertia, tau)
+    attitude = attitude * Rotation.from_rotvec(h * b)
+    return attitude, attitude.apply(_three_stages(attitude, b, h / 2.0, inertia, tau))
+
+
 def _kutta(attitude, w, h, inertia, tau, corrected):
     b = attitude.inv().apply(w)
     rates, turns = [], []

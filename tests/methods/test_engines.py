@@ -16,6 +16,7 @@ from symtop.methods.framework.calling import solve
 from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import Plan
 from symtop.model import charts
+from symtop.model.body import Attitude, RigidBody
 from symtop.model.top import flat
 from tests.conftest import random_scenes
 from tests.methods import engine_formulas
@@ -76,6 +77,22 @@ def test_a_step_is_the_engines_formula_in_body_axes(name):
             np.testing.assert_allclose(
                 one_step(name, scene, h, "axis"), [*new.as_matrix()[:, 2], *L], atol=2e-14 * (1.0 + np.linalg.norm(L))
             )
+
+
+@pytest.mark.parametrize("name", AXIS_ERROR)
+def test_a_step_of_a_body_without_symmetry_is_the_formula(name):
+    quaternion = np.array([0.8, 0.4, -0.3, 0.2]) / math.sqrt(0.93)
+    at, h = Attitude(tuple(quaternion), (0.7, -1.1, 2.0)), 0.013
+    for moments in ((0.5, 0.9, 1.3), (1.3, 0.5, 0.9)):
+        body = RigidBody(*moments, 1.7, (0.3, -0.2, 1.0))
+        attitude, inertia = Rotation.from_quat(np.roll(quaternion, -1)), np.diag(body.moments)
+        rates = attitude.apply(at.omega_body)
+        new, w = getattr(engine_formulas, name.replace("-", "_"))(
+            attitude, rates, h, inertia, lambda there, c=body.torque: np.cross([0.0, 0.0, 1.0], there.apply(c))
+        )
+        done = solve(symtop.integrator(name), "body", body, at, Plan.steps(h, [1])).states[-1]
+        assert charts.attitude_distance(done[:4], np.roll(new.as_quat(), 1)) < 1e-14
+        np.testing.assert_allclose(done[4:], inertia @ new.inv().apply(w), rtol=0.0, atol=2e-14)
 
 
 @pytest.mark.parametrize(("one", "other"), [("jolt", "physx"), ("yade", "fincham"), ("mujoco3-rk4", "rkmk4")])
