@@ -59,31 +59,48 @@ def _kept_twice(monkeypatch, folder):
     monkeypatch.setenv("SYMTOP_CACHE", str(folder))
     kernel = compile_kernel(_doubled)
     assert (kernel(2), kernel(2.5)) == (4, 5.0)
-    files = sorted(folder.rglob("*.nbc"))
+    files = sorted(folder.rglob("*.code"))
     assert len(files) == 2
     return kernel, files
 
 
 def test_a_file_is_named_after_the_signature_whose_code_it_holds(monkeypatch, tmp_path):
-    """Two processes that save at once, each with the index from before, give two signatures two files."""
+    """And after the processor, so that two processes that save at once write two files."""
     kernel, files = _kept_twice(monkeypatch, tmp_path)
-    index, named = kernel._cache._cache_file, []
-    for signature in index._load_index():
-        index._save_index({})
-        index.save(signature, "code")
-        named.append(index._load_index()[signature])
-    assert len(set(named)) == 2
-    assert sorted(tmp_path.rglob("*.nbc")) == files
+    codegen = kernel.targetctx.codegen()
+    assert sorted(kernel._cache.files(signature, codegen)[0] for signature in kernel.overloads) == files
+    monkeypatch.setattr(codegen, "magic_tuple", lambda: ("this system", "another processor", ""))
+    assert not set(files) & {kernel._cache.files(signature, codegen)[0] for signature in kernel.overloads}
 
 
-def test_the_code_of_another_signature_is_not_run(monkeypatch, tmp_path):
-    _, (one, other) = _kept_twice(monkeypatch, tmp_path)
-    aside = one.read_bytes()
-    one.write_bytes(other.read_bytes())
-    other.write_bytes(aside)
+@pytest.mark.parametrize("swapped", [["code"], ["bitcode"], ["code", "bitcode"]])
+def test_the_code_of_another_signature_is_not_run(monkeypatch, tmp_path, swapped):
+    _kept_twice(monkeypatch, tmp_path)
+    for kind in swapped:
+        one, other = tmp_path.rglob(f"*.{kind}")
+        aside = one.read_bytes()
+        one.write_bytes(other.read_bytes())
+        other.write_bytes(aside)
     again = compile_kernel(_doubled)
     assert (again(2), again(2.5)) == (4, 5.0)
     assert {signature[0].name for signature in again.signatures} == {"int64", "float64"}
+
+
+def test_machine_code_is_run_with_the_bitcode_that_it_was_made_of(monkeypatch, tmp_path):
+    """Names in it hang on the process that compiled: with another's, a process ended."""
+    kernel, files = _kept_twice(monkeypatch, tmp_path)
+    old = [file.read_bytes() for file in files]
+    for file in tmp_path.rglob("*.bitcode"):
+        file.unlink()
+    for number in range(3):  # more names of numba's
+        compile_kernel(lambda x, number=number: x + number)(1)
+    monkeypatch.setattr(jit, "_pruned", [])
+    assert compile_kernel(_doubled)(2) == 4
+    for file, code in zip(files, old, strict=True):
+        file.write_bytes(code)
+    again = compile_kernel(_doubled)
+    assert (again(2), again(2.5)) == (4, 5.0)
+    assert kernel.signatures == again.signatures
 
 
 def test_a_full_disk_costs_time_and_no_run(monkeypatch, tmp_path):
@@ -92,11 +109,11 @@ def test_a_full_disk_costs_time_and_no_run(monkeypatch, tmp_path):
 
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
     with monkeypatch.context() as patch:
-        patch.setattr(jit._Index, "_save_data", full)
+        patch.setattr(jit, "_write", full)
         assert compile_kernel(_doubled)(2.0) == 4.0
-    assert not list(tmp_path.rglob("*.nbc"))
+    assert not list(tmp_path.rglob("*.code"))
     assert compile_kernel(_doubled)(2.0) == 4.0
-    assert list(tmp_path.rglob("*.nbc"))
+    assert list(tmp_path.rglob("*.code"))
 
 
 def test_kernels_of_one_factory_have_names_of_their_own():
