@@ -26,7 +26,7 @@ AXIS_ERROR = {  # rad, the largest at a hundred samples of 10 s with h = 0.025
     "no-gyro": 1.5673, "no-gyro-linear": 1.5716, "mujoco-euler": 0.61079, "mujoco-implicit": 0.38563,
     "bullet": 0.20959, "jolt": 0.57414, "physx": 0.29945, "rapier": 0.049537, "ode": 2.0531, "lammps-rigid": 3.7530e-3,
     "no-squish": 8.6827e-4, "yade": 0.14976, "fincham": 3.6370e-3, "spiral": 2.2302e-3, "mujoco3-rk4": 4.4663e-3,
-    "rkmk4": 8.1624e-6,    "jsbsim-buss2": 0.045686, "jsbsim-default": 0.97945,
+    "rkmk4": 8.1624e-6, "jsbsim-buss2": 0.045686, "jsbsim-default": 0.97945,
 }  # fmt: skip
 ENERGY = {  # relative to |E| + mgl, after 1000 s with h = 0.025
     "mujoco-implicit": -0.22, "bullet": -0.073, "jolt": 2.1, "physx": -0.49, "rapier": -0.40, "ode": -0.15,
