@@ -20,11 +20,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from xarray.backends import BackendArray
+from xarray.core import indexing
 
 from symtop.core.errors import SymtopError
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.numbers import GOLDEN
-from symtop.core.parallel import heed
+from symtop.core.parallel import cores, heed, in_threads
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.lanes import Many, W, column, members_of, put
@@ -49,6 +51,7 @@ CHUNK_STEPS = 5_000_000  # in a chunk: a hundredth of a second in lanes, to a se
 SHARES, LEAST_STEPS = 16, 200_000  # threads share even a small ensemble, in chunks of a millisecond or more
 HARMLESS = 1e100  # states and momenta below it have a finite energy: no inertia is below 1e-40
 UNKNOWN_STEPS = 1000  # what a member counts for that chooses its steps, or makes none
+READ_TOGETHER = 4096  # members of which a thread makes angles continuous
 RAISED = "raised"  # outcome of a member on which a solver raised an exception
 ENDS = (*OUTCOMES, RAISED)
 IN_LANES = "lanes"
@@ -219,6 +222,7 @@ class Job:
     shown: tuple[str, ...]  # of `SHOWN`
     period: Array | None = None  # of nutation, where it is known
     names: Any = None  # what members are called (n,), where they have labels
+    continuous: bool = True  # are angles; otherwise modulo a turn where that takes the closed form (`Turns`)
     first: int = 0  # number of the first member
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -334,9 +338,62 @@ class Job:
     def _observables(self, view: View, times: Array) -> dict[str, Array]:
         """Of what a `Trajectory` shows of one run, what is asked for, of all."""
         columns = {name: getattr(view, name) for name in self.shown}
-        turned = [name for name in ("phi", "psi") if name in self.shown and self.chart != "angles"]
-        truth = ClosedForms(self.numbers)(np.nan_to_num(times)) if turned else None
-        return columns | {name: charts.unwrapped(columns[name], getattr(truth, name)) for name in turned}
+        turned = self.turned if self.continuous else ()
+        return columns | Turns(self.numbers, times, {name: columns[name] for name in turned}).of(slice(None))
+
+    @property
+    def turned(self) -> tuple[str, ...]:
+        """The angles that are shown and that the chart knows modulo a turn."""
+        return tuple(name for name in ("phi", "psi") if name in self.shown and self.chart in ("axis", "attitude"))
+
+
+@dataclass(frozen=True, eq=False)
+class Turns:
+    """phi and psi of members, (n, samples), modulo a turn, and the closed forms that make them continuous."""
+
+    numbers: Array
+    times: Array
+    angles: dict[str, Array]
+
+    def of(self, members: Any) -> dict[str, Array]:
+        """Continuous angles of some members."""
+        if not self.angles:
+            return {}
+        guides = ClosedForms(self.numbers[members]).turns(np.nan_to_num(self.times[members]))
+        guide = dict(zip(("phi", "psi"), guides, strict=True))
+        return {name: charts.unwrapped(values[members], guide[name]) for name, values in self.angles.items()}
+
+    @functools.cached_property
+    def all(self) -> dict[str, Array]:
+        """Those of all, on all cores."""
+        parts = list(in_threads(self.of, _slices(len(self.numbers), READ_TOGETHER), cores()))
+        return {name: np.concatenate([part[name] for part in parts]) for name in self.angles}
+
+
+class Later(BackendArray):  # type: ignore[misc]
+    """One of the angles of `Turns`, made when it is looked at: the constants of a closed form take 4 us."""
+
+    def __init__(self, turns: Turns, name: str) -> None:
+        self.turns, self.name = turns, name
+        self.shape, self.dtype = turns.angles[name].shape, np.dtype(float)
+
+    def __getitem__(self, key: Any) -> Any:
+        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
+
+    def _read(self, key: tuple[Any, ...]) -> Any:
+        chosen = np.arange(len(self.turns.numbers))[key[0]]
+        few = 2 * chosen.size < len(self.turns.numbers)
+        values = self.turns.of(np.atleast_1d(chosen))[self.name] if few else self.turns.all[self.name][chosen]
+        return values.reshape(*chosen.shape, -1)[..., key[1]]
+
+    def variable(self) -> xr.Variable:
+        """A variable that keeps what it has read."""
+        data = indexing.MemoryCachedArray(indexing.CopyOnWriteArray(indexing.LazilyIndexedArray(self)))
+        return xr.Variable(("member", "time"), data)
+
+
+def _slices(n: int, size: int) -> Iterator[slice]:
+    return (slice(first, first + size) for first in range(0, n, size))
 
 
 def _received(values: dict[str, Any]) -> Job:
@@ -395,10 +452,12 @@ def same_times(times: Any, row: Any) -> bool:
     return bool(np.isnan(row).any() and np.array_equal(times, np.broadcast_to(row, times.shape), equal_nan=True))
 
 
-def as_dataset(columns: dict[str, Any], labels: dict[str, Any], *, shared: bool | None = None) -> xr.Dataset:
+def as_dataset(
+    columns: dict[str, Any], labels: dict[str, Any], *, shared: bool | None = None, turns: Turns | None = None
+) -> xr.Dataset:
     """Columns (n, ...) and labels (n,) as a dataset; times that all members share are one row.
 
-    `shared` says so where the columns are not those of all members.
+    `shared` says so where the columns are not those of all members; angles of `turns` are made when they are read.
     """
     columns, vectors = columns | labels, {"axis": "component", "quaternion": "part"}
     times = columns.pop("time")
@@ -406,6 +465,7 @@ def as_dataset(columns: dict[str, Any], labels: dict[str, Any], *, shared: bool 
     variables = {
         name: (("member", "time", vectors.get(name, ""))[: values.ndim], values) for name, values in columns.items()
     }
+    variables |= {name: Later(turns, name).variable() for name in (turns.angles if turns else ())}
     coordinates = {dim: list(LABELS[dim]) for name, dim in vectors.items() if name in columns}
     clock = ("time", times[0]) if shared else (("member", "time"), times)
     return xr.Dataset(variables, {"time": clock, **coordinates})

@@ -8,6 +8,7 @@ import contextlib
 import warnings
 import zipfile
 from collections.abc import Callable, Generator, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,9 @@ from symtop.methods.framework.registry import Integrator, integrator as find_int
 from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run import cluster
-from symtop.run.ensemble.chunks import CHUNK, CHUNK_STEPS, RAISED, SHOWN, Job, as_dataset, nutation_periods, same_times
+from symtop.run.ensemble.chunks import (
+    CHUNK, CHUNK_STEPS, RAISED, SHOWN, Job, Turns, as_dataset, nutation_periods, same_times,
+)  # fmt: skip
 from symtop.run.ensemble.inputs import Members, called, for_each, read_members
 from symtop.run.guard import MOST_STEPS
 from symtop.run.simulation import MOST_SAMPLES, MOST_SWINGS, chart_of, check_control
@@ -114,11 +117,13 @@ def ensemble(
         return raised, first
 
     if path is None:
-        columns = dict[str, Any]()
+        job, columns = replace(job, continuous=False), dict[str, Any]()
         raised, first = compute(chunks, lambda chunk, part: _fill(columns, part, chunk, n))
         if raised == n:
             raise SymtopError(first)
-        data = netcdf.describe(as_dataset(columns, read.labels), **words, **({RAISED: first} if raised else {}))
+        turns = Turns(job.numbers, columns["time"], {name: columns[name] for name in job.turned})
+        data = as_dataset(columns, read.labels, turns=turns)
+        data = netcdf.describe(data, **words, **({RAISED: first} if raised else {}))
     else:
         with _stream(file_path("path", path), job, read.labels, words) as stream:
             raised, first = compute(stream.missing(chunks), stream.keep)
