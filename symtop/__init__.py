@@ -9,7 +9,7 @@ Names are imported on first use, so that ``import symtop`` costs nothing; type c
 import importlib
 from typing import TYPE_CHECKING
 
-from symtop.core import old_paths as old_paths
+from symtop.core import __version__ as __version__, old_paths as old_paths
 
 if TYPE_CHECKING:
     from symtop.advise import Advice as Advice, recommend as recommend
@@ -46,14 +46,13 @@ if TYPE_CHECKING:
     from symtop.model.top import Angles as Angles, Momenta as Momenta, SymmetricTop as SymmetricTop
     from symtop.report.card import card as card
     from symtop.report.plot import plot as plot
+    from symtop.run.ensemble.bodies import body_population as body_population
     from symtop.run.ensemble.ensemble import ensemble as ensemble
     from symtop.run.ensemble.population import population as population
     from symtop.run.long_run import long_run as long_run
     from symtop.run.reference.truth import reference as reference
     from symtop.run.simulation import simulate as simulate
     from symtop.runner.study import Case as Case, Picture as Picture, Study as Study
-
-__version__ = "0.3.0"
 
 _NAMES = {  # by the module that holds them
     "advise": "Advice recommend",
@@ -74,6 +73,7 @@ _NAMES = {  # by the module that holds them
     "model.body": "Attitude RigidBody",
     "model.scenes": "Scene body_scenes register_scene scene scenes",
     "model.top": "Angles Momenta SymmetricTop",
+    "run.ensemble.bodies": "body_population",
     "run.ensemble.ensemble": "ensemble",
     "run.long_run": "long_run",
     "run.ensemble.population": "population",

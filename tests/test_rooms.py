@@ -2,8 +2,7 @@
 
 `ORDER` is the rule. A module imports modules of its own row's room and of the rows below; two rooms in one row do not
 import each other. Statements inside functions count as well as those at the top, and so do those under TYPE_CHECKING,
-except in circles: what only a type checker reads cannot go round in one. ``from symtop import __version__`` is allowed
-everywhere.
+except in circles: what only a type checker reads cannot go round in one.
 """
 
 import ast
@@ -39,7 +38,6 @@ class Arrow(NamedTuple):
     """One imported module."""
 
     target: str
-    names: tuple[str, ...]
     line: int
     typing: bool  # under TYPE_CHECKING
 
@@ -77,13 +75,13 @@ def read(root: Path) -> dict[str, Module]:
 def _arrows(node: ast.AST, package: str, known: set[str], *, typing: bool = False) -> Iterator[Arrow]:
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.Import):
-            yield from (Arrow(alias.name, (), child.lineno, typing) for alias in child.names)
+            yield from (Arrow(alias.name, child.lineno, typing) for alias in child.names)
         elif isinstance(child, ast.ImportFrom):
             above = package.split(".")[: package.count(".") + 2 - child.level] if child.level else []
             source = ".".join([*above, *([child.module] if child.module else [])])
             for alias in child.names:
                 inner = f"{source}.{alias.name}"
-                yield Arrow(inner if inner in known else source, (alias.name,), child.lineno, typing)
+                yield Arrow(inner if inner in known else source, child.lineno, typing)
         else:
             checked = isinstance(child, ast.If) and ast.unparse(child.test).rpartition(".")[2] == "TYPE_CHECKING"
             yield from _arrows(child, package, known, typing=typing or checked)
@@ -98,7 +96,7 @@ def upward(modules: dict[str, Module]) -> list[str]:
             continue
         for arrow in module.arrows:
             target = modules.get(arrow.target)
-            if target is None or target.room == module.room or arrow.names == ("__version__",):
+            if target is None or target.room == module.room:
                 continue
             if FLOOR.get(target.room, len(ORDER)) >= FLOOR[module.room]:
                 complaints.append(f"{module.name}:{arrow.line} imports {target.name}")
@@ -108,8 +106,7 @@ def upward(modules: dict[str, Module]) -> list[str]:
 def circles(modules: dict[str, Module]) -> list[str]:
     """Sets of files that import each other, directly or through others; TYPE_CHECKING imports aside."""
     graph = {
-        name: {arrow.target for arrow in module.arrows if not arrow.typing and arrow.names != ("__version__",)}
-        & modules.keys() - {name}
+        name: {arrow.target for arrow in module.arrows if not arrow.typing} & modules.keys() - {name}
         for name, module in modules.items()
     }
     reached: dict[str, set[str]] = {}
@@ -173,7 +170,7 @@ def small(tmp_path):
         "    from symtop.model.good import value\n",
         "symtop/extra.py": "",
         "symtop/core/__init__.py": "",
-        "symtop/core/plain.py": "from symtop import __version__\n",
+        "symtop/core/plain.py": "from symtop.core import __version__\n",
         "symtop/core/up.py": "from symtop.model import good\n",
         "symtop/core/progress.py": "def look():\n    import symtop.model.good\n",
         "symtop/core/typed.py": "from typing import TYPE_CHECKING\n"

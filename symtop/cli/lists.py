@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from symtop import __version__
 from symtop.cli.common import (
     File,
     as_text,
@@ -21,6 +20,7 @@ from symtop.cli.common import (
     table,
     terminal_width,
 )
+from symtop.core import __version__
 from symtop.core.errors import SymtopError
 from symtop.report import formats
 

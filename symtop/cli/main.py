@@ -9,10 +9,9 @@ import sys
 
 import click
 
-from symtop import __version__
 from symtop.cli import compare, doctor, judge, lists, runs, study
 from symtop.cli.common import Group, warn
-from symtop.core import files
+from symtop.core import __version__, files
 from symtop.core.progress import post
 
 

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import xarray as xr
 
-from symtop import __version__
+from symtop.core import __version__
 from symtop.core.code_hash import processor, version
 from symtop.core.errors import SymtopError, words_of
 from symtop.core.signals import deferred

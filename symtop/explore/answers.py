@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop import __version__
+from symtop.core import __version__
 from symtop.core.errors import SymtopError, finite, positive
 from symtop.measure.conservation import CONSTANTS, residuals
 from symtop.methods.framework.plan import OUTCOMES, sentence

@@ -32,8 +32,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from symtop import __version__
-from symtop.core import netcdf
+from symtop.core import __version__, netcdf
 from symtop.measure import columns
 from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import Scene, scenes

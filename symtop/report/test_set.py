@@ -18,7 +18,7 @@ from symtop.core.errors import SymtopError, file_path
 from symtop.core.progress import post
 from symtop.model.exact.body_digits import Digits, body_digits
 from symtop.model.scenes import Scene
-from symtop.run.ensemble.bodies import random_bodies
+from symtop.run.ensemble.bodies import body_population, scenes_of
 
 SEED, TIMES, PERIODS = 48, 100, 5.0
 SHARES = {"short-axis": 2, "long-axis": 2, "near-separatrix": 2, "near-symmetric": 2, "needle": 2, "regular": 5,
@@ -56,7 +56,8 @@ Made by symtop, BSD-3-Clause.
 
 def problems() -> list[Scene]:
     """The bodies and their starts."""
-    return [scene for kind, count in SHARES.items() for scene in random_bodies(count, seed=SEED, kind=kind)]
+    each = (body_population(count, seed=SEED, kind=kind) for kind, count in SHARES.items())
+    return [scene for members in each for scene in scenes_of(members)]
 
 
 def times_of(scene: Scene) -> list[float]:

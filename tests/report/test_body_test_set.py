@@ -15,7 +15,7 @@ from symtop.core import netcdf
 from symtop.model.body import Attitude, RigidBody
 from symtop.model.exact.body_digits import body_digits
 from symtop.report import test_set
-from symtop.run.ensemble.bodies import STRATA, growth, random_bodies
+from symtop.run.ensemble.bodies import body_population, scenes_of
 from tests.model.bodies import PreciseBody
 
 KINDS = ("near-separatrix", "regular", "lagrange")
@@ -26,7 +26,7 @@ def written(tmp_path_factory):
     """A test set of three problems over one natural period, and their scenes."""
     patch = pytest.MonkeyPatch()
     patch.setattr(test_set, "PERIODS", 1.0)
-    scenes = [random_bodies(1, seed=3, kind=kind)[0] for kind in KINDS]
+    scenes = [scenes_of(body_population(1, seed=3, kind=kind))[0] for kind in KINDS]
     folder = test_set.write(tmp_path_factory.mktemp("set") / "bodies", scenes)
     patch.undo()
     return folder, scenes
@@ -120,7 +120,7 @@ def exact_momentum(scene):
 
 
 def test_a_start_that_is_moved_by_a_rounding_is_another_motion(monkeypatch):
-    scene = random_bodies(1, seed=3, kind="regular")[0]
+    scene = scenes_of(body_population(1, seed=3, kind="regular"))[0]
     one, again = (body_digits(scene.top, scene.start, [0.5]) for _ in range(2))
     assert one == again
     w1, w2, w3 = scene.start.omega_body
@@ -129,37 +129,6 @@ def test_a_start_that_is_moved_by_a_rounding_is_another_motion(monkeypatch):
     monkeypatch.setattr("symtop.model.exact.body_digits.LONGEST", 5)
     with pytest.raises(symtop.SymtopError, match="times must be within 5 steps of the series, not reach 1000"):
         body_digits(scene.top, scene.start, [1000.0])
-
-
-def test_random_bodies_are_of_their_strata():
-    drawn = random_bodies(2 * len(STRATA), seed=7)
-    assert drawn[: len(STRATA)] == random_bodies(len(STRATA), seed=7)
-    assert [scene.name for scene in drawn[: len(STRATA)]] == [f"{kind}-0" for kind in STRATA]
-    of = {kind: [scene for scene in drawn if scene.name.startswith(kind)] for kind in STRATA}
-    for scene in drawn:
-        low, middle, high = sorted(scene.top.moments)
-        at = dict(zip(scene.top.moments, scene.top.momentum(scene.start), strict=True))
-        kind = scene.name.rpartition("-")[0]
-        size, twice = scene.momentum_scale, 2.0 * scene.top.energy(scene.start)
-        if kind in ("short-axis", "long-axis"):
-            assert abs(at[high if kind == "short-axis" else low]) > 0.87 * size
-        elif kind == "near-separatrix":
-            assert abs(twice * middle / size**2 - 1.0) < 0.1
-        elif kind == "near-symmetric":
-            assert min(middle / low, high / middle) - 1.0 < 2.0**-5
-        elif kind == "needle":
-            assert low < 2.0**-4 * middle
-    assert all(growth(scene) > 1000.0 for scene in of["chaotic"])
-    assert all(growth(scene) < 1000.0 for scene in of["regular"])
-    assert all(scene.top.I1 == scene.top.I2 and scene.top.centre == (0.0, 0.0, 1.0) for scene in of["lagrange"])
-    assert random_bodies(1, seed=8)[0] != drawn[0]
-    for words, sentence in (
-        ({"kind": "odd"}, "kind 'odd' is unknown"),
-        ({"seed": -1}, "seed"),
-        ({"n": 0}, "n must be"),
-    ):
-        with pytest.raises(symtop.SymtopError, match=sentence):
-            random_bodies(**{"n": 1} | words)
 
 
 def test_the_command_refuses_a_folder_that_holds_something(tmp_path):

@@ -1,37 +1,44 @@
-"""Random bodies without symmetry, in strata, as scenes.
+"""Random bodies without symmetry: a population in strata, and its members as scenes.
 
 Free bodies have the least and the largest moment of a triangle of ratios, and a momentum at a small or larger angle
 from an axis; |L| is 1 and times are counted in natural periods. Heavy ones lie at a distance epsilon from a Lagrange
-top: I2 = I1 (1 + epsilon u), I3 between 0.2 and 1.8 of I1, the centre epsilon v off the third axis, u and v drawn.
+top with I1 = mgl = 1: I2 = 1 + epsilon u, u from 1/2 to 1, I3 from 0.2 to 1.8, as far as a body can have it, the centre
+epsilon v off the third axis, |v| up to 1, rates across it up to 3/2. Attitudes are even over all turns.
 
     short-axis       a rotation about the axis of the largest moment, up to 0.5 rad off
     long-axis        about that of the smallest moment
     near-separatrix  2 E I2/L^2 = 1 to 2^-16 .. 2^-4 of the room there is
     near-symmetric   two moments equal to 2^-20 .. 2^-6, the momentum in any direction
     needle           the smallest moment is 2^-12 .. 2^-5 of the others, which spins fast
-    heavy            epsilon from 2^-7 to 1/2, spins from 1/4 to 4 of the sleeping threshold
+    heavy            epsilon from 2^-7 to 1/2, spins from 1/16 to 4 of the sleeping threshold
     regular          those of heavy whose disturbances grow less than `CHAOS` times in `PERIODS` natural periods
-    chaotic          and those whose grow more
+    chaotic          and those whose grow more: by an exponent of 0.69 a natural period
     lagrange         heavy with epsilon = 0: a symmetric top as a body
 
 The growth is that of the largest of two disturbances of `SMALL`, by the Taylor series `series-general`; of a rotation
-that is not unstable it grows with the time, and not by as much. Numbers of a scene have nine digits. The first n scenes
-of more are those of fewer.
+that is not unstable it grows with the time, and not by as much. Drawn numbers have nine digits, so that sines of
+another machine change nothing; directions are then brought to length one. The first n members of more are those of
+fewer, and member i of `heavy` is drawn from the same numbers for each epsilon.
 """
 
 import math
-from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
 
-from symtop.core.errors import one_of, whole
+from symtop.core import netcdf
+from symtop.core.errors import SymtopError, finite, one_of, whole
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
 from symtop.model.body import Attitude, RigidBody
 from symtop.model.charts import BODY, attitude_distance
 from symtop.model.scenes import Scene
-from symtop.run.ensemble.population import between, octaves, signs
+from symtop.run.ensemble.population import between, check_memory, octaves, signs
+from symtop.run.trajectory import LABELS
+
+Array = NDArray[np.float64]
 
 FREE = ("short-axis", "long-axis", "near-separatrix", "near-symmetric", "needle")
 HEAVY = ("regular", "chaotic", "lagrange")
@@ -40,92 +47,140 @@ KINDS = (*STRATA, "heavy", "all")
 DRAWS, MOST = 16, 1_000_000
 PERIODS, CHAOS, SMALL = 10.0, 1000.0, 1e-8
 STEPS = 64  # of the series in a natural period
+FARTHEST, NEAREST = 0.5, 0.02  # epsilon at most; and at least where chaos is asked for, which nothing below has
+VECTORS = {"centre": "component", "quaternion": "part", "omega_body": "component"}
+PRINCIPAL = {name: {"long_name": "principal moment of inertia", "units": "1"} for name in ("I1", "I3")}
+SPLIT = (1, 2, 3, 4, 7, 11)  # of the 14 numbers of a member: I1, I2, I3, mgl, and the vectors
 
 
-def random_bodies(n: int, *, seed: int = 0, kind: str = "all") -> list[Scene]:
-    """Draw n scenes of a stratum, or with "all" of each stratum in turn; each runs over `PERIODS` natural periods.
+def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float | None = None) -> xr.Dataset:
+    """Draw n bodies without symmetry and their starts: a dataset over ``member``.
 
-    The stratum is the name of a scene up to its number. Raises SymtopError for arguments that make no sense.
+    Variables ``I1``, ``I2``, ``I3``, ``mgl``, ``centre`` and ``omega_body`` (member, 3; principal axes),
+    ``quaternion`` (member, 4; w, x, y, z, body to space), in any consistent units, and ``stratum``, its name. `kind` is
+    a stratum (free: short-axis, long-axis, near-separatrix, near-symmetric, needle; heavy: regular, chaotic,
+    lagrange), "heavy" without asking for chaos, or "all" for each stratum in turn. `epsilon`, from 0 to 1/2, is how far
+    heavy bodies are from a Lagrange top; without one it is drawn. Member i depends on the seed alone, and not on n.
+
+    Raises SymtopError for arguments that make no sense.
     """
-    count, chosen = whole("n", n, 1, MOST), one_of("kind", kind, KINDS)
-    first = whole("seed", seed, 0)
+    count, chosen, first = whole("n", n, 1, MOST), one_of("kind", kind, KINDS), whole("seed", seed, 0)
+    check_memory("n", count)
     kinds = STRATA if chosen == "all" else (chosen,)
-    streams = [_scenes(one, first, KINDS.index(one)) for one in kinds]
-    return [next(streams[i % len(streams)]) for i in range(count)]
+    if epsilon is not None:
+        if not {*kinds} - {*FREE, "lagrange"}:
+            raise SymtopError(f"epsilon is of heavy bodies, and not of the kind {chosen!r}", "epsilon")
+        least = NEAREST if "chaotic" in kinds else 0.0
+        if not least <= finite("epsilon", epsilon) <= FARTHEST:
+            raise SymtopError(f"epsilon must be from {least} to {FARTHEST}, not {epsilon!r}", "epsilon")
+    rows, strata = np.empty((count, 14)), np.empty(count, dtype=f"U{max(map(len, KINDS))}")
+    for place, one in enumerate(kinds[:count]):
+        rows[place :: len(kinds)] = _members(one, first, len(range(place, count, len(kinds))), epsilon)
+        strata[place :: len(kinds)] = one
+    parts = dict(zip(("I1", "I2", "I3", "mgl", *VECTORS), np.split(rows, SPLIT, axis=1), strict=True))
+    columns: dict[str, Any] = {
+        name: (("member", VECTORS[name]), part) if name in VECTORS else ("member", part[:, 0], PRINCIPAL.get(name))
+        for name, part in parts.items()
+    }
+    data = xr.Dataset(columns | {"stratum": ("member", strata)}, {name: list(LABELS[name]) for name in LABELS})
+    return netcdf.describe(data, f"{count} bodies of the population {chosen!r}", seed=first, kind=chosen)
 
 
-def _scenes(kind: str, seed: int, stream: int) -> Iterator[Scene]:
-    """Scenes of one stratum without end."""
-    generator = np.random.Philox(key=[seed % 2**64, stream])
-    drawn = "heavy" if kind in HEAVY else kind
-    count = 0
-    while True:
-        uniform = (generator.random_raw(DRAWS) >> np.uint64(11)) * 2.0**-53
-        body, start = _heavy(uniform, lagrange=kind == "lagrange") if drawn == "heavy" else _free(kind, uniform)
-        period = body.nutation_period(start)
-        scene = Scene(f"{kind}-{count}", body, start, PERIODS * period, f"a random body, {kind}")
-        if kind not in ("regular", "chaotic") or (growth(scene) > CHAOS) is (kind == "chaotic"):
-            count += 1
-            yield scene
+def scenes_of(members: xr.Dataset) -> list[Scene]:
+    """Members as scenes over `PERIODS` natural periods, named by stratum and number within it."""
+    rows = np.column_stack([members[name].values for name in ("I1", "I2", "I3", "mgl", *VECTORS)])
+    seen: dict[str, int] = {}
+    scenes = list[Scene]()
+    for row, kind in zip(rows, members["stratum"].values.tolist(), strict=True):
+        seen[kind] = seen.get(kind, -1) + 1
+        scenes.append(_scene(row, f"{kind}-{seen[kind]}", f"a random body, {kind}"))
+    return scenes
 
 
-def _unit(first: float, second: float) -> tuple[float, float, float]:
-    """A direction, evenly over the sphere."""
+def _scene(row: Array, name: str = "drawn", purpose: str = "") -> Scene:
+    I1, I2, I3, mgl, c1, c2, c3, w, x, y, z, *rates = row.tolist()
+    body, start = RigidBody(I1, I2, I3, mgl, (c1, c2, c3)), Attitude((w, x, y, z), (rates[0], rates[1], rates[2]))
+    return Scene(name, body, start, PERIODS * body.nutation_period(start), purpose)
+
+
+def _members(kind: str, seed: int, count: int, epsilon: float | None) -> Array:
+    """The first members of one stratum, (count, 14)."""
+    generator = np.random.Philox(key=[seed % 2**64, KINDS.index(kind)])
+    found, left = list[Array](), count
+    while left:
+        integers = generator.random_raw(DRAWS * left) >> np.uint64(11)
+        uniform = np.ascontiguousarray((integers * 2.0**-53).reshape(-1, DRAWS).T)
+        drawn = _free(kind, uniform) if kind in FREE else _heavy(uniform, 0.0 if kind == "lagrange" else epsilon)
+        if kind in ("regular", "chaotic"):
+            chaotic = np.array([growth(_scene(row)) > CHAOS for row in drawn])
+            drawn = drawn[chaotic == (kind == "chaotic")]
+        found.append(drawn)
+        left -= len(drawn)
+    return np.concatenate(found)
+
+
+def _direction(first: Array, second: Array) -> Array:
+    """Directions (3, n), evenly over the sphere."""
     z, angle = 2.0 * first - 1.0, 2.0 * math.pi * second
-    across = math.sqrt(max(1.0 - z * z, 0.0))
-    return across * math.cos(angle), across * math.sin(angle), z
+    across = np.sqrt(np.maximum(1.0 - z * z, 0.0))
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z])
 
 
-def _tidy(*values: float) -> Any:
-    """Numbers of nine digits, so that sines of another machine change nothing."""
-    return tuple(float(f"{value:.9g}") + 0.0 for value in values)
-
-
-def _start(u: Any, rates: Sequence[float]) -> Attitude:
-    """A quaternion, evenly over all turns, and these rates."""
-    out, back = math.sqrt(u[0]), math.sqrt(1.0 - u[0])
+def _turn(u: Array) -> Array:
+    """Quaternions (4, n), evenly over all turns."""
+    out, back = np.sqrt(u[0]), np.sqrt(1.0 - u[0])
     first, second = 2.0 * math.pi * u[1], 2.0 * math.pi * u[2]
-    turn = out * math.cos(first), out * math.sin(first), back * math.cos(second), back * math.sin(second)
-    return Attitude(_tidy(*turn), _tidy(*rates))
+    return np.stack([out * np.cos(first), out * np.sin(first), back * np.cos(second), back * np.sin(second)])
 
 
-def _free(kind: str, u: Any) -> tuple[RigidBody, Attitude]:
-    """A free body with |L| = 1, its axes in an order that is drawn."""
-    low, high = float(between(0.3, 0.9, u[0])), float(between(1.1, 1.25, u[1]))
-    moments = [low, 1.0, min(high, 0.99 * (1.0 + low))]
-    tilt, turn, small = 0.5 * float(u[2]), 2.0 * math.pi * u[3], float(octaves(-16.0, -4.0, u[4]))
-    side = math.sin(tilt) * math.cos(turn), math.sin(tilt) * math.sin(turn)
-    momentum = [*side, math.cos(tilt)]
+def _rows(moments: Array, mgl: float, centre: Array, turns: Array, rates: Array) -> Array:
+    """Members (n, 14) of parts (parts, n)."""
+    n = moments.shape[1]
+    rows = np.concatenate([moments, np.full((1, n), mgl), centre, turns, rates]).T
+    rows = np.array([float(f"{value:.9g}") + 0.0 for value in rows.ravel().tolist()]).reshape(n, 14)
+    for begin, end in ((4, 7), (7, 11)):
+        rows[:, begin:end] /= np.sqrt((rows[:, begin:end] ** 2).sum(axis=1, keepdims=True))
+    return rows
+
+
+def _free(kind: str, u: Array) -> Array:
+    """Free bodies with |L| = 1, their axes in an order that is drawn."""
+    low, one, high = between(0.3, 0.9, u[0]), np.ones(u.shape[1]), between(1.1, 1.25, u[1])
+    moments = np.stack([low, one, np.minimum(high, 0.99 * (1.0 + low))])
+    tilt, turn, small = 0.5 * u[2], 2.0 * math.pi * u[3], octaves(-16.0, -4.0, u[4])
+    side = np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn)
+    momentum = np.stack([*side, np.cos(tilt)])
     if kind == "long-axis":
-        momentum = [math.cos(tilt), *side]
+        momentum = np.stack([np.cos(tilt), *side])
     elif kind == "needle":
-        thin = float(octaves(-12.0, -5.0, u[5]))
-        moments = [thin, 1.0 - 0.5 * thin * u[6], 1.0]
-        momentum = [(2.0 * u[2] - 1.0) * math.sqrt(thin), math.cos(turn), math.sin(turn)]
+        thin = octaves(-12.0, -5.0, u[5])
+        moments = np.stack([thin, 1.0 - 0.5 * thin * u[6], one])
+        momentum = np.stack([(2.0 * u[2] - 1.0) * np.sqrt(thin), np.cos(turn), np.sin(turn)])
     elif kind == "near-symmetric":
-        equal = 1.0 + float(octaves(-20.0, -6.0, u[5]))
-        moments = [low, 1.0, equal] if u[6] < 0.5 else [1.0, equal, 1.3]
-        momentum = list(_unit(u[2], u[3]))
+        equal = 1.0 + octaves(-20.0, -6.0, u[5])
+        moments = np.where(u[6] < 0.5, np.stack([low, one, equal]), np.stack([one, equal, 1.3 * one]))
+        momentum = _direction(u[2], u[3])
     elif kind == "near-separatrix":  # I1 (I3 - I2) M3^2 = I3 (I2 - I1) M1^2 on it
-        slope = math.sqrt((moments[1] - moments[0]) * moments[2] / ((moments[2] - moments[1]) * moments[0]))
-        share = math.sin(0.5 + tilt)
-        momentum = [share, math.cos(0.5 + tilt), share * slope * (1.0 + float(signs(u[7])) * small)]
-    order = [int(place) for place in np.argsort(u[8:11])]
-    size = math.hypot(*momentum)
-    rates = [momentum[k] / size / moments[k] for k in order]
-    return RigidBody(*_tidy(*(moments[k] for k in order))), _start(u[11:14], rates)
+        slope = np.sqrt((moments[1] - moments[0]) * moments[2] / ((moments[2] - moments[1]) * moments[0]))
+        share = np.sin(0.5 + tilt)
+        momentum = np.stack([share, np.cos(0.5 + tilt), share * slope * (1.0 + signs(u[7]) * small)])
+    rates = momentum / np.sqrt((momentum**2).sum(axis=0)) / moments
+    order = np.argsort(u[8:11], axis=0)
+    moments, rates = (np.take_along_axis(part, order, axis=0) for part in (moments, rates))
+    return _rows(moments, 0.0, np.stack([0.0 * one, 0.0 * one, one]), _turn(u[11:14]), rates)
 
 
-def _heavy(u: Any, *, lagrange: bool) -> tuple[RigidBody, Attitude]:
-    """A heavy body with I1 = mgl = 1, at a distance epsilon from a Lagrange top."""
-    epsilon = 0.0 if lagrange else float(octaves(-7.0, -1.0, u[0]))
-    second, third = 1.0 + epsilon * float(u[1]), float(between(0.2, 1.8, u[2]))
-    second, third = min(second, 0.99 * (1.0 + third)), min(third, 0.99 * (1.0 + second))
-    off = [epsilon * part for part in _unit(u[3], u[4])[:2]]
-    spin = float(signs(u[5]) * octaves(-2.0, 2.0, u[6])) * 2.0 / third
-    rates = float(u[7]) * math.cos(2.0 * math.pi * u[8]), float(u[7]) * math.sin(2.0 * math.pi * u[8]), spin
-    moments = _tidy(second, third)
-    return RigidBody(1.0, moments[0], moments[1], 1.0, _tidy(*off, 1.0)), _start(u[9:12], rates)
+def _heavy(u: Array, epsilon: float | None) -> Array:
+    """Heavy bodies with I1 = mgl = 1, epsilon from a Lagrange top, or a distance that is drawn."""
+    off, one = octaves(-7.0, -1.0, u[0]) if epsilon is None else np.full(u.shape[1], epsilon), np.ones(u.shape[1])
+    third = between(0.2, 1.8, u[2])
+    second = np.minimum(1.0 + off * between(0.5, 1.0, u[1]), 0.99 * (1.0 + third))
+    third = np.minimum(third, 0.99 * (1.0 + second))
+    centre = np.stack([*(off * _direction(u[3], u[4])[:2]), one])
+    spin = signs(u[5]) * octaves(-4.0, 2.0, u[6]) * 2.0 / third
+    turn = 2.0 * math.pi * u[8]
+    rates = np.stack([1.5 * u[7] * np.cos(turn), 1.5 * u[7] * np.sin(turn), spin])
+    return _rows(np.stack([one, second, third]), 1.0, centre, _turn(u[9:12]), rates)
 
 
 def growth(scene: Scene) -> float:
