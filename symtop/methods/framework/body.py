@@ -50,9 +50,10 @@ class Pose(NamedTuple):
 
 @register_jitable
 def opened(plain: Any) -> Any:
-    """A body and a start, of their 13 numbers."""
-    I1, I2, I3, c1, c2, c3 = plain[:6]
-    return General(1.0 / I1, 1.0 / I2, 1.0 / I3, I1, I2, I3, c1, c2, c3), Pose(*plain[6:])
+    """A body and a start, of their 14 numbers."""
+    I1, I2, I3, mgl, x, y, z = plain[:7]
+    body = General(1.0 / I1, 1.0 / I2, 1.0 / I3, I1, I2, I3, mgl * x, mgl * y, mgl * z)
+    return body, Pose(*plain[7:11], I1 * plain[11], I2 * plain[12], I3 * plain[13])
 
 
 @register_jitable
@@ -95,8 +96,8 @@ def _in_space(par: Any, t: float, y: Any) -> Any:
 
 
 of_top, in_space = Preparation(_of_top, 7), Shown(_in_space, 7)  # a top as (q, M), shown as (q, L)
-on_body = _OfBody(_on_body, 7, opened=opened, momenta=_momenta)
-turned, turned_back = _OfBody(_turned, 7, opened=opened, momenta=_momenta), Shown(_turned_back, 7)
+on_body = _OfBody(_on_body, 7, opened=opened, momenta=_momenta, given=14)
+turned, turned_back = _OfBody(_turned, 7, opened=opened, momenta=_momenta, given=14), Shown(_turned_back, 7)
 
 
 @register_jitable

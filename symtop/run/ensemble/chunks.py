@@ -29,7 +29,7 @@ from symtop.core.numbers import GOLDEN
 from symtop.core.parallel import cores, heed, in_threads
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.lanes import Many, W, column, members_of, put
+from symtop.methods.framework.lanes import Many, W, column, members_of, of_bodies, put
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, off_length
 from symtop.methods.framework.preparation import Body, Start
@@ -37,9 +37,9 @@ from symtop.methods.framework.registry import Integrator, integrator as find_int
 from symtop.methods.library import exact
 from symtop.methods.simd import wide_vectors
 from symtop.model import charts, top as model
-from symtop.model.charts import View
+from symtop.model.charts import BODY, View
 from symtop.model.exact.closed_form import ClosedForms
-from symtop.model.top import SymmetricTop
+from symtop.model.top import NUMBERS, SymmetricTop
 from symtop.run.simulation import STRETCHES, WIDEST_GAP
 from symtop.run.trajectory import LABELS
 
@@ -62,6 +62,7 @@ SHOWN = {  # by each chart
     "angles": ("theta", "phi", "psi", "axis", "energy", "p_theta", "p_phi", "p_psi"),
     "axis": ("theta", "phi", "axis", "energy", "p_theta", "p_phi", "p_psi"),
     "attitude": ("theta", "phi", "psi", "axis", "quaternion", "energy", "p_theta", "p_phi", "p_psi"),
+    BODY: ("theta", "axis", "quaternion", "energy", "p_phi", "momentum"),
 }
 PER_MEMBER = (  # columns, beside what a member shows
     "outcome", "steps", "force_evaluations", "newton_iterations", "reached_time", "step_size", "horizon", "dithered",
@@ -94,7 +95,9 @@ def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -
 
 
 def nutation_periods(numbers: Array) -> Array:
-    """`SymmetricTop.nutation_period` of tops and starts (n, 9), to the bit; infinite on a separatrix."""
+    """`Scene.nutation_period` of tops and starts (n, 9), to the bit, or of bodies (n, 14); infinite on a separatrix."""
+    if of_bodies(numbers):
+        return np.array([body.nutation_period(start) for body, start in members_of(numbers)])
     periods = np.empty(len(numbers))
     _all_periods()(np.ascontiguousarray(numbers), periods)
     return periods
@@ -269,10 +272,7 @@ class Job:
         plan = schedule(period, self.horizon, self.samples, self.steps)
         with np.errstate(all="ignore"):  # a run may blow up, and that is a result
             runs = _of_length_one(self._runs(plan), plan, self.chart)
-            columns = {name: self.numbers[:, k : k + 1] for k, name in enumerate(("I1", "I3", "mgl"))}
-            top: Any = SimpleNamespace(**columns)
-            top.reduced_energy = functools.partial(SymmetricTop.reduced_energy, top)  # of all tops at once
-            view = View(self.chart, top, runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
+            view = View(self.chart, together(self.numbers), runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
             runs, columns = _whole(runs, view, plan), self._observables(view, plan.times)
         each: tuple[Any, ...] = (
             np.array(ENDS)[runs.outcome], runs.steps, runs.force_evaluations, runs.newton_iterations, runs.reached,
@@ -401,6 +401,16 @@ def _received(values: dict[str, Any]) -> Job:
     return Job(**values | {"method": find_integrator(values["method"])})
 
 
+def together(numbers: Array) -> Any:
+    """All tops at once, or all bodies, as a `View` takes one."""
+    if of_bodies(numbers):
+        torque = (numbers[:, 3:4] * numbers[:, 4:7]).T[..., None]
+        return SimpleNamespace(moments=numbers[:, None, :3], torque=torque)
+    top: Any = SimpleNamespace(**{name: numbers[:, k : k + 1] for k, name in enumerate(NUMBERS[:3])})
+    top.reduced_energy = functools.partial(SymmetricTop.reduced_energy, top)
+    return top
+
+
 def sampled(solver: FixedStep, numbers: Array, plan: Schedule) -> Many:
     """The runs of a plan, those with equally many samples in one call."""
     counts = np.unique(plan.counts)
@@ -422,7 +432,8 @@ def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
     """A run whose states or energy are not finite, and that reports nothing of it, ends there, as in `simulate`."""
     if all(values.min() > -HARMLESS and values.max() < HARMLESS for values in runs[:2]):  # a tenth of the time
         return runs
-    finite = np.isfinite(runs.states).all(axis=2) & np.isfinite(view.energy + view.p_phi) | np.isnan(plan.times)
+    readings = view.energy if view.chart == BODY else view.energy + view.p_phi
+    finite = np.isfinite(runs.states).all(axis=2) & np.isfinite(readings) | np.isnan(plan.times)
     bad = np.flatnonzero((runs.outcome == OK) & ~finite.all(axis=1))
     if not bad.size:
         return runs
@@ -459,13 +470,13 @@ def as_dataset(
 
     `shared` says so where the columns are not those of all members; angles of `turns` are made when they are read.
     """
-    columns, vectors = columns | labels, {"axis": "component", "quaternion": "part"}
+    columns, vectors = columns | labels, {"axis": "component", "momentum": "component", "quaternion": "part"}
     times = columns.pop("time")
     shared = same_times(times, times[0]) if shared is None else shared
     variables = {
         name: (("member", "time", vectors.get(name, ""))[: values.ndim], values) for name, values in columns.items()
     }
     variables |= {name: Later(turns, name).variable() for name in (turns.angles if turns else ())}
-    coordinates = {dim: list(LABELS[dim]) for name, dim in vectors.items() if name in columns}
+    coordinates = {dim: list(LABELS[dim]) for dim in LABELS if any(vectors.get(name) == dim for name in columns)}
     clock = ("time", times[0]) if shared else (("member", "time"), times)
     return xr.Dataset(variables, {"time": clock, **coordinates})
