@@ -464,11 +464,12 @@ def same_times(times: Any, row: Any) -> bool:
 
 
 def as_dataset(
-    columns: dict[str, Any], labels: dict[str, Any], *, shared: bool | None = None, turns: Turns | None = None
+    columns: dict[str, Any], labels: dict[str, Any], *, shared: bool | None = None, of: Job | None = None
 ) -> xr.Dataset:
     """Columns (n, ...) and labels (n,) as a dataset; times that all members share are one row.
 
-    `shared` says so where the columns are not those of all members; angles of `turns` are made when they are read.
+    `shared` says so where the columns are not those of all members. Angles `of` a job that leaves them modulo a turn
+    are made continuous when they are read.
     """
     columns, vectors = columns | labels, {"axis": "component", "momentum": "component", "quaternion": "part"}
     times = columns.pop("time")
@@ -476,7 +477,9 @@ def as_dataset(
     variables = {
         name: (("member", "time", vectors.get(name, ""))[: values.ndim], values) for name, values in columns.items()
     }
-    variables |= {name: Later(turns, name).variable() for name in (turns.angles if turns else ())}
+    if of is not None:
+        turns = Turns(of.numbers, times, {name: columns[name] for name in of.turned})
+        variables |= {name: Later(turns, name).variable() for name in of.turned}
     coordinates = {dim: list(LABELS[dim]) for dim in LABELS if any(vectors.get(name) == dim for name in columns)}
     clock = ("time", times[0]) if shared else (("member", "time"), times)
     return xr.Dataset(variables, {"time": clock, **coordinates})

@@ -33,9 +33,7 @@ from symtop.model.charts import BODY
 from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run import cluster
-from symtop.run.ensemble.chunks import (
-    CHUNK, CHUNK_STEPS, RAISED, SHOWN, Job, Turns, as_dataset, nutation_periods, same_times,
-)  # fmt: skip
+from symtop.run.ensemble.chunks import CHUNK, CHUNK_STEPS, RAISED, SHOWN, Job, as_dataset, nutation_periods, same_times
 from symtop.run.ensemble.inputs import Members, called, for_each, read_members
 from symtop.run.guard import MOST_STEPS
 from symtop.run.simulation import MOST_SAMPLES, MOST_SWINGS, chart_of, check_control
@@ -104,8 +102,8 @@ def ensemble(
         cluster.check_sent(scheduler, job.part(slice(0, 1)), method.name)
     chunks = list(job.chunks())
     words = {
-        "title": f"{method.name} on {n} {'bodies' if chart == BODY else 'tops'}", "units": read.units, "integrator": method.name, "chart": chart,
-        "implementation": method.implementation, "execution": job.execution,
+        "title": f"{method.name} on {n} {'bodies' if chart == BODY else 'tops'}", "units": read.units, "chart": chart,
+        "integrator": method.name, "implementation": method.implementation, "execution": job.execution,
     }  # fmt: skip
 
     def compute(rest: list[slice], keep: Callable[[slice, dict[str, Any]], object]) -> tuple[int, str]:
@@ -125,8 +123,7 @@ def ensemble(
         raised, first = compute(chunks, lambda chunk, part: _fill(columns, part, chunk, n))
         if raised == n:
             raise SymtopError(first)
-        turns = Turns(job.numbers, columns["time"], {name: columns[name] for name in job.turned})
-        data = as_dataset(columns, read.labels, turns=turns)
+        data = as_dataset(columns, read.labels, of=job)
         data = netcdf.describe(data, **words, **({RAISED: first} if raised else {}))
     else:
         with _stream(file_path("path", path), job, read.labels, words) as stream:

@@ -88,7 +88,8 @@ def _from_dataset(data: xr.Dataset) -> Members:
         if name in data:
             given, vector = data[name], width > 1
             over = given.dims[:-1] if vector else given.dims
-            if over not in ((), ("member",)) or given.dtype.kind not in "fiu" or (vector and given.shape[-1:] != (width,)):
+            fits = not vector or given.shape[-1:] == (width,)
+            if over not in ((), ("member",)) or given.dtype.kind not in "fiu" or not fits:
                 wrong = f"{given.dtype} {given.shape} over {', '.join(map(str, given.dims)) or 'nothing'}"
                 each = f"rows of {width} numbers" if vector else "numbers"
                 raise SymtopError(f"{name} of members must be {each} over member, or one for all, not {wrong}")
