@@ -292,7 +292,7 @@ def test_angles_are_made_when_they_are_read_with_the_bits_of_a_file(name, tmp_pa
         whole = {angle: written[angle].values for angle in angles}
     assert any(np.abs(values).max() > np.pi for values in whole.values())  # more than a turn
     for angle in angles:
-        np.testing.assert_array_equal(pickle.loads(pickle.dumps(data))[angle], whole[angle])  # noqa: S301
+        np.testing.assert_array_equal(pickle.loads(pickle.dumps(data))[angle], whole[angle])
         np.testing.assert_array_equal(data[angle].isel(member=[3, 30], time=slice(2, 5)), whole[angle][[3, 30], 2:5])
         np.testing.assert_array_equal(data[angle].isel(member=4, time=-1), whole[angle][4, -1])
     xr.testing.assert_identical(data.isel(member=slice(5, 30)).phi, again.load().phi.isel(member=slice(5, 30)))
