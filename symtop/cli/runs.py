@@ -152,7 +152,8 @@ def long(
     """Run one INTEGRATOR on one SCENE for very many steps, in little memory.
 
     The run is cut into windows, and the output holds the least, largest and mean change of the energy and the momenta
-    in each. A change grows as the power of the time that is fitted to its size in the later windows. A checkpoint is written as it goes: the same command resumes a run that was interrupted.
+    in each, and as what power of the time their sizes grow. A checkpoint is written as it goes: the same command
+    resumes a run that was interrupted.
 
     \b
     symtop long spheroid stormer-verlet --steps 1e9 --output long.nc

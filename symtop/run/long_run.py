@@ -173,6 +173,7 @@ def long_run(
     result = None if output is None else checkpoints.checked(file_path("output", output))
     at, rows = checkpoints.resumed(loop.start(par, rule, state, h))
     ends, outcome, reached, title = windows(count), OK, at.k, f"{method.name} on {chosen.name}"
+    quantities = OF_BODY if chosen.of_body else QUANTITIES
     gauge = watch(chosen, method, h) if len(rows) < len(ends) else None
     bar = tqdm(total=count, initial=at.k, desc=title, unit="step", unit_scale=True, disable=quiet or None, leave=False)
     with checkpoints.saved_on_failure():
@@ -186,8 +187,8 @@ def long_run(
                     at = after
                     checkpoints.note(at, rows)
         data = netcdf.describe(
-            _windowed(rows, ends, OF_BODY if chosen.of_body else QUANTITIES), title=f"{title}, {count} steps", units=chosen.units, integrator=method.name,
-            scene=chosen.name, step_size=h, horizon=count * h, compensated=str(compensated).lower(),
+            _windowed(rows, ends, quantities), title=f"{title}, {count} steps", units=chosen.units,
+            integrator=method.name, scene=chosen.name, step_size=h, horizon=count * h, compensated=str(compensated).lower(),
             outcome=OUTCOMES[outcome], reached_time=reached * h,
             outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h, chosen.second),
         )  # fmt: skip

@@ -21,8 +21,8 @@ def assert_alone(data, scenes, name, horizons, **setting):
         for variable in run.variables:
             np.testing.assert_array_equal(one[variable].values, run[variable].values, err_msg=f"{variable} of {i}")
         assert str(one.outcome.values) == run.attrs["outcome"]
-        counted = [one[word].item() for word in ("steps", "force_evaluations", "newton_iterations", "reached_time")]
-        assert counted == [run.attrs[word] for word in ("steps", "force_evaluations", "newton_iterations", "reached_time")]
+        for word in ("steps", "force_evaluations", "newton_iterations", "reached_time"):
+            assert one[word].item() == run.attrs[word]
 
 
 @pytest.mark.parametrize(

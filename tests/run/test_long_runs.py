@@ -322,8 +322,9 @@ def test_a_body_is_watched_as_simulate_shows_it(name):
 
 
 def test_what_a_free_body_keeps_grows_as_rounding_and_what_it_does_not_keep_as_the_time(tmp_path):
-    command = ["long", "tennis-racket", "--steps", "1e5", "--per-nutation", "60.37", "--checkpoint", str(tmp_path / "c.nc")]
-    kept, lost = (CliRunner().invoke(main, [*command, name]) for name in ("strang", "rk4"))
+    command = ["long", "tennis-racket", "--steps", "1e5", "--per-nutation", "60.37", "--checkpoint"]
+    file = str(tmp_path / "c.nc")
+    kept, lost = (CliRunner().invoke(main, [*command, file, name]) for name in ("strang", "rk4"))
     assert (kept.exit_code, lost.exit_code) == (0, 0), kept.output + lost.output
     sizes = {}
     for name, done in (("strang", kept), ("rk4", lost)):

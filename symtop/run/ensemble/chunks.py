@@ -370,7 +370,7 @@ class Turns:
         return {name: np.concatenate([part[name] for part in parts]) for name in self.angles}
 
 
-class Later(BackendArray):  # type: ignore[misc]
+class Later(BackendArray):
     """One of the angles of `Turns`, made when it is looked at: the constants of a closed form take 4 us."""
 
     def __init__(self, turns: Turns, name: str) -> None:
@@ -388,7 +388,8 @@ class Later(BackendArray):  # type: ignore[misc]
 
     def variable(self) -> xr.Variable:
         """A variable that keeps what it has read."""
-        data = indexing.MemoryCachedArray(indexing.CopyOnWriteArray(indexing.LazilyIndexedArray(self)))
+        layers: Any = indexing  # whose types know no array but NumPy's
+        data = layers.MemoryCachedArray(layers.CopyOnWriteArray(layers.LazilyIndexedArray(self)))
         return xr.Variable(("member", "time"), data)
 
 
@@ -474,7 +475,7 @@ def as_dataset(
     columns, vectors = columns | labels, {"axis": "component", "momentum": "component", "quaternion": "part"}
     times = columns.pop("time")
     shared = same_times(times, times[0]) if shared is None else shared
-    variables = {
+    variables: dict[str, Any] = {
         name: (("member", "time", vectors.get(name, ""))[: values.ndim], values) for name, values in columns.items()
     }
     if of is not None:
