@@ -49,6 +49,7 @@ from symtop.methods.framework.registry import (
     integrator,
     integrators,
     is_built_in,
+    methods,
     split_name,
 )
 from symtop.model import scenes
@@ -176,14 +177,16 @@ class _Trial(NamedTuple):
 
 
 def recommend(
-    scene: "str | Scene", *, accuracy: float, quantity: str = "axis", horizon: float | None = None,
+    scene: "str | Scene", *, accuracy: float, quantity: str | None = None, horizon: float | None = None,
     results: str | Path | None = None, needs: Collection[str] = (), step_size: float | None = None,
     max_step: float | None = None, general: bool = False, keeps: str | None = None, time_a_step: float | None = None,
 ) -> Advice:  # fmt: skip
     """The cheapest integrator, with its step or tolerance, that keeps the error of `quantity` below `accuracy`.
 
-    `accuracy` is the largest error of `quantity` over the run: radians for ``axis``, ``attitude`` and ``theta``, and
-    relative for others, energy and momenta by the scales of `symtop.errors`. `horizon` is the scene's own by default.
+    `accuracy` is the largest error of `quantity`, by default of the axis, over the run: radians for ``axis``,
+    ``attitude`` and ``theta``, and relative for others, energy and momenta by the scales of `symtop.errors`. `horizon`
+    is the scene's own by default. Of a body without symmetry the `quantity` is the attitude by default, the candidates
+    are the methods of the chart ``body``, and `keeps` may be "energy" alone.
     `results` is a folder with a stored ``cost.nc``; without it a table made from one says what is tried. `needs` leaves
     out methods that need something else (`Integrator.needs`), for example ``("derivative", "kicks")``, or by what you
     can supply, ``"f(t, y), torque, free motion"``; without them, what is made for this very top is not the answer but
@@ -193,17 +196,20 @@ def recommend(
     is the answer. `max_step` is the longest step, `time_a_step` the most seconds of one on this machine. `general`
     leaves out what does not exist for a body without symmetry, `keeps` ("energy", "momenta") what lets them drift.
 
-    Raises SymtopError for arguments that are out of range. It runs what it recommends, which takes from 0.1 s to half
+    Raises SymtopError for arguments that are out of range, and for a `horizon` to which the motion of a body is not
+    known. It runs what it recommends, which takes from 0.1 s to half
     a minute.
     """
-    scene = scenes.scene(scene)
+    scene = scenes.scene(scene, bodies=True)
+    quantity = ("attitude" if scene.of_body else "axis") if quantity is None else quantity
     allowed = _needs([needs] if isinstance(needs, str) else needs)
     accuracy = positive("accuracy", accuracy)
-    one_of("quantity", quantity, KNOWN_QUANTITIES)
+    one_of("quantity", quantity, settings.OF_BODY if scene.of_body else KNOWN_QUANTITIES)
     if quantity in settings.ANGLES and accuracy >= math.pi:
         raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}", "accuracy")
     horizon = scene.horizon if horizon is None else horizon_of(horizon)
     comparable = allowed or OF_ANY
+    results = None if scene.of_body else results  # the study is of tops
     near = None if results is None else nearest(Path(results) / STORED, scene, quantity, accuracy, horizon, comparable)
     limit = settings.judgeable(scene, quantity, horizon)
     step = None if step_size is None else positive("step_size", step_size)
@@ -212,13 +218,13 @@ def recommend(
         raise SymtopError(f"step_size must be {words}", "step_size")
     longest = math.inf if max_step is None else positive("max_step", max_step)
     pace = math.inf if time_a_step is None else positive("time_a_step", time_a_step)
-    kept = None if keeps is None else one_of("keeps", keeps, KEPT)
+    kept = None if keeps is None else one_of("keeps", keeps, [*KEPT][: 1 if scene.of_body else None])
     limits = step, longest, boolean("general", general), kept, pace
     question = _Question(scene, accuracy, quantity, horizon, allowed, *limits)
     if accuracy < limit:
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(question, [], (), source)
-    if {*allowed} == {"solution"} and question.allows(integrator("exact")):
+    if {*allowed} == {"solution"} and not scene.of_body and question.allows(integrator("exact")):
         return _the_motion(question, limit)
     guesses, source = _candidates(question, near)
     source += f" ({Path(results) / STORED})" if results is not None else ""
@@ -302,13 +308,18 @@ class _Search:
             self.fails.setdefault(trial, []).append(method.name)
 
 
-def _usable(quantity: str, needs: tuple[str, ...] = ()) -> list[str]:
+def _usable(quantity: str, needs: tuple[str, ...] = (), *, of_body: bool = False) -> list[str]:
     """Compiled methods with a step or a tolerance, each in the charts that show the quantity, which it then names."""
+    if of_body:
+        names = [method.name for method in methods().values() if BODY in method.solvers]
+    else:
+        rows = settings.compared(settings.observed(quantity))
+        names = [row.name if len(integrator(row.method).charts()) > 1 else row.method for row in rows]
+    found = {name: integrator(name) for name in names}
     return [
-        variant.name if len(integrator(variant.method).charts()) > 1 else variant.method
-        for variant in settings.compared(settings.observed(quantity))
-        if variant.control is not None and variant.implementation == "compiled"
-        if not needs or variant.needs in needs
+        name
+        for name, one in found.items()
+        if one.control is not None and one.implementation == "compiled" and (not needs or one.needs in needs)
     ]
 
 
@@ -320,7 +331,8 @@ def _same(variant: str, usable: Sequence[str]) -> str | None:
 
 def _everyone(question: _Question) -> list[str]:
     """Every compiled method that the user can use."""
-    return [name for name in _usable(question.quantity, question.needs) if question.allows(integrator(name))]
+    usable = _usable(question.quantity, question.needs, of_body=question.scene.of_body)
+    return [name for name in usable if question.allows(integrator(name))]
 
 
 def _menu(question: _Question) -> list[str]:
@@ -329,7 +341,7 @@ def _menu(question: _Question) -> list[str]:
         return []
     scene, accuracy, quantity, horizon = question[:4]
     nutations, usable = horizon / scene.time_scale(horizon), _everyone(question)
-    rows = cheapest(question.needs, quantity, accuracy, nutations, general=question.general)
+    rows = cheapest(question.needs, quantity, accuracy, nutations, general=question.general or scene.of_body)
     return list(dict.fromkeys(name for row in rows if (name := _same(row, usable))))
 
 
@@ -446,14 +458,16 @@ def _advice(
     if need := best.met.integrator.needs:
         worth += f"; it needs {NEEDS[need]} ({need})"
     if fixed:
-        a_step = f"{scene.time_scale(horizon) / best.met.setting:.3g} a nutation, {1e6 * best.a_step:.2g} us each"
+        period = "natural period" if scene.of_body else "nutation"
+        a_step = f"{scene.time_scale(horizon) / best.met.setting:.3g} a {period}, {1e6 * best.a_step:.2g} us each"
         worth += f"; steps are {a_step}"
     runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
     served = _same(name, list(near.served)) if near is not None else None  # None: the study has no chart of it
     return Advice(
         scene.name, quantity, accuracy, horizon, name, best.met.setting if fixed else None,
         None if fixed else best.met.setting, best.error, best.seconds, best.confidence,
-        f"{best.words()} meets {goal}: {worth}; {source}. {_carries(best.met.integrator)}", runner_up="".join(runners),
+        f"{best.words()} meets {goal}: {worth}; {source}.{_carries(question, best.met.integrator)}",
+        runner_up="".join(runners),
         beside=_beside(beside, best.seconds),
         closed_form=_without_steps(question, best.seconds), nearest=near.words(served) if near and served else "",
         fails=fails, **_lines(question, best.met.integrator, best.met.setting),
@@ -468,7 +482,8 @@ def _the_motion(question: _Question, limit: float) -> Advice:
     lines = _lines(question, exact, None)
     reason = (
         f"exact, the closed form, meets {quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}: error below "
-        f"{limit:.2g} in {seconds:.2g} s, without steps; it needs {NEEDS['solution']} (solution). {_carries(exact)}"
+        f"{limit:.2g} in {seconds:.2g} s, without steps; it needs {NEEDS['solution']} (solution)."
+        f"{_carries(question, exact)}"
     )
     return Advice(
         scene.name, quantity, accuracy, horizon, exact.name, expected_error=limit, seconds=seconds,
@@ -476,12 +491,14 @@ def _the_motion(question: _Question, limit: float) -> Advice:
     )  # fmt: skip
 
 
-def _carries(method: Integrator) -> str:
-    """Does a method carry over to a body without symmetry?"""
+def _carries(question: _Question, method: Integrator) -> str:
+    """Does a method of a top carry over to a body without symmetry?"""
+    if question.scene.of_body:
+        return ""
     if method.general is not True:
-        return "It does not carry over to a body without symmetry."
+        return " It does not carry over to a body without symmetry."
     here = ", in the chart body" if BODY in integrator(method.method).solvers else ", which symtop does not run it on"
-    return f"It carries over to a body without symmetry{here}."
+    return f" It carries over to a body without symmetry{here}."
 
 
 def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
@@ -494,7 +511,7 @@ def _lines(question: _Question, method: Integrator, setting: float | None) -> di
     """The command and the Python line that make the recommended run; no command for a scene that has no name here."""
     scene, _, _, horizon = question[:4]
     name, whole = method.name, horizon == scene.horizon
-    known = scenes.scenes().get(scene.name) == scene
+    known = scenes.all_scenes().get(scene.name) == scene
     shown, control = f'"{name}"' if "[" in name else name, str(method.control)
     option = "" if setting is None else f" --{control.replace('_', '-')} {float(setting)!r}"
     until = "" if whole else f" --horizon {horizon!r}"
@@ -518,6 +535,8 @@ def _exact_seconds(question: _Question) -> float:
 def _without_steps(question: _Question, best: float) -> str:
     """What the closed form costs beside a run of `best` seconds (nan if there is none), and why it is not advised."""
     scene, _, quantity, horizon = question[:4]
+    if scene.of_body:
+        return "A free body needs no integrator: symtop.reference evaluates its exact motion." if scene.top.free else ""
     taken, way = _exact_seconds(question), "" if closed_form.load() else ", interpreted"
     limit = settings.judgeable(scene, quantity, horizon)
     error = f", with an error below {limit:.1g}" if math.isfinite(limit) else ""
@@ -599,7 +618,7 @@ def i_use(
     (error, forces), off = measured[best], {name: value for name, (value, _) in measured.items()}
     if accuracy is not None:
         limits["step_size"] = step_size
-    elif limits.get("quantity", "axis") != "axis":
+    elif limits.get("quantity") not in (None, "axis"):
         raise SymtopError(f"quantity must be axis where there is no accuracy, not {limits['quantity']!r}", "quantity")
     target = error if accuracy is None else accuracy
     sought = accuracy is not None or error <= WORST

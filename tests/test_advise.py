@@ -378,3 +378,24 @@ def test_who_has_the_solution_is_given_the_exact_motion_with_its_price():
     assert stepped.integrator is None
     assert "no compiled method is within these limits" in stepped.reason
     assert symtop.recommend("spheroid", accuracy=1e-3, needs=("solution", "kicks")).integrator != "exact"
+
+
+def test_a_body_is_answered_with_a_method_of_its_chart():
+    scene = symtop.scene("tennis-racket", bodies=True)
+    advice = symtop.recommend(scene, accuracy=1e-6)
+    assert (advice.quantity, advice.confidence) == ("attitude", "checked")
+    assert measured(scene, advice, "attitude") <= 1e-6
+    assert "a natural period" in advice.reason
+    assert "needs no integrator" in advice.closed_form
+    assert "symmetry" not in str(advice)  # it is one without
+    assert advice.command.startswith(f"symtop run tennis-racket {advice.integrator} --")
+    heavy = symtop.recommend("heavy-brick", accuracy=1e-6, needs="kicks", keeps="energy", step_size=0.02)
+    assert symtop.integrator(heavy.integrator).needs == "kicks"
+    assert (heavy.step_size, heavy.closed_form) == (0.02, "")
+    assert symtop.recommend("tennis-racket", accuracy=1e-3, needs="this-top").integrator is None
+    for wrong, words in (
+        ({"horizon": 72.0}, "horizon must be below 60"), ({"quantity": "p_psi"}, "quantity 'p_psi' is unknown"),
+        ({"keeps": "momenta"}, "keeps 'momenta' is unknown"), ({"accuracy": 4.0}, "accuracy must be below pi"),
+    ):  # fmt: skip
+        with pytest.raises(symtop.SymtopError, match=words):
+            symtop.recommend("heavy-chaotic", **{"accuracy": 1e-6} | wrong)

@@ -28,7 +28,7 @@ Variables over `quantity`, `target`, `member`, `level`, `kind` (of tops), `guard
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,7 +85,7 @@ def quantities_of(variant: Integrator, twin: bool) -> tuple[str, ...]:
 
     The energy is not asked of a variant that claims to conserve it: any step would do.
     """
-    (chart,) = variant.charts()
+    (chart,) = variant.solvers
     left = {"energy"} if "energy" in (variant.conserves or ()) else set()
     left |= {"attitude"} if chart == "axis" else {"axis", "energy"} if twin else set()
     return tuple(name for name in ASKED if name not in left)
@@ -105,7 +105,7 @@ def run_level(variant: Integrator, tops: Tops, chosen: Members, level: int, budg
         h = tops.period[chosen] / FIRST * 0.5**level
         marks = np.broadcast_to(tops.marks << level, (len(chosen), tops.marks.size))
         return stepped(variant, tops.numbers[chosen], h, marks)
-    tolerance, solver = setting_of(variant, level), variant.solvers[variant.charts()[0]]
+    tolerance, solver = setting_of(variant, level), next(iter(variant.solvers.values()))
     times = tops.times[chosen]
     if isinstance(solver, Adaptive):
         n, samples = times.shape
@@ -117,7 +117,7 @@ def run_level(variant: Integrator, tops: Tops, chosen: Members, level: int, budg
 
 def stepped(variant: Integrator, numbers: Array, h: Array, marks: NDArray[np.int64]) -> Level:
     """Runs of steps `h` (n,), sampled at `marks` (n, samples): in one call where the variant has a loop to share."""
-    solver = inside(variant.solvers[variant.charts()[0]])
+    solver = inside(next(iter(variant.solvers.values())))
     if solver is None:
         return in_turn(variant, numbers, [Plan.steps(float(step), ends) for step, ends in zip(h, marks, strict=True)])
     many = solver.many(numbers, h, marks)
@@ -132,7 +132,7 @@ def in_turn(variant: Integrator, numbers: Array, plans: Sequence[Plan]) -> Level
 
 def one_by_one(variant: Integrator, members: Iterable[tuple[SymmetricTop, Angles]], plans: Sequence[Plan]) -> Level:
     """The same of tops and starts."""
-    (chart,), shape = variant.charts(), (len(plans), plans[0].times.size)
+    (chart,), shape = variant.solvers, (len(plans), plans[0].times.size)
     states, momenta = np.full((*shape, DIMENSIONS[chart]), np.nan), np.full((*shape, 2), np.nan)
     work, outcome = np.empty(len(plans)), np.empty(len(plans), dtype=np.int64)
     for k, ((top, start), plan) in enumerate(zip(members, plans, strict=True)):
@@ -142,9 +142,12 @@ def one_by_one(variant: Integrator, members: Iterable[tuple[SymmetricTop, Angles
     return Level(states, momenta, work, outcome)
 
 
-def climb(variant: Integrator, tops: Tops, asked: dict[str, NDArray[np.bool_]], budget: float) -> Climb:
-    """All runs of a variant; `asked` (targets, n) by quantity."""
-    n, (chart,) = len(tops.period), variant.charts()
+def climb(
+    variant: Integrator, tops: Any, asked: dict[str, NDArray[np.bool_]], budget: float,
+    run: Callable[..., Level] = run_level,
+) -> Climb:  # fmt: skip
+    """All runs of a variant on `tops`, or on others with the same properties; `asked` (targets, n) by quantity."""
+    n, (chart,) = len(tops.period), variant.solvers
     names = (*asked, *(name for name in ("axis", "energy", MOMENTA) if name not in asked))
     blank = np.full((LEVELS, n), np.nan)
     done = Climb(blank.copy(), {name: blank.copy() for name in names}, np.zeros((LEVELS, n), bool), np.zeros(n, bool))
@@ -154,7 +157,7 @@ def climb(variant: Integrator, tops: Tops, asked: dict[str, NDArray[np.bool_]], 
         for level in range(LEVELS):
             if not live.size or math.isnan(setting_of(variant, level)):
                 break
-            runs = run_level(variant, tops, live, level, budget)
+            runs = run(variant, tops, live, level, budget)
             shown = tops.errors(chart, runs, live)
             good = (runs.outcome == 0) & np.isfinite(shown["axis"])
             done.work[level, live], done.ended[level, live] = runs.work, good
@@ -237,7 +240,7 @@ def table(variant: Integrator, tops: Tops, budget: float, *, twin: bool, guarded
     return xr.Dataset(data, coords={"quantity": list(ASKED), "target": list(TARGETS), "kind": list(KINDS)})
 
 
-def typical_work(variant: Integrator, done: Climb, tops: Tops) -> Array:
+def typical_work(variant: Integrator, done: Climb, tops: Any) -> Array:
     """Force evaluations of the median top of each kind, (LEVELS, kinds); NaN where a level was run on less than half.
 
     A top that left takes as much more at a finer setting as the tops that stayed.

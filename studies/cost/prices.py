@@ -41,8 +41,10 @@ from symtop_studies.memoize import of_one_dataset
 from symtop.measure.timing import quartile_spread, timings
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator, integrator
-from symtop.model.charts import Array
+from symtop.model.body import Attitude, RigidBody
+from symtop.model.charts import BODY, Array
 from symtop.model.exact.closed_form import ClosedForms
+from symtop.model.scenes import body_scenes
 from symtop.model.top import NUMBERS, Angles, SymmetricTop
 from symtop.run.ensemble.population import population
 
@@ -80,6 +82,13 @@ def timed_top() -> tuple[SymmetricTop, Angles, float]:
     return top, start, float(forms.nutation_period[chosen])
 
 
+@functools.cache
+def timed_body() -> tuple[RigidBody, Attitude, float]:
+    """The body without symmetry that is timed, its start and its natural period."""
+    one = body_scenes()["heavy-brick"]
+    return one.top, one.start, one.time_scale()
+
+
 def tolerances_of(variant: Integrator) -> tuple[float, ...]:
     """The tolerances at which a variant is timed; one where its price does not depend on it."""
     return TOLERANCES if not variant.fixed_step and variant.order is None else (TOLERANCE,)
@@ -87,9 +96,10 @@ def tolerances_of(variant: Integrator) -> tuple[float, ...]:
 
 def run_of(variant: Integrator, tolerance: float, nutations: float, *, own: bool = True) -> Call:
     """The bare run of the top over so many nutations, of heyoka by its `own` loop."""
+    (chart,) = variant.solvers
     if own and variant.inner_loop == "heyoka":
-        return bare_heyoka(variant.charts()[0], tolerance, nutations)
-    (chart,), (top, start, period) = variant.charts(), timed_top()
+        return bare_heyoka(chart, tolerance, nutations)
+    top, start, period = timed_body() if chart == BODY else timed_top()
     solver, steps = variant.solvers[chart], max(round(nutations * FIRST * 2.0**FINE), 2)
     plan = Plan.steps(period * (nutations / steps), np.array([steps // 2, steps]))
     if not variant.fixed_step:
@@ -101,7 +111,7 @@ def bare_heyoka(chart: str, tolerance: float, nutations: float) -> Call:
     """heyoka's integrator on the same equations, top and times."""
     from symtop.methods.taylor.heyoka import start_numbers, stepper
 
-    top, start, period = timed_top()
+    top, start, period = timed_body() if chart == BODY else timed_top()
     state, parameters = start_numbers(chart, "double", top, start)
     one = stepper(chart, "double", tolerance)
 

@@ -168,7 +168,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
 
 
 @click.command(short_help="Find the cheapest integrator for an accuracy.")
-@click.argument("scene", shell_complete=completing("scenes"))
+@click.argument("scene", shell_complete=completing("all scenes"))
 @click.option("--accuracy", type=float, help="The largest error you accept, for example 1e-6; rad of an angle.")
 @click.option("--i-use", "engine", help="A physics engine, for example mujoco: what its settings make of the scene.")
 @click.option("--step-size", type=float, help="The step that you have; of the engine, 1/240 by default.")
@@ -178,13 +178,14 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
 @click.option("--needs", callback=common.separated, help="What you can supply: derivative,kicks or torque,inertia.")
 @click.option("--general", is_flag=True, help="Only what exists for a body without symmetry.")
 @click.option("--keeps", help="Only what does not let it drift: energy or momenta.")
-@click.option("--quantity", default="axis", show_default=True, help="Of what: axis, attitude, theta, energy, ...")
+@click.option("--quantity", help="Of what: axis, which is the default, attitude (that of a body), theta, energy, ...")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
 @click.option("--results", type=File(file_okay=False), help="Folder of a stored study; results by default.")
+@common.body_options
 @plugin_option
 @json_option
 def recommend(
-    scene: str, accuracy: float | None, engine: str | None, results: str | None, as_json: bool, **options: Any
+    scene: Any, accuracy: float | None, engine: str | None, results: str | None, as_json: bool, **options: Any
 ) -> None:
     """Find the cheapest integrator and step that meet an accuracy on a SCENE.
 
@@ -197,6 +198,7 @@ def recommend(
     symtop recommend spheroid --accuracy 1e-6 --needs derivative,kicks --keeps energy
     symtop recommend goldstein --accuracy 1e-3 --quantity attitude --horizon 1e4
     symtop recommend mine --plugin my_scene.py --accuracy 1e-9
+    symtop recommend tennis-racket --accuracy 1e-6
     symtop recommend goldstein --i-use mujoco --step-size 0.002
     """
     with ticking("loading"):

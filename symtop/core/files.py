@@ -7,6 +7,7 @@ until the folder is small enough. Another process may be doing the same.
 
 import contextlib
 import errno
+import functools
 import importlib.util
 import os
 import shutil
@@ -78,11 +79,16 @@ def distrust(path: Path) -> tuple[str, str]:
 
 
 def is_trusted(path: Path) -> bool:
-    """Can nobody else have written this file or folder of compiled code? A warning says why not."""
+    """Can nobody else have written this file or folder of compiled code? A warning says why not, once."""
     why, remedy = distrust(path)
     if why:
-        warnings.warn(f"kernels are compiled in memory, because {why}; {remedy}", SymtopWarning, stacklevel=2)
+        _warn(f"kernels are compiled in memory, because {why}; {remedy}")
     return not why
+
+
+@functools.cache
+def _warn(sentence: str) -> None:
+    warnings.warn(sentence, SymtopWarning, stacklevel=3)
 
 
 def touch(entry: Path) -> None:

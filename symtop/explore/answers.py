@@ -12,28 +12,32 @@ import base64
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from symtop.core import __version__
-from symtop.core.errors import SymtopError, finite, positive
+from symtop.core.errors import SymtopError, finite, one_of, positive
 from symtop.measure.conservation import CONSTANTS, residuals
 from symtop.methods.framework.plan import OUTCOMES, sentence
 from symtop.methods.framework.registry import Integrator, integrator, integrators
 from symtop.methods.lagrangian.damped_oscillator import Oscillator, discrete_path, notebook_positions, rule_sums
 from symtop.methods.lagrangian.damped_top import NEAR, Friction, damped_run, theta_before_pole
 from symtop.model import charts
+from symtop.model.body import rotated
 from symtop.model.exact.closed_form import ClosedForm
-from symtop.model.scenes import Scene, closed_form, horizon_of, scenes
+from symtop.model.scenes import Scene, all_scenes, body_scenes, closed_form, horizon_of
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.ensemble.ensemble import ensemble
-from symtop.run.simulation import integrate, simulate
+from symtop.run.reference.truth import reference
+from symtop.run.simulation import chart_of, integrate, simulate
+from symtop.run.trajectory import Trajectory
 
 TOP = ("I1", "I3", "mgl")
 START = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
+OF_BODY, RATES = ("I1", "I2", "I3", "mgl"), ("w1", "w2", "w3")  # the rest of a body and its start is its scene's
 MOST_STEPS = 2_000_000  # of one run; the common kernels take a quarter of a second for them
 MOST_WORK = {"compiled": 2e6, "python": 2e5}  # of an adaptive run: force evaluations or Taylor steps
 MOST_SECONDS = 2.0  # of an adaptive run, where that much work would take longer
@@ -119,14 +123,20 @@ def setup(fields: Mapping[str, Any]) -> Setup:
     """The run that a page asks for. Raises SymtopError if a field is missing or out of range."""
     if not isinstance(fields, Mapping):
         raise SymtopError(f"the question must be a mapping of names to values, not {fields!r}")
-    missing = [name for name in (*TOP, *START, "horizon", "integrator") if name not in fields]
+    of_body = fields.get("I2") is not None
+    names = (OF_BODY, RATES) if of_body else (TOP, START)
+    missing = [name for name in (*names[0], *names[1], "horizon", "integrator") if name not in fields]
     if missing:
         raise SymtopError(f"the question lacks {', '.join(missing)}")
-    top = SymmetricTop(*(finite(name, fields[name]) for name in TOP))
-    start = Angles(*(finite(name, fields[name]) for name in START))
+    top, start = (tuple(finite(name, fields[name]) for name in some) for some in names)
+    if of_body:
+        base = body_scenes()[one_of("base", str(fields.get("base")), body_scenes())]
+        moving = replace(base.top, **dict(zip(OF_BODY, top, strict=True))), replace(base.start, omega_body=start)
+    else:
+        moving = SymmetricTop(*top), Angles(*start)
+    scene = Scene(str(fields.get("scene", "explored")), *moving, horizon_of(fields["horizon"]))
     method = integrator(str(fields["integrator"]))
-    method.chart_for("attitude")  # refuses a variant such as rk4[axis]: the page shows the whole attitude
-    scene = Scene(str(fields.get("scene", "explored")), top, start, horizon_of(fields["horizon"]))
+    chart_of(method, scene.observes, "attitude")  # refuses a variant such as rk4[axis]: the page shows the attitude
     if method.control is None:
         return Setup(scene, method, None)
     setting = positive(method.control, fields.get(method.control))
@@ -147,40 +157,45 @@ def answer(chosen: Setup) -> dict[str, Any]:
     """A run beside the exact motion: attitudes, residuals, errors, and the sentences of the outcome and the guard.
 
     Arrays are base64 of float32, over `time`: ``attitude`` and ``truth`` (w, x, y, z in turn), ``theta``, ``energy``,
-    ``p_phi`` and ``p_psi`` (relative changes since the start), ``axis_error`` and ``attitude_error`` in radians, and
-    ``p_theta``. Values after a failure are NaN. ``true_theta`` and ``true_p_theta`` are the exact phase curve, one
-    nutation at 361 times.
+    ``p_phi`` and ``p_psi`` (relative changes since the start), ``axis_error`` and ``attitude_error`` in radians. Values
+    after a failure are NaN. Of a top also ``p_theta``, and the exact phase curve, ``true_theta`` and ``true_p_theta``,
+    one nutation at 361 times; of a body ``middle`` and ``true_middle``, the share of the angular momentum along the
+    axis of the middle moment, which changes its sign where the body flips.
     """
     began = time.perf_counter()
     warnings: list[str] = []
     run = integrate(chosen.scene, chosen.method, **chosen.arguments, guard=warnings.append)
     ran = time.perf_counter()
-    times = run.time
-    truth = closed_form(chosen.scene).quaternion(times)
-    period = float(np.nan_to_num(chosen.scene.nutation_period, posinf=0.0))
-    once = closed_form(chosen.scene)(np.linspace(0.0, period or chosen.scene.horizon, PORTRAIT))
-    attitude = charts.quaternion_from_angles(run.theta, run.phi, run.psi) if run.quaternion is None else run.quaternion
+    times, scene, attitude = run.time, chosen.scene, run.quaternion
+    period = float(np.nan_to_num(scene.nutation_period, posinf=0.0))
+    if scene.of_body:
+        true = Trajectory.of_data(reference(scene, times))
+        truth, own = true.quaternion, {"middle": _middle(scene, run), "true_middle": _middle(scene, true)}
+    else:
+        truth = closed_form(scene).quaternion(times)
+        once = closed_form(scene)(np.linspace(0.0, period or scene.horizon, PORTRAIT))
+        own = {"p_theta": run.p_theta, "true_theta": once.theta, "true_p_theta": scene.top.I1 * once.theta_dot}
+    if attitude is None:
+        attitude = charts.quaternion_from_angles(run.theta, run.phi, run.psi)
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
         arrays = {
             "time": times,
             "attitude": attitude,
             "truth": truth,
             "theta": run.theta,
-            "p_theta": run.p_theta,
-            "true_theta": once.theta,
-            "true_p_theta": chosen.scene.top.I1 * once.theta_dot,
-            **residuals(chosen.scene, run),
+            **own,
+            **residuals(scene, run),
             "axis_error": charts.axis_distance(run.axis, charts.axis_from_quaternion(truth)),
             "attitude_error": charts.attitude_distance(attitude, truth),
         }
         largest = {}
-        for name in (*CONSTANTS, "axis_error"):
+        for name in {*CONSTANTS, "axis_error", "attitude_error"} & {*arrays}:
             good = np.abs(arrays[name][np.isfinite(arrays[name])])
             largest[name] = float(good.max()) if good.size else None
         coded = {name: _float32(values) for name, values in arrays.items()}
     return {
         "outcome": run.outcome,
-        "message": sentence(run.outcome, run.reached_time, chosen.scene.horizon, chosen.scene.second),
+        "message": sentence(run.outcome, run.reached_time, scene.horizon, scene.second),
         "warnings": warnings,
         "steps": int(run.steps),
         "force_evaluations": int(run.force_evaluations),
@@ -190,6 +205,14 @@ def answer(chosen: Setup) -> dict[str, Any]:
         "largest": largest,
         "arrays": coded,
     }
+
+
+def _middle(scene: Scene, run: Trajectory) -> np.ndarray:
+    """The share of a body's angular momentum along the axis of its middle moment, (n,)."""
+    middle = np.eye(3)[np.argsort(scene.top.moments)[1]]
+    with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
+        along = np.sum(rotated(run.quaternion, middle) * run.momentum, axis=1)
+        return np.asarray(along / np.linalg.norm(run.momentum, axis=1))
 
 
 def _float32(values: Any) -> str:
@@ -203,6 +226,8 @@ def grid(fields: Mapping[str, Any]) -> tuple[Setup, np.ndarray, np.ndarray]:
     Raises SymtopError for a method without a step, a range that is empty, and a map of too many steps.
     """
     chosen = setup(fields)
+    if chosen.scene.of_body:
+        raise SymtopError(f"a map must be of a top, not of {chosen.scene.name}, a body without symmetry")
     if chosen.method.control != "step_size":
         raise SymtopError(f"integrator must be one with a step for a map, not {chosen.method.name!r}")
     least, most = (positive(name, fields.get(name)) for name in ("step_least", "step_most"))
@@ -329,18 +354,15 @@ def inclination(chosen: Setup, friction: float) -> dict[str, Any]:
 
 def script(chosen: Setup) -> str:
     """A Python script that makes the same dataset, to the bit."""
-    scene = chosen.scene
-    top = ", ".join(f"{name}={getattr(scene.top, name)!r}" for name in TOP)
-    start = ", ".join(f"{name}={getattr(scene.start, name)!r}" for name in START)
-    name, samples = chosen.method.name, chosen.samples
+    scene, name, samples = chosen.scene, chosen.method.name, chosen.samples
     options = "" if chosen.method.control is None else f", {chosen.method.control}={chosen.setting!r}"
     options += "" if chosen.budget is None else f", budget={chosen.budget!r}"
     return f'''"""A run of symtop explore, symtop {__version__}."""
 
 import symtop
 
-top = symtop.SymmetricTop({top})
-start = symtop.Angles({start})
+top = symtop.{scene.top!r}
+start = symtop.{scene.start!r}
 scene = symtop.Scene("{scene.name}", top, start, horizon={scene.horizon!r})
 run = symtop.simulate(scene, "{name}"{options}, observe="attitude", samples={samples})
 run.to_netcdf("explored.nc")
@@ -356,15 +378,20 @@ def catalogue() -> dict[str, Any]:
         {
             **{name: getattr(entry, name) for name in ("name", "purpose", "horizon")},
             "period": float(np.nan_to_num(entry.nutation_period, posinf=0.0)),
-            **{name: getattr(entry.top, name) for name in TOP},
-            **{name: getattr(entry.start, name) for name in START},
+            **{name: getattr(entry.top, name) for name in (OF_BODY if entry.of_body else TOP)},
+            **(
+                dict(zip(RATES, entry.start.omega_body, strict=True))
+                if entry.of_body
+                else {name: getattr(entry.start, name) for name in START}
+            ),
         }
-        for entry in scenes().values()
+        for entry in all_scenes().values()
     ]
     methods = [
         {
             **{name: getattr(entry, name) for name in ("name", "family", "summary", "control", "implementation")},
             "chart": entry.chart_for("attitude"),
+            "of_body": charts.BODY in entry.solvers,
             "tolerance": max(entry.default_tolerance or 1e-6, entry.least_tolerance),
             "color": style.look(entry.name).color,
         }

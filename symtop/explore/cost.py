@@ -17,7 +17,9 @@ from symtop.explore.answers import Setup, setup
 from symtop.judging.comparison import BUDGET, compare
 from symtop.measure.timing import bare_run, first_call
 from symtop.methods.framework.registry import Integrator, integrator
+from symtop.model.charts import BODY
 from symtop.model.scenes import Scene
+from symtop.run.simulation import chart_of
 
 BESIDE = ("stormer-verlet", "strang", "rk4", "gauss-4", "dop853-compiled")  # whatever method is chosen
 SHARE = 0.1  # of the evaluations that `compare` spends on a run
@@ -37,15 +39,17 @@ def question(fields: Mapping[str, Any]) -> list[Setup]:
 
 def _variants(asked: list[Setup]) -> dict[str, Integrator]:
     """Those of the question first, each in the chart that the page shows, by the name of the method."""
-    methods = [*(one.method for one in asked), *map(integrator, BESIDE)]
-    return {method.name: method.variant(method.chart_for("attitude")) for method in methods if method.control}
+    scene, beside = asked[0].scene, map(integrator, BESIDE)
+    methods = [*(one.method for one in asked), *(one for one in beside if not scene.of_body or BODY in one.solvers)]
+    return {one.name: one.variant(chart_of(one, scene.observes, "attitude")) for one in methods if one.control}
 
 
 def _line(scene: Scene, variant: Integrator) -> dict[str, Any]:
-    """Seconds and largest axis errors (rad) of the runs that ended well, and how many did not."""
+    """Seconds and largest errors (rad) of the axis, or of a body's attitude, of good runs, and how many failed."""
     budget = SHARE * BUDGET[variant.implementation] * min(variant.speed, 1.0)
     try:
-        data = compare(scene, [variant], budget=budget, quiet=True).isel(variant=0)
+        quantity = "attitude" if scene.of_body else "axis"
+        data = compare(scene, [variant], quantity=quantity, budget=budget, quiet=True).isel(variant=0)
     except Exception as problem:  # noqa: BLE001  (shown in the place of the line; the other lines are computed)
         words = str(problem) if isinstance(problem, SymtopError) else words_of(problem)
         return {"seconds": [], "error": [], "failed": 0, "message": words}
@@ -77,7 +81,7 @@ def _seconds(one: Setup) -> float | None:
 
     Not `timings`, which has the closed form compiled and so waits for whatever else is.
     """
-    chart = one.method.chart_for("attitude")
+    chart = chart_of(one.method, one.scene.observes, "attitude")
     setting = math.nan if one.setting is None else one.setting
     run = bare_run(one.scene, one.method, chart, setting, one.scene.horizon, budget=one.budget)
     if run().outcome != "ok":

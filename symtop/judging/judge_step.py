@@ -112,8 +112,7 @@ def judge(
     file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES)
     states = form is None and (file or isinstance(target, (xr.Dataset, Mapping)))
     chosen, listen = find_scene(scene, bodies=states), tell or (lambda _: None)
-    told = {"adaptive": adaptive, "autonomous": autonomous, "quick": quick}
-    for name, flag in told.items():
+    for name, flag in (("adaptive", adaptive), ("autonomous", autonomous), ("quick", quick)):
         boolean(name, flag)
     drawn = secrets.randbelow(SEEDS) if seed is None else whole("seed", seed, 0, SEEDS)
     structure: dict[str, Any] = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
@@ -123,12 +122,12 @@ def judge(
     if states:
         if set(structure.values()) != {None}:
             raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
-        constants = tuple(of_trajectory(target, chosen, kept, energy))
+        shown_by = of_trajectory(target, chosen, kept, energy)
         about = About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory", "", "", 0.0)
         listen(about)
-        for finding in constants:
+        for finding in shown_by:
             listen(finding)
-        return StepLedger(about.name, chosen.name, constants, {}, about)
+        return StepLedger(about.name, chosen.name, tuple(shown_by), {}, about)
     implied = {"time": not autonomous, "energy": energy is None and "energy" not in kept, "order": order is None}
     heartbeat.reset(quick=quick)
     began, findings = time.monotonic(), list[Finding]()
@@ -266,9 +265,7 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
         changed = changed._replace(exponent=math.nan)
     constant = Constant(changed, math.nan, KEPT * grain, grain)
     kind, verdict, off = constant.kind, constant.verdict(declared), abs(values[0] - true) / scale
-    why = f"largest relative change {changed.largest:.1e} in {time.size} samples; it begins {off:.1e} from the scene's"
-    if kind not in ("kept", "unknown"):
-        why += f", growth exponent {changed.exponent:.2f} +- {changed.exponent_interval:.2f}"
+    why = constant.words(f"in {time.size} samples; it begins {off:.1e} from the scene's")
     if verdict == "undecided":
         why += "; no law of growth to judge it by" if kind == "unknown" else ", which leaves open whether it grows"
     measured = NOTHING if kind == "unknown" else Measured(kind, changed.largest)

@@ -85,7 +85,7 @@ class Process:
             with contextlib.suppress(BrokenPipeError):
                 self.pipe.send((name, args))
             kind, answer = self._answer()
-        except _LostError as failure:
+        except SymtopError as failure:
             back = heartbeat.inside and heartbeat.step < 0.0 and not heartbeat.forward_only
             self.end()
             if back:
@@ -110,21 +110,21 @@ class Process:
         self.began = clock(self.process.pid)
 
     def _answer(self) -> Any:
-        """What the process sends; _LostError if it ends, hangs in a call or takes longer than it may."""
+        """What the process sends; SymtopError if it ends, hangs in a call or takes longer than it may."""
         calls, since = heartbeat.calls, clock(self.process.pid)
         while not self.pipe.poll(LOOK):
             now = clock(self.process.pid)
             if heartbeat.calls != calls or not heartbeat.inside:
                 calls, since = heartbeat.calls, now
             if now - since > heartbeat.allowed:
-                raise _LostError(f"a step of h = {heartbeat.step:.3g} had not returned after {now - since:.0f} s")
+                raise SymtopError(f"a step of h = {heartbeat.step:.3g} had not returned after {now - since:.0f} s")
             if now - self.began > self.limit:
                 self.late = self.limit / max(heartbeat.calls - self.calls, 1)
-                raise _LostError(f"it was not judged within {self.limit:.0f} s, at {1e3 * self.late:.2g} ms a call")
+                raise SymtopError(f"it was not judged within {self.limit:.0f} s, at {1e3 * self.late:.2g} ms a call")
         try:
             return json.loads(self.pipe.recv_bytes())
         except (EOFError, OSError, ValueError):
-            raise _LostError(self._death()) from None
+            raise SymtopError(self._death()) from None
 
     def _death(self) -> str:
         self.process.join(2.0)
@@ -135,10 +135,6 @@ class Process:
         self.output.seek(0)
         words = " ".join(self.output.read()[-4 * WORDS :].decode(errors="replace").split())[-WORDS:]
         return f"its process ended with code {code}{': ' if words else ''}{words}"
-
-
-class _LostError(Exception):
-    """A process was ended, or ended by itself: why."""
 
 
 def _serve(make: Callable[[], Table], asking: Any, pipe: Any, output: Any) -> None:
@@ -212,6 +208,10 @@ class Remote(Stepper):
         self.adaptive = functools.partial(_run, process, "adaptive") if facts["adaptive"] else None
         for name in FACTS:
             setattr(self, name, facts[name])
+
+    def clock(self) -> float:
+        """Seconds, less those in which the process waited for a processor."""
+        return clock(self.process.process.pid) if self.process.process else time.monotonic()
 
     def renew(self) -> None:
         """The next call is of a new process."""

@@ -18,13 +18,14 @@ from symtop.measure.phase import FREQUENCIES
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import Integrator, integrator, integrators, variants
 from symtop.model.scenes import Scene
-from symtop.run.simulation import likely_step
+from symtop.run.simulation import chart_of, likely_step
 
 LEAST_RUN = 6.37  # steps of a run: fewer samples do not show its error; not commensurate with the nutation
 LEAST_STEPS = 4.37  # a nutation, where the error of a constant is asked: long steps may keep it and miss the motion
 LOOSEST = 0.4  # tolerance
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)  # axis errors, rad, that studies of costs ask for
 ANGLES = ("axis", "attitude", "theta")
+OF_BODY = (*ANGLES, "energy", "p_phi")  # quantities of a body without symmetry
 TEDIOUS = 1e-8  # the least tolerance of an implicit method in Python: radau at 1e-12 takes a minute for ten nutations
 SHORT = 12.37  # nutations of a trial run
 LEAST = 0.3  # of the target: the least error that ends a search
@@ -186,8 +187,16 @@ def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, qu
 
 
 def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
-    """The least error of a quantity that the reference can judge over a horizon; NaN if the motion does not show it."""
-    return attempt(scene, integrators()["exact"], math.nan, horizon, quantity).bound
+    """The least error of a quantity that the reference can judge over a horizon; NaN if the motion does not show it.
+
+    Raises SymtopError for a horizon to which the motion of a body is not known.
+    """
+    if not scene.of_body:
+        return attempt(scene, integrators()["exact"], math.nan, horizon, quantity).bound
+    try:  # a few steps of any method, as the reference and its bound know none
+        return attempt(scene, integrators()["rk4"], horizon / LEAST_RUN, horizon, quantity).bound
+    except SymtopError as error:
+        raise SymtopError(error.renamed({"times": "horizon"}), "horizon") from error
 
 
 def search(
@@ -231,7 +240,7 @@ def seconds(scene: Scene, mets: Sequence[Met], quantity: str, horizon: float) ->
     """Wall times of bare runs to a horizon with settings, timed against each other; scaled from the runs that met."""
     runs = []
     for met in mets:
-        chart = met.integrator.chart_for(observed(quantity))
+        chart = chart_of(met.integrator, scene.observes, observed(quantity))
         runs.append(bare_run(scene, met.integrator, chart, met.setting, met.horizon))
     taken = timings(runs, batches=5, batch=0.002, patience=0.1, exact=False)
     return [timing.best * horizon / met.horizon for timing, met in zip(taken, mets, strict=True)]

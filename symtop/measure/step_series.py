@@ -48,6 +48,7 @@ class Series(NamedTuple):
     defect: Array  # |c_k| / |y_k|, k = 0 ...
     noise: Array  # what the samples leave in doubt of each
     backward: bool  # were steps of -h taken?
+    chart: str
 
     @property
     def resolved(self) -> int:
@@ -71,6 +72,22 @@ class Series(NamedTuple):
         """The largest defect of the terms up to h^power that are resolved."""
         return float(np.max(self.defect[: min(power, self.resolved) + 1], initial=0.0))
 
+    def least(self, power: int) -> float:
+        """The least defect of the h^power term, or of the last one that is there, that is told from none."""
+        return max(AGREES, SURE * float(self.noise[min(power, self.noise.size - 1)]))
+
+    def words(self, power: int) -> str:
+        """What it says of the order `power`."""
+        agreed = min(power, self.order)
+        if agreed < min(power, self.resolved):
+            return f"{self.wrong_term()}, in the {self.chart} chart"
+        return f"a step has the motion's terms up to h^{agreed} to {max(self.worst(agreed), 1e-16):.0e}"
+
+    def wrong_term(self) -> str:
+        """The first term that is not the motion's, if there is one."""
+        term = self.order + 1
+        return f"the h^{term} term of a step is off by {self.defect[term]:.1e} of itself (noise {self.noise[term]:.0e})"
+
 
 def step_series(step: StepMap, start: Angles, period: float) -> Series:
     """The series of a step from `start`, a point of a motion with that nutation period.
@@ -86,16 +103,19 @@ def step_series(step: StepMap, start: Angles, period: float) -> Series:
         lambda h: aligned(step.chart, step.image(z, h), before),
         lambda h: aligned(step.chart, motion(h), before),
         period,
+        step.chart,
     )
 
 
-def compared(image: Callable[[float], Array], motion: Callable[[float], Array], period: float) -> Series:
-    """The series of one function of h beside that of another, both (n,) and of order one."""
+def compared(
+    image: Callable[[float], Array], motion: Callable[[float], Array], period: float, chart: str = ""
+) -> Series:
+    """The series of one function of h beside that of another, both (n,) of one chart and of order one."""
     backward, width, best = True, WIDEST * period, None
     refusal = SymtopError("no step succeeds")
     for _ in range(TRIES):
         try:
-            fitted = _fitted(image, motion, width, backward=backward)
+            fitted = _fitted(image, motion, width, chart, backward=backward)
         except SymtopError as error:
             refusal = error
             if backward and _refuses(image, width):
@@ -126,7 +146,7 @@ def _refuses(image: Callable[[float], Array], width: float) -> bool:
 
 
 def _fitted(
-    image: Callable[[float], Array], motion: Callable[[float], Array], width: float, *, backward: bool
+    image: Callable[[float], Array], motion: Callable[[float], Array], width: float, chart: str, *, backward: bool
 ) -> tuple[float, Series]:
     """The noise of a fit over [-width, width], or [0, width], and the series that it finds."""
     nodes = np.cos(math.pi * (np.arange(NODES) + 0.5) / NODES)
@@ -149,7 +169,7 @@ def _fitted(
     weights[0] = 1.0 / NODES
     grown = np.sqrt((_to_powers(power, backward=backward) ** 2) @ weights)  # what a scatter of one makes of each power
     doubt = np.maximum(scatter * grown, moved)
-    return scatter, Series(width, np.max(np.abs(terms), axis=1) / size, doubt / size, backward)
+    return scatter, Series(width, np.max(np.abs(terms), axis=1) / size, doubt / size, backward, chart)
 
 
 def _degree(nodes: Array, values: Array) -> tuple[float, int]:

@@ -24,6 +24,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, finite, positive
 from symtop.core.jit_functions import inlined, two_product
+from symtop.core.numbers import EPSILON
 from symtop.model.top import LARGEST, bounded, unit, vector
 
 SLACK = 1e-12  # of the triangle inequality: moments come rounded
@@ -43,6 +44,12 @@ def vertical(w: Any, x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
     return 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z
 
 
+def _as_stored(given: Sequence[float], scaled: Sequence[float]) -> tuple[float, ...]:
+    """Numbers scaled to length one; as they are given if that is their rounding, so that a stored body is the same."""
+    near = all(abs(float(old) - new) <= 2.0 * EPSILON for old, new in zip(given, scaled, strict=True))
+    return tuple(float(number) for number in (given if near else scaled))
+
+
 @dataclass(frozen=True, slots=True)
 class Attitude:
     """An attitude and the angular velocity at one instant: the start of a `RigidBody`.
@@ -55,7 +62,7 @@ class Attitude:
     omega_body: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "quaternion", tuple(unit("quaternion", self.quaternion, 4)))
+        object.__setattr__(self, "quaternion", _as_stored(self.quaternion, unit("quaternion", self.quaternion, 4)))
         rates = (bounded("omega_body", rate) for rate in vector("omega_body", self.omega_body, 3))
         object.__setattr__(self, "omega_body", tuple(rates))
 
@@ -90,8 +97,8 @@ class RigidBody:
         length = math.hypot(*centre)
         if not 1.0 / LARGEST <= length <= LARGEST:
             raise SymtopError(f"centre must be a direction and of a length above zero, not {self.centre!r}", "centre")
-        object.__setattr__(self, "centre", tuple(part / length for part in centre))
-        object.__setattr__(self, "axes", tuple(unit("axes", self.axes, 4)))
+        object.__setattr__(self, "centre", _as_stored(centre, [part / length for part in centre]))
+        object.__setattr__(self, "axes", _as_stored(self.axes, unit("axes", self.axes, 4)))
 
     @classmethod
     def from_inertia(
@@ -202,7 +209,7 @@ def from_flat(row: Sequence[float]) -> tuple[RigidBody, Attitude]:
     body, start = object.__new__(RigidBody), object.__new__(Attitude)
     values = *row[:4], tuple(row[4:7]), tuple(row[7:11]), tuple(row[11:])
     for name, value in zip((*PARTS, "axes"), (*values, (1.0, 0.0, 0.0, 0.0)), strict=True):
-        object.__setattr__(start if name in Attitude.__slots__ else body, name, value)  # type: ignore[attr-defined]
+        object.__setattr__(start if name in Attitude.__slots__ else body, name, value)
     return body, start
 
 

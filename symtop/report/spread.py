@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError, one_of
 from symtop.model import charts, scenes
-from symtop.model.exact.closed_form import NUMBERS, ClosedForms
+from symtop.model.exact.closed_form import ClosedForms
+from symtop.model.top import NUMBERS
 from symtop.run.ensemble.inputs import read_members
 
 Array = NDArray[np.float64]

@@ -188,8 +188,8 @@ def long_run(
                     checkpoints.note(at, rows)
         data = netcdf.describe(
             _windowed(rows, ends, quantities), title=f"{title}, {count} steps", units=chosen.units,
-            integrator=method.name, scene=chosen.name, step_size=h, horizon=count * h, compensated=str(compensated).lower(),
-            outcome=OUTCOMES[outcome], reached_time=reached * h,
+            integrator=method.name, scene=chosen.name, step_size=h, horizon=count * h,
+            compensated=str(compensated).lower(), outcome=OUTCOMES[outcome], reached_time=reached * h,
             outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h, chosen.second),
         )  # fmt: skip
         if result is not None:

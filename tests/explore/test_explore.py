@@ -33,9 +33,12 @@ from tests.browser import Browser
 
 def fields(name="spheroid", integrator="midpoint", **changes):
     """What the page sends for a scene of the catalogue."""
-    entry = symtop.scene(name)
-    numbers = {name: getattr(entry.top, name) for name in answers.TOP}
-    numbers |= {name: getattr(entry.start, name) for name in answers.START}
+    entry = symtop.scene(name, bodies=True)
+    numbers = {name: getattr(entry.top, name) for name in (answers.OF_BODY if entry.of_body else answers.TOP)}
+    if entry.of_body:
+        numbers |= {"base": name, **dict(zip(answers.RATES, entry.start.omega_body, strict=True))}
+    else:
+        numbers |= {name: getattr(entry.start, name) for name in answers.START}
     return (
         numbers | {"horizon": entry.horizon, "integrator": integrator, "step_size": 0.02, "tolerance": 1e-6} | changes
     )
@@ -65,6 +68,28 @@ def test_an_answer_is_the_run_beside_the_truth(method):
         np.max(np.abs(energy - energy[0])) / chosen.scene.energy_scale, rel=1e-5
     )
     assert answer["outcome"] == "ok"
+
+
+def test_an_answer_on_a_body_is_the_run_beside_its_truth():
+    chosen = answers.setup(fields("heavy-brick", "rk4", I2=1.1, w3=2.5))
+    assert chosen.scene.top.centre == symtop.scene("heavy-brick", bodies=True).top.centre
+    assert chosen.scene.top.moments == (1.0, 1.1, 0.6)
+    answer, run = answers.answer(chosen), answers.dataset(chosen, str)
+    wrong, truth = symtop.errors(run), symtop.reference(chosen.scene, run["time"].values)
+    assert answer["largest"]["attitude_error"] == pytest.approx(float(wrong["attitude"].max()), rel=1e-6)
+    assert np.array_equal(unpacked(answer["arrays"]["truth"]).reshape(-1, 4), truth["quaternion"].astype(np.float32))
+    moment = run["momentum"].values[7] / np.linalg.norm(run["momentum"].values[7])
+    w, x, y, z = run["quaternion"].values[7]  # of the middle moment, I1, is the first axis
+    first = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]
+    assert unpacked(answer["arrays"]["middle"])[7] == pytest.approx(moment @ first, abs=1e-6)
+    assert not {"p_psi", "p_theta"} & {*answer["arrays"]}
+    for wrong, word in (({"base": "spheroid"}, "base"), ({"I2": 9.0}, "sum of the other"), ({"horizon": 1e9}, "known")):
+        with pytest.raises(SymtopError, match=word):
+            answers.answer(answers.setup(fields("heavy-chaotic", "rk4", **{"step_size": 1e3} | wrong)))
+    with pytest.raises(SymtopError, match="map must be of a top"):
+        answers.grid(fields("tennis-racket", "rk4"))
+    with pytest.raises(SymtopError, match="chart for bodies"):
+        answers.setup(fields("tennis-racket", "midpoint"))
 
 
 def test_the_map_of_an_engine_is_played_beside_the_truth_from_a_group_of_its_own():
@@ -128,10 +153,16 @@ def test_a_question_that_lacks_something_says_what():
         answers.setup(["spheroid"])
 
 
-@pytest.mark.parametrize("method", ["trapezoidal", "rk45", "exact"])
-def test_the_script_makes_the_same_dataset_to_the_bit(method, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("method", "scene", "changes"),
+    [
+        *((method, "goldstein", {"theta": 0.7123456789}) for method in ("trapezoidal", "rk45", "exact")),
+        ("strang", "tennis-racket", {"w1": 0.0123456789, "horizon": 70.0}),
+    ],
+)
+def test_the_script_makes_the_same_dataset_to_the_bit(method, scene, changes, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    chosen = answers.setup(fields("goldstein", method, theta=0.7123456789))
+    chosen = answers.setup(fields(scene, method, **changes))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SymtopWarning)  # the guard's, which the page has shown
         exec(compile(answers.script(chosen), "explored.py", "exec"), {})
@@ -420,6 +451,12 @@ def test_the_first_chart_of_costs_is_there_at_once_and_its_lines_are_those_of_co
     assert np.argmin(lines["trapezoidal"]["error"]) in slower[-2:]
     again = costs(integrator="trapezoidal", second="strang", horizon=7.5)
     assert again["lines"] == whole["lines"]  # stored; the runs of the page are timed again
+
+
+def test_the_chart_of_a_body_has_the_methods_that_step_it():
+    lines = {line["name"]: line for line in costs(name="tennis-racket", integrator="gauss-2", second="strang")["lines"]}
+    assert {*lines} == {"gauss-2", "strang", "rk4", "gauss-4", "dop853-compiled"}
+    assert all(min(line["error"]) < 1e-3 and not line["message"] for line in lines.values())
 
 
 def test_the_run_of_the_page_is_a_point_on_the_line_of_its_method():

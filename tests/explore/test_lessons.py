@@ -121,12 +121,12 @@ def test_a_hand_reaches_everything_and_every_text_can_be_read(site):
 
 SHOWN = r'\s+scene: "(.*?)", integrator: "(.*?)", second: "(.*?)", step_size: (.*?),'
 STORIES = {  # the scene, the methods and the step of each in stories.js
-    name: found for name, *found in re.findall(rf'^  "?([a-z ]+)"?: {{{SHOWN}', TOLD, re.MULTILINE)
+    name: found for name, *found in re.findall(rf'^  "?([a-z -]+)"?: {{{SHOWN}', TOLD, re.MULTILINE)
 }
 
 
 def test_every_story_is_looked_into():
-    assert {*STORIES} == {"cusp", "loop", "sleeping", "pole jump", "resonance"}
+    assert {*STORIES} == {"cusp", "loop", "sleeping", "pole jump", "resonance", "tennis-racket"}
     looked = [name for name in globals() if name.startswith("test_what_the_story_of_")]
     assert len(looked) == len(STORIES)
 
@@ -181,3 +181,46 @@ def test_what_the_story_of_the_resonance_says():
     assert told("resonance")["largest"]["axis_error"] < 1e-6
     assert told("resonance", step_size=0.21)["outcome"] != "ok"
     assert told("resonance", True, step_size=0.21)["outcome"] == "ok"
+
+
+def test_what_the_story_of_the_tennis_racket_says():
+    def flips(answer, name="middle"):
+        time, along = (np.frombuffer(base64.b64decode(answer["arrays"][key]), "<f4") for key in ("time", name))
+        k = np.flatnonzero(along[:-1] * along[1:] < 0.0)
+        return time[k] + (time[k + 1] - time[k]) * along[k] / (along[k] - along[k + 1])
+
+    exact, late = [14.9, 42.4, 69.9, 97.5], [13.3, 37.7, 62.2, 86.7]
+    shown, good = told("tennis-racket"), told("tennis-racket", True)
+    np.testing.assert_allclose(flips(good, "true_middle"), exact, atol=0.1)
+    np.testing.assert_allclose(flips(good), exact, atol=0.1)
+    np.testing.assert_allclose(flips(shown), late, atol=0.1)
+    assert max(shown["largest"]["energy"], good["largest"]["energy"]) < 1e-15
+    fine = flips(told("tennis-racket", step_size=0.1))
+    assert fine[-1] - exact[-1] == pytest.approx(-0.2, abs=0.1)
+    assert symtop.scene("tennis-racket", bodies=True).nutation_period / 0.6 == pytest.approx(10.0, abs=0.6)
+
+
+def test_a_body_is_two_bricks_side_by_side(site):
+    with Browser(1280, 1000) as browser:
+        browser.open(address(site))
+        browser.wait_for("document.body.dataset.answer === 'ok'")
+        browser.click("#play")
+        answered(browser, "#story", "tennis-racket")
+        browser.wait_for("document.querySelector('#status').textContent.startsWith('lie-variational: reached t = 100')")
+        visible = "document.querySelector('{}').checkVisibility()"
+        shown = {
+            name: browser.evaluate(visible.format(name)) for name in ("#plot-middle", "#I2", "#w2", "#map", "#theta")
+        }
+        assert shown == {"#plot-middle": True, "#I2": True, "#w2": True, "#map": False, "#theta": False}
+        before = browser.evaluate("document.querySelector('#sphere').toDataURL().length")
+        answered(browser, "#I1-slider", 0.2)  # and the sides of the bricks
+        browser.wait_for(f"document.querySelector('#sphere').toDataURL().length !== {before}")
+        assert browser.evaluate("document.querySelector('#scene').selectedOptions[0].text") == "tennis-racket (edited)"
+        assert browser.evaluate(
+            "[...document.querySelector('#integrator').options].find((o) => o.value === 'midpoint').disabled"
+        )
+        answered(browser, "#scene", "goldstein")
+        assert browser.evaluate(visible.format("#map"))
+        assert not browser.evaluate(visible.format("#I2"))
+        assert browser.evaluate("document.querySelector('#watch').textContent") == ""
+        assert browser.problems == []

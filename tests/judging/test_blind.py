@@ -16,14 +16,15 @@ import symtop
 from symtop.judging import battery
 from symtop.judging.claims import order
 from symtop.judging.findings import description
+from symtop.judging.remote import Remote
 from tests.judging.blind import right, wrong
 
 BLIND = Path(__file__).parent / "blind"
 right.INERTIA = symtop.scene("spheroid").top.I1
-needs_awk = pytest.mark.skipif(shutil.which("awk") is None, reason="there is no awk")
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no C compiler")
 SPLIT = {"symplectic": True, "symmetric": True, "conserves": ["p_phi", "p_psi"], "energy": "bounded"}
 SHOWN = ("order", "symplectic", "symmetric")  # claims that every right step must have confirmed
+PROGRAM = {"form": "program"}
 
 
 def compiled(folder, source, *options, program=False):
@@ -40,8 +41,10 @@ def step_of(name, *modules):
 
 
 def confirmed(ledger, *claims):
-    """Nothing is refuted, and these claims are confirmed."""
+    """Nothing is refuted, these claims are confirmed, and the order in time is that of the claim if it is."""
     assert ledger.refuted == [], str(ledger)
+    time = [one for one in ledger.findings if one.claim == "time" and one.verdict == "confirmed"]
+    assert all(str(one.measured.number) == one.declared for one in time)
     assert {ledger[claim].verdict for claim in claims} <= {"confirmed"}, str(ledger)
 
 
@@ -93,52 +96,57 @@ def test_a_correct_method_is_not_refuted_in_another_chart(name, chart):
     confirmed(symtop.judge(step_of(name, right), chart=chart, quick=True, order=order), "order")
 
 
+def slowly(*values):
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
 @needs_compiler
 @pytest.mark.parametrize(
-    ("options", "order"),
-    [((), 2), *(pytest.param((option,), 4, marks=pytest.mark.slow) for option in ("-DYOSHIDA", "-DMCLACHLAN"))],
+    ("source", "options", "claims", "refuted"),
+    [
+        ("strang.c", (), {"order": 2, **SPLIT}, ""),
+        slowly("strang.c", ("-DYOSHIDA",), {"order": 4, **SPLIT}, ""),
+        slowly("strang.c", ("-DMCLACHLAN",), {"order": 4, **SPLIT}, ""),
+        slowly("tricks.c", ("-DKIND=3",), {"order": 2, "symplectic": False}, ""),
+        slowly("strang.c", (), {"order": 2, **SPLIT, **PROGRAM}, ""),
+        ("wrong.c", ("-DKIND=0",), {"order": 3}, "order"),
+        slowly("wrong.c", ("-DKIND=1",), {"order": 4}, "order"),
+        slowly("wrong.c", ("-DKIND=2",), {"order": 4}, "order"),
+        slowly("wrong.c", ("-DKIND=3",), {"order": 2}, "order"),
+        slowly("tricks.c", ("-DKIND=0",), {"order": 2}, "order"),
+        slowly("tricks.c", ("-DKIND=1",), {"order": 2}, "calls"),
+        slowly("tricks.c", ("-DKIND=2",), {"order": 1, "symplectic": True}, "symplectic"),
+        slowly("wrong.c", ("-DKIND=9",), {"order": 2, **PROGRAM}, "calls"),  # time is summed in single precision
+    ],
 )
-def test_a_correct_library_is_not_refuted(tmp_path, options, order):
-    ledger = symtop.judge(compiled(tmp_path, "strang.c", *options), quick=True, order=order, **SPLIT)
-    confirmed(ledger, "order", "symplectic", "symmetric", "energy", "p_phi", "p_psi")
-
-
-@needs_compiler
-@pytest.mark.slow
-def test_an_explicit_library_is_not_refuted(tmp_path):
-    ledger = symtop.judge(compiled(tmp_path, "tricks.c", "-DKIND=3"), quick=True, order=2, symplectic=False)
-    confirmed(ledger, "order", "symplectic")
-
-
-@needs_compiler
-@pytest.mark.slow
-def test_a_correct_program_is_not_refuted(tmp_path):
-    command = compiled(tmp_path, "strang.c", program=True)
-    confirmed(symtop.judge(command, form="program", quick=True, order=2, **SPLIT), "order", "symplectic", "p_psi")
+def test_what_is_written_in_c(tmp_path, source, options, claims, refuted):
+    target = compiled(tmp_path, source, *options, program="form" in claims)
+    ledger = symtop.judge(target, quick=True, **claims)
+    if refuted:
+        assert refuted in ledger.refuted, str(ledger)
+    else:
+        kept = ("energy", "p_phi", "p_psi") if "energy" in claims else ()
+        confirmed(ledger, *(claim for claim in claims if claim in SHOWN), *kept)
 
 
 @needs_compiler
 def test_the_order_of_a_correct_program_is_confirmed(tmp_path, only, monkeypatch):
     only("calls", "order")
     monkeypatch.setattr(order, "DRAWS", (96, 8))
-    command = compiled(tmp_path, "strang.c", program=True)
-    confirmed(symtop.judge(command, form="program", quick=True, order=2), "order")
+    confirmed(symtop.judge(compiled(tmp_path, "strang.c", program=True), quick=True, order=2, **PROGRAM), "order")
 
 
 @pytest.mark.slow
-def test_a_correct_program_that_writes_raw_doubles_is_not_refuted():
-    command = f"{sys.executable} {BLIND / 'heun_program.py'}"
-    confirmed(symtop.judge(command, form="program", quick=True, order=2, symplectic=False), "order", "symplectic")
-
-
-@needs_awk
-@pytest.mark.slow
-def test_a_program_in_awk_is_not_refuted_and_one_that_writes_six_digits_is():
+def test_programs_of_other_languages():
+    """One in Python writes raw doubles, one in awk all digits or six."""
+    python = f"{sys.executable} {BLIND / 'heun_program.py'}"
+    confirmed(symtop.judge(python, quick=True, order=2, symplectic=False, **PROGRAM), "order", "symplectic")
     for digits, refuted in ((), False), (("-v OUT=%.6g",), True):
-        command = " ".join(["awk", *digits, "-f", str(BLIND / "midpoint.awk")])
-        ledger = symtop.judge(command, form="program", quick=True, order=2, conserves=["p_phi"])
-        assert ("order" in ledger.refuted) is refuted, str(ledger)
-        assert ledger["order"].verdict == ("refuted" if refuted else "confirmed")
+        if shutil.which("awk"):
+            command = " ".join(["awk", *digits, "-f", str(BLIND / "midpoint.awk")])
+            ledger = symtop.judge(command, quick=True, order=2, conserves=["p_phi"], **PROGRAM)
+            assert ("order" in ledger.refuted) is refuted, str(ledger)
+            assert ledger["order"].verdict == ("refuted" if refuted else "confirmed")
 
 
 def test_the_stages_of_an_implicit_class_are_solved_and_newton_is_left_as_it_was(only):
@@ -190,34 +198,6 @@ def test_a_step_that_tires_after_a_hundred_thousand_is_found_in_full():
     assert "calls" in symtop.judge(wrong.tires, order=4).refuted
 
 
-@needs_compiler
-@pytest.mark.parametrize(
-    ("source", "kind", "claims", "line"),
-    [
-        ("wrong.c", 0, {"order": 3}, "order"),
-        *(
-            pytest.param(*case, marks=pytest.mark.slow)
-            for case in (
-                ("wrong.c", 1, {"order": 4}, "order"), ("wrong.c", 2, {"order": 4}, "order"),
-                ("wrong.c", 3, {"order": 2}, "order"), ("tricks.c", 0, {"order": 2}, "order"),
-                ("tricks.c", 1, {"order": 2}, "calls"),
-                ("tricks.c", 2, {"order": 1, "symplectic": True}, "symplectic"),
-            )
-        ),
-    ],
-)  # fmt: skip
-def test_a_wrong_library_is_caught(tmp_path, source, kind, claims, line):
-    ledger = symtop.judge(compiled(tmp_path, source, f"-DKIND={kind}"), quick=True, **claims)
-    assert line in ledger.refuted, str(ledger)
-
-
-@needs_compiler
-@pytest.mark.slow
-def test_time_that_is_summed_in_single_precision_is_caught(tmp_path):
-    command = compiled(tmp_path, "wrong.c", "-DKIND=9", program=True)
-    assert "calls" in symtop.judge(command, form="program", quick=True, order=2).refuted
-
-
 # ---- what is said ----------------------------------------------------------------------------------------------------
 
 
@@ -225,6 +205,12 @@ def test_time_that_is_summed_in_single_precision_is_caught(tmp_path):
 def test_random_noise_is_no_memory(name, only):
     only("calls")
     assert symtop.judge(step_of(name, wrong, right), quick=True)["calls"].measured.kind == "not repeatable"
+
+
+def test_what_remembers_a_state_is_caught_where_no_process_is_new(only, monkeypatch):
+    only("calls")
+    monkeypatch.setattr(Remote, "renew", lambda _: None)
+    assert symtop.judge(wrong.adams_from_memory, quick=True, order=2).refuted == ["calls"]
 
 
 def test_without_a_claim_it_says_the_order_that_a_step_has_and_not_the_slope(only):

@@ -339,7 +339,7 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
         (lambda: symtop.simulate("heavy-brick", "rk4", step_size=1, observe="nutation"), "known: axis, attitude"),
         (lambda: symtop.long_run("heavy-brick", "midpoint", step_size=1, steps=9), "must have a chart for bodies"),
         (lambda: symtop.long_run("heavy-brick", "vern9", step_size=0.1, steps=9), "no compiled loop of fixed steps"),
-        (lambda: symtop.recommend("heavy-brick", accuracy=1e-3), "SymmetricTop here, not heavy-brick"),
+        (lambda: symtop.recommend("heavy-chaotic", accuracy=1e-3, horizon=99.0), "horizon must be below"),
         (lambda: symtop.reference("heavy-brick", [1.0], certify="digits"), "certify must be None on heavy-brick"),
     ],
 )  # fmt: skip
@@ -347,3 +347,18 @@ def test_what_is_no_body_or_takes_none_is_refused(make, words: str) -> None:  # 
     with pytest.raises(symtop.SymtopError) as refused:
         make()
     assert words in str(refused.value)
+
+
+def test_a_stored_body_is_read_back_to_the_bit():
+    """Numbers of length one but for their rounding are not scaled again; others are."""
+    run = symtop.simulate("heavy-brick", "rk4", step_size=0.01, guard=False)
+    assert float(symtop.errors(run, "heavy-brick")["attitude"].max()) == float(symtop.errors(run)["attitude"].max())
+    other = symtop.scene("heavy-chaotic", bodies=True)
+    with pytest.raises(symtop.SymtopError, match="scene must be that of the data"):
+        symtop.errors(run, other)
+    draws = np.random.default_rng(0).normal(size=(500, 4))
+    for w, x, y, z in draws:
+        body = symtop.RigidBody(1.0, 1.2, 0.9, 1.0, (x, y, z))
+        start = symtop.Attitude(np.array([w, x, y, z]) / np.linalg.norm([w, x, y, z]))
+        assert (dataclasses.replace(body), dataclasses.replace(start)) == (body, start)
+    assert symtop.RigidBody(1.0, 1.2, 0.9, 1.0, (0.0, 0.0, 1.0 + 1e-15)).centre == (0.0, 0.0, 1.0)

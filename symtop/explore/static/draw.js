@@ -79,35 +79,71 @@ export class Sphere {
     this.elevation = Math.min(1.55, Math.max(-1.55, this.elevation - up));
   }
 
+  // A top with the path of the second method beside it; of bodies two, each with its name.
   draw(run, place, second) {
     const [context, width, height] = surface(this.canvas);
-    const scale = 0.46 * Math.min(width, height);
+    const shown = run && run.sides && second ? [run, second] : [run];
+    const scale = 0.46 * Math.min(width / shown.length, height);
     this.context = context;
-    this.at = (point) => {
-      const [x, y, depth] = this.project(point);
-      return [width / 2 + scale * x, height / 2 - scale * y, depth];
-    };
     context.lineJoin = context.lineCap = "round";
-    context.fillStyle = tone("tint");
-    context.strokeStyle = tone("line");
-    context.lineWidth = 1;
-    context.beginPath();
-    context.arc(width / 2, height / 2, scale, 0, 2 * Math.PI);
-    context.fill();
-    context.stroke();
     const circle = Array.from({ length: 73 }, (_, k) => [Math.cos((k * Math.PI) / 36), Math.sin((k * Math.PI) / 36)]);
-    [[1, 2], [0, 2], [0, 1]].forEach(([i, j], k) => {
-      this.line(circle.map(([c, s]) => { const p = [0, 0, 0]; p[i] = c; p[j] = s; return p; }), TRIAD[k], 0.8, 0.55, true);
+    shown.forEach((one, n) => {
+      const middle = (width * (n + 0.5)) / shown.length;
+      this.at = (point) => {
+        const [x, y, depth] = this.project(point);
+        return [middle + scale * x, height / 2 - scale * y, depth];
+      };
+      context.fillStyle = tone("tint");
+      context.strokeStyle = tone("line");
+      context.lineWidth = 1;
+      context.beginPath();
+      context.arc(middle, height / 2, scale, 0, 2 * Math.PI);
+      context.fill();
+      context.stroke();
+      [[1, 2], [0, 2], [0, 1]].forEach(([i, j], k) => {
+        this.line(circle.map(([c, s]) => { const p = [0, 0, 0]; p[i] = c; p[j] = s; return p; }), TRIAD[k], 0.8, 0.55, true);
+      });
+      if (!one) return;
+      const here = one === second ? second.place(place) : place;
+      this.path(one.truth, here, GHOST, 2.2, [2, 4], one);
+      this.path(one.attitude, here, one.color, 1.4, [], one);
+      if (second && shown.length === 1) this.path(second.attitude, second.place(place), second.color, 1.8, [7, 4], second);
+      this.rods(attitudeAt(one.truth, here), true);
+      const now = attitudeAt(one.attitude, here);
+      if (now.every(Number.isFinite)) {
+        if (one.sides) this.brick(now, one.sides, one.color); else this.body(now, one.width, one.color);
+        this.rods(now, false);
+      }
+      if (shown.length === 1) return;
+      context.fillStyle = tone("ink");
+      context.font = "bold 13px system-ui, 'DejaVu Sans', sans-serif";
+      context.textAlign = "center";
+      context.fillText(one.name, middle, height - 4);
     });
-    if (!run) return;
-    this.path(run.truth, place, GHOST, 2.2, [2, 4], run.trail);
-    this.path(run.attitude, place, run.color, 1.4, [], run.trail);
-    if (second) this.path(second.attitude, (place / (run.time.length - 1)) * (second.time.length - 1), second.color, 1.8, [7, 4], second.trail);
-    this.rods(attitudeAt(run.truth, place), true);
-    const now = attitudeAt(run.attitude, place);
-    if (!now.every(Number.isFinite)) return;
-    this.body(now, run.width, run.color);
-    this.rods(now, false);
+  }
+
+  // A body as the brick of its moments, the far faces first.
+  brick(attitude, sides, color) {
+    const { context } = this, axes = bodyAxes(...attitude);
+    const point = (signs) => [0, 1, 2].map((i) => signs.reduce((sum, sign, k) => sum + sign * sides[k] * axes[k][i], 0));
+    const faces = [0, 1, 2].flatMap((k) => [-1, 1].map((sign) => [[-1, -1], [-1, 1], [1, 1], [1, -1]].map(([one, other]) => {
+      const signs = [0, 0, 0];
+      signs[k] = sign; signs[(k + 1) % 3] = one; signs[(k + 2) % 3] = other;
+      return this.at(point(signs));
+    })));
+    const depth = (face) => face.reduce((sum, corner) => sum + corner[2], 0);
+    context.fillStyle = context.strokeStyle = color;
+    context.lineWidth = 1.2;
+    for (const face of faces.sort((one, other) => depth(one) - depth(other))) {
+      context.beginPath();
+      face.forEach(([x, y], n) => { if (n) context.lineTo(x, y); else context.moveTo(x, y); });
+      context.closePath();
+      context.globalAlpha = 0.22;
+      context.fill();
+      context.globalAlpha = 0.9;
+      context.stroke();
+    }
+    context.globalAlpha = 1;
   }
 
   // The top as a cone on its point, as wide as its inertia says; every third sector is darker, so that it is seen to spin.
@@ -143,7 +179,7 @@ export class Sphere {
     context.globalAlpha = 1;
   }
 
-  path(samples, place, color, width, dash, trail) {
+  path(samples, place, color, width, dash, { trail, shown }) {
     const { context } = this;
     const end = Math.floor(place);
     context.setLineDash(dash);
@@ -155,7 +191,7 @@ export class Sphere {
       let pen = false;
       for (let k = Math.max(0, end - trail); k <= end; k++) {
         const [w, x, y, z] = samples.subarray(4 * k, 4 * k + 4);
-        const [px, py, depth] = this.at([2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z]);
+        const [px, py, depth] = this.at(bodyAxes(w, x, y, z)[shown]);
         if (!Number.isFinite(px) || depth >= 0 !== front) { pen = false; continue; }
         if (pen) context.lineTo(px, py); else context.moveTo(px, py);
         pen = true;

@@ -8,9 +8,10 @@ import { STORIES } from "./stories.js";
 
 const $ = (id) => document.getElementById(id);
 // name, label with its unit, least, most of the slider, logarithmic; a rate's slider spans twice the scene's own value
-const TOP = [["I1", "I1 (kg m²)", 0.01, 20, true], ["I3", "I3 (kg m²)", 0.01, 20, true], ["mgl", "mgl (N m)", -40, 160, false]];
+const TOP = [["I1", "I1 (kg m²)", 0.01, 20, true], ["I2", "I2 (kg m²)", 0.01, 20, true], ["I3", "I3 (kg m²)", 0.01, 20, true], ["mgl", "mgl (N m)", -40, 160, false]];
 const START = [
   ["theta", "theta (rad)", 0.01, 3.13, false], ["phi", "phi (rad)", -3.1416, 3.1416, false], ["psi", "psi (rad)", -3.1416, 3.1416, false],
+  ["w1", "rate w1 (rad/s)", -3, 3, false], ["w2", "rate w2 (rad/s)", -3, 3, false], ["w3", "rate w3 (rad/s)", -3, 3, false],
   ["theta_dot", "theta' (rad/s)", -2, 2, false], ["phi_dot", "phi' (rad/s)", -5, 5, false], ["psi_dot", "psi' (rad/s)", -10, 10, false],
 ];
 const SETTINGS = [["step_size", "step (s)", 1e-5, 1, true], ["tolerance", "tolerance", 1e-13, 1e-2, true], ["horizon", "time (s)", 0.5, 500, true]];
@@ -19,7 +20,7 @@ const DAMPED = {  // the path of a question: the names that it depends on, and t
   oscillator: { of: ["friction", "oscillator_step"], curves: { midpoint: "#0072b2", trapezoidal: "#e69f00", guess: "#cc79a7" } },
   "damped-top": { of: ["friction", "step_size", "horizon", ...[...TOP, ...START].map(([name]) => name)], curves: { midpoint: "#0072b2" } },
 };
-const PLOTS = ["axis_error", "energy", "p_phi", "p_psi"];
+const PLOTS = ["axis_error", "attitude_error", "energy", "p_phi", "p_psi"];
 
 const values = {};
 const rows = {};
@@ -47,7 +48,7 @@ function control([name, label, least, most, logarithmic], group) {
   const show = (value) => { number.value = +value.toPrecision(6); slider.value = forth(value); };
   slider.addEventListener("input", () => { values[name] = +back(+slider.value).toPrecision(6); number.value = values[name]; changed(group); });
   number.addEventListener("change", () => { values[name] = number.value === "" ? null : +number.value; slider.value = forth(values[name]); changed(group); });
-  const span = (value) => { if (name.endsWith("_dot")) Object.assign(slider, { min: Math.min(least, -2 * Math.abs(value)), max: Math.max(most, 2 * Math.abs(value)) }); };
+  const span = (value) => { if (/_dot$|^w\d$/.test(name)) Object.assign(slider, { min: Math.min(least, -2 * Math.abs(value)), max: Math.max(most, 2 * Math.abs(value)) }); };
   rows[name] = { row, set: (value) => { values[name] = value; span(value); show(value); } };
 }
 
@@ -65,6 +66,9 @@ function edited(group) {
   $("reset").disabled = false;
 }
 
+const ofBody = () => document.body.classList.contains("a-body");  // a body without symmetry, and no top
+const errorOf = (largest) => largest[ofBody() ? "attitude_error" : "axis_error"];
+
 function chosen() {
   return catalogue.integrators.find((entry) => entry.name === values.integrator);
 }
@@ -75,7 +79,15 @@ function chooseScene(name) {
   for (const option of $("scene").options) option.text = option.value;
   values.scene = name;
   $("reset").disabled = true;
-  for (const [key] of [...TOP, ...START]) rows[key].set(entry[key]);
+  document.body.classList.toggle("a-body", "I2" in entry);
+  for (const [key] of [...TOP, ...START]) {
+    rows[key].row.hidden = !(key in entry);
+    if (key in entry) rows[key].set(entry[key]); else values[key] = null;
+  }
+  for (const option of document.querySelectorAll("#integrator option, #second option")) option.disabled = ofBody() && !(catalogue.integrators.find((one) => one.name === option.value) || { of_body: true }).of_body;
+  for (const [id, other] of [["second", ""], ["integrator", "rk4"]]) if ($(id).selectedOptions[0].disabled) $(id).value = other;
+  values.second = $("second").value;
+  if ($("integrator").value !== values.integrator) chooseIntegrator($("integrator").value);
   rows.horizon.set(entry.horizon);
   rows.step_size.set(+((entry.period || entry.horizon) / 60).toPrecision(2));
   place = 0;
@@ -94,9 +106,9 @@ function chooseStory(name) {
   $("watch").textContent = story ? story.watch : "";
   if (!story) return;
   $("scene").value = story.scene;
+  chooseScene(story.scene);
   $("integrator").value = story.integrator;
   $("second").value = values.second = story.second;
-  chooseScene(story.scene);
   chooseIntegrator(story.integrator);
   rows.step_size.set(story.step_size);
   ask();
@@ -111,12 +123,11 @@ function restore() {
   const kept = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
   if (!catalogue.scenes.some((scene) => scene.name === kept.base) || !catalogue.integrators.some((entry) => entry.name === kept.integrator)) return false;
   $("scene").value = kept.base;
-  $("integrator").value = kept.integrator;
-  $("second").value = kept.second || "";
-  values.second = $("second").value;
   chooseScene(kept.base);
+  $("integrator").value = kept.integrator;
+  $("second").value = values.second = kept.second || "";
   chooseIntegrator(kept.integrator);
-  for (const [name, row] of Object.entries(rows)) if (name in kept && Number.isFinite(+kept[name])) row.set(+kept[name]);
+  for (const [name, row] of Object.entries(rows)) if (name in kept && values[name] !== null && Number.isFinite(+kept[name])) row.set(+kept[name]);
   if (kept.scene !== kept.base) edited("start");
   ask();
   return true;
@@ -125,7 +136,7 @@ function restore() {
 function chooseIntegrator(name) {
   values.integrator = name;
   const { summary, chart, control, tolerance } = chosen();
-  $("summary").textContent = `${summary} (shown in the ${chart} chart)`;
+  $("summary").textContent = `${summary} (shown in the ${ofBody() ? "body" : chart} chart)`;
   const controls = [control, values.second && catalogue.integrators.find((entry) => entry.name === values.second).control];
   for (const name of ["step_size", "tolerance"]) rows[name].row.hidden = !controls.includes(name);
   if (control === "tolerance") rows.tolerance.set(tolerance);
@@ -133,7 +144,7 @@ function chooseIntegrator(name) {
 }
 
 async function post(path, changes) {
-  return fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ ...values, ...changes }) });
+  return fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ ...values, base: $("scene").value, ...changes }) });
 }
 
 // One request at a time; changes made meanwhile lead to one more, with the newest values.
@@ -163,6 +174,7 @@ async function ask() {
 // compiled: meanwhile runs are answered.
 async function askMap() {
   if (mapping) return;
+  if (ofBody()) { clearTimeout(patient); patient = setTimeout(askCost, 300); return; }
   const range = mapRange();
   const question = JSON.stringify({ ...values, ...range, scene: "", step_size: 0, psi_dot: 0, tolerance: 0, second: "", friction: 0, oscillator_step: 0 });
   clearTimeout(patient);
@@ -201,6 +213,7 @@ async function askCost() {
 const askDamped = () => Object.keys(DAMPED).forEach(askOneDamped);
 
 async function askOneDamped(name) {
+  if (ofBody() && name === "damped-top") return;
   const one = DAMPED[name], question = JSON.stringify(one.of.map((key) => values[key]));
   if (one.asking || question === one.answered) return;
   one.asking = true;
@@ -230,12 +243,20 @@ function refuse(sentence) {
   document.body.dataset.answer = "refused";
 }
 
+// The half sides of a homogeneous brick with the moments of the page, half a diagonal of 0.8 in all, and its middle axis.
+function brick() {
+  const moments = [values.I1, values.I2, values.I3], all = moments.reduce((sum, one) => sum + one);
+  const sides = moments.map((one) => Math.sqrt(Math.max(0, all - 2 * one))), size = Math.hypot(...sides);
+  return { sides: sides.map((side) => Math.max(0.04, (0.8 * side) / size)), middle: moments.indexOf([...moments].sort((one, other) => one - other)[1]) };
+}
+
 function unpacked(answer, name) {
   const arrays = Object.fromEntries(Object.entries(answer.arrays).map(([key, text]) => [key, unpack(text)]));
   const last = arrays.time.length - 1;
   const trail = answer.period ? Math.ceil((8 * answer.period * last) / arrays.time[last]) : last;
   const swing = answer.period ? (values.I1 * 2 * Math.PI * Math.PI) / (180 * answer.period) : 1e-3;  // p_theta of a nutation by a degree
-  return { ...arrays, trail, swing, degrees: arrays.theta.map((value) => (value * 180) / Math.PI), color: catalogue.integrators.find((entry) => entry.name === name).color };
+  const { sides, middle } = ofBody() ? brick() : {};
+  return { ...arrays, trail, swing, sides, shown: middle ?? 2, name, place: (of) => (of / (run.time.length - 1)) * last, degrees: arrays.theta.map((value) => (value * 180) / Math.PI), color: catalogue.integrators.find((entry) => entry.name === name).color };
 }
 
 function show(answer, other, began) {
@@ -244,6 +265,7 @@ function show(answer, other, began) {
   second = other ? unpacked(other, values.second) : null;
   const taken = second && second.color === run.color;
   for (const one of [run, second]) if (one) { const own = one.color; Object.defineProperty(one, "color", { get: () => ((one === second && taken) || own === "#000000" ? tone("ink") : own) }); }
+  $("sphere").classList.toggle("pair", Boolean(second && run.sides));
   run.width = Math.min(0.6, 0.42 * Math.sqrt(values.I3 / values.I1));
   const last = run.time.length - 1;
   run.trueTheta = Array.from({ length: last + 1 }, (_, k) => {
@@ -253,14 +275,14 @@ function show(answer, other, began) {
   place = before * last;
   for (const name of PLOTS) {
     const largest = answer.largest[name];
-    $(`largest-${name}`).textContent = largest === null ? "" : largest === 0 ? "always zero" : `largest ${largest.toExponential(1)}`;
+    $(`largest-${name}`).textContent = largest == null ? "" : largest === 0 ? "always zero" : `largest ${largest.toExponential(1)}`;
   }
-  const a = answer.period && answer.steps ? `, ${Math.round((answer.steps * answer.period) / run.time[last])} a nutation` : "";
+  const a = answer.period && answer.steps ? `, ${Math.round((answer.steps * answer.period) / run.time[last])} a ${ofBody() ? "natural period" : "nutation"}` : "";
   $("status").textContent = `${values.integrator}: ${answer.message}; ${answer.steps} steps${a}, ${answer.force_evaluations} force evaluations, ${answer.run_ms.toFixed(0)} ms`;
   $("status").className = answer.outcome === "ok" ? "" : "failed";
   $("other").hidden = !other;
   if (other) {
-    $("other").textContent = `${values.second}: ${other.message}; largest axis error ${other.largest.axis_error.toExponential(1)} rad`;
+    $("other").textContent = `${values.second}: ${other.message}; largest ${ofBody() ? "attitude" : "axis"} error ${errorOf(other.largest) === null ? "unknown" : errorOf(other.largest).toExponential(1)} rad`;
     $("other").className = other.outcome === "ok" ? "" : "failed";
   }
   for (const [id, name, one] of [["swatch-1", values.integrator, run], ["swatch-2", values.second, second]]) {
@@ -273,8 +295,8 @@ function show(answer, other, began) {
     return item;
   }));
   $("netcdf").disabled = $("script").disabled = false;
-  run.error = answer.outcome === "ok" ? answer.largest.axis_error : null;
-  if (second) second.error = other.outcome === "ok" ? other.largest.axis_error : null;
+  run.error = answer.outcome === "ok" ? errorOf(answer.largest) : null;
+  if (second) second.error = other.outcome === "ok" ? errorOf(other.largest) : null;
   if (costs) costs.seconds = [];  // those of the runs before
   clearTimeout(patient);
   askDamped();
@@ -291,12 +313,15 @@ function drawPlots() {
   if (!run) return;
   const now = run.time[Math.round(place)] || 0;
   plot($("plot-theta"), run.time, [{ values: run.trueTheta, color: "#9a9a9a", dash: [2, 3] }, { values: run.degrees, color: run.color }, ...beside("degrees")], false, now);
-  for (const name of PLOTS) plot($(`plot-${name}`), run.time, [{ values: run[name], color: run.color }, ...beside(name)], true, now);
+  if (run.middle) plot($("plot-middle"), run.time, [{ values: run.true_middle, color: "#9a9a9a", dash: [2, 3] }, { values: run.middle, color: run.color }, ...beside("middle")], false, now);
+  for (const name of PLOTS) if (run[name]) plot($(`plot-${name}`), run.time, [{ values: run[name], color: run.color }, ...beside(name)], true, now);
   for (const [id, one] of [["swatch-1", run], ["swatch-2", second]]) if (one) $(id).style.borderColor = one.color;
   if (costs) drawCost($("cost"), costs, [run, second].flatMap((one, k) => (one ? [{ name: k ? values.second : values.integrator, seconds: costs.seconds[k], error: one.error, color: one.color }] : [])), catalogue.integrators);
   for (const [name, { arrays, curves }] of Object.entries(DAMPED)) if (arrays) plot($(`plot-${name}`), arrays.time, [{ values: arrays.exact, time: arrays.exact_time, color: "#9a9a9a", dash: [2, 3] }, ...Object.entries(curves).map(([curve, color]) => ({ values: arrays[curve], color }))], false, NaN);
-  portrait($("portrait"), second ? [run, second] : [run]);
-  outcomes.draw({ step: values.step_size, spin: values.psi_dot });
+  if (run.true_theta) {  // and not of the body that was shown before
+    portrait($("portrait"), second ? [run, second] : [run]);
+    outcomes.draw({ step: values.step_size, spin: values.psi_dot });
+  }
   drawnAt = performance.now();
 }
 
@@ -350,7 +375,7 @@ async function begin() {
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawPlots);
   window.addEventListener("hashchange", restore);
-  $("scene").addEventListener("change", () => chooseScene($("scene").value));
+  $("scene").addEventListener("change", () => { $("story").value = ""; chooseStory(""); chooseScene($("scene").value); });
   $("reset").addEventListener("click", () => chooseScene($("scene").value));
   $("integrator").addEventListener("change", () => chooseIntegrator($("integrator").value));
   $("clock").addEventListener("input", () => { place = $("clock").value * (run ? run.time.length - 1 : 0); playing = false; $("play").textContent = "Play"; drawPlots(); });

@@ -5,8 +5,10 @@ others than it has. Each call of it stands in the context of `heartbeat`, which 
 """
 
 import ctypes
+import math
 import mmap
 import re
+import time
 from collections.abc import Callable, Sequence
 from ctypes import c_bool, c_double, c_long
 from dataclasses import dataclass
@@ -46,6 +48,7 @@ class Stepper:
     takes_field = False  # is it given a right-hand side (`along`)?
     since = 0.0  # the time at which runs begin
     wrote = False  # has it changed its input?
+    clock: Callable[[], float] = staticmethod(time.perf_counter)  # by which its steps are timed
 
     def renew(self) -> None:
         """Forget whatever it may keep, where that is possible."""
@@ -64,16 +67,36 @@ class Stepper:
         return np.array(state, dtype=float), run
 
 
-def repeat(once: Callable[[int, Any], Any], y: Any, marks: Marks, show: Callable[[Any], Array] = np.asarray) -> Array:
-    """The states at the marks as `show` has them, of steps y = once(k, y); NaN once a state is not finite."""
+def in_runs(
+    run: Callable[[int, int, Any], Any], y: Any, marks: Marks, most: int, show: Callable[[Any], Array] = np.asarray
+) -> Array:
+    """The states at the marks as `show` has them, of y = run(done, steps, y); NaN once a state is not finite."""
     states, done = np.full((marks.size, show(y).size), np.nan), 0
-    for place, mark in enumerate(marks):
-        for k in range(done, int(mark)):
-            if k % LOOK == 0 and not np.isfinite(show(y)).all():
+    for place, mark in enumerate(map(int, marks)):
+        while done < mark:
+            if not np.isfinite(show(y)).all():
                 return states
-            y = once(k, y)
-        done, states[place] = int(mark), show(y)
+            steps = min(most, mark - done)
+            done, y = done + steps, run(done, steps, y)
+        states[place] = show(y)
     return states
+
+
+def repeat(once: Callable[[int, Any], Any], y: Any, marks: Marks, show: Callable[[Any], Array] = np.asarray) -> Array:
+    """The same of single steps y = once(k, y)."""
+
+    def run(done: int, steps: int, y: Any) -> Any:
+        for k in range(done, done + steps):
+            y = once(k, y)
+        return y
+
+    return in_runs(run, y, marks, LOOK, show)
+
+
+def relative_gap(first: Any, second: Any) -> float:
+    """Largest difference, relative to the largest number; infinite where it is none."""
+    apart = float(np.max(np.abs(first - second))) / max(float(np.max(np.abs(first))), 1e-300)
+    return apart if np.isfinite(apart) else math.inf
 
 
 def label_of(thing: Any) -> str:

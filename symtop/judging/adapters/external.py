@@ -30,10 +30,8 @@ import ctypes
 import dataclasses
 import functools
 import importlib
-import os
 import shlex
 import shutil
-import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -43,7 +41,7 @@ from typing import Any
 import numpy as np
 
 from symtop.core.errors import SymtopError, at_home
-from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat, label_of, repeat
+from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat, in_runs, label_of, relative_gap, repeat
 from symtop.judging.adapters.python_step import MOST_NEWTON, state_like
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
@@ -88,16 +86,13 @@ class SharedObject(Stepper):
         numbers, size = np.array([top.I1, top.I3, top.mgl]), y.size
         par, room = numbers.copy(), np.full(size + GUARD, MARK)
         room[:size] = y
-        states, done = np.full((marks.size, size), np.nan), 0
-        for place, mark in enumerate(marks):
-            while done < mark:
-                some = min(MOST, int(mark) - done)
-                with heartbeat.call(h):
-                    self.function(room.ctypes.data_as(Doubles), h, par.ctypes.data_as(Doubles), some)
-                done += some
-            states[place] = room[:size]
-            if not np.isfinite(room[:size]).all():
-                break
+
+        def run(_done: int, steps: int, room: Array) -> Array:
+            with heartbeat.call(h):
+                self.function(room.ctypes.data_as(Doubles), h, par.ctypes.data_as(Doubles), steps)
+            return room
+
+        states = in_runs(run, room, marks, MOST, lambda room: room[:size])
         if (room[size:] != MARK).any():
             raise SymtopError(f"{self.name} writes beyond the {size} numbers of its state")
         if (par != numbers).any():
@@ -125,39 +120,28 @@ class Program(Stepper):
         answer = self._answer(" ".join(map(repr, numbers)) + "\n", h, last)
         states = _states(answer, last // stride + 1, y.size, self.name)
         if not _begins(states[0], y):
+            first = ", ".join(f"{value:.4g}" for value in states[0])
             raise SymtopError(
-                f"{self.name} must write the start that it was given as the first of its states, not "
-                f"{', '.join(f'{value:.4g}' for value in states[0])}"
+                f"{self.name} must write the start that it was given as the first of its states, not {first}"
             )
         return March(states[marks // stride], 0)
 
     def _answer(self, line: str, h: float, steps: int) -> bytes:
-        expected = SLACK * self.seconds_a_step * steps
-        seconds = heartbeat.patience + expected
-        with heartbeat.call(h, expected + seconds):
-            began = time.monotonic()
-            with subprocess.Popen(  # noqa: S603  (the command is the user's)
-                self.words,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                start_new_session=True,
-            ) as process:
-                try:
-                    out, errors = process.communicate(line.encode(), timeout=seconds)
-                except subprocess.TimeoutExpired:
-                    with contextlib.suppress(OSError):
-                        os.killpg(process.pid, signal.SIGKILL)
-                    what = f"{steps} steps of {h:.3g}"
-                    raise SymtopError(
-                        f"{self.name} had not ended {seconds:.0f} s after it was asked for {what}"
-                    ) from None
-        if process.returncode != 0:
-            words = " ".join(errors.decode(errors="replace").split())[-WORDS:]
-            raise SymtopError(f"{self.name} ended with code {process.returncode}: {words or 'it said nothing'}")
+        seconds, began = heartbeat.patience + SLACK * self.seconds_a_step * steps, time.monotonic()
+        with heartbeat.call(h, 2.0 * seconds):
+            try:
+                done = subprocess.run(  # noqa: S603  (the command is the user's)
+                    self.words, input=line.encode(), capture_output=True, timeout=seconds, check=False
+                )
+            except subprocess.TimeoutExpired:
+                what = f"{steps} steps of {h:.3g}"
+                raise SymtopError(f"{self.name} had not ended {seconds:.0f} s after it was asked for {what}") from None
+        if done.returncode != 0:
+            words = " ".join(done.stderr.decode(errors="replace").split())[-WORDS:]
+            raise SymtopError(f"{self.name} ended with code {done.returncode}: {words or 'it said nothing'}")
         if steps > 0:
             self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps) if steps > 50 else 0.0
-        return out
+        return done.stdout
 
 
 def _states(answer: bytes, rows: int, size: int, name: str) -> Array:
@@ -170,10 +154,8 @@ def _states(answer: bytes, rows: int, size: int, name: str) -> Array:
         shown = answer[:40].decode(errors="replace").strip()
         raise SymtopError(f"{name} must write numbers, as text or as raw doubles, not {shown!r}") from None
     if values.size != rows * size:
-        raise SymtopError(
-            f"{name} must write {rows} states of {size} numbers (the start and one every stride steps), "
-            f"{rows * size} in all, not {values.size}"
-        )
+        must = f"{rows} states of {size} numbers (the start and one every stride steps), {rows * size} in all"
+        raise SymtopError(f"{name} must write {must}, not {values.size}")
     return values.reshape(rows, size)
 
 
@@ -216,12 +198,9 @@ class BatchStep(Stepper):
         """A step of the first row alone, and in the batch."""
         pair = (_once(step, 0.0, rows, h, COMPILING)[0] for rows in (self._array(y[None]), batch + 0.0))
         one, two = (state_like(y, np.asarray(row)) for row in pair)
-        apart = float(np.max(np.abs(one - two))) / max(float(np.max(np.abs(one))), 1e-300)
-        if apart > SAME:
-            raise SymtopError(
-                "a row of a batch must be stepped by itself: the same state with another row beside it comes out "
-                f"different by {apart:.1e}"
-            )
+        if (apart := relative_gap(one, two)) > SAME:
+            how = f"the same state with another row beside it comes out different by {apart:.1e}"
+            raise SymtopError(f"a row of a batch must be stepped by itself: {how}")
         self._tried = True
 
 
@@ -287,9 +266,9 @@ class DiffraxSolver(Stepper):
         if not is_solver(solver):
             raise SymtopError(f"form diffrax needs an instance of a solver, such as diffrax.Tsit5(), not {solver!r}")
         if isinstance(solver.term_structure, tuple):
+            name = type(solver).__name__
             raise SymtopError(
-                f"{type(solver).__name__} steps a system in two parts; form diffrax has one, y' = f(y): "
-                "judge it as a function, with form separable"
+                f"{name} steps a system in two parts; form diffrax has one, y' = f(y): judge it with form separable"
             )
         if hasattr(solver, "root_finder"):
             newton = importlib.import_module("optimistix").Newton(rtol=SAME, atol=SAME)
@@ -301,23 +280,19 @@ class DiffraxSolver(Stepper):
 
     def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks; NaN where the solver says that a step failed."""
-        states, done = np.full((marks.size, y.size), np.nan), 0
+
+        def run(done: int, steps: int, at: Any) -> Any:
+            with heartbeat.call(h, COMPILING if self._fresh else 0.0):
+                after = self._run(par, *at, self.since + done * h, h, steps)
+                self.jax.block_until_ready(after)
+            self._fresh = False
+            return after
+
         with double_precision(self.jax):
-            more = COMPILING if self._fresh else 0.0
-            with heartbeat.call(h, more):
-                at = self.jax.numpy.asarray(y)
-                memory = self._begin(par, at, h)
-            for place, mark in enumerate(marks):
-                while done < mark:
-                    some = min(MOST, int(mark) - done)
-                    with heartbeat.call(h, more):
-                        at, memory = self._run(par, at, memory, self.since + done * h, h, some)
-                        self.jax.block_until_ready(at)
-                    self._fresh, more, done = False, 0.0, done + some
-                states[place] = np.asarray(at)
-                if not np.isfinite(states[place]).all():
-                    break
-        return March(states, 0)
+            with heartbeat.call(h, COMPILING if self._fresh else 0.0):
+                start = self.jax.numpy.asarray(y)
+                memory = self._begin(par, start, h)
+            return March(in_runs(run, (start, memory), marks, MOST, lambda at: np.asarray(at[0])), 0)
 
     def _compiled(self) -> tuple[Any, Any]:
         """The start of a run, and so many steps of it; the numbers of the top are `args`, so that both compile once."""

@@ -30,7 +30,7 @@ and it may take `MOST_NEWTON` rounds. With a tolerance, rtol = atol, the class c
 import contextlib
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -151,7 +151,7 @@ class ScipySolver(PythonStep):
         def once(k: int, y: Array) -> Array:
             if made.status != "running" or not np.isfinite(y).all():
                 return np.full(y.shape, np.nan)
-            with heartbeat.call(h), self._patient():
+            with heartbeat.call(h):
                 made.step()
             if abs(made.t - (t + (k + 1) * h)) > SAME * size * (k + 1):
                 raise SymtopError(
@@ -160,21 +160,12 @@ class ScipySolver(PythonStep):
                 )
             return state_like(y, made.y, "a solver")
 
-        return repeat(once, state_like(y, made.y, "a solver"), marks)
-
-    @contextlib.contextmanager
-    def _patient(self) -> Iterator[None]:
-        """Newton's iteration goes on until it is solved."""
-        kinds = self.function.__mro__  # type: ignore[attr-defined]
-        modules = filter(None, {sys.modules.get(kind.__module__) for kind in kinds})
-        counts = {module: vars(module)[NEWTON] for module in modules if NEWTON in vars(module)}
-        try:
-            for module in counts:
-                setattr(module, NEWTON, MOST_NEWTON)
-            yield
-        finally:
-            for module, count in counts.items():
-                setattr(module, NEWTON, count)
+        with contextlib.ExitStack() as undo:  # Newton's iteration goes on until it is solved
+            for module in {sys.modules.get(one.__module__) for one in self.function.__mro__}:  # type: ignore[attr-defined]
+                if hasattr(module, NEWTON):
+                    undo.callback(setattr, module, NEWTON, getattr(module, NEWTON))
+                    setattr(module, NEWTON, MOST_NEWTON)
+            return repeat(once, state_like(y, made.y, "a solver"), marks)
 
 
 class Body(NamedTuple):
@@ -256,16 +247,14 @@ class RotationStep(FunctionStep):
     def __init__(self, function: Callable[..., Any], name: str = "") -> None:
         super().__init__(function, name)
         self.of_matrix = ""  # what it raises if it is given one, until it has made a step
+        probe = np.eye(3), np.array([0.1, 0.2, 0.3]), PROBE, np.array([1.0, 1.0, 0.5]), lambda _: np.zeros(3)
         try:
             with heartbeat.call(PROBE):
-                first = function(
-                    np.eye(3), np.array([0.1, 0.2, 0.3]), PROBE, np.array([1.0, 1.0, 0.5]), lambda _: np.zeros(3)
-                )
-        except SymtopError as error:
-            self.of_matrix = str(error)
-        else:
+                first = function(*probe)
             with contextlib.suppress(Exception):
                 self.form = MATRIX if np.shape(first[0]) == (3, 3) and np.size(first[1]) == 3 else ROTATION
+        except SymtopError as error:
+            self.of_matrix = str(error)
 
     def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks."""

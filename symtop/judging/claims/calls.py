@@ -17,16 +17,16 @@ from typing import Any
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.adapters.adapter import Stepper
+from symtop.judging.adapters.adapter import Stepper, relative_gap
 from symtop.judging.claims.subject import Subject
 from symtop.judging.findings import Finding, Measured, inapplicable
-from symtop.measure.step_map import generic_start
+from symtop.measure.step_map import generic_start, one_step
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles
 
 SHARE = 0.0137  # of a nutation: the step that is called
 SAME = 1e-13  # relative: what threads may leave between two calls
-AGAIN = 8  # pairs of calls that tell noise from what is kept
+AGAIN, NOISY = 16, 0.1  # calls that tell noise from what is kept, by how much of a difference they scatter
 REPEATS, SECONDS = 250, 0.3  # calls with the same arguments, or as many as there is time for
 NOTHING, STANDS = 1e-8, 1e-6  # a step of so little moves a state by less than this, relative
 FAR = 200.0  # times the step: one that most methods do not survive
@@ -59,29 +59,18 @@ def _calls(subject: Subject) -> Finding:
         return run(state, 1)[0]
 
     stepper.renew()  # the step has been timed
-    other = Angles(*(getattr(start, name) * (1.0 - ELSEWHERE) for name in Angles.__slots__))
+    moved = {name: getattr(start, name) * (1.0 - ELSEWHERE) for name in Angles.__slots__}
+    other = Angles(**moved | {"phi": 0.0, "psi": 0.0})  # which a map of (theta, p_theta) shows as zero
     first = once(start, h)
     if not np.isfinite(first).all():
         kind = f"returns {'NaN' if np.isnan(first).any() else 'infinity'}"
         return _refuted(kind, f"a step of h = {h:.3g} {kind}", resolution=math.nan)
-    again, third = once(start, h), once(start, h)
-    count, differs = (0, 0.0) if stepper.own_loop else _repeated(lambda: once(start, h), third)
-    once(other, h)
-    with contextlib.suppress(SymtopError):
-        once(other, FAR * h)  # which may fail, and must not be remembered either
-    after = once(start, h)
-    twice, later = _apart(again, third), max(_apart(first, again), _apart(first, after), _apart(again, after))
-    if twice > SAME:
-        why = f"two calls with the same arguments differ by {twice:.1e}"
-        why = why if np.isfinite(twice) else "of calls with the same arguments one returns NaN and another does not"
-        return _refuted("not repeatable", why, twice)
-    if max(later, differs) > SAME:
-        return _kept(later, count, differs, lambda: _apart(once(start, h), once(start, h)))
-    still = stepper.from_start(scene.top, other, h)[0]
-    moved = _apart(still, _alike(stepper.chart, still, once(other, NOTHING * h)))
-    if moved > STANDS:
-        why = f"it keeps something of its first start: from another one, a step of {NOTHING * h:.0e} moves by "
-        return _refuted("keeps state", f"{why}{moved:.1e}", moved, STANDS)
+    if refuted := _repeated(stepper, lambda: relative_gap(first, once(start, h)), lambda step: once(other, step), h):
+        return refuted
+    step = one_step(subject.method, subject.method.charts()[0], scene, NOTHING * h)
+    if (gap := step.gap(step.image(step.point(other)), step.at(other))) > STANDS:
+        why = f"it keeps something of its first start: from another one, a step of {step.h:.0e} moves by {gap:.1e}"
+        return _refuted("keeps state", why, gap, STANDS)
     traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # in two words, and in a clause
     single = {"single precision": "its numbers are those of single precision"}
     traits |= single if (first == first.astype(np.float32)).all() else {}
@@ -92,7 +81,7 @@ def _calls(subject: Subject) -> Finding:
     missed, why = _late(subject, h / 1.6)
     if missed > (most := MISSED if stepper.own_loop else RECALLED):
         return _refuted("keeps state", f"it keeps something between calls: {why}", missed, most)
-    if (gap := _apart(first, once(start, h))) > SAME:
+    if (gap := relative_gap(first, once(start, h))) > SAME:
         why = f"it keeps something between calls: the first one, repeated, differs by {gap:.1e}"
         return _refuted("keeps state", why, gap)
     try:
@@ -100,24 +89,27 @@ def _calls(subject: Subject) -> Finding:
     except SymtopError as error:
         traits["forward only"] = str(error)
     why = "; ".join(["a call gives the same numbers again, and after a step elsewhere", *traits.values()])
-    return Finding("calls", "", Measured(", ".join(traits) or "a function"), "measured", why, later, SAME)
+    return Finding("calls", "", Measured(", ".join(traits) or "a function"), "measured", why, gap, SAME)
 
 
-def _repeated(call: Callable[[], Any], state: Any) -> tuple[int, float]:
-    """The first of many calls that differs, counted from the one that gave `state`, and by how much; else the last."""
-    began, count, gap = time.monotonic(), 0, 0.0
-    while count < REPEATS and gap <= SAME and time.monotonic() - began < SECONDS:
-        count, gap = count + 1, _apart(state, call())
-    return count, gap
-
-
-def _kept(later: float, count: int, differs: float, noise: Callable[[], float]) -> Finding:
-    """The finding on a call that differs from the same one before: it kept some, or calls in a row differ, too."""
-    how, gap = "after a step elsewhere the same call", later
-    if not later > SAME:
-        how, gap = f"call {count} with the same arguments", differs
-    if (now := max(noise() for _ in range(AGAIN))) > 0.1 * gap:
-        return _refuted("not repeatable", f"calls with the same arguments differ by {now:.1e}", now)
+def _repeated(
+    stepper: Stepper, again: Callable[[], float], elsewhere: Callable[[float], Any], h: float
+) -> Finding | None:
+    """The finding if the first call differs from the same one later, by `again`: it kept some, or calls are noisy."""
+    began, most, count, gap = time.monotonic(), 2 if stepper.own_loop else REPEATS, 1, 0.0
+    while count <= most and gap <= SAME and time.monotonic() - began < SECONDS:
+        count, gap = count + 1, again()
+    how = f"call {count} with the same arguments"
+    if gap <= SAME:
+        elsewhere(h)
+        with contextlib.suppress(SymtopError):
+            elsewhere(FAR * h)  # which may fail, and must not be remembered either
+        how, gap = "after a step elsewhere the same call", again()
+    if gap <= SAME:
+        return None
+    differences = [again() for _ in range(AGAIN)]
+    if (noise := max(differences) - min(differences)) > NOISY * gap:
+        return _refuted("not repeatable", f"calls with the same arguments differ by {noise:.1e}", noise)
     return _refuted("keeps state", f"it keeps something between calls: {how} differs by {gap:.1e}", gap)
 
 
@@ -160,15 +152,6 @@ def _late(subject: Subject, h: float) -> tuple[float, str]:
     return worst, words
 
 
-def _alike(chart: str, guide: Any, state: Any) -> Any:
-    """The state, its q or angles as near to those of `guide` as they can be: -q is q, and angles have whole turns."""
-    if chart == "attitude":
-        return np.concatenate([np.copysign(1.0, guide[:4] @ state[:4]) * state[:4], state[4:]])
-    if chart == "angles":
-        return np.concatenate([state[:3] - 2.0 * math.pi * np.rint((state[:3] - guide[:3]) / 2.0 / math.pi), state[3:]])
-    return state
-
-
 def _largest(state: Any) -> float:
     return float(np.max(np.abs(state)))
 
@@ -176,9 +159,3 @@ def _largest(state: Any) -> float:
 def _gap(first: Any, second: Any) -> float:
     """Largest difference."""
     return float(np.max(np.abs(first - second)))
-
-
-def _apart(first: Any, second: Any) -> float:
-    """Largest difference, relative to the largest number; infinite where it is none."""
-    apart = _gap(first, second) / max(_largest(first), 1e-300)
-    return apart if np.isfinite(apart) else math.inf

@@ -52,7 +52,7 @@ ROUNDING_OF_A_STEP = 2e-13  # a change in one step that may be rounding, where |
 BOUNDED = 0.25  # an exponent that exceeds it with its whole interval is growth
 SURE = 8.0
 VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
-SUDDEN, LITTLE, FROM = 100.0, 1e-2, "changes as it begins"
+SUDDEN, LITTLE, BLOWN_UP, FROM = 100.0, 1e-2, 1e4, "changes as it begins"
 OF_A_RUN = (*CONSTANTS, "reported", "invariant", "explicit", "work")
 KINDS = ("kept", "bounded", "random walk", "growing", "drift")  # from best to worst
 OWN = "its states'"  # what every run says of the momenta that it reports
@@ -92,6 +92,13 @@ class Constant(NamedTuple):
         least = self.changed.exponent - self.changed.exponent_interval
         return True if self.kind == "drift" or least > BOUNDED else None
 
+    def words(self, where: str) -> str:
+        """Its largest change, `where` that is, and how it grows."""
+        words, change = f"largest relative change {self.changed.largest:.1e} {where}", self.changed
+        if self.kind in ("kept", "unknown"):
+            return words
+        return f"{words}, growth exponent {change.exponent:.2f} +- {change.exponent_interval:.2f}"
+
     def verdict(self, claimed: str) -> str:
         """Of the claim that it is kept or bounded; "measured" where neither is claimed."""
         if self.kind == "unknown" or (claimed == "bounded" and self.grows is None):
@@ -114,7 +121,7 @@ class LongRun(NamedTuple):
     iterations: float  # of a solver, a step
     steady_cost: bool  # every run of the same number of steps cost the same, at two step sizes
     reported: Difference | None  # of the momenta from those of the states; None where the states show none
-    energy: tuple[Array, Array]  # times, in nutations, and the largest relative change around each, shape (WINDOWS,)
+    energy: Array  # times, in nutations, and the largest relative change around each, shape (2, WINDOWS)
 
     @property
     def span(self) -> str:
@@ -167,24 +174,25 @@ def long_run(
     _, other, _ = _run(method, scene, inside, PILOT, 0.21 * step, PILOT + 1)
     steady = len({one.force_evaluations / max(one.steps, 1) for one in (first, other)}) == 1
     reported = None
-    if inside != "angles":
-        reported = _difference(scene, shown, run)
-    elif chart != PLANE and method.fixed_step:
-        reported = from_increments(method, scene, plan)
-    if method.fixed_step and not isinstance(method.solvers[inside], AdapterSolver):
-        reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
-    changes, every_step = (
-        {name: values for name, values in constants(scene, one).items() if chart != PLANE or name == "energy"}
-        for one in (shown, pilot)
-    )
+    if not isinstance(method.solvers[inside], AdapterSolver):  # whose momenta are those of its states
+        reported = _reported(method, scene, chart, shown, (run, plan))
+        if method.fixed_step:
+            reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
+    changes, every_step = constants(scene, shown), constants(scene, pilot)
     made, grains = max(run.steps, 1), {"energy": scene.energy_grain}
     kept = {
-        name: change_of(plan.times, changes[name], every_step[name], made, grains.get(name, 1.0)) for name in changes
+        name: change_of(plan.times, changes[name], every_step[name], made, grains.get(name, 1.0), changes["energy"])
+        for name in (changes if chart != PLANE else ("energy",))
     }
     message, nutations = sentence(run.outcome, run.reached, float(plan.times[-1])), run.reached / unit
     costs = run.force_evaluations / made, run.newton_iterations / made, steady
-    energy = windows(plan.times / unit, changes["energy"])
-    return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *costs, reported, energy)
+    # the largest |change| in windows of the logarithm of time, for a figure; NaN where there is no sample
+    shape, times = np.full((2, WINDOWS), math.nan), plan.times / unit
+    for row, values in zip(
+        shape, tops(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS), strict=True
+    ):
+        row[: len(values)] = values
+    return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *costs, reported, shape)
 
 
 def _contradiction(
@@ -204,16 +212,13 @@ def _contradiction(
     return None
 
 
-def windows(nutations: Array, change: Array) -> tuple[Array, Array]:
-    """The largest |change| in windows of the logarithm of time, with their middles; NaN where there is no sample."""
-    middles, largest = np.full((2, WINDOWS), math.nan)
-    times, values = tops(nutations, change, math.log10(nutations[-1] / nutations[1]), WINDOWS)
-    middles[: len(times)], largest[: len(values)] = times, values
-    return middles, largest
-
-
-def _difference(scene: Scene, shown: Trajectory, run: Run) -> Difference:
+def _reported(
+    method: Integrator, scene: Scene, chart: str, shown: Trajectory, long: tuple[Run, Plan]
+) -> Difference | None:
     """How far the reported momenta are from those of the states, over the long run."""
+    run, plan = long
+    if chart == "angles":
+        return from_increments(method, scene, plan) if method.fixed_step else None
     apart = {}
     for name in ("p_phi", "p_psi"):
         gap = np.abs(getattr(run, name) - getattr(shown, name)) / scene.momentum_scale
@@ -248,15 +253,21 @@ def _cayley_residual(top: SymmetricTop, run: Trajectory) -> Array:
     return np.asarray((whole - whole[0]) / float(np.max(np.abs(rest[good]))))
 
 
-def change_of(time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0) -> Constant:
-    """Size, growth and trend of a residual over so many steps; `every_step` holds it at consecutive ones."""
+def change_of(
+    time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0, energy: Any = 0.0
+) -> Constant:
+    """Size, growth and trend of a residual over so many steps; `every_step` holds it at consecutive ones.
+
+    Where the change of the `energy` is beyond `BLOWN_UP`, rounding is larger, and nothing is sudden.
+    """
     jumps = np.abs(np.diff(every_step))
     a_step = float(np.max(jumps[np.isfinite(jumps)])) if np.isfinite(jumps).any() else math.nan
     rounding = a_step * math.sqrt(steps) if a_step <= ROUNDING_OF_A_STEP * grain else 0.0
     floor = max(KEPT * grain, rounding)
     with np.errstate(all="ignore"):  # a run may blow up
         ratio = np.abs(np.diff(values)) / max(a_step * steps / (time.size - 1), floor)
-        jump = np.flatnonzero((ratio[1:] > SUDDEN) & (ratio[:-1] < SUDDEN / 10.0) & (np.abs(values[1:-1]) < LITTLE))
+        calm = (np.abs(values) < LITTLE) & (np.abs(energy) < BLOWN_UP)
+        jump = np.flatnonzero((ratio[1:] > SUDDEN) & (ratio[:-1] < SUDDEN / 10.0) & calm[1:-1])
     words = "after t = {:.4g} it changes {:.0e} times as much as by its first steps"
     sudden = words.format(time[jump[0] + 1], ratio[jump[0] + 1]) if jump.size else ""
     return Constant(constant_of(time, values), a_step, floor, grain, sudden)
@@ -281,7 +292,7 @@ def measure(subject: Subject) -> list[Finding]:
 def of_run(method: Integrator, run: LongRun) -> list[Finding]:
     """What one long run shows of each claim of `OF_A_RUN`."""
     motion = [_constant(method, one, declared(method, one), run, run.constants.get(one)) for one in CONSTANTS]
-    return [*motion, _reported(run), _invariant(method, run), *_costs(method, run)]
+    return [*motion, _of_states(run), _invariant(method, run), *_costs(method, run)]
 
 
 def _named(finding: Finding, chart: str) -> Finding:
@@ -301,11 +312,8 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
         return inapplicable(claim, f"the {run.chart} chart has no such constant", claimed)
     kind, changed, verdict = constant.kind, constant.changed, "undecided"
     measured = Measured(kind, changed.largest) if kind != "unknown" and run.steps else NOTHING
-    why = f"largest relative change {changed.largest:.1e} in {run.span}, {constant.a_step:.0e} in one step at most"
-    if kind not in ("kept", "unknown"):
-        why += f", growth exponent {changed.exponent:.2f} +- {changed.exponent_interval:.2f}"
-        if kind == "drift":
-            why += f", drifting by {changed.rise / max(run.steps, 1):.1e} a step"
+    why = constant.words(f"in {run.span}, {constant.a_step:.0e} in one step at most")
+    why += f", drifting by {changed.rise / max(run.steps, 1):.1e} a step" if kind == "drift" else ""
     # an error that returns with the nutation cannot exceed the largest change of a step, all one way
     most = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
     steady = kind in ("kept", "bounded")
@@ -315,7 +323,7 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
         verdict, claimed, why = "refuted", claimed or FROM, f"{constant.sudden}; {why}"
     elif kind == "unknown":
         why = f"the run {run.message}" if run.outcome != "ok" else f"{why}: no exponent to judge it by"
-    elif claimed == "bounded" and constant.grows is None and changed.largest > most:
+    elif claimed == "bounded" and kind != "kept" and changed.largest > max(most, constant.floor):
         verdict, why = "refuted", f"{why}, more than the steps of a nutation can add up to: it does not come back"
     else:
         verdict = constant.verdict(claimed)
@@ -323,21 +331,24 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
     return Finding(claim, claimed, measured, verdict, why, changed.largest, constant.floor)
 
 
-def _reported(run: LongRun) -> Finding:
-    """Are the momenta that the run reports those that its states have?"""
+def _of_states(run: LongRun) -> Finding:
+    """Are the momenta that the run reports those that its states have, and is it a part of longer ones?"""
     other = run.reported
     if other is None:
         return inapplicable("reported", f"the {run.chart} chart shows no momenta beside the reported")
+    size = f"{other.size:.1e}"
     if other.size <= other.floor:
-        why = f"they differ from those of the states by {other.size:.1e} at most"
-        return Finding("reported", "", Measured(OWN), "measured", why, other.size, other.floor)
-    if other.name == OF_RUN:
-        why = (
-            f"a run contradicts itself, as if the method knew of it: the state differs by {other.size:.1e} {other.how}"
+        why, declared, kind, verdict = f"they differ from those of the states by {size} at most", "", OWN, "measured"
+    else:
+        why, kind = (
+            f"it reports other momenta than its states have: {other.name} differs by {size} {other.how}",
+            "others",
         )
-        return Finding("reported", OWN, Measured("another run", other.size), "refuted", why, other.size, other.floor)
-    why = f"it reports other momenta than its states have: {other.name} differs by {other.size:.1e} {other.how}"
-    return Finding("reported", OWN, Measured("others", other.size), "refuted", why, other.size, other.floor)
+        declared, verdict = OWN, "refuted"
+    if other.name == OF_RUN:
+        why = f"a run contradicts itself, as if the method knew of it: the state differs by {size} {other.how}"
+        kind = "another run"
+    return Finding("reported", declared, Measured(kind), verdict, why, other.size, other.floor)
 
 
 def _invariant(method: Integrator, run: LongRun) -> Finding:
@@ -355,25 +366,21 @@ def _invariant(method: Integrator, run: LongRun) -> Finding:
 
 def _costs(method: Integrator, run: LongRun) -> list[Finding]:
     """The findings on explicit and work."""
-    claimed = declared(method, "explicit")
+    claimed, iterates = declared(method, "explicit"), run.iterations > 0.0
     if method.control is None or not run.evaluations:
         why = "it makes no steps" if method.control is None else "its forces are not counted"
         return [inapplicable("explicit", why, claimed), inapplicable("work", why)]
-    answer, why = None, f"it reports no iterations and {run.evaluations:.2f} forces a step, always"
-    if run.iterations > 0.0:
-        answer, why = False, f"it reports {run.iterations:.2f} iterations a step"
-    elif method.explicit is False:
-        why += "; so does a method that solves linear equations"
-    else:
-        answer = True
+    text = f"{run.evaluations:.1f}" + f" ({run.iterations:.1f} it.)" * iterates
+    solves = f" and {run.iterations:.2f} iterations" * iterates
+    why = f"{run.evaluations:.2f} force evaluations{solves} a step, in {run.span}"
+    work = Finding("work", "", Measured("work", run.evaluations, text=text), "measured", why, run.evaluations, 0.0)
+    if not (iterates or run.steady_cost):
+        why = "it reports no iterations, but its steps do not all cost the same"
+        return [undecided("explicit", claimed, why), work]
+    answer = False if iterates else None if method.explicit is False else True
+    why = f"it reports no iterations and {run.evaluations:.2f} forces a step, always"
+    why += "; so does a method that solves linear equations" * (answer is None)
+    why = f"it reports {run.iterations:.2f} iterations a step" if iterates else why
     measured = NOTHING if answer is None else Measured(yes_no(answer))
     verdict = agreement(declared=method.explicit, measured=answer)
-    explicit = Finding("explicit", claimed, measured, verdict, why, run.iterations, 0.0)
-    if not (run.iterations > 0.0 or run.steady_cost):
-        why = "it reports no iterations, but its steps do not all cost the same"
-        explicit = undecided("explicit", claimed, why)
-    solves = f" and {run.iterations:.2f} iterations" if run.iterations else ""
-    why = f"{run.evaluations:.2f} force evaluations{solves} a step, in {run.span}"
-    text = f"{run.evaluations:.1f}" + (f" ({run.iterations:.1f} it.)" if run.iterations else "")
-    measured = Measured("work", run.evaluations, text=text)
-    return [explicit, Finding("work", "", measured, "measured", why, run.evaluations, 0.0)]
+    return [Finding("explicit", claimed, measured, verdict, why, run.iterations, 0.0), work]

@@ -32,10 +32,12 @@ frame at rest, w = 0, is one of wrong times. A step that asks f at t0 alone was 
 
 import contextlib
 import math
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from symtop.core.errors import SymtopError
 from symtop.judging.claims.structure import ONE_MAP, map_of
@@ -47,7 +49,7 @@ from symtop.measure.order_conditions import Conditions, conditions, splitting_co
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
 from symtop.measure.step_map import StepMap, aligned, generic_start, one_step, restart_gap
-from symtop.measure.step_series import AGREES, SURE, Series, compared, step_series
+from symtop.measure.step_series import Series, compared, step_series
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import Array, sentence
@@ -89,10 +91,8 @@ def measure(subject: Subject) -> list[Finding]:
     table = table_of(method)
     if table is not None:
         power = method.order or table.order
-        words, verdict = table.words(power), finding.verdict
-        if table.order < min(power, len(table.defect)):
-            words, verdict = words + _visible_from(table, power, subject.scene), "refuted"
-        finding = finding._replace(verdict=verdict, why=f"{words}; {finding.why}")
+        verdict = "refuted" if table.order < min(power, len(table.defect)) else finding.verdict
+        finding = finding._replace(verdict=verdict, why=f"{table.words(power)}; {finding.why}")
     if method.order is not None and finding.verdict == "confirmed":
         lower = _elsewhere(subject, method.order)
         if lower is not None:
@@ -109,13 +109,10 @@ def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
     """
     if subject.in_plane or not subject.method.fixed_step or subject.method.exact_steps:
         return None
-    draw, stepper = np.random.default_rng(subject.seed), subject.stepper
-    for k, (name, scene) in enumerate(subject.elsewhere(DRAWS, DRAWING)):
-        since = scene.time_scale() * 10.0 ** draw.uniform(0.0, 3.0) * (k % 2)
+    draw = np.random.default_rng(subject.seed)
+    for name, scene in subject.elsewhere(DRAWS, DRAWING):
         scale = scene.time_scale() * math.sin(scene.start.theta)
         sizes: Array = scale / draw.uniform(9.0, 18.0) / 2.0 ** np.arange(float(HALVINGS))
-        if stepper is not None:
-            stepper.since = since
         for chart in subject.charts:
             with contextlib.suppress(SymtopError):
                 step = one_step(subject.method, chart, scene, float(sizes[0]))
@@ -123,12 +120,7 @@ def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
                     continue
                 order, h = _lower(sizes, _misses(step, scene, sizes), power, scale / SHORT)
                 if order < power:
-                    at = f"{name}, t = {since:.3g}" if stepper is not None and since else name
-                    if stepper is not None:
-                        stepper.since = 0.0
-                    return order, f"a step of h = {h:.2g} from {at} has order {order:.1f}, in the {chart} chart"
-        if stepper is not None:
-            stepper.since = 0.0
+                    return order, f"a step of h = {h:.2g} from {name} has order {order:.1f}, in the {chart} chart"
     return None
 
 
@@ -156,55 +148,23 @@ def _lower(sizes: Array, misses: Array, power: int, short: float) -> tuple[float
     return (float(orders[jumps[0]]), float(sizes[jumps[0]])) if jumps.size else (math.inf, math.nan)
 
 
-class ChartSeries(NamedTuple):
-    """The series of a step in one chart."""
-
-    chart: str
-    series: Series
-
-    @property
-    def order(self) -> int:
-        """The order that the series shows."""
-        return self.series.order
-
-    def words(self, power: int) -> str:
-        """What it says of the order `power`."""
-        agreed = min(power, self.order)
-        if agreed < min(power, self.series.resolved):
-            return f"{self.wrong_term()}, in the {self.chart} chart"
-        return f"a step has the motion's terms up to h^{agreed} to {max(self.series.worst(agreed), 1e-16):.0e}"
-
-    def wrong_term(self) -> str:
-        """The first term that is not the motion's."""
-        term = self.order + 1
-        defect, noise = self.series.defect[term], self.series.noise[term]
-        return f"the h^{term} term of a step is off by {defect:.1e} of itself (noise {noise:.0e})"
-
-    def term(self, power: int) -> tuple[float, float]:
-        """The largest defect up to h^power, and the least that is told from none."""
-        noise = self.series.noise[min(power, self.series.noise.size - 1)]
-        return self.series.worst(power), max(AGREES, SURE * float(noise))
-
-    @property
-    def measured(self) -> Measured:
-        """The order that is seen, or the least that it can be."""
-        text = f"{self.order} or more"
-        if self.series.is_exact:
-            defect, noise = self.series.defect[self.order + 1], self.series.noise[self.order + 1]
-            text = (
-                f"{self.order}, a step wrong from its h^{self.order + 1} term on, by {defect:.1g} +- {noise:.0g} of it"
-            )
-        return Measured("by a term", self.order, text=text)
+def _terms(series: Series) -> Measured:
+    """The order that a series shows, or the least that it can be."""
+    text, term = f"{series.order} or more", series.order + 1
+    if series.is_exact:
+        off = f"{series.defect[term]:.1g} +- {series.noise[term]:.0g} of it"
+        text = f"{series.order}, a step wrong from its h^{term} term on, by {off}"
+    return Measured("by a term", series.order, text=text)
 
 
-def series_of(subject: Subject) -> ChartSeries | None:
+def series_of(subject: Subject) -> Series | None:
     """The series of the chart with the lowest order; None where no step is one map of the state."""
     shown = []
     for chart in subject.charts if subject.method.fixed_step else ():
         with contextlib.suppress(SymtopError):
             step, start = map_of(subject, chart)
             if restart_gap(step, start) <= ONE_MAP:
-                shown.append(ChartSeries(chart, step_series(step, start, subject.scene.time_scale())))
+                shown.append(step_series(step, start, subject.scene.time_scale()))
     return min(shown, key=lambda one: one.order, default=None)
 
 
@@ -212,13 +172,10 @@ class Order(NamedTuple):
     """What the errors of a method say about its order."""
 
     scene: str
-    step_size: Array
-    tolerance: Array  # NaN at fixed steps
-    error: Array  # of the attitude, or of the axis where the chart has no attitude
-    bound: Array
-    fits: dict[str, Fit]  # attitude (or axis), theta, energy
-    observed: str
-    fixed_step: bool
+    table: xr.Dataset  # of `order_table`
+    step_size: Array  # mean ones of an adaptive method
+    fits: dict[str, Fit]  # attitude (or axis, where the chart has no attitude), theta, energy
+    observed: str  # the first of them, which decides
 
     @property
     def main(self) -> Fit:
@@ -231,6 +188,10 @@ class Order(NamedTuple):
         fit = self.main
         return Measured("slope", fit.slope, text=str(fit)) if math.isfinite(fit.slope) else NOTHING
 
+    def columns(self, *names: str) -> list[Array]:
+        """Columns of the table; "" and "_bound" are of what decides."""
+        return [self.table[self.observed + name if name in ("", "_bound") else name].values for name in names]
+
 
 def measured_order(
     method: Integrator, scene: Scene, *, quick: bool = False, finest: float | None = None, main: str = ""
@@ -238,29 +199,24 @@ def measured_order(
     """Slopes of the errors of attitude (or axis, or `main`), theta and energy; `finest`: most steps of a run."""
     if method.control is None:
         raise SymtopError(f"{method.name} has neither a step nor a tolerance")
-    runs = [(scene, NUTATIONS)]
+    runs, shown = [(scene, NUTATIONS)], observable(method)
     if finest is not None and method.fixed_step:
         runs.append((scene, SHARE))  # the same number of steps, and smaller errors
     if not (quick or not method.fixed_step or method.order is None or method.implementation == "python"):
         runs += [(find_scene(FALLBACK), nutations) for nutations in LONGER]
-    tried: list[Order] = []
-    for chosen, nutations in runs:
-        tried.append(_slopes(method, chosen, nutations, quick, finest, main or observable(method)))
-        if math.isfinite(tried[-1].main.slope):
-            return tried[-1]
-    return tried[0]
-
-
-def _slopes(method: Integrator, scene: Scene, nutations: float, quick: bool, finest: float | None, main: str) -> Order:
-    horizon = nutations * scene.time_scale()
     count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # steps that are chosen scatter
     most = FINEST[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
-    settings = ladder(method, scene, horizon, count, most)
-    table = order_table(scene, method, settings, horizon, observable(method), dense=finest is None)
-    step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
-    fits = {name: order_fit(scene, method, table, name, horizon) for name in (main, "theta", "energy")}
-    error, bound = table[main].values, table[f"{main}_bound"].values
-    return Order(scene.name, step, table["tolerance"].values, error, bound, fits, main, method.fixed_step)
+    tried: list[Order] = []
+    for chosen, nutations in runs:
+        horizon = nutations * chosen.time_scale()
+        settings = ladder(method, chosen, horizon, count, most)
+        table = order_table(chosen, method, settings, horizon, shown, dense=finest is None)
+        step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
+        fits = {name: order_fit(chosen, method, table, name, horizon) for name in (main or shown, "theta", "energy")}
+        tried.append(Order(chosen.name, table, step, fits, main or shown))
+        if tried[-1].measured:
+            return tried[-1]
+    return tried[0]
 
 
 def _by_steps(subject: Subject) -> Finding:
@@ -269,44 +225,50 @@ def _by_steps(subject: Subject) -> Finding:
     series, claim = series_of(subject), method.order
     options: dict[str, Any] = {"quick": subject.quick, "finest": finest, "main": "theta" if subject.in_plane else ""}
     fitted = measured_order(method, scene, **options)
-    if series and not fitted.measured and series.series.is_exact and series.order < (claim or 0):
+    if series and not fitted.measured and series.is_exact and series.order < (claim or 0):
         # a method of high order is tried at long steps, whose errors fall as no power where the order is low, and the
         # limit of its runs is extrapolated by a power that they do not have: it looks wrong
         method = replace(method, order=max(series.order, 1))
         fitted = measured_order(method, scene, **options)
-    rank = np.argsort(fitted.step_size)[:SHOWN]
-    columns = {"step_size": fitted.step_size, "error": fitted.error, "fitted": fitted.main.used.astype(float)}
+    main, measured, rank = fitted.main, fitted.measured, np.argsort(fitted.step_size)[:SHOWN]
+    columns = {"step_size": fitted.step_size, "error": fitted.columns("")[0], "fitted": main.used.astype(float)}
     padded = np.full(SHOWN - rank.size, math.nan)
     subject.traces.update({name: np.concatenate([values[rank], padded]) for name, values in columns.items()})
-    main = fitted.main
     slopes = ", ".join(f"{name} {fit}" for name, fit in fitted.fits.items() if math.isfinite(fit.slope))
     slopes = f"slopes {slopes} on {fitted.scene}" if slopes else "no slope"
     power = method.order or 1
     # runs of a step that has the motion's terms up to h^power, beyond doubt, go to the motion
-    follows = series and series.order >= max(power, 1) and float(series.series.noise[1]) < CLEAR
-    sure = subject.in_plane or (fitted.measured and follows)
-    if method.fixed_step and not sure:
-        if fitted.measured:
-            power = max(1, min(method.order or 99, round(main.slope)))
-        wrong = limit(method, scene, power, finest).wrong
-        if wrong:
+    follows = series and series.order >= max(power, 1) and float(series.noise[1]) < CLEAR
+    if method.fixed_step and not (subject.in_plane or (measured and follows)):
+        power = max(1, min(method.order or 99, round(main.slope))) if measured else power
+        if wrong := limit(method, scene, power, finest).wrong:
             why = f"as its step goes to zero it goes to a motion that is wrong by {wrong:.1e} ({slopes})"
             verdict = "measured" if claim is None else "refuted"
             return Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)
-    if claim is None and subject.stepper is not None and method.adaptive:
+    if claim is not None:
+        return _claimed(claim, fitted, fitted.fits.values() if method.fixed_step else (), series, slopes)
+    if subject.stepper is not None and method.adaptive:
         return _converges(fitted, slopes)
-    return weighed(claim, fitted, series, slopes)
+    value, why = main.slope, slopes
+    if series is not None:
+        power = round(main.slope) if measured else series.order
+        why = f"{slopes}; {series.words(power)}"
+        if not measured or series.order < power:  # the slope, unless the series of a step has a lower order
+            measured, value = _terms(series), float(series.order)
+    if not measured:
+        return undecided("order", "", main.reason)
+    return Finding("order", "", measured, "measured", why, value, main.interval)
 
 
 def _converges(fitted: Order, slopes: str) -> Finding:
     """Does the error fall with the tolerance, down to rounding?"""
-    good = np.isfinite(fitted.error)
+    tolerances, errors = fitted.columns("tolerance", "")
+    good, (decades, less) = np.isfinite(errors), FALLS
     if not good.any():
         return undecided("order", CONVERGES, fitted.main.reason)
-    rank = np.flatnonzero(good)[np.argsort(fitted.tolerance[good])]
-    tolerances, errors = fitted.tolerance[rank], fitted.error[rank]
-    last, (decades, less) = float(errors[0]), FALLS
-    coarser = errors[tolerances > 0.99 * decades * tolerances[0]]
+    rank = np.flatnonzero(good)[np.argsort(tolerances[good])]
+    tolerances, errors = tolerances[rank], errors[rank]
+    last, coarser = float(errors[0]), errors[tolerances > 0.99 * decades * tolerances[0]]
     why = f"an error of {last:.1e} at a tolerance of {tolerances[0]:.0e}, from {errors[-1]:.1e} at {tolerances[-1]:.0e}"
     if last <= ROUNDED or (coarser.size and last < coarser.min() / less):
         measured = fitted.measured or Measured("converges", last, text="converges as its tolerance falls")
@@ -316,43 +278,26 @@ def _converges(fitted: Order, slopes: str) -> Finding:
     return Finding("order", CONVERGES, Measured("wrong limit", last), "refuted", f"it stays at {why}", last, ROUNDED)
 
 
-def weighed(claim: int | None, fitted: Order, series: ChartSeries | None, slopes: str) -> Finding:
-    """The finding of slopes and series together; `slopes` says what the slopes are."""
-    if claim is not None:
-        return _claimed(claim, fitted, series, slopes)
-    main, measured, value, why = fitted.main, fitted.measured, fitted.main.slope, slopes
-    if series is not None:
-        power = round(main.slope) if measured else series.order
-        why = f"{slopes}; {series.words(power)}"
-        if not measured or series.order < power:  # the slope, unless the series of a step has a lower order
-            measured, value = series.measured, float(series.order)
-    if not measured:
-        return Finding("order", "", NOTHING, "undecided", main.reason)
-    return Finding("order", "", measured, "measured", why, value, main.interval)
-
-
-def _claimed(power: int, fitted: Order, series: ChartSeries | None, slopes: str) -> Finding:
-    """The verdict on a declared order; the steps of an adaptive method, which has no series, do not all scale alike.
+def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | None, slopes: str) -> Finding:
+    """The verdict on a declared order; the steps of an adaptive method, which has no `fits`, do not all scale alike.
 
     Where the series shows the first wrong term, its order is that of the runs as h -> 0, so that a larger slope is one
     of steps that are too long. A lower slope stands: a run may meet what one step from one point does not.
     """
-    main, measured = fitted.main, fitted.measured
-    fits = list(fitted.fits.values()) if fitted.fixed_step else []
-    verdict = order_verdict(power, main, fits)
+    main, measured, verdict = fitted.main, fitted.measured, order_verdict(power, fitted.main, fits)
     value, resolution = main.slope, BESIDE + main.interval
     why = f"{slopes}; {series.words(power)}" if series else slopes
-    if series is not None and series.order == power and series.series.is_exact and verdict != "confirmed":
+    if series is not None and series.order == power and series.is_exact and verdict != "confirmed":
         early = bool(measured) and main.slope > power and all(not fit.slope < power - BESIDE for fit in fits)
         if early or (not measured and _agree(fitted, power)):
             why = f"{why} ({main.reason or 'at steps too long for a slope'})"
-            return Finding("order", str(power), series.measured, "confirmed", why, *series.term(power))
+            defect = series.worst(power), series.least(power)
+            return Finding("order", str(power), _terms(series), "confirmed", why, *defect)
     if verdict == "refuted":
         why = f"the error falls with another power of the step: {why}"
-    elif series is not None and series.order < min(power, series.series.resolved):
-        verdict, why = "refuted", f"{series.words(power)}; {slopes}"
-        measured = series.measured
-        value, resolution = series.term(series.order + 1)
+    elif series is not None and series.order < min(power, series.resolved):
+        verdict, why, measured, term = "refuted", f"{series.words(power)}; {slopes}", _terms(series), series.order + 1
+        value, resolution = series.worst(term), series.least(term)
     elif verdict == "undecided":
         why = f"the slope is neither {power} nor clearly another order: {why}" if measured else f"{main.reason} ({why})"
     return Finding("order", str(power), measured, verdict, why, value, resolution)
@@ -360,8 +305,8 @@ def _claimed(power: int, fitted: Order, series: ChartSeries | None, slopes: str)
 
 def _agree(fitted: Order, power: int) -> bool:
     """Do the errors of the finest runs fall about as h^power, as far as they can be judged?"""
-    h, error = fitted.step_size, fitted.error
-    good = np.isfinite(error) & (error > ABOVE * fitted.bound) & (error < LARGEST_ERROR)
+    h, (error, bound) = fitted.step_size, fitted.columns("", "_bound")
+    good = np.isfinite(error) & (error > ABOVE * bound) & (error < LARGEST_ERROR)
     finest = np.argsort(h[good])[:FINEST_RUNS]
     scaled = error[good][finest] / h[good][finest] ** power
     return scaled.size < 2 or float(np.max(scaled)) < SPREAD * float(np.min(scaled))
@@ -382,16 +327,12 @@ class Limit(NamedTuple):
 def limit(method: Integrator, scene: Scene, power: int, finest: float | None = None) -> Limit:
     """How far from the true motion runs of a method of order `power`, of `finest` steps at most, end as h -> 0."""
     fewest = STEPS.get(power, 200) // (1 if method.implementation == "compiled" else 20)
-    if finest is not None:
-        fewest = min(fewest, int(finest) // 4)
-    ends = [_signed_error(method, scene, SHARE * scene.time_scale(), fewest * 2**k) for k in range(3)]
-
-    def without(power: int, coarse: Array, fine: Array) -> Array:
-        """The combination of the errors at h and h/2 that has no term in h^power."""
-        return fine + (fine - coarse) / (2.0**power - 1.0)
-
-    once = [without(power, ends[k], ends[k + 1]) for k in range(2)]
-    size = [float(np.max(np.abs(value))) for value in (ends[2], once[1], without(power + 1, once[0], once[1]))]
+    fewest = fewest if finest is None else min(fewest, int(finest) // 4)
+    first, second, third = (_signed_error(method, scene, SHARE * scene.time_scale(), fewest * 2**k) for k in range(3))
+    # errors at h and h/2 without their term in h^power, then without that in h^(power + 1)
+    coarse, fine = (b + (b - a) / (2.0**power - 1.0) for a, b in ((first, second), (second, third)))
+    last = fine + (fine - coarse) / (2.0 ** (power + 1) - 1.0)
+    size = [float(np.max(np.abs(value))) for value in (third, fine, last)]
     return Limit(min(size[0], size[2]), abs(size[2] - size[1]))
 
 
@@ -433,42 +374,28 @@ def table_of(method: Integrator) -> Conditions | None:
     return None
 
 
-def _visible_from(table: Conditions, power: int, scene: Scene) -> str:
-    """From which step on a slope would show the condition that is missed; empty where that is not known."""
-    low, high = table.order + 1, power + 1
-    if low >= high or high > len(table.defect) or table.defect[high - 1] == 0.0:
-        return ""
-    turn = (table.defect[low - 1] / table.defect[high - 1]) ** (1.0 / (high - low))
-    return f" (slopes show it from steps of {turn * scene.time_scale() / (2.0 * math.pi):.0e} downwards)"
-
-
 def time_order(subject: Subject) -> list[Finding]:
     """The finding on the order in a frame that turns."""
-    if not subject.method.fixed_step or not subject.stepper.takes_field:
-        return [inapplicable("time", "it takes no right-hand side")]
-    if subject.autonomous:
-        return [inapplicable("time", "it was written for f(y)")]
-    return [_in_frame(subject)]
-
-
-def _in_frame(subject: Subject) -> Finding:
+    if subject.autonomous or not (subject.method.fixed_step and subject.stepper.takes_field):
+        why = "it was written for f(y)" if subject.autonomous else "it takes no right-hand side"
+        return [inapplicable("time", why)]
     order, rate = subject.method.order, 2.0 * math.pi * TURNS / subject.scene.time_scale()
     turning, calls = series_in_frame(subject, rate)
     if not calls:
-        return inapplicable("time", "it asks for no right-hand side")
+        return [inapplicable("time", "it asks for no right-hand side")]
     if turning.order < 0:
-        return inapplicable("time", "a step of no length moves a state that is not of its chart")
-    series, power = turning.series, turning.order if order is None else order
+        return [inapplicable("time", "a step of no length moves a state that is not of its chart")]
+    power = turning.order if order is None else order
     shown = min(turning.order, power)
     declared, measured, verdict = yes_no(order), Measured("order", shown, text=str(shown)), "measured"
-    if turning.order >= min(power, series.resolved):
+    if turning.order >= min(power, turning.resolved):
         if turning.order < power:  # no higher term is resolved
             measured, verdict = Measured("order", shown, text=f"{shown} or more"), "undecided"
         elif order is not None:
             verdict = "confirmed"
         why = f"where f depends on t, {turning.words(power)}"
     elif subject.knows_top:
-        return inapplicable("time", "it knows equations of the top beside f, which depend on no time")
+        return [inapplicable("time", "it knows equations of the top beside f, which depend on no time")]
     elif calls == {BEGIN * subject.scene.time_scale()}:  # a step for f(y): no fault on a top
         declared, measured = "", Measured("f(y) only", shown, text=f"f(y) only, {shown}")
         why = "f is asked at the start of a step alone, which is right for f(y); where f depends on t, "
@@ -477,7 +404,8 @@ def _in_frame(subject: Subject) -> Finding:
         declared, why = "", f"{turning.wrong_term()}, as for f(y)"
     else:
         verdict, why = "refuted", f"where f depends on t, {turning.wrong_term()}: f is asked at wrong times"
-    return Finding("time", declared, measured, verdict, why, *turning.term(min(power, turning.order + 1)))
+    term = min(power, turning.order + 1)
+    return [Finding("time", declared, measured, verdict, why, turning.worst(term), turning.least(term))]
 
 
 class TurningField:
@@ -486,22 +414,21 @@ class TurningField:
     def __init__(self, par: Any, rate: float) -> None:
         self.par, self.rate, self.times = par, rate, set[float]()
 
-    def turned(self, t: float, y: Array, sign: float) -> Array:
+    def turned(self, t: float, y: Any, sign: float = 1.0) -> Array:
         """R(t) y for sign 1, R(t)^T y for -1."""
         c, s = math.cos(self.rate * t), sign * math.sin(self.rate * t)
-        x, v, w, lx, lv, lw = y
-        return np.array([x, c * v - s * w, s * v + c * w, lx, c * lv - s * lw, s * lv + c * lw])
+        turn = np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
+        return np.asarray((np.reshape(y, (2, 3)) @ turn).ravel())
 
     def __call__(self, t: float, z: Any) -> Array:
         """z'."""
-        z = np.asarray(z, dtype=float)
-        swept = self.rate * np.array([0.0, -z[2], z[1], 0.0, -z[5], z[4]])
         self.times.add(t)
-        rates = FORMULATIONS["axis"].field(self.par, self.turned(t, z, 1.0).tolist())
-        return self.turned(t, np.array(rates), -1.0) - swept
+        rates = FORMULATIONS["axis"].field(self.par, self.turned(t, z).tolist())
+        swept = np.cross([self.rate, 0.0, 0.0], np.reshape(z, (2, 3))).ravel()
+        return np.asarray(self.turned(t, rates, -1.0) - swept)
 
 
-def series_in_frame(subject: Subject, rate: float) -> tuple[ChartSeries, set[float]]:
+def series_in_frame(subject: Subject, rate: float) -> tuple[Series, set[float]]:
     """The series of a step in a frame that turns at a rate, and the times at which it asks for f."""
     scene, start = subject.scene, generic_start(subject.scene)
     begin, unit = BEGIN * scene.time_scale(), np.repeat([1.0, scene.momentum_scale], 3)
@@ -517,4 +444,4 @@ def series_in_frame(subject: Subject, rate: float) -> tuple[ChartSeries, set[flo
 
     first = motion(0.0) * unit
 
-    return ChartSeries("turning", compared(image, motion, scene.time_scale())), f.times
+    return compared(image, motion, scene.time_scale(), "turning"), f.times

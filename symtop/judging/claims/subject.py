@@ -83,13 +83,20 @@ class Subject:
         return not np.max(np.abs(end - y)) <= AT_REST * np.max(np.abs(y))
 
     def elsewhere(self, draws: tuple[int, int], seconds: tuple[float, float]) -> Iterator[tuple[str, Scene]]:
-        """Starts that are drawn, with a name for each, while there are draws and seconds; the second with --quick."""
-        began = time.monotonic()
+        """Starts that are drawn, with a name for each, while there are draws and seconds; the second with --quick.
+
+        Between one and the next, runs of every other one begin at a late time.
+        """
+        began, draw, stepper = time.monotonic(), np.random.default_rng(self.seed), self.stepper or Stepper()
         scenes = drawn(self.scene, draws[self.quick], self.seed, same_top=self.knows_top)
-        for k, scene in enumerate(scenes, start=1):
-            if time.monotonic() - began > seconds[self.quick]:  # a program that takes long to start
-                return
-            yield f"start {k} of seed {self.seed}", scene
+        try:
+            for k, scene in enumerate(scenes, start=1):
+                if time.monotonic() - began > seconds[self.quick]:  # a program that takes long to start
+                    return
+                stepper.since = 0.0 if k % 2 else scene.time_scale() * 10.0 ** draw.uniform(0.0, 3.0)
+                yield f"start {k} of seed {self.seed}" + f", t = {stepper.since:.3g}" * (k % 2 == 0), scene
+        finally:
+            stepper.since = 0.0
 
     @property
     def charts(self) -> tuple[str, ...]:
@@ -128,9 +135,9 @@ def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
     start, run = stepper.from_start(scene.top, generic_start(scene), scene.time_scale() / STEPS_A_NUTATION)
 
     def seconds(steps: int) -> tuple[float, bool]:
-        began = time.perf_counter()
+        began = stepper.clock()
         end = run(start, steps)
-        return time.perf_counter() - began, bool(np.isfinite(end).all())
+        return stepper.clock() - began, bool(np.isfinite(end).all())
 
     first, steps = min(seconds(1)[0], seconds(1)[0]), 1
     while True:

@@ -53,7 +53,8 @@ def opened(plain: Any) -> Any:
     """A body and a start, of their 14 numbers."""
     I1, I2, I3, mgl, x, y, z = plain[:7]
     body = General(1.0 / I1, 1.0 / I2, 1.0 / I3, I1, I2, I3, mgl * x, mgl * y, mgl * z)
-    return body, Pose(*plain[7:11], I1 * plain[11], I2 * plain[12], I3 * plain[13])
+    w, x, y, z, w1, w2, w3 = plain[7:]
+    return body, Pose(w, x, y, z, I1 * w1, I2 * w2, I3 * w3)
 
 
 @register_jitable

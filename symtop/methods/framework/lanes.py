@@ -341,7 +341,7 @@ def in_turn(
 
 def of_bodies(numbers: Array) -> bool:
     """Are these rows of bodies without symmetry, and not of tops?"""
-    return numbers.shape[1] != len(NUMBERS)
+    return int(numbers.shape[1]) != len(NUMBERS)
 
 
 def members_of(numbers: Array) -> Iterator[tuple[Any, Any]]:

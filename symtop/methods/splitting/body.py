@@ -93,7 +93,7 @@ def _kicking(gradient: bool | None) -> Callable[..., Any]:
             kick = plus(kick, bend, cross(force, slope))
         return (*step[:4], step[4] + kick[0], step[5] + kick[1], step[6] + kick[2])
 
-    return kick  # type: ignore[no-any-return]
+    return kick
 
 
 @register_jitable
@@ -293,7 +293,7 @@ def _five(turns: _Turns) -> Callable[..., Any]:
         step = about(par, middle, state, about(par, inner, state, step, time), half)
         return momentum(state, about(par, outer, state, step, half), 0.0)[0]  # the length of q
 
-    return drift  # type: ignore[no-any-return]
+    return drift
 
 
 def _five_in_lanes() -> Callable[..., Any]:
@@ -310,7 +310,7 @@ def _five_in_lanes() -> Callable[..., Any]:
         step, e = first(state, step, half * par.a1)
         return momentum(state, step, 0.0)[0], a & b & c & d & e
 
-    return drift  # type: ignore[no-any-return]
+    return drift
 
 
 march_five, march_five_of_top = _march(_five(ALONE), _five_in_lanes()), _march(_five(_turns(by_library, exact)), None)

@@ -43,7 +43,7 @@ Array = NDArray[np.float64]
 FREE = ("short-axis", "long-axis", "near-separatrix", "near-symmetric", "needle")
 HEAVY = ("regular", "chaotic", "lagrange")
 STRATA = (*FREE, *HEAVY)
-KINDS = (*STRATA, "heavy", "all")
+KINDS = (*STRATA, "heavy", "all", "free")
 DRAWS, MOST = 16, 1_000_000
 PERIODS, CHAOS, SMALL = 10.0, 1000.0, 1e-8
 STEPS = 64  # of the series in a natural period
@@ -59,14 +59,15 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
     Variables ``I1``, ``I2``, ``I3``, ``mgl``, ``centre`` and ``omega_body`` (member, 3; principal axes),
     ``quaternion`` (member, 4; w, x, y, z, body to space), in any consistent units, and ``stratum``, its name. `kind` is
     a stratum (free: short-axis, long-axis, near-separatrix, near-symmetric, needle; heavy: regular, chaotic,
-    lagrange), "heavy" without asking for chaos, or "all" for each stratum in turn. `epsilon`, from 0 to 1/2, is how far
-    heavy bodies are from a Lagrange top; without one it is drawn. Member i depends on the seed alone, and not on n.
+    lagrange), "heavy" without asking for chaos, or "free" or "all" for such strata in turn. `epsilon`, from 0 to 1/2,
+    is how far heavy bodies are from a Lagrange top; without one it is drawn. Member i depends on the seed alone, and
+    not on n.
 
     Raises SymtopError for arguments that make no sense.
     """
     count, chosen, first = whole("n", n, 1, MOST), one_of("kind", kind, KINDS), whole("seed", seed, 0)
     check_memory("n", count)
-    kinds = STRATA if chosen == "all" else (chosen,)
+    kinds = {"all": STRATA, "free": FREE}.get(chosen, (chosen,))
     if epsilon is not None:
         if not {*kinds} - {*FREE, "lagrange"}:
             raise SymtopError(f"epsilon is of heavy bodies, and not of the kind {chosen!r}", "epsilon")

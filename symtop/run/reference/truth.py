@@ -177,7 +177,7 @@ def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) ->
     shown = _samples(body, start, times.tobytes(), precision == "quad")
     if (lost := shown.lost(times)) is not None:
         words = "its motion is not known to 1e-9 rad from there on"
-        raise SymtopError(f"times must be below {lost:.6g} on {scene.name}, not {times.max():.6g}: {words}")
+        raise SymtopError(f"times must be below {lost:.6g} on {scene.name}, not {times.max():.6g}: {words}", "times")
     quaternion = shown.quaternion
     momentum = charts.lifted(np.concatenate([quaternion, shown.momentum], axis=1))
     axis = charts.axis_from_quaternion(quaternion)

@@ -26,29 +26,13 @@ def euler(f, t, y, h):
     return y + h * f(t, y)
 
 
-def midpoint(f, t, y, h):
-    return y + h * f(t + h / 2, y + h / 2 * f(t, y))
-
-
-def heun(f, t, y, h):
-    k = f(t, y)
-    return y + h / 2 * (k + f(t + h, y + h * k))
-
-
+midpoint = explicit(((), (0.5,)), (0.0, 1.0), (0.0, 0.5))
+heun = explicit(((), (1.0,)), (0.5, 0.5), (0.0, 1.0))
+ralston = explicit(((), (2 / 3,)), (1 / 4, 3 / 4), (0.0, 2 / 3))
 kutta_3 = explicit(((), (0.5,), (-1.0, 2.0)), (1 / 6, 2 / 3, 1 / 6), (0.0, 0.5, 1.0))
-
-
 ssp_3 = explicit(((), (1.0,), (0.25, 0.25)), (1 / 6, 1 / 6, 2 / 3), (0.0, 1.0, 0.5))
-
-
-def rk4(f, t, y, h):
-    k1 = f(t, y)
-    k2 = f(t + h / 2, y + h / 2 * k1)
-    k3 = f(t + h / 2, y + h / 2 * k2)
-    k4 = f(t + h, y + h * k3)
-    return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-
-
+CLASSICAL = ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6), (0.0, 0.5, 0.5, 1.0)
+rk4 = explicit(*CLASSICAL)
 three_eighths = explicit(
     ((), (1 / 3,), (-1 / 3, 1.0), (1.0, -1.0, 1.0)), (1 / 8, 3 / 8, 3 / 8, 1 / 8), (0.0, 1 / 3, 2 / 3, 1.0)
 )
@@ -63,9 +47,6 @@ dormand_prince = explicit(
     (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
     (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0),
 )  # fmt: skip
-
-
-ralston = explicit(((), (2 / 3,)), (1 / 4, 3 / 4), (0.0, 2 / 3))
 
 
 def solved(function, guess, tolerance=4e-16):
@@ -132,9 +113,11 @@ class HeunSolver(OdeSolver):
 
     def _step_impl(self):
         h = self.direction * min(self.max_step, abs(self.t_bound - self.t))
-        self.y = heun(self.fun, self.t, self.y, h)
-        self.t += h
+        self.y, self.t = self.moved(self.t, self.y, h), self.t + h
         return True, None
+
+    def moved(self, t, y, h):
+        return heun(self.fun, t, y, h)
 
 
 class AdamsBashforth(HeunSolver):
@@ -142,28 +125,29 @@ class AdamsBashforth(HeunSolver):
 
     slope = None
 
-    def _step_impl(self):
-        h = self.direction * min(self.max_step, abs(self.t_bound - self.t))
-        now = self.fun(self.t, self.y)
-        if self.slope is None:
-            self.y = heun(self.fun, self.t, self.y, h)
-        else:
-            self.y = self.y + h / 2 * (3 * now - self.slope)
-        self.slope = now
-        self.t += h
-        return True, None
+    def moved(self, t, y, h):
+        before, self.slope = self.slope, self.fun(t, y)
+        return heun(self.fun, t, y, h) if before is None else y + h / 2 * (3 * self.slope - before)
+
+
+class Leaping(HeunSolver):
+    """The leapfrog of two steps, y_(n+1) = y_(n-1) + 2 h f(y_n), started by the midpoint rule."""
+
+    before = None
+
+    def moved(self, t, y, h):
+        last, self.before = self.before, y
+        return midpoint(self.fun, t, y, h) if last is None else last + 2 * h * self.fun(t, y)
 
 
 def radau_iia(f, t, y, h):
     """Of order 3, two stages; its equations are iterated until they stand still."""
-    k1 = k2 = f(t, y)
-    for _ in range(200):
-        before = k1, k2
-        k1 = f(t + h / 3, y + h * (5 * k1 - k2) / 12)
-        k2 = f(t + h, y + h * (3 * k1 + k2) / 4)
-        if np.array_equal(before[0], k1) and np.array_equal(before[1], k2):
-            break
-    return y + h * (3 * k1 + k2) / 4
+
+    def slopes(k):
+        return np.array([f(t + h / 3, y + h * (5 * k[0] - k[1]) / 12), f(t + h, y + h * (3 * k[0] + k[1]) / 4)])
+
+    k = solved(slopes, np.array([f(t, y)] * 2))
+    return y + h * (3 * k[0] + k[1]) / 4
 
 
 def as_a_list(f, t, y, h):
@@ -243,21 +227,6 @@ class Midpoints:
 halves = Midpoints()
 
 
-class Leaping(HeunSolver):
-    """The leapfrog of two steps, y_(n+1) = y_(n-1) + 2 h f(y_n), started by the midpoint rule."""
-
-    before = None
-
-    def _step_impl(self):
-        h = self.direction * self.max_step
-        if self.before is None:
-            after = midpoint(self.fun, self.t, self.y, h)
-        else:
-            after = self.before + 2 * h * self.fun(self.t, self.y)
-        self.before, self.y, self.t = self.y, after, self.t + h
-        return True, None
-
-
 class AtTolerance(RK45):
     """SciPy's own, to be judged at a tolerance."""
 
@@ -275,13 +244,11 @@ def tr_bdf2(f, t, y, h):
 def newmark(f, t, y, h):
     """beta = 1/4, gamma = 1/2, in angles: q'' = a(q, q'). Newmark, J. Eng. Mech. 85 (1959) 67."""
     q, v, before = y[:3], y[3:], f(t, y)[3:]
-    after = before
-    for _ in range(80):
-        place, rate = q + h * v + h * h / 4 * (before + after), v + h / 2 * (before + after)
-        after, last = f(t + h, np.concatenate([place, rate]))[3:], after
-        if np.abs(after - last).max() <= 4e-16 * np.abs(after).max():
-            break
-    return np.concatenate([place, rate])
+
+    def end(after):
+        return np.concatenate([q + h * v + h * h / 4 * (before + after), v + h / 2 * (before + after)])
+
+    return end(solved(lambda after: f(t + h, end(after))[3:], before))
 
 
 def own_drift(f, t, y, h):
@@ -352,6 +319,13 @@ def rotation_negated(q, w, h, inertia, torque):
     return -q, w
 
 
+def verlet(state, h, dT, dV):
+    theta, p = state
+    p = p - h / 2 * dV(theta)
+    theta = theta + h * dT(p)
+    return theta, p - h / 2 * dV(theta)
+
+
 def separable_forest_ruth(state, h, dT, dV):
     """Of order 4, drift first."""
     theta, p = state
@@ -365,14 +339,12 @@ def separable_forest_ruth(state, h, dT, dV):
 
 def separable_implicit_midpoint(state, h, dT, dV):
     """Iterated until it stands still: symplectic, and no splitting."""
-    theta, p = state
-    x, y = theta + h * dT(p), p - h * dV(theta)
-    for _ in range(300):
-        last = x, y
-        x, y = theta + h * dT((p + y) / 2), p - h * dV((theta + x) / 2)
-        if abs(x - last[0]) + abs(y - last[1]) < 4e-16:
-            break
-    return x, y
+
+    def end(after):
+        theta, p = (state + after) / 2
+        return state + h * np.array([dT(p), -dV(theta)])
+
+    return solved(end, state)
 
 
 def separable_heun(state, h, dT, dV):
@@ -383,8 +355,6 @@ def separable_heun(state, h, dT, dV):
 
 
 ALL = ("energy", "p_phi", "p_psi", "axis_length")
-
-
 ROTATION, SEPARABLE = {"form": "rotation"}, {"form": "separable"}
 CLAIMS = {  # name: claims, and options of judge
     "euler": ({"order": 1, "explicit": True}, {}),

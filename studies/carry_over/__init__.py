@@ -1,0 +1,1 @@
+"""Which method is the cheapest at the accuracy I need, with what I have?"""

@@ -1,0 +1,342 @@
+"""Bodies compared with symmetric tops: tau of the rankings, winners, steps, silent wrong runs, growth, order.
+
+A cost is in seconds, evaluations x price + call. A method's median is over the bodies of a family whose truth judges
+the target; not reached is infinite, and infinite ones tie. Families with a number have the same members, so that they
+are resampled together.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from symtop_studies.cost.ladder import setting_of
+from symtop_studies.cost.prices import prices
+from symtop_studies.cost.ranking import ENDS, Ladder, Safe, factors, safe
+from symtop_studies.memoize import of_one_dataset
+
+from symtop.methods.framework.registry import NEEDS, integrator
+from symtop.model.charts import BODY, Array
+
+from .bodies import ASKED, CHAOTIC, FAMILIES, FREE, SYMMETRIC
+from .measures import STATUS
+
+SAME, PART = 0.9, 0.8  # tau
+LEVEL, DOUBLE, SEVERAL = 1.1, 2.0, 5.0  # factors
+EXPONENT, LOWER = 0.25, 0.5
+STEPS = 69.92  # a period, of the count of silent wrong runs
+CHAOS = 1000.0  # growth in ten periods
+DRAWS = 100
+ANY = "any body"
+WITHIN = 2.5  # times the least median of a class: who comes as close runs over a hundred periods
+MOST_OF = 0.95  # of the methods
+SPANS = ("short", "long")
+YES, FACTOR, PARTLY, NO = "carries over", "with a factor", "in part", "does not"
+OTHERS = tuple(name for name in FAMILIES if name != SYMMETRIC)
+
+
+class Costs(NamedTuple):
+    """Seconds of methods on the bodies of a family, and what prices are wrong by."""
+
+    names: list[str]
+    needs: list[str]
+    values: Array  # (methods, bodies), inf where the target is not reached, NaN where it is not asked
+    errors: Array  # (methods,)
+
+
+class Interval(NamedTuple):
+    """A number with the ends of its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+def label(name: str) -> str:
+    """A method of bodies without its chart."""
+    return name.removesuffix(f"[{BODY}]")
+
+
+def targets() -> Sequence[float]:
+    """The errors that are asked."""
+    return ASKED
+
+
+def group_of(data: xr.DataTree, span: str) -> xr.Dataset:
+    """The dataset of a group over its only scene."""
+    return data[span].to_dataset().isel(scene=0)
+
+
+@of_one_dataset
+def costs(data: xr.DataTree, family: str, target: float, quantity: str = "axis", span: str = "short") -> Costs:
+    """Costs of all methods of bodies; span "own" has the same methods in charts of the top, of epsilon = 0."""
+    group = group_of(data, span)
+    names = [str(name) for name in group["variant"].values]
+    asked = group.sel(quantity=quantity).sel(target=target, method="nearest")
+    if span != "own":
+        asked = asked.sel(family=family)
+    values, met = (asked[name].transpose("variant", "member").values.astype(float) for name in ("cost", "met_at"))
+    known = prices(data)
+    for row, name in enumerate(names):
+        fixed = str(group["control"].values[row]) == "step_size"
+        price, call = known.at(name, np.full(met.shape[1], np.nan) if fixed else met[row])
+        values[row] = values[row] * price + call
+    errors = known.error[[known.names.index(name) for name in names]]
+    return Costs(names, [str(needs) for needs in group["needs"].values], values, errors)
+
+
+def there(taken: Costs) -> NDArray[np.int64]:
+    """The bodies that are asked."""
+    return np.flatnonzero(~np.isnan(taken.values).all(axis=0))
+
+
+def medians(values: Array) -> Array:
+    """Over bodies, along the last axis; of ties that are not reached a number that ties as well."""
+    return np.minimum(np.nan_to_num(np.median(values, axis=-1), nan=1e300, posinf=1e300), 1e300)
+
+
+def tau_of(first: Array, second: Array) -> float:
+    """Kendall's tau-b of two rows; NaN of fewer than three methods."""
+    either = (first < 1e300) | (second < 1e300)
+    if either.sum() < 3:
+        return float("nan")
+    one, other = (np.sign(row[either, np.newaxis] - row[either]) for row in (first, second))
+    pairs = (one * one).sum() * (other * other).sum()
+    return float((one * other).sum() / np.sqrt(pairs)) if pairs else float("nan")
+
+
+def _bootstrapped(
+    first: Costs, second: Costs, rows: tuple[list[int], list[int]], paired: bool, draws: int = DRAWS
+) -> Interval:
+    """Tau of the medians of two rows of methods, with bodies and prices drawn; without draws no interval."""
+    here, other = there(first), there(second)
+    if here.size < 3 or other.size < 3:
+        return Interval(*(float("nan"),) * 3)
+    a, b = first.values[rows[0]], second.values[rows[1]]
+    value = tau_of(medians(a[:, here]), medians(b[:, other]))
+    generator, drawn = np.random.default_rng(4), [] if draws else [float("nan")]
+    price = factors(first.errors[rows[0]], DRAWS), factors(second.errors[rows[1]], DRAWS)
+    both = np.intersect1d(here, other)
+    for k in range(draws):
+        if paired:
+            chosen = both[generator.integers(both.size, size=both.size)]
+            pair = chosen, chosen
+        else:
+            pair = tuple(part[generator.integers(part.size, size=part.size)] for part in (here, other))
+        drawn.append(tau_of(medians(a[:, pair[0]]) * price[0][k], medians(b[:, pair[1]]) * price[1][k]))
+    ends = np.nanquantile(drawn, ENDS).tolist() if np.isfinite(drawn).any() else (float("nan"),) * 2
+    return Interval(value, *ends)
+
+
+@of_one_dataset
+def tau(data: xr.DataTree, family: str, target: float, quantity: str = "axis", span: str = "short") -> Interval:
+    """The ranking of a family against that at epsilon = 0, prices the same in both."""
+    first, second = (costs(data, name, target, quantity, span) for name in (SYMMETRIC, family))
+    rows = list(range(len(first.names)))
+    draws = DRAWS if quantity == "axis" else 0
+    return _bootstrapped(first, second, (rows, rows), family not in (CHAOTIC, FREE), draws)
+
+
+@of_one_dataset
+def ceiling(data: xr.DataTree, target: float, quantity: str = "axis", span: str = "short") -> Interval:
+    """Tau between two halves of the bodies of epsilon = 0."""
+    taken = costs(data, SYMMETRIC, target, quantity, span)
+    here, generator, drawn = there(taken), np.random.default_rng(5), list[float]()
+    for _ in range(DRAWS):
+        order = generator.permutation(here)
+        drawn.append(tau_of(*(medians(taken.values[:, half]) for half in np.array_split(order, 2))))
+    if not np.isfinite(drawn).any():
+        return Interval(*(float("nan"),) * 3)
+    return Interval(float(np.nanmedian(drawn)), *np.nanquantile(drawn, ENDS).tolist())
+
+
+@of_one_dataset
+def own_tau(data: xr.DataTree, family: str, target: float) -> Interval:
+    """The ranking by the top's own kernels at epsilon = 0 against that of the same methods on bodies of a family."""
+    first, second = costs(data, SYMMETRIC, target, "axis", "own"), costs(data, family, target)
+    places = [label(name) for name in second.names]
+    methods = [integrator(name).method for name in first.names]
+    rows = [k for k, name in enumerate(methods) if name in places], [places.index(m) for m in methods if m in places]
+    return _bootstrapped(first, second, rows, family not in (CHAOTIC, FREE))
+
+
+# ---- winners ---------------------------------------------------------------------------------------------------------
+
+
+def classes(data: xr.DataTree) -> list[str]:
+    """The classes of `needs` that methods of bodies have, and all together."""
+    present = set(map(str, group_of(data, "short")["needs"].values))
+    return [*(name for name in NEEDS if name in present), ANY]
+
+
+def of_class(taken: Costs, needs: str) -> list[int]:
+    """Rows of a class."""
+    return [row for row, one in enumerate(taken.needs) if needs in (one, ANY)]
+
+
+@of_one_dataset
+def winner(data: xr.DataTree, family: str, target: float, needs: str = ANY, span: str = "short") -> str | None:
+    """The method of a class with the least median cost."""
+    taken = costs(data, family, target, span=span)
+    rows, here = of_class(taken, needs), there(taken)
+    middle = medians(taken.values[np.ix_(rows, here)]) if here.size and rows else np.array([1e300])
+    return taken.names[rows[int(np.argmin(middle))]] if middle.min() < 1e300 else None
+
+
+@of_one_dataset
+def transferred(data: xr.DataTree, family: str, target: float, needs: str = ANY, span: str = "short") -> Interval:
+    """The cost of the winner at epsilon = 0 over the least of its class on each body: median, and of 95 % the ends."""
+    best = winner(data, SYMMETRIC, target, needs, span)
+    taken = costs(data, family, target, span=span)
+    rows, here = of_class(taken, needs), there(taken)
+    if best is None or not here.size:
+        return Interval(*(float("nan"),) * 3)
+    values = taken.values[np.ix_(rows, here)]
+    solved = np.isfinite(values).any(axis=0)
+    if not solved.any():
+        return Interval(*(float("nan"),) * 3)
+    ratio = values[rows.index(taken.names.index(best))][solved] / values[:, solved].min(axis=0)
+    return Interval(*np.quantile(ratio, (0.5, *ENDS), method="nearest").tolist())
+
+
+def contenders(data: xr.DataTree) -> list[str]:
+    """The methods that come within `WITHIN` of the least median of their class, in some family at some target."""
+    names = set[str]()
+    for family in FAMILIES:
+        for target in ASKED:
+            taken = costs(data, family, target)
+            here = there(taken)
+            for needs in classes(data) if here.size else ():
+                rows = of_class(taken, needs)
+                middle = medians(taken.values[np.ix_(rows, here)])
+                near = (middle <= WITHIN * middle.min()) & (middle < 1e300)
+                names |= {taken.names[row] for row, close in zip(rows, near, strict=True) if close}
+    return [str(name) for name in group_of(data, "short")["variant"].values if str(name) in names]
+
+
+# ---- steps -----------------------------------------------------------------------------------------------------------
+
+
+@of_one_dataset
+def safest(data: xr.DataTree, family: str, target: float, span: str = "short") -> dict[str, Safe]:
+    """By method its safe setting and seconds: `symtop_studies.cost.ranking.safe`."""
+    group, known, ladders = group_of(data, span), prices(data), list[Ladder]()
+    part = group.sel(quantity="axis").sel(target=target, method="nearest")
+    work = group["work"]
+    if span != "own":
+        part, work = part.sel(family=family), work.sel(family=family)
+    for name in map(str, group["variant"].values):
+        met = part["met_at"].sel(variant=name).values.astype(float)
+        met = met[~np.isnan(part["cost"].sel(variant=name).values)]
+        fixed = integrator(name).fixed_step
+        settings = np.array([setting_of(integrator(name), level) for level in range(work.sizes["level"])])
+        price, call = known.at(name, np.full(settings.size, np.nan) if fixed else settings)
+        seconds = work.sel(variant=name).values * price + call
+        ladders.append(Ladder(name, met, settings, seconds, fixed, float(known.error[known.names.index(name)])))
+    return {one.name: one for one in safe(ladders)[0]}
+
+
+@of_one_dataset
+def step_factors(data: xr.DataTree, family: str, target: float, span: str = "short") -> dict[str, float]:
+    """By method of fixed step, safe steps a period over those at epsilon = 0; where both are known."""
+    before, after = (safest(data, name, target, span) for name in (SYMMETRIC, family))
+    return {name: one.setting / before[name].setting for name, one in after.items()
+            if integrator(name).fixed_step and np.isfinite([one.setting, before[name].setting]).all()}  # fmt: skip
+
+
+@of_one_dataset
+def own_factors(data: xr.DataTree, family: str, target: float) -> dict[str, float]:
+    """By method, safe steps of a body over those of the top's own chart at epsilon = 0."""
+    own = {integrator(name).method: one for name, one in safest(data, SYMMETRIC, target, "own").items()}
+    after = safest(data, family, target)
+    return {name: one.setting / own[label(name)].setting for name, one in after.items()
+            if integrator(name).fixed_step and label(name) in own
+            and np.isfinite([one.setting, own[label(name)].setting]).all()}  # fmt: skip
+
+
+def price_factors(data: xr.DataTree) -> dict[str, float]:
+    """By method, price of an evaluation in the chart of bodies over that in the top's own."""
+    known = prices(data)
+    own = {integrator(name).method: name for name in map(str, group_of(data, "own")["variant"].values)}
+    pairs = {
+        name: own[label(name)] for name in map(str, group_of(data, "short")["variant"].values) if label(name) in own
+    }
+    at = np.array([1e-8])
+    return {name: float(known.at(name, at)[0][0] / known.at(other, at)[0][0]) for name, other in pairs.items()}
+
+
+# ---- what goes wrong -------------------------------------------------------------------------------------------------
+
+
+@of_one_dataset
+def silent(data: xr.DataTree, name: str, family: str, chosen: str = "") -> float:
+    """The share of bodies whose run of a method with `STEPS` steps a period is wrong without a sign.
+
+    `chosen` is a stratum of free bodies, or regular or chaotic by growth in ten periods; empty for all.
+    """
+    group = group_of(data, "short").sel(variant=name, family=family)
+    about = data["bodies"].to_dataset().isel(variant=0).sel(scene="short", family=family)
+    settings = group["setting"].values[list(STATUS)]
+    row = int(np.argmin(np.abs(np.log(settings / STEPS))))
+    status = group["status"].transpose("kept", "member").values[row]
+    part = status > 0.0
+    if chosen in ("regular", CHAOTIC):
+        chaos = about["growth"].values[: status.size] > CHAOS
+        part &= chaos if chosen == CHAOTIC else ~chaos
+    elif chosen:
+        part &= about["stratum"].values[: status.size] == chosen
+    return float((status[part] == 3.0).mean()) if part.any() else float("nan")
+
+
+def fixed_steps(data: xr.DataTree) -> list[str]:
+    """Methods of bodies with a step."""
+    return [name for name in map(str, group_of(data, "short")["variant"].values) if integrator(name).fixed_step]
+
+
+def silent_shares(data: xr.DataTree, family: str, chosen: str = "") -> Array:
+    """The shares of all methods of fixed step."""
+    return np.array([silent(data, name, family, chosen) for name in fixed_steps(data)])
+
+
+@of_one_dataset
+def exponents(data: xr.DataTree) -> dict[tuple[str, str, str], float]:
+    """By method, family and quantity the exponent of growth of the median error with time, over all times."""
+    group = data["growth"].to_dataset().isel(scene=0)
+    found = {}
+    for name in map(str, group["variant"].values):
+        for family in map(str, group["family"].values):
+            for quantity in ("attitude", "energy"):
+                error = group[f"error_{quantity}"].sel(variant=name, family=family).values
+                found[label(name), family, quantity] = exponent(group["time"].values, error, quantity)
+    return found
+
+
+def exponent(time: Array, error: Array, quantity: str) -> float:
+    """The slope of log error over log time; NaN where the error is rounding or has the size of the motion."""
+    most, least = (0.3, 1e-11) if quantity == "attitude" else (0.3, 1e-13)
+    good = np.isfinite(error) & (error < most) & (error > least)
+    return float(np.polyfit(np.log(time[good]), np.log(error[good]), 1)[0]) if good.sum() >= 3 else float("nan")
+
+
+def orders(data: xr.DataTree) -> Iterator[tuple[str, str, float, float]]:
+    """Method, family, order seen, order seen at epsilon = 0."""
+    order = group_of(data, "short")["order"]
+    for name in fixed_steps(data):
+        first = float(order.sel(variant=name, family=SYMMETRIC))
+        for family in OTHERS:
+            yield label(name), family, float(order.sel(variant=name, family=family)), first
+
+
+# ---- verdicts --------------------------------------------------------------------------------------------------------
+
+
+def ranking_verdict(one: Interval) -> str:
+    """Of an interval of tau."""
+    return NO if one.high < PART else YES if one.low >= SAME else PARTLY
+
+
+def factor_verdict(factor: float, with_factor: float = DOUBLE) -> str:
+    """Of a factor, either way."""
+    size = max(factor, 1.0 / factor) if factor > 0.0 else np.inf
+    return YES if size <= LEVEL else FACTOR if size <= with_factor else NO

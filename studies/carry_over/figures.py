@@ -1,0 +1,87 @@
+"""The study's figures: tau of rankings, factors of safe steps, runs that are wrong without a sign."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from symtop.report import style
+from symtop.runner.study import Picture
+
+from . import comparison as by
+from .bodies import ASKED, FAMILIES
+from .comparison import OTHERS, label
+from .facts import decades, words
+
+COLORS = (style.BLUE, style.VERMILLION, style.GREEN)
+MARKS = ("o", "s", "^")
+NAMED = ("rk4[body]", "tsit5-fixed[body]", "gauss-4[body]", "strang[body]", "lie-variational[body]",
+         "five-rotations[body]", "kahan-li-8[body]", "series-general[body]")  # fmt: skip
+
+
+def pictures(data: xr.DataTree) -> list[Picture]:
+    """The three figures."""
+    return [
+        Picture("rankings", draw_rankings(data)), Picture("steps", draw_steps(data)),
+        Picture("silent", draw_silent(data)),
+    ]  # fmt: skip
+
+
+def _families(axis: Any, names: Any) -> None:
+    axis.set_xticks(range(len(names)), [words(name).replace("epsilon ", "ε = ") for name in names])
+
+
+def draw_rankings(data: xr.DataTree) -> Any:
+    """Tau of each family and target with its interval, and the ceiling as a band."""
+    figure, ((axis,),) = style.panels(1, 1, height=2.9)
+    for k, (target, color, mark) in enumerate(zip(ASKED, COLORS, MARKS, strict=True)):
+        each = [by.tau(data, family, target) for family in OTHERS]
+        places = np.arange(len(each)) + 0.18 * (k - 1)
+        middle, low, high = (np.array([getattr(one, name) for one in each]) for name in ("value", "low", "high"))
+        axis.vlines(places, low, high, color=color, lw=1.6)
+        axis.plot(places, middle, ls="none", marker=mark, ms=5, color=color, label=f"axis to 1e-{decades(target)} rad")
+        own = [by.own_tau(data, family, target).value for family in OTHERS]
+        axis.plot(places, own, ls="none", marker=mark, ms=5, mfc="white", color=color)
+    tops = [by.ceiling(data, target) for target in ASKED]
+    low, high = min(one.low for one in tops), max(one.high for one in tops)
+    axis.axhspan(low, high, color=style.GREY, alpha=0.25, lw=0, label="between halves of the tops")
+    axis.plot(
+        [], [], ls="none", marker="o", mfc="white", color=style.GREY, label="open: ranked by the top's own kernels"
+    )
+    _families(axis, OTHERS)
+    axis.set(ylabel="Kendall's tau with tops", ylim=(min(0.3, axis.get_ylim()[0]), 1.02))
+    style.legend_below(figure, [axis])
+    return figure
+
+
+def draw_steps(data: xr.DataTree) -> Any:
+    """Factors of safe steps: a dot a method, by family and target."""
+    figure, ((axis,),) = style.panels(1, 1, height=2.9)
+    shift = np.random.default_rng(6)
+    for k, (target, color) in enumerate(zip(ASKED, COLORS, strict=True)):
+        for place, family in enumerate(OTHERS):
+            values = np.array([*by.step_factors(data, family, target).values()])
+            at = place + 0.25 * (k - 1) + shift.uniform(-0.08, 0.08, values.size)
+            named = {"label": f"axis to 1e-{decades(target)} rad"} if place == 0 else {}
+            axis.plot(at, values, ls="none", marker=MARKS[k], ms=3, alpha=0.6, color=color, **named)
+    for factor in (1.0, by.DOUBLE):
+        axis.axhline(factor, color="black", lw=0.8, ls="-" if factor == 1.0 else "--")
+    _families(axis, OTHERS)
+    axis.set(yscale="log", ylabel="safe steps, over those of tops")
+    ticks = [tick for tick in (0.25, 0.5, 1.0, 2.0, 4.0, 8.0) if axis.get_ylim()[0] <= tick <= axis.get_ylim()[1]]
+    axis.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+    axis.minorticks_off()
+    style.legend_below(figure, [axis])
+    return figure
+
+
+def draw_silent(data: xr.DataTree) -> Any:
+    """Share of runs at `STEPS` steps a period that are wrong without a sign, a line a method."""
+    figure, ((axis,),) = style.panels(1, 1, height=2.9)
+    for name in [one for one in NAMED if one in by.fixed_steps(data)]:
+        shares = [100.0 * by.silent(data, name, family) for family in FAMILIES]
+        axis.plot(range(len(shares)), shares, label=label(name), **style.line(name))
+    _families(axis, [*FAMILIES])
+    axis.set(ylabel="wrong without a sign (% of bodies)", ylim=(-1.0, None))
+    style.legend_below(figure, [axis])
+    return figure

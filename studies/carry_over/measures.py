@@ -1,0 +1,159 @@
+"""What a case measures: costs and verdicts of a method on every family, growth exponents, what is known of bodies.
+
+Variables over `family`, `quantity`, `target`, `member`, `level`:
+
+    cost, met_at       as in the study of cost: evaluations, and the setting, that reach the target
+    work, setting      evaluations of the median body at each level, and the setting
+    status             0 not run, 1 right, 2 wrong and seen in energy, momenta or outcome, 3 wrong without a sign
+    order              that is seen between the two finest settings with an error in `ASYMPTOTE`
+    error_attitude, error_energy   median over bodies, at `time` natural periods (group growth)
+"""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from symtop_studies.cost.ladder import KEPT, LEVELS, WRONG, Climb, climb, one_by_one, setting_of, stored, typical_work
+from symtop_studies.cost.ranking import cost_to_reach
+from symtop_studies.cost.tops import MOMENTA
+
+from symtop.measure.settings import TARGETS
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import Integrator
+from symtop.model.charts import Array, attitude_distance
+from symtop.run.ensemble.bodies import body_population, growth, scenes_of
+from symtop.run.reference.truth import reference
+
+from .bodies import FREE, SYMMETRIC, Bodies, as_tops, grain, run_level, unit
+
+STATUS = tuple(range(2, 8))  # levels whose verdicts are kept: 4.37 to 140 steps a period
+ASYMPTOTE = (1e-9, 1e-3)  # rad
+CHECKED = 4  # heavy bodies of a family whose truth is compared with an integration that has a bound
+GROWN = {  # steps a natural period: an error that is neither rounding nor as large as the motion for `doublings`
+    "strang": 64, "five-rotations": 64, "kahan-li-8": 16, "srkn-11-6": 16, "lie-variational": 128, "gauss-4": 32,
+    "rk4": 64, "tsit5-fixed": 32, "dop853-compiled-fixed": 8, "rkmk-se3-4": 64, "series-general": 4,
+}  # fmt: skip
+REGULAR: dict[str, tuple[str, float | None]] = {
+    SYMMETRIC: ("lagrange", None),
+    "0.1": ("regular", 0.1),
+    "0.3": ("regular", 0.3),
+    FREE: ("short-axis", None),
+}
+FIRST_TIME = 5.0  # natural periods
+
+
+def table(variant: Integrator, drawn: dict[str, Bodies], budget: float) -> xr.Dataset:
+    """One method on all families."""
+    parts = [_family(variant, bodies, budget) for bodies in drawn.values()]
+    return xr.concat(parts, dim="family").assign_coords(family=list(drawn)).assign(_traits(variant))
+
+
+def own_table(variant: Integrator, drawn: dict[str, Bodies], budget: float) -> xr.Dataset:
+    """A method in a chart of the top, on the bodies of epsilon = 0."""
+    tops = as_tops(drawn[SYMMETRIC])
+    asked = {"axis": drawn[SYMMETRIC].asked(TARGETS)["axis"] & tops.known}
+    done = climb(variant, tops, asked, budget)
+    return _costs(variant, done, asked, tops).assign(_traits(variant))
+
+
+def _traits(variant: Integrator) -> dict[str, Any]:
+    numbers = {"control": variant.control or "", "needs": variant.needs or "", "method": variant.method}
+    return {name: ((), value) for name, value in numbers.items()}
+
+
+def _costs(variant: Integrator, done: Climb, asked: dict[str, Any], bodies: Any) -> xr.Dataset:
+    settings = np.array([setting_of(variant, level) for level in range(LEVELS)])
+    set_to = np.where(np.isfinite(done.work), settings[:, np.newaxis], np.nan)
+    shape = len(asked), len(TARGETS), len(bodies.period)
+    costs, met = np.full(shape, np.nan, np.float32), np.full(shape, np.nan, np.float32)
+    for place, name in enumerate(asked):
+        for into, values in ((costs, done.work), (met, set_to)):
+            into[place] = np.where(asked[name], stored(cost_to_reach(values, done.errors[name], TARGETS)), np.nan)
+    over = ("quantity", "target", "member")
+    data: dict[str, Any] = {
+        "cost": (over, costs), "met_at": (over, met), "setting": ("level", settings),
+        "work": ("level", typical_work(variant, done, bodies)[:, 0]),
+    }  # fmt: skip
+    return xr.Dataset(data, {"quantity": list(asked), "target": list(TARGETS)})
+
+
+def _family(variant: Integrator, bodies: Bodies, budget: float) -> xr.Dataset:
+    asked = bodies.asked(TARGETS)
+    done = climb(variant, bodies, asked, budget, run_level)
+    status = verdicts(done)[list(STATUS)].astype(np.float32)
+    order = observed_order(done.errors["attitude"]) if variant.fixed_step else np.nan
+    return _costs(variant, done, asked, bodies).assign(status=(("kept", "member"), status), order=((), order))
+
+
+def verdicts(done: Climb) -> Array:
+    """The status of each member at each level, (LEVELS, n); one that has left with an accurate run is right."""
+    ran, error = np.isfinite(done.work), done.errors["axis"]
+    kept = done.ended & (done.errors["energy"] <= KEPT) & (done.errors[MOMENTA] <= KEPT)
+    status = np.where(error <= WRONG, 1.0, np.where(kept, 3.0, 2.0))
+    return np.where(ran, status, np.where(done.settled, 1.0, 0.0))
+
+
+def observed_order(errors: Array) -> float:
+    """The median over members of the slope between the two finest levels with an error in `ASYMPTOTE`, or NaN."""
+    low, high = ASYMPTOTE
+    with np.errstate(all="ignore"):
+        inside = (errors > low) & (errors < high)
+        steep = np.log2(errors[:-1] / errors[1:])
+    both = inside[:-1] & inside[1:]
+    last = both.shape[0] - 1 - np.argmax(both[::-1], axis=0)
+    found = both.any(axis=0)
+    return float(np.median(steep[last, np.arange(errors.shape[1])][found])) if found.any() else float("nan")
+
+
+def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> xr.Dataset:
+    """Median errors of regular bodies at times that double: exponents are read off them."""
+    at = FIRST_TIME * 2.0 ** np.arange(doublings)
+    steps = GROWN[variant.method]
+    medians = np.full((2, len(REGULAR), doublings), np.nan)
+    for row, (kind, epsilon) in enumerate(REGULAR.values()):
+        scenes = scenes_of(body_population(count, seed=seed, kind=kind, epsilon=epsilon))
+        bodies = Bodies(scenes, [kind] * count, float(at[-1]))
+        fine = at[:, np.newaxis] * np.linspace(0.55, 1.0, 10)  # the largest error of the last half of each time
+        marks = np.unique(np.rint(fine.ravel() * steps).astype(np.int64))
+        bodies.marks, bodies.times = marks, marks * (bodies.period / steps)[:, np.newaxis]
+        plans = [Plan.steps(float(period) / steps, marks) for period in bodies.period]
+        everyone = np.arange(count)
+        runs = one_by_one(variant, bodies.members(everyone), plans)
+        errors = bodies.errors_at(runs.states, everyone)
+        for k, time in enumerate(at):
+            near = (marks <= np.rint(time * steps)) & (marks > 0.5 * time * steps)
+            for place, name in enumerate(("attitude", "energy")):
+                medians[place, row, k] = np.median(grain(errors[name][:, near].max(axis=1)))
+    data = {f"error_{name}": (("family", "time"), medians[k]) for k, name in enumerate(("attitude", "energy"))}
+    return xr.Dataset(data, {"family": list(REGULAR), "time": at}).assign(_traits(variant))
+
+
+def about(drawn: dict[str, Bodies], *, long: bool) -> xr.Dataset:
+    """Of each family: growth of a disturbance over ten periods, bounds of the truth, and a check of these."""
+    n = len(next(iter(drawn.values())).period)
+    grown, bounds = np.full((len(drawn), n), np.nan), np.full((len(drawn), n), np.nan)
+    strata, gap, known = np.full((len(drawn), n), "", dtype="U16"), np.full(len(drawn), np.nan), []
+    for row, bodies in enumerate(drawn.values()):
+        strata[row], bounds[row] = bodies.strata, bodies.truth[1]
+        if not long and not bodies.scenes[0].top.free:
+            grown[row] = [growth(scene) for scene in bodies.scenes]
+        chosen = [k for k in range(min(CHECKED, n)) if not bodies.scenes[k].top.free and bodies.known[k]]
+        off = [_checked(bodies, k) for k in chosen]
+        gap[row] = max(off, default=np.nan)
+        known.append(float(bodies.asked(TARGETS)["axis"][2].mean()))
+    over = ("family", "member")
+    data: dict[str, Any] = {
+        "growth": (over, grown), "truth_bound": (over, bounds), "stratum": (over, strata),
+        "off_bound": ("family", gap), "judged": ("family", known),
+    }  # fmt: skip
+    return xr.Dataset(data, {"family": list(drawn)})
+
+
+def _checked(bodies: Bodies, k: int) -> float:
+    """How far the truth of a body is from an integration with a bound, over both bounds: above 1 refutes them."""
+    exact = reference(bodies.scenes[k], bodies.times[k])
+    there = np.isfinite(exact["attitude_error_bound"].values)
+    if not there.any():
+        return 0.0
+    gap = attitude_distance(bodies.truth[0][k][there], unit(exact["quaternion"].values[there]))
+    return float((gap / (bodies.truth[1][k] + exact["attitude_error_bound"].values[there])).max())
