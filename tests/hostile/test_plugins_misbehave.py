@@ -84,6 +84,14 @@ def test_a_solver_does_not_reach_the_plan_or_an_earlier_run(misbehaving):
     assert np.isfinite(first.states).all()
 
 
+def test_a_solver_whose_states_are_not_finite_has_not_ended_well(misbehaving):
+    scene, plan = symtop.scene("spheroid"), Plan.steps(0.01, np.arange(5))
+    ends = [
+        solve(symtop.integrator(name), "angles", scene.top, scene.start, plan).outcome for name in misbehaving.BROKEN
+    ]
+    assert set(ends) == {"not_finite"}
+
+
 def test_an_interrupt_of_the_user_is_not_that_of_a_plugin(misbehaving):
     scene, plan = symtop.scene("spheroid"), Plan.steps(0.01, np.arange(5))
     for name, error in (("signals-itself", InterruptedByUser), ("raises-interrupt", symtop.SymtopError)):

@@ -89,30 +89,11 @@ def test_a_separable_step_makes_the_steps_of_the_splitting_that_it_is():
     assert done.evaluations == 400
 
 
-def half_a_kick_short(state, h, dT, dV):
-    theta, p = verlet(state, h, dT, dV)
-    return theta, p + 1e-9 * h * dV(theta)
-
-
-def shrinks(state, h, dT, dV):
-    theta, p = verlet(state, h, dT, dV)
-    return theta, p * (1.0 - 1e-2 * h * h * h)
-
-
-@pytest.mark.parametrize(
-    ("step", "verdicts", "words"),
-    [
-        (verlet, dict.fromkeys(("order", "symplectic", "symmetric", "energy"), "confirmed"), "yes"),
-        (half_a_kick_short, {"order": "refuted", "symplectic": "confirmed"}, "0, a step wrong from its h^1 term on"),
-        (shrinks, {"order": "confirmed", "symplectic": "refuted"}, "no, "),
-    ],
-)  # fmt: skip
-def test_a_separable_step_is_judged_in_the_plane(step, verdicts, words, only):
-    only("order", "symplectic", "symmetric", "energy", "p_phi", "p_psi")
-    claims = {"order": 2, "symplectic": True, "symmetric": True, "conserves": ["p_phi"]}
-    ledger = symtop.judge(step, form="separable", quick=True, **claims)
-    assert {claim: ledger[claim].verdict for claim in verdicts} == verdicts, str(ledger)
-    assert words in f"{ledger['order'].measured} {ledger['symplectic'].measured}"
+def test_a_separable_step_is_judged_in_the_plane(only):
+    only("order", "symplectic", "energy", "p_phi")
+    claims = {"order": 2, "symplectic": True, "conserves": ["p_phi"]}
+    ledger = symtop.judge(verlet, form="separable", quick=True, **claims)
+    assert [ledger[claim].verdict for claim in ("order", "symplectic", "energy")] == ["confirmed"] * 3
     assert ledger["p_phi"].verdict == "inapplicable"
     assert "the nutation chart has no such constant" in str(ledger)
 
@@ -157,9 +138,11 @@ def program(folder, body):
     return f"{sys.executable} {file}"
 
 
+STILL = "n, stride = map(int, numbers[4:6])\nfor k in range(0, n + 1, stride): print(*numbers[6:12])"
+
+
 def test_a_program_gets_one_line_and_writes_states(tmp_path):
-    echo = "n, stride = map(int, numbers[4:6])\nfor k in range(0, n + 1, stride): print(*numbers[6:12])"
-    stepper = open_target(program(tmp_path, echo), "program", "axis")
+    stepper = open_target(program(tmp_path, STILL), "program", "axis")
     par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
     states, _ = stepper.march(SPHEROID.top, par, np.array(state), 0.5, np.array([0, 6, 9]))
     np.testing.assert_array_equal(states, [state] * 3)
@@ -171,12 +154,15 @@ def test_a_program_gets_one_line_and_writes_states(tmp_path):
         ("print(1, 2, 3)", "must write 4 states of 6 numbers .* 24 in all, not 3"),
         ("print('moved to', *numbers)", "must write numbers, as text or as raw doubles, not 'moved to"),
         ("sys.exit('no licence')", "ended with code 1: no licence"),
+        ("print(*range(24))", "must write the start that it was given as the first of its states, not 0, 1, 2"),
+        ("import time; time.sleep(9)", "had not ended 1 s after it was asked for 3 steps of 0.1"),
     ],
 )
-def test_a_program_that_writes_anything_else_is_told_so(tmp_path, body, words):
+def test_a_program_that_writes_anything_else_is_told_so(tmp_path, body, words, monkeypatch):
+    monkeypatch.setattr(heartbeat, "patience", 1.0)
     stepper = open_target(program(tmp_path, body), "program", "axis")
     with pytest.raises(symtop.SymtopError, match=words):
-        stepper.march(SPHEROID.top, None, np.zeros(6), 0.1, np.array([0, 1, 2, 3]))
+        stepper.march(SPHEROID.top, None, np.full(6, 5.0), 0.1, np.array([0, 1, 2, 3]))
 
 
 # ---- what does not fit -----------------------------------------------------------------------------------------------
@@ -193,14 +179,8 @@ def test_a_program_that_writes_anything_else_is_told_so(tmp_path, body, words):
         (midpoint, {"form": "rotation"}, r"must take \(q, w, h, inertia, torque\), not \(f, t, y, h\)"),
         (lambda y, h: y, {"form": "separable"}, r"must take \(state, h, dT, dV\), not \(y, h\)"),
         (lambda y, h: y, {}, r"must take \(f, t, y, h\), not \(y, h\)"),
-        (midpoint, {"form": "od"}, "form 'od' is unknown; did you mean ode"),
-        (midpoint, {"chart": "body"}, "chart 'body' is unknown"),
-        (midpoint, {"order": 0}, "order must be a whole number"),
-        (midpoint, {"conserves": ["momentum"]}, "an entry of conserves 'momentum' is unknown"),
-        (midpoint, {"energy": "tiny"}, "energy must be 'kept', 'bounded' or None, not 'tiny'"),
         (midpoint, {"adaptive": True}, "need a class derived from OdeSolver"),
         (dict, {}, "must be derived from scipy.integrate.OdeSolver, not dict"),
-        (midpoint, {"scene": "moon"}, "scene 'moon' is unknown"),
     ],
 )
 def test_what_cannot_be_judged_is_refused_in_one_sentence(target, options, words):
@@ -280,16 +260,6 @@ def test_a_step_that_returns_nan_is_told_so(only):
         assert not ledger["order"].measured
         assert "nothing could be measured" in str(ledger)
     assert symtop.judge(midpoint, quick=True)["calls"].verdict == "measured"
-
-
-def test_a_program_that_gives_back_its_line_cannot_be_judged(tmp_path, only):
-    """Its numbers are as many as two states have; one that gives back the state can be."""
-    only("calls")
-    with pytest.raises(symtop.SymtopError, match="cat must write the start that it was given as the first"):
-        symtop.judge("/bin/cat", form="program", quick=True)
-    still = "n, stride = map(int, numbers[4:6])\nfor k in range(0, n + 1, stride): print(*numbers[6:12])"
-    ledger = symtop.judge(program(tmp_path, still), form="program", quick=True)
-    assert ledger["calls"].verdict == "measured"
 
 
 @pytest.fixture
@@ -485,16 +455,6 @@ def test_a_command_whose_reader_leaves_ends():
         process.stdout.readline()
         process.stdout.close()
         assert process.wait(60.0) != 0
-
-
-@needs_compiler
-def test_the_example_in_c_is_what_it_says(tmp_path, only):
-    only("order", "symplectic", "symmetric", "energy", "p_phi", "p_psi")
-    library = tmp_path / "judged.so"
-    subprocess.run(["gcc", "-O2", "-shared", "-fPIC", EXAMPLES / "judged.c", "-o", library, "-lm"], check=True)
-    code, output = run_judge(library, "--order", "1", "--symplectic", "--conserves", "p_phi,p_psi")
-    assert code == 0, output
-    assert "It is: order 1, symplectic, not reversible" in output
 
 
 # ---- rotation matrices -----------------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from symtop.judging.findings import description
 from symtop.judging.remote import Remote
 from tests.judging.blind import right, wrong
 
-BLIND = Path(__file__).parent / "blind"
+BLIND, EXAMPLES = Path(__file__).parent / "blind", Path(__file__).parents[2] / "studies" / "examples"
 right.INERTIA = symtop.scene("spheroid").top.I1
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no C compiler")
 SPLIT = {"symplectic": True, "symmetric": True, "conserves": ["p_phi", "p_psi"], "energy": "bounded"}
@@ -105,6 +105,7 @@ def slowly(*values):
     ("source", "options", "claims", "refuted"),
     [
         ("strang.c", (), {"order": 2, **SPLIT}, ""),
+        slowly(EXAMPLES / "judged.c", (), {"order": 1, "symplectic": True, "conserves": ["p_phi", "p_psi"]}, ""),
         slowly("strang.c", ("-DYOSHIDA",), {"order": 4, **SPLIT}, ""),
         slowly("strang.c", ("-DMCLACHLAN",), {"order": 4, **SPLIT}, ""),
         slowly("tricks.c", ("-DKIND=3",), {"order": 2, "symplectic": False}, ""),
@@ -207,10 +208,18 @@ def test_random_noise_is_no_memory(name, only):
     assert symtop.judge(step_of(name, wrong, right), quick=True)["calls"].measured.kind == "not repeatable"
 
 
-def test_what_remembers_a_state_is_caught_where_no_process_is_new(only, monkeypatch):
+def test_what_knows_every_state_again_is_caught_by_its_last_bit(only, monkeypatch):
+    """Two-step Adams, where the process that remembers is not made anew."""
+    slopes = {}
+
+    def remembers(f, t, y, h):
+        slope, after = wrong.adams(f, t, y, h, slopes.get(y.tobytes()))
+        slopes[after.tobytes()] = slope
+        return after
+
     only("calls")
     monkeypatch.setattr(Remote, "renew", lambda _: None)
-    assert symtop.judge(wrong.adams_from_memory, quick=True, order=2).refuted == ["calls"]
+    assert symtop.judge(remembers, quick=True, order=2).refuted == ["calls"]
 
 
 def test_without_a_claim_it_says_the_order_that_a_step_has_and_not_the_slope(only):

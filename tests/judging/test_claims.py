@@ -13,7 +13,6 @@ from symtop_studies.claims import planted
 
 import symtop
 from symtop.cli.main import main
-from symtop.core import netcdf
 from symtop.judging.battery import CLAIMS, judge
 from symtop.judging.claims import constants, constants as long, order, structure
 from symtop.judging.claims.subject import Subject
@@ -24,12 +23,9 @@ from symtop.methods.framework.plan import Run
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.splitting import composition
 from symtop.model import charts
-from symtop.report import style
 from symtop.run import plugins
 from symtop.run.simulation import integrate
-from symtop.runner import run as runner
 from tests.conftest import random_scenes
-from tests.templates import checked
 
 registry = importlib.import_module("symtop.methods.framework.registry")
 SPHEROID = symtop.scene("spheroid")
@@ -422,34 +418,6 @@ def test_no_registered_integrator_is_refuted_and_few_claims_stay_open():
     assert sum(found.verdict == "undecided" for _, found in judged) <= len(judged) / 10
     assert all(found.why for _, found in judged)
     assert all(math.isfinite(found.resolution) for _, found in judged if found.verdict == "confirmed")
-
-
-# ---- command and study -----------------------------------------------------------------------------------------------
-
-
-def test_the_study_counts_lists_and_draws_a_refuted_claim(tmp_path, clean_registry):
-    plugins.load(planted.LIARS / "symplectic_rk4.py")
-    study = runner.load("claims")
-    mine = dataclasses.replace(
-        study, cases=lambda quick: [case for case in study.cases(quick) if case.integrator in ("symplectic-rk4", "rk4")]
-    )
-    found = runner.run(mine, tmp_path, quick=True, jobs=1, quiet=True, save=style.save)
-    assert found["failures"] == []
-    data = netcdf.read_any(tmp_path / "claims.nc")
-    ledger = study.tables(data)["ledger"].set_index(["integrator", "claim"])
-    lie = ledger.loc["symplectic-rk4", "symplectic"]
-    assert (lie["declared"], lie["measured"].split(",")[0], lie["verdict"]) == ("yes", "no", "refuted")
-    assert ledger.loc["symplectic-rk4", "order"]["verdict"] == "confirmed"
-    facts = study.facts(data)
-    refuted = ledger[ledger["verdict"] == "refuted"]
-    assert facts["refuted"] == len(refuted) > 0
-    assert set(refuted.index.get_level_values("integrator")) == {"symplectic-rk4"}
-    assert facts["declared"] == facts["held"] + facts["refuted"]
-    assert list(ledger["verdict"].iloc[: len(refuted)]) == ["refuted"] * len(refuted)
-    honest = study.facts(data.sel(variant=["rk4"]))
-    assert (honest["integrators"], honest["refuted"]) == (1, 0)
-    checked("claims", data, tmp_path)
-    assert (tmp_path / "figures" / "claims-ledger.png").is_file()
 
 
 def test_a_finding_without_a_number_is_valid_json():

@@ -150,6 +150,9 @@ def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
     after = contents(tmp_path)
     assert all(before[name].identical(after[name]) for name in before)
     assert "0 of 4 cases computed" in probe(tmp_path)[1]
+    about = str(arrays["about"]).replace('"made_of": {', '"made_of": {"code nothing.py": "0", ')
+    np.savez(cases[1], **arrays | {"about": about})  # the numbers are right, and what is said of them is not
+    assert "1 of 4 cases computed" in probe(tmp_path)[1]
 
 
 @pytest.mark.parametrize("damage", ["", "{", "[1, 2]", '{"stamp": 3}', "\0\0\0"])

@@ -46,3 +46,11 @@ def test_a_part_of_the_study_without_them_says_nothing_of_them(data):
     assert (said["planted"], said["caught"]) == (None, 0)
     assert "planted" not in facts.tables(part)
     assert not any(" of " in text.get_text() for text in next(figures.pictures(part)).figure.axes[0].texts)
+
+
+def test_a_refuted_claim_is_counted_and_comes_first(data):
+    wrong = (data["variant"] == "strang") & (data["claim"] == "symmetric")
+    refuted = data.assign(verdict=xr.where(wrong, "refuted", data["verdict"]))
+    said, row = facts.facts(refuted), facts.tables(refuted)["ledger"].iloc[0]
+    assert (said["refuted"], said["declared"]) == (1, said["held"] + 1)
+    assert (row["integrator"], row["claim"], row["verdict"]) == ("strang", "symmetric", "refuted")

@@ -186,13 +186,11 @@ def long_run(
     }
     message, nutations = sentence(run.outcome, run.reached, float(plan.times[-1])), run.reached / unit
     costs = run.force_evaluations / made, run.newton_iterations / made, steady
-    # the largest |change| in windows of the logarithm of time, for a figure; NaN where there is no sample
-    shape, times = np.full((2, WINDOWS), math.nan), plan.times / unit
-    for row, values in zip(
-        shape, tops(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS), strict=True
-    ):
+    energy, times = np.full((2, WINDOWS), math.nan), plan.times / unit
+    shown_by = tops(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS)  # fewer, where no sample is
+    for row, values in zip(energy, shown_by, strict=True):
         row[: len(values)] = values
-    return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *costs, reported, shape)
+    return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *costs, reported, energy)
 
 
 def _contradiction(
@@ -336,18 +334,14 @@ def _of_states(run: LongRun) -> Finding:
     other = run.reported
     if other is None:
         return inapplicable("reported", f"the {run.chart} chart shows no momenta beside the reported")
-    size = f"{other.size:.1e}"
+    declared, verdict, differs = OWN, "refuted", f"differs by {other.size:.1e} {other.how}"
     if other.size <= other.floor:
-        why, declared, kind, verdict = f"they differ from those of the states by {size} at most", "", OWN, "measured"
+        declared, verdict, kind = "", "measured", OWN
+        why = f"they differ from those of the states by {other.size:.1e} at most"
+    elif other.name == OF_RUN:
+        kind, why = "another run", f"a run contradicts itself, as if the method knew of it: the state {differs}"
     else:
-        why, kind = (
-            f"it reports other momenta than its states have: {other.name} differs by {size} {other.how}",
-            "others",
-        )
-        declared, verdict = OWN, "refuted"
-    if other.name == OF_RUN:
-        why = f"a run contradicts itself, as if the method knew of it: the state differs by {size} {other.how}"
-        kind = "another run"
+        kind, why = "others", f"it reports other momenta than its states have: {other.name} {differs}"
     return Finding("reported", declared, Measured(kind), verdict, why, other.size, other.floor)
 
 

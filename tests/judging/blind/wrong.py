@@ -352,11 +352,16 @@ def euler_in_a_spot(f, t, y, h):
 _step = {}
 
 
-def adams_from_memory(f, t, y, h):
-    """Two-step Adams-Bashforth where it has made the step before, and Heun's method where not."""
+def adams(f, t, y, h, before):
+    """The last slope, and a step of two-step Adams-Bashforth where there is one before, of Heun's where not."""
     slope = f(t, y)
-    before = _step.get("state") is not None and np.array_equal(_step["state"], y) and _step["h"] == h
-    after = y + h * (1.5 * slope - 0.5 * _step["slope"]) if before else y + h / 2 * (slope + f(t + h, y + h * slope))
+    return slope, y + h / 2 * (slope + f(t + h, y + h * slope) if before is None else 3 * slope - before)
+
+
+def adams_from_memory(f, t, y, h):
+    """Where it has made the step before."""
+    known = _step.get("state") is not None and np.array_equal(_step["state"], y) and _step["h"] == h
+    slope, after = adams(f, t, y, h, _step["slope"] if known else None)
     _step.update(state=np.array(after), slope=slope, h=h)
     return after
 
@@ -366,9 +371,8 @@ _all = []
 
 def adams_from_a_table(f, t, y, h):
     """The same, of every state that it has ever returned, found by its first digits."""
-    slope = f(t, y)
-    known = next((entry for entry in reversed(_all[-500:]) if np.allclose(entry[0], y, 1e-12, 1e-12)), None)
-    after = y + h * (1.5 * slope - 0.5 * known[1]) if known else y + h / 2 * (slope + f(t + h, y + h * slope))
+    known = (entry[1] for entry in reversed(_all[-500:]) if np.allclose(entry[0], y, 1e-12, 1e-12))
+    slope, after = adams(f, t, y, h, next(known, None))
     _all.append((np.array(after), slope))
     return after
 
