@@ -39,7 +39,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from symtop.core.jit import register_jitable
+from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework import body
 from symtop.methods.framework.lanes import Lanes, W, column, put
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
@@ -128,31 +128,22 @@ class _Turns(NamedTuple):
 def _turns(sine: Callable[..., Any], rotor: Callable[..., Any]) -> _Turns:
     """The turns by M_k `turn` about the axes of the body, and the flow of turn |M|^2/2 by a rotor of `rotor`."""
 
-    @register_jitable
-    def about(w, x, y, z, M1, M2, M3, turn):  # type: ignore[no-untyped-def]
-        """What the turn about the first of three cyclic axes adds to q, M2 and M3."""
-        s, m, near = sine(0.5 * turn * M1)
-        C, S = -2.0 * s * s, 2.0 * s * (1.0 + m)
-        turned = m * w - s * x, m * x + s * w, m * y + s * z, m * z - s * y, C * M2 + S * M3, C * M3 - S * M2
-        return turned, near
+    def about(k: int) -> Callable[..., Any]:
+        """The turn about axis k and what it does to the two that follow: numbers of q, and of M three further."""
+        a, b, c = 1 + k, 1 + (k + 1) % 3, 1 + (k + 2) % 3
 
-    @register_jitable
-    def first(state, d, turn):  # type: ignore[no-untyped-def]
-        w, x, y, z = state[0] + d[0], state[1] + d[1], state[2] + d[2], state[3] + d[3]
-        (a, b, c, e, m2, m3), near = about(w, x, y, z, state[4] + d[4], state[5] + d[5], state[6] + d[6], turn)
-        return (d[0] + a, d[1] + b, d[2] + c, d[3] + e, d[4], d[5] + m2, d[6] + m3), near
+        @register_jitable
+        def turned(state, d, turn):  # type: ignore[no-untyped-def]
+            w, x, y, z = state[0] + d[0], state[a] + d[a], state[b] + d[b], state[c] + d[c]
+            M2, M3 = state[b + 3] + d[b + 3], state[c + 3] + d[c + 3]
+            s, m, near = sine(0.5 * turn * (state[a + 3] + d[a + 3]))
+            C, S = -2.0 * s * s, 2.0 * s * (1.0 + m)
+            d = set_item(set_item(d, 0, d[0] + (m * w - s * x)), a, d[a] + (m * x + s * w))
+            d = set_item(set_item(d, b, d[b] + (m * y + s * z)), c, d[c] + (m * z - s * y))
+            d = set_item(set_item(d, b + 3, d[b + 3] + (C * M2 + S * M3)), c + 3, d[c + 3] + (C * M3 - S * M2))
+            return d, near
 
-    @register_jitable
-    def second(state, d, turn):  # type: ignore[no-untyped-def]
-        w, x, y, z = state[0] + d[0], state[1] + d[1], state[2] + d[2], state[3] + d[3]
-        (a, c, e, b, m3, m1), near = about(w, y, z, x, state[5] + d[5], state[6] + d[6], state[4] + d[4], turn)
-        return (d[0] + a, d[1] + b, d[2] + c, d[3] + e, d[4] + m1, d[5], d[6] + m3), near
-
-    @register_jitable
-    def third(state, d, turn):  # type: ignore[no-untyped-def]
-        w, x, y, z = state[0] + d[0], state[1] + d[1], state[2] + d[2], state[3] + d[3]
-        (a, e, b, c, m1, m2), near = about(w, z, x, y, state[6] + d[6], state[4] + d[4], state[5] + d[5], turn)
-        return (d[0] + a, d[1] + b, d[2] + c, d[3] + e, d[4] + m1, d[5] + m2, d[6]), near
+        return turned
 
     @register_jitable
     def momentum(state, d, turn):  # type: ignore[no-untyped-def]
@@ -169,7 +160,7 @@ def _turns(sine: Callable[..., Any], rotor: Callable[..., Any]) -> _Turns:
         )  # fmt: skip
         return moved, square < 1.0
 
-    return _Turns(first, second, third, momentum)
+    return _Turns(about(0), about(1), about(2), momentum)
 
 
 ALONE, TOGETHER = _turns(by_either, exact), _turns(by_series, near)  # with a branch, and without it for lanes

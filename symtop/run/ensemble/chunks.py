@@ -24,7 +24,7 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from symtop.core.errors import SymtopError
-from symtop.core.jit import compile_kernel, register_jitable
+from symtop.core.jit import compile_kernel, register_jitable, to_fixed_tuple
 from symtop.core.numbers import GOLDEN
 from symtop.core.parallel import cores, heed, in_threads
 from symtop.methods.framework.adaptive import Adaptive
@@ -32,7 +32,7 @@ from symtop.methods.framework.calling import solve
 from symtop.methods.framework.lanes import Many, W, column, members_of, of_bodies, put
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, off_length
-from symtop.methods.framework.preparation import Body, Start
+from symtop.methods.framework.preparation import opened
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
 from symtop.methods.simd import wide_vectors
@@ -108,17 +108,12 @@ def _all_periods() -> Any:
     """The compiled loop over members, whose bisections run in lanes: a third of the time."""
     period_between, cubic_of, bisected, none = model.period_between, model.nutation_cubic, model.bisected, (0.0,) * 9
 
-    @register_jitable
-    def member(numbers, i):  # type: ignore[no-untyped-def]
-        at = numbers[i]
-        return Body(at[0], at[1], at[2]), Start(at[3], at[4], at[5], at[6], at[7], at[8])
-
     def all_periods(numbers, periods):  # type: ignore[no-untyped-def]
         wide_vectors()
         n, lanes = len(numbers), np.empty(len(none) * W)
         for first in range(0, n, W):
             for j in range(W):
-                top, start = member(numbers, min(first + j, n - 1))
+                top, start = opened(to_fixed_tuple(numbers[min(first + j, n - 1)], len(none)))
                 cosine = math.cos(start.theta)
                 put(lanes, 0, j, (*cubic_of(top, start), cosine, -1.0, cosine, 1.0, cosine))
             for _ in range(model.BISECTIONS):
@@ -126,7 +121,7 @@ def _all_periods() -> Any:
                     at = column(lanes, 0, j, none)
                     put(lanes, 5, j, bisected(at[:4], at[4], *at[5:]))
             for j in range(min(W, n - first)):
-                top, start = member(numbers, first + j)
+                top, start = opened(to_fixed_tuple(numbers[first + j], len(none)))
                 low, below, high, above = column(lanes, 5, j, none[:4])
                 periods[first + j] = period_between(top, start, 0.5 * (low + below), 0.5 * (high + above))
 
