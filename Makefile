@@ -5,7 +5,7 @@
 # make test            run the fast tests            make test-all   run all tests
 # make lint            run ruff and mypy             make docs       build the site, into docs/_build/html
 # make bench           time the kernels against C    make peers      run the same tops in other libraries
-# make engines         run physics engines against their maps
+# make engines         run physics engines        make wheel      build a wheel with compiled kernels, into dist/
 # make clean           delete .venv, caches and what studies stored
 # make archive         bundle the results for a repository of data, into results/
 # make snapshot        copy the report and its figures to docs/snapshot, which the repository holds
@@ -25,7 +25,7 @@ APART := --numprocesses auto --dist loadfile --no-loadscope-reorder # a file to 
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup studies quick report check-results test test-all lint bench peers engines docs snapshot archive clean
+.PHONY: help setup studies quick report check-results test test-all lint bench peers engines docs snapshot archive wheel clean
 
 help:
 	@sed -n '1,12s/^# //p' Makefile
@@ -74,6 +74,10 @@ snapshot: $(READY)
 
 archive: $(READY)
 	@$(BIN)/symtop archive
+
+wheel: $(READY)
+	@echo "symtop: compiling the kernels that are used first, a minute or two"
+	@SYMTOP_COMPILE_WITH=$(abspath $(BIN)/python) $(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 docs: $(DOCS)
 	@echo "symtop: building the site (half a minute); a warning is an error"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 
 from symtop.core.errors import one_of
 from symtop.measure.settings import smallest_charts
-from symtop.methods.framework.registry import Integrator, variants
+from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import TAGS, Scene, scenes
 
 
@@ -20,10 +20,10 @@ def grid_scenes(left_out: Iterable[str] = (), suits: Callable[[Scene], bool] = l
     return [name for name, scene in scenes().items() if not tags.intersection(scene.tags) and suits(scene)]
 
 
-def grid_variants(observe: str, *, attitude: bool = False) -> list[Integrator]:
+def grid_variants(observe: str) -> list[Integrator]:
     """The variants of a grid: every method in each of its charts that shows the "nutation" or the "axis".
 
-    Where a method has the axis chart, its attitude chart is left out unless `attitude` is true: it steps the same axis
-    and angular momentum, and the rotation about the axis besides, which neither quantity depends on.
+    Where a method has the axis chart, its attitude chart is left out: it steps the same axis and angular momentum, and
+    the rotation about the axis besides, which neither quantity depends on.
     """
-    return variants(observe) if attitude else smallest_charts(observe)
+    return smallest_charts(observe)

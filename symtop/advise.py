@@ -151,6 +151,10 @@ class _Question(NamedTuple):
     keeps: str | None = None
     pace: float = math.inf  # most seconds of a step
 
+    def advice(self, **facts: Any) -> Advice:
+        """An answer."""
+        return Advice(self.scene.name, self.quantity, self.accuracy, self.horizon, **facts)
+
     def allows(self, method: Integrator) -> bool:
         """Is a method what the user can use, before its error is known?"""
         kept = all(declared(method, claim) in ("kept", "bounded") for claim in KEPT.get(self.keeps or "", ()))
@@ -442,35 +446,24 @@ def _advice(
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}."
         without = _without_steps(question, math.nan)
-        return Advice(
-            scene.name,
-            quantity,
-            accuracy,
-            horizon,
-            reason=reason,
-            beside=_beside(beside),
-            closed_form=without,
-            fails=fails,
-        )
+        return question.advice(reason=reason, beside=_beside(beside), closed_form=without, fails=fails)
     best = ranked[0]
     name, fixed = best.met.integrator.name, best.met.integrator.fixed_step
     worth = f"error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
     if need := best.met.integrator.needs:
         worth += f"; it needs {NEEDS[need]} ({need})"
     if fixed:
-        period = "natural period" if scene.of_body else "nutation"
-        a_step = f"{scene.time_scale(horizon) / best.met.setting:.3g} a {period}, {1e6 * best.a_step:.2g} us each"
-        worth += f"; steps are {a_step}"
+        count = scene.time_scale(horizon) / best.met.setting
+        worth += f"; steps are {count:.3g} a {scene.period_word}, {1e6 * best.a_step:.2g} us each"
     runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
     served = _same(name, list(near.served)) if near is not None else None  # None: the study has no chart of it
-    return Advice(
-        scene.name, quantity, accuracy, horizon, name, best.met.setting if fixed else None,
-        None if fixed else best.met.setting, best.error, best.seconds, best.confidence,
-        f"{best.words()} meets {goal}: {worth}; {source}.{_carries(question, best.met.integrator)}",
-        runner_up="".join(runners),
-        beside=_beside(beside, best.seconds),
+    setting = {str(best.met.integrator.control): best.met.setting}
+    return question.advice(
+        integrator=name, expected_error=best.error, seconds=best.seconds, confidence=best.confidence, fails=fails,
+        reason=f"{best.words()} meets {goal}: {worth}; {source}.{_carries(question, best.met.integrator)}",
+        runner_up="".join(runners), beside=_beside(beside, best.seconds),
         closed_form=_without_steps(question, best.seconds), nearest=near.words(served) if near and served else "",
-        fails=fails, **_lines(question, best.met.integrator, best.met.setting),
+        **setting, **_lines(question, best.met.integrator, best.met.setting),
     )  # fmt: skip
 
 
@@ -479,15 +472,14 @@ def _the_motion(question: _Question, limit: float) -> Advice:
     scene, accuracy, quantity, horizon = question[:4]
     closed_form.compile_now()  # its time is the answer
     exact, seconds = integrator("exact"), _exact_seconds(question)
-    lines = _lines(question, exact, None)
     reason = (
         f"exact, the closed form, meets {quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}: error below "
         f"{limit:.2g} in {seconds:.2g} s, without steps; it needs {NEEDS['solution']} (solution)."
         f"{_carries(question, exact)}"
     )
-    return Advice(
-        scene.name, quantity, accuracy, horizon, exact.name, expected_error=limit, seconds=seconds,
-        confidence="at the reference's limit", reason=reason, command=lines["command"], python=lines["python"],
+    return question.advice(
+        integrator=exact.name, expected_error=limit, seconds=seconds, confidence="at the reference's limit",
+        reason=reason, **_lines(question, exact, None),
     )  # fmt: skip
 
 
@@ -572,7 +564,7 @@ class EngineAdvice:
         run = f"step {self.step_size:g}{self.unit}, to t = {self.horizon:g}{self.unit}"
         lines = [
             f"{self.engine} on {self.scene}, {run}: the axis is off by",
-            *(f"    {value:.2e} rad  {name} ({maps[name]})" for name, value in self.errors.items()),
+            *(f"    {_off(value)}  {name} ({maps[name]})" for name, value in self.errors.items()),
         ]
         near = self.errors[self.best] <= WORST
         if self.best != default and near:
@@ -589,6 +581,11 @@ class EngineAdvice:
         much = f"{self.gain:.3g} times fewer" if self.gain >= 1.0 else f"{1.0 / self.gain:.3g} times more"
         lines.append(f"As near as {self.best} with {much} force evaluations: {self.advice.reason}")
         return "\n".join(lines)
+
+
+def _off(error: float) -> str:
+    """An axis error of an engine's map, or that its run ended early."""
+    return f"{error:.2e} rad" if error < math.pi else "ended early "
 
 
 def _settings() -> dict[str, dict[str, str]]:
@@ -614,8 +611,9 @@ def i_use(
     if h >= end:
         raise SymtopError(f"step_size must be below the horizon {end:g}, not {h:g}", "step_size")
     measured = {name: _error_and_forces(start, method, h, end) for name, method in maps[engine].items()}
-    best = min(measured, key=lambda name: measured[name][0])
-    (error, forces), off = measured[best], {name: value for name, (value, _) in measured.items()}
+    off = {name: value for name, (value, _) in measured.items()}
+    best = min(off, key=lambda name: off[name])
+    error, forces = measured[best]
     if accuracy is not None:
         limits["step_size"] = step_size
     elif limits.get("quantity") not in (None, "axis"):
@@ -623,13 +621,13 @@ def i_use(
     target = error if accuracy is None else accuracy
     sought = accuracy is not None or error <= WORST
     advice = recommend(start, accuracy=target, horizon=end, **limits) if sought else None
-    if advice is None or advice.integrator is None:
-        return EngineAdvice(
-            start.name, engine, h, end, off, best, math.nan, None if accuracy is None else advice, start.second
-        )
-    setting: dict[str, Any] = {"step_size": advice.step_size, "tolerance": advice.tolerance}
-    needed = simulate(start, advice.integrator, **setting, horizon=end, guard=False, observe="axis")
-    gain = forces / float(needed.attrs["force_evaluations"])
+    gain = math.nan
+    if advice is not None and advice.integrator is not None:
+        setting: dict[str, Any] = {"step_size": advice.step_size, "tolerance": advice.tolerance}
+        needed = simulate(start, advice.integrator, **setting, horizon=end, guard=False, observe="axis")
+        gain = forces / float(needed.attrs["force_evaluations"])
+    elif accuracy is None:
+        advice = None
     return EngineAdvice(start.name, engine, h, end, off, best, gain, advice, start.second)
 
 

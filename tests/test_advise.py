@@ -237,7 +237,7 @@ def test_the_closed_form_is_not_compiled_to_print_its_price(monkeypatch):
     for kernel in (closed_form._build, closed_form._fill, closed_form._compare):
         monkeypatch.setattr(kernel, "patience", math.inf)
         monkeypatch.setattr(kernel, "compiled", None)
-        monkeypatch.setattr(kernel, "_is_cached", lambda: False)
+        monkeypatch.setattr(kernel, "_worth", lambda: math.inf)
         monkeypatch.setattr(kernel, "compile", lambda: pytest.fail("compiled"))
     few(monkeypatch, 1)
     assert "us, interpreted" in symtop.recommend("spheroid", accuracy=1e-3, horizon=3.0).closed_form

@@ -105,9 +105,9 @@ class Bodies:
         moments, centre, weight, _, energy, scale, start = (part[chosen, np.newaxis] for part in self.numbers)
         true = self.truth[0][chosen]
         with np.errstate(all="ignore"):  # a run may have blown up
-            q, M = unit(states[..., :4]), states[..., 4:]
-            up = np.stack(vertical(*np.moveaxis(q, -1, 0)), axis=-1)
-            lifted = rotated(q, M)
+            q, M = states[..., :4], states[..., 4:]  # a length of q that is not one counts in energy and momenta
+            up, lifted = np.stack(vertical(*np.moveaxis(q, -1, 0)), axis=-1), rotated(q, M)
+            q = unit(q)
             axes = (rotated(one, np.broadcast_to(centre, M.shape)) for one in (q, true))
             free = (weight == 0.0).all(axis=-1)
             drift = lifted - start

@@ -219,16 +219,18 @@ def contenders(data: xr.DataTree) -> list[str]:
 
 
 @of_one_dataset
-def safest(data: xr.DataTree, family: str, target: float, span: str = "short") -> dict[str, Safe]:
-    """By method its safe setting and seconds: `symtop_studies.cost.ranking.safe`."""
+def safest(data: xr.DataTree, family: str, target: float, span: str = "short", without: str = "") -> dict[str, Safe]:
+    """By method its safe setting and seconds: `symtop_studies.cost.ranking.safe`; `without` one stratum."""
     group, known, ladders = group_of(data, span), prices(data), list[Ladder]()
     part = group.sel(quantity="axis").sel(target=target, method="nearest")
     work = group["work"]
+    strata = data["bodies"].to_dataset().isel(variant=0).sel(scene="short", family=family)["stratum"].values
+    kept = strata[: part.sizes["member"]] != (without or None)
     if span != "own":
         part, work = part.sel(family=family), work.sel(family=family)
     for name in map(str, group["variant"].values):
         met = part["met_at"].sel(variant=name).values.astype(float)
-        met = met[~np.isnan(part["cost"].sel(variant=name).values)]
+        met = met[~np.isnan(part["cost"].sel(variant=name).values) & kept]
         fixed = integrator(name).fixed_step
         settings = np.array([setting_of(integrator(name), level) for level in range(work.sizes["level"])])
         price, call = known.at(name, np.full(settings.size, np.nan) if fixed else settings)
@@ -246,10 +248,10 @@ def step_factors(data: xr.DataTree, family: str, target: float, span: str = "sho
 
 
 @of_one_dataset
-def own_factors(data: xr.DataTree, family: str, target: float) -> dict[str, float]:
+def own_factors(data: xr.DataTree, family: str, target: float, without: str = "") -> dict[str, float]:
     """By method, safe steps of a body over those of the top's own chart at epsilon = 0."""
     own = {integrator(name).method: one for name, one in safest(data, SYMMETRIC, target, "own").items()}
-    after = safest(data, family, target)
+    after = safest(data, family, target, without=without)
     return {name: one.setting / own[label(name)].setting for name, one in after.items()
             if integrator(name).fixed_step and label(name) in own
             and np.isfinite([one.setting, own[label(name)].setting]).all()}  # fmt: skip

@@ -15,7 +15,7 @@ from .bodies import ASKED, CHAOTIC, FAMILIES, FREE, SYMMETRIC
 from .comparison import ANY, FACTOR, LEVEL, MOST_OF, NO, OTHERS, PARTLY, SEVERAL, YES, label
 
 SHOWN = ("0.1", "0.3", CHAOTIC, FREE)  # families of the short table
-QUOTED = "rk4[body]"
+NEEDLE = "needle"  # a stratum of free bodies whose spin the natural period does not tell
 STRATA = ("regular", CHAOTIC)
 
 
@@ -54,9 +54,16 @@ def steps(data: xr.DataTree, family: str, span: str = "short") -> tuple[float, f
     return pooled([by.step_factors(data, family, target, span) for target in ASKED])
 
 
-def own_steps(data: xr.DataTree, family: str) -> tuple[float, float]:
-    """Safe steps over those of the top's own charts: median and upper end."""
-    return pooled([by.own_factors(data, family, target) for target in ASKED])
+def own_steps(data: xr.DataTree, family: str, without: str = "") -> tuple[float, float]:
+    """Safe steps over those of the top's own charts: median and upper end; `without` a stratum of free bodies."""
+    return pooled([by.own_factors(data, family, target, without) for target in ASKED])
+
+
+def first_steps(data: xr.DataTree, family: str) -> float:
+    """The same of the cheapest methods that need f(t, y) alone, the most of the targets; without needles."""
+    each = [(by.winner(data, SYMMETRIC, target, "derivative"), by.own_factors(data, family, target, NEEDLE))
+            for target in ASKED]  # fmt: skip
+    return max((found[name] for name, found in each if name in found), default=math.nan)
 
 
 def silent_share(data: xr.DataTree, family: str, chosen: str = "") -> float:
@@ -74,6 +81,14 @@ def exponent_gap(data: xr.DataTree, family: str) -> tuple[float, str]:
     return max(((gap, name) for name, gap in known.items()), default=(math.nan, ""))
 
 
+def exponents_within(data: xr.DataTree, family: str) -> tuple[int, int]:
+    """How many exponents of growth are within `EXPONENT` of those at epsilon = 0, and of how many."""
+    found = by.exponents(data)
+    gaps = [abs(value - found[name, SYMMETRIC, quantity])
+            for (name, one, quantity), value in found.items() if one == family]  # fmt: skip
+    return sum(gap <= by.EXPONENT for gap in gaps), sum(not math.isnan(gap) for gap in gaps)
+
+
 def order_gap(data: xr.DataTree, family: str) -> tuple[float, str]:
     """By how much the order seen is lower than at epsilon = 0 at most, and of which method."""
     gaps = [(first - one, name) for name, kind, one, first in by.orders(data) if kind == family]
@@ -85,17 +100,22 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
     tau, best, (middle, most) = worst_tau(data, family), worst_winner(data, family), steps(data, family)
     own_middle, own_most = own_steps(data, family)
     share, before = silent_share(data, family), silent_share(data, SYMMETRIC)
-    gap, order = exponent_gap(data, family)[0], order_gap(data, family)[0]
+    gap, order, first = exponent_gap(data, family)[0], order_gap(data, family)[0], first_steps(data, family)
+    within, told = exponents_within(data, family)
+    round_ones = own_steps(data, family, NEEDLE)
+    but = f"; without needles {number(round_ones[0], 3)}, up to {number(round_ones[1], 3)}" if family == FREE else ""
     ratio = share / before if before > 0.0 else math.nan
-    bounded = "at most" if most <= by.DOUBLE else "up to"
     return {
         "ranking": (f"tau {number(tau.value, 2)} [{number(tau.low, 2)}, {number(tau.high, 2)}]",
                     by.ranking_verdict(tau)),
         "winner": (f"{number(best.value, 3)} times the best", by.factor_verdict(best.value)),
-        "steps": (f"{number(middle, 3)}, {bounded} {number(most, 3)} times", by.factor_verdict(max(most, middle))),
-        "own": (f"{number(own_middle, 3)}, up to {number(own_most, 3)} times", by.factor_verdict(own_most)),
+        "steps": (f"{number(middle, 3)}, up to {number(most, 3)} times", by.factor_verdict(most)),
+        "own": (f"{number(own_middle, 3)}, up to {number(own_most, 3)} times{but}", by.factor_verdict(own_most)),
+        "first": (f"up to {number(first, 3)} times{', without needles' if family == FREE else ''}",
+                  by.factor_verdict(first)),
         "silent": (f"{percent(share, 1)}, {percent(before, 1)} of tops", by.factor_verdict(ratio, SEVERAL)),
-        "growth": (f"exponents within {number(gap, 2)}", YES if gap <= by.EXPONENT else NO),
+        "growth": (f"{within} of {told} exponents within {by.EXPONENT}, all within {number(gap, 2)}",
+                   YES if gap <= by.EXPONENT else NO),
         "order": (f"lower by at most {number(max(order, 0.0), 2)}", YES if order <= by.LOWER else NO),
     }  # fmt: skip
 
@@ -103,6 +123,7 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
 LINES = {
     "ranking": "ranking of methods by cost", "winner": "the cheapest method, its cost",
     "steps": "safe steps a period, to those of a top as a body", "own": "safe steps, to those in the top's own charts",
+    "first": "the same of the cheapest with f(t, y)",
     "silent": "wrong without a sign", "growth": "growth of errors with time", "order": "order of a method",
 }  # fmt: skip
 
@@ -168,10 +189,18 @@ def _of_family(data: xr.DataTree, family: str) -> dict[str, Any]:
         f"tau_{place}": tau.value, f"tau_{place}_low": tau.low, f"tau_{place}_high": tau.high,
         f"transfer_{place}": best.value, f"transfer_{place}_high": best.high,
         f"steps_{place}": steps(data, family)[0], f"steps_{place}_high": steps(data, family)[1],
-        f"own_{place}_high": own_steps(data, family)[1], f"silent_{place}": silent_share(data, family),
+        f"own_{place}_high": own_steps(data, family)[1], f"first_{place}": first_steps(data, family),
+        f"silent_{place}": silent_share(data, family),
         f"growth_{place}": gap[0], f"growth_{place}_of": gap[1] or None,
         f"order_{place}": order[0], f"order_{place}_of": order[1] or None,
     }  # fmt: skip
+    named |= dict(zip((f"growth_{place}_within", f"growth_{place}_told"), exponents_within(data, family), strict=True))
+    if family == FREE:
+        named |= dict(zip(("round_steps", "round_steps_high"), own_steps(data, family, NEEDLE), strict=True))
+    for name, kind, seen, first in by.orders(data) if order[1] else ():
+        if (name, kind) == (order[1], family):
+            named |= {f"order_{place}_seen": seen, f"order_{place}_top": first}
+            named[f"order_{place}_declared"] = integrator(name).order
     if "long" in data.children:
         named[f"long_tau_{place}"] = worst_tau(data, family, "long").value
         named[f"long_steps_{place}_high"] = steps(data, family, "long")[1]

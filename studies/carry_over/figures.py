@@ -68,7 +68,11 @@ def draw_steps(data: xr.DataTree) -> Any:
         axis.axhline(factor, color="black", lw=0.8, ls="-" if factor == 1.0 else "--")
     _families(axis, OTHERS)
     axis.set(yscale="log", ylabel="safe steps, over those of tops")
-    ticks = [tick for tick in (0.25, 0.5, 1.0, 2.0, 4.0, 8.0) if axis.get_ylim()[0] <= tick <= axis.get_ylim()[1]]
+    ticks = [
+        tick
+        for tick in (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
+        if axis.get_ylim()[0] <= tick <= axis.get_ylim()[1]
+    ]
     axis.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     axis.minorticks_off()
     style.legend_below(figure, [axis])
@@ -79,8 +83,9 @@ def draw_silent(data: xr.DataTree) -> Any:
     """Share of runs at `STEPS` steps a period that are wrong without a sign, a line a method."""
     figure, ((axis,),) = style.panels(1, 1, height=2.9)
     for name in [one for one in NAMED if one in by.fixed_steps(data)]:
-        shares = [100.0 * by.silent(data, name, family) for family in FAMILIES]
-        axis.plot(range(len(shares)), shares, label=label(name), **style.line(name))
+        shares, look = [100.0 * by.silent(data, name, family) for family in FAMILIES], style.line(name)
+        axis.plot(range(len(shares) - 2), shares[:-2], label=label(name), **look)  # the others are no farther ones
+        axis.plot(range(len(shares) - 2, len(shares)), shares[-2:], **(look | {"ls": "none"}))
     _families(axis, [*FAMILIES])
     axis.set(ylabel="wrong without a sign (% of bodies)", ylim=(-1.0, None))
     style.legend_below(figure, [axis])

@@ -21,8 +21,8 @@ from symtop.measure.settings import TARGETS
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import Array, attitude_distance
+from symtop.model.exact.heavy_body import HeavyBody
 from symtop.run.ensemble.bodies import body_population, growth, scenes_of
-from symtop.run.reference.truth import reference
 
 from .bodies import FREE, SYMMETRIC, Bodies, as_tops, grain, run_level, unit
 
@@ -151,9 +151,9 @@ def about(drawn: dict[str, Bodies], *, long: bool) -> xr.Dataset:
 
 def _checked(bodies: Bodies, k: int) -> float:
     """How far the truth of a body is from an integration with a bound, over both bounds: above 1 refutes them."""
-    exact = reference(bodies.scenes[k], bodies.times[k])
-    there = np.isfinite(exact["attitude_error_bound"].values)
-    if not there.any():
-        return 0.0
-    gap = attitude_distance(bodies.truth[0][k][there], unit(exact["quaternion"].values[there]))
-    return float((gap / (bodies.truth[1][k] + exact["attitude_error_bound"].values[there])).max())
+    body, start = bodies.scenes[k].top, bodies.scenes[k].start
+    motion = HeavyBody(body.moments, body.torque, start.quaternion, body.momentum(start), body.momentum_lo(start))
+    exact = motion.samples(bodies.times[k])  # NaN from where it is not known
+    there = np.isfinite(exact.bound)
+    gap = attitude_distance(bodies.truth[0][k][there], unit(exact.quaternion[there]))
+    return float((gap / (bodies.truth[1][k] + exact.bound[there])).max(initial=0.0))

@@ -50,7 +50,7 @@ def has_twin(variant: Integrator) -> bool:
 
 def timing(names: list[str], batch: str, *, quick: bool) -> list[Case]:
     """One case for each process of a batch that times the variants."""
-    asked = {"integrators": names, "rounds": 2 if quick else 4, "batch": 0.0005 if quick else 0.002}
+    asked = {"integrators": names, "rounds": 2 if quick else 4, "batch": 0.0005 if quick else 0.001}
     processes = range(ENOUGH if quick else PROCESSES)
     return [Case(f"{batch}-{k}", "together", asked, timed=True, group=PRICES) for k in processes]
 

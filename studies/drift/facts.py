@@ -24,7 +24,6 @@ from .measures import (
     phases_by_energy,
     shares,
     shifts,
-    without_repeats,
 )
 from .phase_loss import LOST
 
@@ -57,9 +56,8 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     return answers
 
 
-def of_histories(every: xr.Dataset) -> dict[str, Any]:
+def of_histories(histories: xr.Dataset) -> dict[str, Any]:
     """A million steps of every variant."""
-    histories = without_repeats(every)
     fate, phases, length = fates(histories), phases_by_energy(histories), shares(histories)
     own = histories["own_tolerance"].max("scene").values > 0.0
     given = histories["tolerance"].max("scene").values[~own]
@@ -123,8 +121,7 @@ def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
     groups = {name: group.to_dataset() for name, group in data.children.items()}
     made: dict[str, pd.DataFrame] = {}
     if HISTORIES in groups:
-        histories = without_repeats(groups[HISTORIES])
-        made |= {"behaviours": behaviour_table(histories), "variants": variant_table(histories)}
+        made |= {"behaviours": behaviour_table(groups[HISTORIES]), "variants": variant_table(groups[HISTORIES])}
     if HORIZONS in groups:
         made["losses"] = loss_table(groups[HORIZONS])
     return made

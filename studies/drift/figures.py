@@ -12,7 +12,7 @@ from symtop.report.formats import number
 from symtop.report.style import BLACK, GREY, LEAST_TEXT, few_ticks, legend_below, line, look, panels, slope_guide
 from symtop.runner.study import Picture
 
-from .measures import HISTORIES, ROUNDINGS, by_integrator, without_repeats
+from .measures import HISTORIES, ROUNDINGS, by_integrator
 
 SHOWN = (  # in the figure of the residuals
     "midpoint[angles]", "stormer-verlet[angles]", "strang[axis]", "gauss-4[axis]", "rk4[angles]", "rk4[axis]",
@@ -34,8 +34,7 @@ def envelope(t: np.ndarray, r: np.ndarray) -> tuple[list[float], list[float]]:
 
 
 def _residuals(histories: xr.Dataset) -> Picture:
-    data = without_repeats(histories)
-    data = data.sel(variant=chosen(list(map(str, data["variant"].values)), SHOWN))
+    data = histories.sel(variant=chosen(list(map(str, histories["variant"].values)), SHOWN))
     figure, axes = panels(len(CONSTANTS), data.sizes["scene"], height=1.9, sharex="col", sharey="row")
     for row, constant in zip(axes, CONSTANTS, strict=True):
         for axis, scene in zip(row, data["scene"].values, strict=True):

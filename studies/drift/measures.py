@@ -51,13 +51,6 @@ def grain(scene_name: str, name: str) -> float:
     return known[scene_name].energy_grain if name == "energy" and scene_name in known else 1.0
 
 
-def without_repeats(histories: xr.Dataset) -> xr.Dataset:
-    """The variants that are shown: no attitude chart beside an axis chart, whose numbers it repeats."""
-    names = list(map(str, histories["variant"].values))
-    repeats = {name.replace("[axis]", "[attitude]") for name in names if name.endswith("[axis]")}
-    return histories.sel(variant=[name for name in names if name not in repeats])
-
-
 def fates(histories: xr.Dataset) -> pd.DataFrame:
     """A line a variant: what became of each constant on the scene where it fared worst, and its largest change.
 

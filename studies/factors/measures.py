@@ -27,7 +27,8 @@ LEAST = 0.7  # of the target: the search ends with an error from here to the tar
 PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
 FINER = 1e-3  # of the target: the tolerance that a second search begins with
 NOISY, TRIES = 0.25, 3  # the distance of the quartiles over the median of a time that is taken again; how often
-ENOUGH = 0.08  # seconds of a function's samples in one process; those that are longer have two
+ENOUGH = 0.08  # seconds of a function's samples in one process; a longer one has one, the median of five is of five
+WARM = 0.01  # of the horizon: a run that loads and compiles what the timed one calls
 START = (
     "from symtop.runner import scripts; scripts.install(); from symtop_studies.factors import measures; measures.{}()"
 )
@@ -83,9 +84,10 @@ def answer() -> None:
     asked: Runs = pickle.load(sys.stdin.buffer)  # noqa: S301  (of the process that started this one)
     known = {cell.name: cell for cell in cells()}
     functions: Any = [caller(asked.scene, known[name], *run) for name, *run in asked.runs]
-    for function in functions:
-        first_call(function)
-    taken = timings(functions, asked.rounds, asked.batch, warm=True, patience=ENOUGH)
+    for name, call, setting, horizon in asked.runs:
+        brief: Any = caller(asked.scene, known[name], call, min(setting, WARM * horizon), WARM * horizon)
+        first_call(brief)
+    taken = timings(functions, asked.rounds, asked.batch, warm=True, patience=ENOUGH, least=1)
     print(json.dumps([timing.best for timing in taken]))  # noqa: T201
 
 

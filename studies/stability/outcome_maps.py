@@ -47,6 +47,7 @@ MOST = 100_000  # samples of the runs that are made in one call: 6 MB, which sta
 SPAN = 1.1  # between the settings of one call: a scene that settles among them is run at all of them
 SETTLED_STEPS, SETTLED_TOLERANCES = 2.0, 10.0  # accurate over this factor, a scene is accurate at smaller settings
 SETTLED_AFTER = 4  # settings at least
+BUDGET = 2e6  # force evaluations: a run at a tolerance of 1e-10 takes 1e5, one whose steps shrink until they vanish 1e8
 CHECKED = 5  # settings, evenly over the map, at which all scenes are run
 
 
@@ -110,7 +111,7 @@ def one_by_one(runs: RowPlan, chart: str, scene: Scene, columns: slice = slice(N
     states, momenta = (np.full((1, *phases.shape, size), math.nan) for size in (charts.DIMENSIONS[chart], 2))
     outcome = np.zeros((1, len(settings)), dtype=np.int64)
     for k, value in enumerate(settings):
-        plan = Plan.steps(value * period, marks[k]) if marks else Plan.until(phases[k] * period, value)
+        plan = Plan.steps(value * period, marks[k]) if marks else Plan.until(phases[k] * period, value, BUDGET)
         run = solve(runs.method, chart, scene.top, scene.start, plan)
         count = len(run.p_phi)
         states[0, k, :count] = run.states

@@ -60,7 +60,7 @@ def compare(
         from symtop.core import netcdf
         from symtop.judging import comparison
         from symtop.judging.findings import pace
-        from symtop.measure.sweep import failed_setting, titled
+        from symtop.measure.sweep import failed_setting, period_word, titled
         from symtop.measure.timing import NOISY
 
     data = comparison.compare(scene, methods, **options)
@@ -80,9 +80,9 @@ def compare(
         click.echo(as_text({"scene": data["scene"].item(), **facts, "exact_seconds": exact, "cheapest": every}))
         return
     timed, end, count = options["cost"] == "time", data.attrs["horizon"], data.attrs["nutations"]
-    unit = " s" if data["reached_time"].attrs["units"] == "s" else ""
-    say(f"{data['scene'].item()} to t = {end:.6g}{unit} ({count:.3g} nutations): the cheapest run by {options['cost']}")
-    say(f"steps a nutation or tolerance{', time' * timed}, force evaluations; error of {data.attrs['quantity']}")
+    unit, period = " s" if data["reached_time"].attrs["units"] == "s" else "", period_word(data)
+    say(f"{data['scene'].item()} to t = {end:.6g}{unit} ({count:.3g} {period}s): the cheapest run by {options['cost']}")
+    say(f"steps a {period} or tolerance{', time' * timed}, force evaluations; error of {data.attrs['quantity']}")
     rows = [[titled(cell), *(_cell(one, timed) for one in own)] for cell, own in zip(cells, records, strict=True)]
     click.echo(table(["variant", *map("error {:.0e}".format, TARGETS)], rows))
     for cell in cells:

@@ -2,7 +2,6 @@
 
 import math
 import sys
-import time
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
@@ -93,8 +92,8 @@ def run(
     facts = data.attrs
     if as_json:
         names = ("outcome", "outcome_message", "reached_time", "steps", "force_evaluations")
-        findings = {**{name: facts[name] for name in names}, "judgement": verdict._asdict(), "errors": largest}
-        click.echo(as_text(findings))
+        of_run = {name: facts[name] for name in names}
+        click.echo(as_text({**of_run, "judgement": verdict._asdict(), "errors": largest}))
     else:
         method, used, wanted = facts["integrator"], facts["step_size"], settings["step_size"]
         variant = method if method.endswith("]") else f"{method}[{facts['chart']}]"
@@ -113,24 +112,19 @@ def run(
         sys.exit(3)
 
 
-def _seconds(run: Callable[[int], object], steps: int) -> float:
-    began = time.monotonic()
-    run(steps)
-    return time.monotonic() - began
-
-
 def estimate(steps: float, run: Callable[[int], object]) -> None:
     """Say before a run of so many steps how long it takes, if that is above ten seconds; `run` makes a few steps."""
+    from symtop.measure.timing import first_call
     from symtop.run.guard import MOST_STEPS
 
     if not MANY * FEW < steps <= MOST_STEPS:  # more are refused
         return
     with ticking("timing some steps"):
         run(FEWEST)  # which compiles
-        few, fixed, spent = FEWEST, _seconds(run, FEWEST), 0.0
+        few, fixed, spent = FEWEST, first_call(partial(run, FEWEST)), 0.0
         while spent < LONG_ENOUGH and few * MANY < steps:
             few *= 4
-            spent = _seconds(run, few) - fixed  # what a run takes whatever its steps does not count
+            spent = first_call(partial(run, few)) - fixed  # what a run takes whatever its steps does not count
     took = spent * steps / (few - FEWEST)
     if took > 10.0:
         warn(f"{steps:.3g} steps take about {f'{took:.2g} s' if took < 100.0 else f'{took / 60.0:.2g} min'}")

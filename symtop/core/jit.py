@@ -15,25 +15,33 @@ import contextlib
 import functools
 import gc
 import hashlib
-import pickle
+import json
+import os
 import sys
+import tempfile
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
+import llvmlite
 import numba
+import numpy as np
+from llvmlite.binding import parse_bitcode
 from numba import njit, types
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
-from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
-from numba.core.compiler import CompileResult
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import compile_result
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.environment import Environment
+from numba.core.funcdesc import PythonFunctionDescriptor
+from numba.core.typing import signature as numba_signature
 from numba.core.typing.templates import builtin_registry
 from numba.cpython.unsafe.tuple import tuple_setitem
 from numba.extending import intrinsic, overload, register_jitable as _register
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from symtop.core.code_hash import Code, Part, by_file, by_name, digest, hashed
+from symtop.core.code_hash import PACKAGE, Code, Part, by_file, by_name, digest, hashed
 from symtop.core.errors import SymtopError
 from symtop.core.files import cache_root, is_trusted, locked, make_private, on_cold, prune, touch
 from symtop.core.jit_functions import Function, fused, marked, two_product
@@ -48,10 +56,16 @@ set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new
 MOST_BYTES = 200_000_000  # of kernels that are kept, about 2000 of them
 OPTIONS = {"error_model": "numpy", "nogil": True}  # division by zero gives infinity, as in C; threads run at once
 HASH = hashlib.sha256().digest_size  # bytes before the code in its file
-NAMES = "by content"  # of kernels: those that were stored before may share one
+FORMAT = "bitcode and machine code"  # of what is stored of a kernel
+SHIPPED = PACKAGE / "kernels"  # bitcode that a wheel brings, by kernel
+NAMED = ("modname", "qualname", "unique_name", "mangled_name", "env_name", "args")  # of a kernel, as numba describes it
 WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # kernels alone call it: 14 % less to compile
 WRAPPERS = ("_ZN7cpython", "cfunc.")  # names of functions that Python and C can call
 INLINED = {"forceinline": True, **WITHIN}
+HOOKS = ("_optimize_final_module", "_finalize_final_module", "_set_compiled_object")
+LEAN = all(hasattr(JITCodeLibrary, name) for name in HOOKS)  # another numba compiles as it does, and keeps nothing
+_ARRAYS = [types.Array(kind, n, "C") for kind in (types.float64, types.int64) for n in (1, 2, 3)]
+RETURNED = {repr(kind): kind for kind in (types.none, types.boolean, types.int64, types.float64, *_ARRAYS)}
 
 _stands_for: dict[int, list[object]] = {}  # id of a function: what numba compiles in its place
 _registered: set[Callable[..., Any]] = set()
@@ -103,132 +117,181 @@ def code() -> Code:
     return Code(lambda function: () if function in _registered else _overloads(function))
 
 
-class _Folder:
-    """Where a kernel is kept, as numba asks for it."""
+class _Library(JITCodeLibrary):  # type: ignore[misc]
+    """The code of a kernel, or of a function that kernels call.
 
-    def __init__(self, path: Path, function: Callable[..., Any]) -> None:
-        self.path, self._py_file = path, function.__code__.co_filename
-
-    def ensure_cache_path(self) -> None:
-        """Make the folder; the first one of a process makes room for it."""
-        if not _pruned:
-            _pruned.append(self.path)
-            prune(self.path.parent, MOST_BYTES)
-        make_private(self.path)
-
-
-class _Index(IndexDataCacheFile):  # type: ignore[misc]
-    """The index of a kernel and its files, each named after the signature whose code it holds.
-
-    numba counts them: two processes that save at the same time give two signatures one file, and each gets the code of
-    the other. And it runs what it finds, damaged bytes, too. Here the code follows its hash, and an index that cannot
-    be read is empty. A pickle is a program: one that somebody else may have written is not read.
+    What a kernel calls is optimised and linked into it as ever, but gets no machine code of its own: numba makes that
+    of each, and nobody runs it, as Python and C call a function through a wrapper, which inner ones lack. A kernel's
+    code hides them: numba numbers names by process, and of two kernels from disk one would call the other's.
     """
 
-    def save(self, key: Any, data: Any) -> None:
-        """Write the code, then the index: a process that is killed in between leaves no name without a file."""
-        name = f"code.{hashed(repr(key))}.nbc"
-        self._save_data(name, data)
-        self._save_index(self._load_index() | {key: name})
+    bitcode = b""  # of a kernel with all that it calls, before it is optimised for a processor
 
-    def _load_index(self) -> dict[Any, str]:
-        with contextlib.suppress(Exception):  # a damaged pickle raises nearly anything
-            if is_trusted(Path(self._index_path)):
-                return super()._load_index()  # type: ignore[no-any-return]
-        return {}
+    def _defined(self) -> list[Any]:
+        return [one for one in self._final_module.functions if not one.is_declaration]
 
-    def _save_data(self, name: str, data: Any) -> None:
-        code = self._dump(data)
-        with self._open_for_write(self._data_path(name)) as file:
-            file.write(hashlib.sha256(code).digest() + code)
+    def _own(self) -> set[str]:
+        """The names by which a kernel is called; none if it is no kernel."""
+        wrappers = {one.name for one in self._defined() if one.name.startswith(WRAPPERS)}
+        return wrappers | {name.removeprefix(WRAPPERS[1]) for name in wrappers}
 
-    @contextlib.contextmanager
-    def _open_for_write(self, filepath: str) -> Iterator[Any]:
-        with super()._open_for_write(filepath) as file:
-            Path(file.name).chmod(0o600)
-            yield file
+    def _optimize_final_module(self) -> None:
+        if self._own():
+            self.bitcode = self._final_module.as_bitcode()
+        super()._optimize_final_module()
 
-    def _load_data(self, name: str) -> Any:
-        path = Path(self._data_path(name))
-        if not is_trusted(path):
-            raise ValueError("the code on disk may be somebody else's")
-        whole = path.read_bytes()
-        checksum, code = whole[:HASH], whole[HASH:]
-        if hashlib.sha256(code).digest() != checksum:
-            raise ValueError("the code on disk is damaged")
-        return pickle.loads(code)  # noqa: S301  (it has its hash)
+    def _finalize_final_module(self) -> None:
+        own, defined = self._own(), self._defined()
+        if not own and any(one.name.startswith("_ZN") for one in defined):
+            self._finalize_dynamic_globals()
+            self._verify_declare_only_symbols()
+            self._finalized = True
+            return
+        for one in defined:
+            if own and one.name not in own:
+                one.linkage = "internal"
+        super()._finalize_final_module()
 
 
-class _Cache(FunctionCache):  # type: ignore[misc]
-    """numba's cache of one kernel in its folder; a full disk or a damaged cache costs a compilation and not the run."""
+class _Cache:
+    """The code of one kernel in its folder, by signature: bitcode, which serves any processor, and machine code.
 
-    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        self._name, self._py_func = repr(function), function
-        self._impl = CompileResultCacheImpl.__new__(CompileResultCacheImpl)
-        self._impl._locator = _Folder(folder, function)
-        self._impl._lineno = function.__code__.co_firstlineno
-        self._cache_path = str(folder)
-        self._cache_file = _Index(self._cache_path, "code", "")
-        self.enable()
+    A file is named after what its code hangs on and begins with a hash: of bitcode with that name, of machine code with
+    the bitcode that it was made of. None holds a pickle, but code is a program, too: what somebody else may have
+    written is not read. Bitcode may also be in `SHIPPED`, which is trusted as the package is. A full disk or a damaged
+    file costs a compilation and not the run.
+    """
 
-    def _index_key(self, signature: Any, codegen: Any) -> Any:
-        return signature, codegen.magic_tuple()
+    def __init__(self, folder: Path) -> None:
+        self.cache_path = folder
 
-    def index(self) -> dict[Any, str]:
-        """The file of the code of each signature."""
-        return self._cache_file._load_index()
+    def files(self, signature: Any, codegen: Any) -> tuple[Path, Path, Path]:
+        """Of the machine code, of the bitcode, and of the bitcode that a wheel may have brought."""
+        system, *processor = codegen.magic_tuple()
+        stem = hashed(json.dumps([*map(_words, signature)]), system, llvmlite.__version__)
+        code = self.cache_path / f"{stem}.{hashed(*processor)}.code"
+        return code, self.cache_path / f"{stem}.bitcode", SHIPPED / self.cache_path.name / f"{stem}.bitcode"
 
-    def load_overload(self, signature: Any, target_context: Any) -> Any:
-        try:
-            loaded = super().load_overload(signature, target_context)
-            if loaded is not None and tuple(loaded.signature.args) == tuple(signature):
-                return loaded
-            damaged = loaded is not None
-        except Exception:  # noqa: BLE001  (a truncated pickle raises nearly anything)
-            damaged = True
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """The compiled kernel, as numba asks for it; None, and whoever listens is told, if it has to be compiled."""
+        context.refresh()
+        code, *bitcode = self.files(signature, context.codegen())
+        for file in bitcode:
+            with contextlib.suppress(OSError, ValueError, LookupError, RuntimeError, zlib.error):
+                return _loaded(signature, context, _read(file, _name(file)), code)
         for tell in on_cold:
             tell()
-        with contextlib.suppress(Exception):
-            if damaged:  # begin anew: it would stand in the way of saving, too
-                self.flush()
         return None
 
-    def save_overload(self, signature: Any, data: Any) -> None:
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Keep a compiled kernel, if what is written says all that another process needs."""
+        library, kernel, constants = result.library, result.fndesc, result.environment.consts
+        about = {name: getattr(kernel, name) for name in NAMED} | {"library": library.name}
+        about |= {"returned": _words(result.signature.return_type), "constants": [str(one) for one in constants]}
+        inner = [one for one in result._find_referenced_environments() if one is not result.environment]
+        with contextlib.suppress(OSError, LookupError, AttributeError, TypeError):
+            same = _type(about["returned"]) == result.signature.return_type
+            same &= [np.dtype(one) for one in about["constants"]] == constants and not any(one.consts for one in inner)
+            if same and not library.has_dynamic_globals and not result.reload_init:
+                code, bitcode, _ = self.files(signature, library.codegen)
+                entry = json.dumps(about).encode() + b"\n" + zlib.compress(library.bitcode, 1)
+                _write(bitcode, entry, _name(bitcode))
+                _write(code, library._get_compiled_object(), entry)
+
+
+def _loaded(arguments: tuple[Any, ...], context: Any, entry: bytes, code: Path) -> Any:
+    """A kernel from its bitcode, with the machine code if that is there; otherwise that is made, and kept."""
+    head, _, bitcode = entry.partition(b"\n")
+    about = json.loads(head)
+    returned = _type(about["returned"])
+    library = _Library(context.codegen(), about["library"])
+    library._final_module = parse_bitcode(zlib.decompress(bitcode))
+    library._final_module.name = library.name
+    library.enable_object_caching()
+    with contextlib.suppress(OSError, ValueError):
+        library._set_compiled_object(_read(code, entry))
+    if library._compiled_object is None:
+        library._optimize_final_module()
+    library._finalize_final_module()
+    if library._compiled:  # now
         with contextlib.suppress(OSError):
-            super().save_overload(signature, data)
+            _write(code, library._get_compiled_object(), entry)
+    kernel = PythonFunctionDescriptor(
+        True, about["modname"], about["qualname"], about["unique_name"], "", {}, returned, {}, tuple(about["args"]), (),
+        argtypes=arguments, env_name=about["env_name"],
+    )  # fmt: skip
+    kernel.mangled_name = about["mangled_name"]
+    environment = Environment.from_fndesc(kernel)
+    environment.consts[:] = [np.dtype(one) for one in about["constants"]]
+    return compile_result(
+        typing_context=context.typing_context, target_context=context, library=library, fndesc=kernel,
+        entry_point=context.get_executable(library, kernel, environment), environment=environment, objectmode=False,
+        signature=numba_signature(returned, *arguments), lifted=(), reload_init=[], type_annotation="",
+    )  # fmt: skip
+
+
+def _words(kind: Any) -> Any:
+    """A type as JSON; that of a named tuple by its class and fields, which its `repr` lacks."""
+    if not isinstance(kind, types.BaseTuple):
+        return repr(kind)
+    named = getattr(kind, "instance_class", tuple)
+    return [named.__module__, named.__qualname__, *getattr(kind, "fields", ()), [*map(_words, kind)]]
+
+
+def _type(words: Any) -> Any:
+    """The type of what a kernel returns."""
+    if isinstance(words, str):
+        return RETURNED[words]
+    return types.BaseTuple.from_types(tuple(map(_type, words[-1])), getattr(sys.modules[words[0]], words[1]))
+
+
+def _name(file: Path) -> bytes:
+    return f"{file.parent.name}/{file.name}".encode()
+
+
+def _read(file: Path, of: bytes) -> bytes:
+    """What was written there of something; ValueError if it was not, or may have been by somebody else."""
+    if SHIPPED not in file.parents and not is_trusted(file):
+        raise ValueError("the code on disk may be somebody else's")
+    whole = file.read_bytes()
+    if hashlib.sha256(of + whole[HASH:]).digest() != whole[:HASH]:
+        raise ValueError("the code on disk is damaged")
+    return whole[HASH:]
+
+
+def _write(file: Path, content: bytes, of: bytes) -> None:
+    """Replace a file in one move, a process's first one after making room."""
+    if not _pruned:
+        _pruned.append(file)
+        prune(file.parent.parent, MOST_BYTES)
+    make_private(file.parent)
+    handle, partial = tempfile.mkstemp(prefix=".", dir=file.parent)
+    with contextlib.ExitStack() as stack:
+        stack.callback(Path(partial).unlink, missing_ok=True)
+        with os.fdopen(handle, "wb") as opened:
+            opened.write(hashlib.sha256(of + content).digest() + content)
+        Path(partial).replace(file)
 
 
 def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
-    """Compile a kernel: what it calls is optimised and linked into it as ever, but gets no machine code of its own.
-
-    numba makes that of each, and nobody runs it: Python and C call a function through a wrapper, which inner ones lack.
-    Environments get addresses with the kernel's code. The caller holds numba's lock; other numbas compile as usual.
-    """
-    finish, set_env = getattr(JITCodeLibrary, "_finalize_final_module", None), getattr(JITCPUCodegen, "set_env", None)
-    if finish is None or set_env is None or not hasattr(CompileResult, "_find_referenced_environments"):
+    """Compile a kernel as a `_Library`; environments get addresses with its code. The caller holds numba's lock."""
+    codegen = kernel.targetctx.codegen()
+    own = vars(codegen)
+    if not LEAN or "set_env" in own:
         return compiling(signature)
 
-    def link_only(library: Any) -> None:
-        names = [function.name for function in library._final_module.functions if not function.is_declaration]
-        if any(name.startswith(WRAPPERS) for name in names) or not any(name.startswith("_ZN") for name in names):
-            finish(library)
-            return
-        library._finalize_dynamic_globals()
-        library._verify_declare_only_symbols()
-        library._finalized = True
-
-    def set_where_defined(codegen: Any, name: str, environment: Any) -> None:
+    def set_where_defined(name: str, environment: Any) -> None:
         if codegen._engine.is_symbol_defined(name):
-            set_env(codegen, name, environment)
+            type(codegen).set_env(codegen, name, environment)
 
     try:
-        JITCodeLibrary._finalize_final_module, JITCPUCodegen.set_env = link_only, set_where_defined
+        codegen._library_class, codegen.set_env = _Library, set_where_defined
         entry = compiling(signature)
     finally:
-        JITCodeLibrary._finalize_final_module, JITCPUCodegen.set_env = finish, set_env
+        own.pop("_library_class"), own.pop("set_env")
     for result in kernel.overloads.values():
         for environment in result._find_referenced_environments():
-            set_env(result.library.codegen, environment.env_name, environment)
+            codegen.set_env(environment.env_name, environment)
     return entry
 
 
@@ -248,8 +311,8 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
                 gc.disable()
             if isinstance(kernel._cache, _Cache) and not is_cached(kernel, signature):
                 with contextlib.suppress(SymtopError, OSError):  # a cache that cannot be written costs time and no run
-                    make_private(Path(kernel._cache._cache_path))
-                    stack.enter_context(locked(Path(kernel._cache._cache_path) / "code", wait=True))
+                    make_private(kernel._cache.cache_path)
+                    stack.enter_context(locked(kernel._cache.cache_path / "code", wait=True))
             return _lean(kernel, compiling, signature)
 
     return compile_now
@@ -265,16 +328,16 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     """
     _register_parts()
     parts = code_of(function)
-    made_of = digest(by_file(parts) | {"names": NAMES})
+    made_of = digest(by_file(parts) | {"format": FORMAT})
     kernel = njit(**OPTIONS)(_named(function, made_of))
     kernel.compile = _once(kernel, kernel.compile)
     functions = (part.thing for part in parts if isinstance(part.thing, FunctionType))
     written = [part for part in functions if not part.__module__.startswith("namedtuple_")]
-    if all(Path(part.__code__.co_filename).is_file() for part in written):
+    if LEAN and all(Path(part.__code__.co_filename).is_file() for part in written):
         folder = cache_root() / "kernels" / made_of
         if all(map(is_trusted, (cache_root(), folder.parent, folder))):
             touch(folder)
-            kernel._cache = _Cache(function, folder)
+            kernel._cache = _Cache(folder)
     return kernel
 
 
@@ -286,12 +349,14 @@ def _named(function: Any, made_of: str) -> FunctionType:
     return own
 
 
-def is_cached(kernel: Any, signature: Any) -> bool:
-    """Is a kernel compiled for this signature, in memory or in the cache?"""
+def is_cached(kernel: Any, signature: Any, *, bitcode: bool = False) -> bool:
+    """Is a kernel's machine code in memory or on disk, or, if that is asked for, at least its bitcode on disk?"""
     if signature in kernel.overloads:
         return True
-    cache = kernel._cache
-    return isinstance(cache, _Cache) and cache._index_key(signature, kernel.targetctx.codegen()) in cache.index()
+    if not isinstance(kernel._cache, _Cache):
+        return False
+    files = kernel._cache.files(signature, kernel.targetctx.codegen())
+    return any(file.is_file() for file in files[: 3 if bitcode else 1])
 
 
 @intrinsic

@@ -12,7 +12,7 @@ import base64
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -220,6 +220,12 @@ def _float32(values: Any) -> str:
     return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode()
 
 
+def _curves(largest: dict[str, float], message: str = "", /, **arrays: Any) -> dict[str, Any]:
+    """What the views of friction are drawn of."""
+    coded = {name: _float32(values) for name, values in arrays.items()}
+    return {"message": message, "largest": largest, "arrays": coded}
+
+
 def grid(fields: Mapping[str, Any]) -> tuple[Setup, np.ndarray, np.ndarray]:
     """The run, the steps and the spins of a map: `step_least`, `step_most` (s), `spin_least`, `spin_most` (rad/s).
 
@@ -245,8 +251,8 @@ def outcome_map(chosen: Setup, steps: np.ndarray, spins: np.ndarray) -> dict[str
     began = time.perf_counter()
     scene = chosen.scene
     step, spin = (each.ravel() for each in np.meshgrid(steps, spins))
-    start = {name: getattr(scene.start, name) for name in START}
-    numbers = {name: getattr(scene.top, name) for name in TOP} | start | {"psi_dot": spin}
+    start = asdict(scene.start)
+    numbers = asdict(scene.top) | start | {"psi_dot": spin}
     members = xr.Dataset({name: ("member", np.broadcast_to(number, step.size)) for name, number in numbers.items()})
     runs = ensemble(
         members, chosen.method, step_size=step, horizon=scene.horizon, samples=MAP_SAMPLES, variables=["axis"],
@@ -281,9 +287,9 @@ def _friction(fields: Mapping[str, Any]) -> float:
 def damped(fields: Mapping[str, Any]) -> tuple[float, float]:
     """Friction and step of the oscillator: `friction` (at least 0) and `oscillator_step`. SymtopError for others."""
     friction, step = _friction(fields), positive("step", fields.get("oscillator_step"))
-    if not OSCILLATOR_HORIZON / MOST_OSCILLATOR_STEPS <= step <= OSCILLATOR_HORIZON / 2.0:
-        least = OSCILLATOR_HORIZON / MOST_OSCILLATOR_STEPS
-        raise SymtopError(f"step must be between {least} and {OSCILLATOR_HORIZON / 2.0}, not {step!r}", "step")
+    least, most = OSCILLATOR_HORIZON / MOST_OSCILLATOR_STEPS, OSCILLATOR_HORIZON / 2.0
+    if not least <= step <= most:
+        raise SymtopError(f"step must be between {least} and {most}, not {step!r}", "step")
     return friction, step
 
 
@@ -299,15 +305,11 @@ def oscillator(friction: float, step: float) -> dict[str, Any]:
     }
     times, dense = paths["midpoint"][0], np.linspace(0.0, OSCILLATOR_HORIZON, FEWEST_SAMPLES)
     exact = body.exact(times, 1.0, 0.0)[0]
-    arrays = {
-        "time": times, "exact_time": dense, "exact": body.exact(dense, 1.0, 0.0)[0],
-        "guess": notebook_positions(friction, times[1], 1.0, float(exact[1]), steps)[1],
-        **{rule: position for rule, (_, position, _) in paths.items()},
-    }  # fmt: skip
-    return {
-        "largest": {rule: float(np.max(np.abs(arrays[rule] - exact))) for rule in RULES},
-        "arrays": {name: _float32(values) for name, values in arrays.items()},
-    }
+    shown = {rule: position for rule, (_, position, _) in paths.items()}
+    largest = {rule: float(np.max(np.abs(position - exact))) for rule, position in shown.items()}
+    guess = notebook_positions(friction, times[1], 1.0, float(exact[1]), steps)[1]
+    of_exact = {"exact_time": dense, "exact": body.exact(dense, 1.0, 0.0)[0]}
+    return _curves(largest, time=times, guess=guess, **of_exact, **shown)
 
 
 def damped_top(fields: Mapping[str, Any]) -> tuple[Setup, float]:
@@ -339,17 +341,9 @@ def inclination(chosen: Setup, friction: float) -> dict[str, Any]:
         ended.append(
             f"the exact motion comes within {NEAR} rad of a pole at t = {dense[exact.size]:.3g} s and ends there"
         )
-    arrays = {
-        "time": times,
-        "midpoint": np.degrees(theta),
-        "exact_time": dense[: exact.size],
-        "exact": np.degrees(exact),
-    }
-    return {
-        "message": "; ".join(ended),
-        "largest": {"midpoint": float(np.nanmax(off))},
-        "arrays": {name: _float32(values) for name, values in arrays.items()},
-    }
+    of_exact = {"exact_time": dense[: exact.size], "exact": np.degrees(exact)}
+    largest = {"midpoint": float(np.nanmax(off))}
+    return _curves(largest, "; ".join(ended), time=times, midpoint=np.degrees(theta), **of_exact)
 
 
 def script(chosen: Setup) -> str:
@@ -378,12 +372,8 @@ def catalogue() -> dict[str, Any]:
         {
             **{name: getattr(entry, name) for name in ("name", "purpose", "horizon")},
             "period": float(np.nan_to_num(entry.nutation_period, posinf=0.0)),
-            **{name: getattr(entry.top, name) for name in (OF_BODY if entry.of_body else TOP)},
-            **(
-                dict(zip(RATES, entry.start.omega_body, strict=True))
-                if entry.of_body
-                else {name: getattr(entry.start, name) for name in START}
-            ),
+            **asdict(entry.top),
+            **(dict(zip(RATES, entry.start.omega_body, strict=True)) if entry.of_body else asdict(entry.start)),
         }
         for entry in all_scenes().values()
     ]

@@ -50,22 +50,17 @@ def _netcdf(chosen: answers.Setup) -> bytes:
         return netcdf.write(answers.dataset(chosen, str), Path(folder) / "explored.nc").read_bytes()
 
 
-# What reads the question, what answers it, and the type of the answer.
-ACTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], bytes], str]] = {
-    "/run": (answers.setup, lambda chosen: json.dumps(answers.answer(chosen)).encode(), "application/json"),
+# What reads the question, what answers it in JSON, or in bytes of the type that follows.
+JSON = "application/json"
+ACTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any], str]] = {
+    "/run": (answers.setup, answers.answer, JSON),
     "/netcdf": (answers.setup, _netcdf, "application/x-netcdf"),
     "/script": (answers.setup, lambda chosen: answers.script(chosen).encode(), "text/x-python; charset=utf-8"),
-    "/cost": (cost.question, lambda asked: json.dumps(cost.chart(asked)).encode(), "application/json"),
-    "/oscillator": (answers.damped, lambda asked: json.dumps(answers.oscillator(*asked)).encode(), "application/json"),
-    "/damped-top": (
-        answers.damped_top,
-        lambda asked: json.dumps(answers.inclination(*asked)).encode(),
-        "application/json",
-    ),
-    "/map": (answers.grid, lambda grid: json.dumps(answers.outcome_map(*grid)).encode(), "application/json"),
+    "/cost": (cost.question, cost.chart, JSON),
+    "/oscillator": (answers.damped, lambda asked: answers.oscillator(*asked), JSON),
+    "/damped-top": (answers.damped_top, lambda asked: answers.inclination(*asked), JSON),
+    "/map": (answers.grid, lambda grid: answers.outcome_map(*grid), JSON),
 }
-
-
 _at_work = threading.BoundedSemaphore(cores())  # of 200 runs that take turns in the interpreter 42 took over a minute
 
 
@@ -130,7 +125,7 @@ class Handler(BaseHTTPRequestHandler):
             name, kind = PAGES[self.place]
             self._reply(200, (STATIC / name).read_bytes(), kind)
         elif self.place == "/catalogue":
-            self._reply(200, json.dumps(answers.catalogue()).encode(), "application/json")
+            self._reply(200, json.dumps(answers.catalogue()).encode(), JSON)
         else:
             self._refuse(404, f"there is no {self.place} here")
 
@@ -156,7 +151,7 @@ class Handler(BaseHTTPRequestHandler):
         if self.place not in ACTIONS:
             self._refuse(404, f"there is no {self.place} here")
             return
-        if self.headers.get_content_type() != "application/json":
+        if self.headers.get_content_type() != JSON:
             self._refuse(415, "a question must be JSON")
             return
         try:
@@ -166,9 +161,8 @@ class Handler(BaseHTTPRequestHandler):
                 self._refuse(413, f"a question must be at most {LONGEST_BODY} bytes, not {length}")
                 return
             read, action, kind = ACTIONS[self.place]
-            body = self.rfile.read(length)
             try:
-                question = json.loads(body)
+                question = json.loads(self.rfile.read(length))
             except (ValueError, RecursionError) as error:
                 raise SymtopError(f"a question must be JSON: {error}") from None
             chosen = read(question)
@@ -176,14 +170,14 @@ class Handler(BaseHTTPRequestHandler):
                 if self._has_left():
                     self.close_connection = True
                     return
-                body = action(chosen)
+                answer = action(chosen)
         except SymtopError as error:
             # The page shows the sentence in place of a run, as an ordinary answer; a file cannot be replaced by it.
             self._refuse(200 if self.place not in ("/netcdf", "/script") else 400, str(error))
         except Exception as error:  # noqa: BLE001  (the page shows it, and the server keeps running)
             self._refuse(500, f"the run failed: {type(error).__name__}: {' '.join(str(error).split())}")
         else:
-            self._reply(200, body, kind)
+            self._reply(200, json.dumps(answer).encode() if kind == JSON else answer, kind)
 
     def _has_left(self) -> bool:
         """Has the browser closed the connection while its question waited?"""
@@ -211,7 +205,7 @@ class Handler(BaseHTTPRequestHandler):
 
     def _refuse(self, status: int, sentence: str) -> None:
         self.close_connection = self.close_connection or status != 200  # the body may be unread
-        self._reply(status, json.dumps({"error": sentence}).encode(), "application/json")
+        self._reply(status, json.dumps({"error": sentence}).encode(), JSON)
 
     def _reply(self, status: int, body: bytes, kind: str) -> None:
         self.send_response(status)

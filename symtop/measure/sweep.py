@@ -30,7 +30,8 @@ from symtop.run.simulation import chart_of, make_plan
 
 KEEP_EVERY = 5.0  # seconds between two writings of the file
 RAISED = "raised"  # outcome of a run whose integrator raised an exception
-BATCHES, BATCH, PATIENCE = 15, 0.001, 0.2  # of timings: samples of a run, seconds of one, seconds of all
+BATCHES, BATCH, PATIENCE = 15, 0.0005, 0.1  # of timings: samples of a run, seconds of one, seconds of all
+CLOSE = 0.01  # between the three least, with which there are enough
 SPENT = {"seconds": math.nan, "seconds_spread": math.nan}
 TIMED = (
     "one call of the method's solver from the start to the horizon, with two samples and nothing around it; the least "
@@ -233,7 +234,7 @@ def timed_rows(cells: "list[tuple[Scene, Integrator, float, list[dict[str, Any]]
         rows += (ended := [one for one in runs if one["outcome"] == "ok"])
         calls += [bare_run(scene, method, next(iter(method.solvers)), one["setting_value"], horizon) for one in ended]
     with foreign_code("a method that is timed"):
-        taken = timings(calls, BATCHES, BATCH, warm=True, patience=PATIENCE) if calls else []
+        taken = timings(calls, BATCHES, BATCH, warm=True, patience=PATIENCE, close=CLOSE) if calls else []
     for one, timing in zip(rows, taken, strict=True):
         one |= {"seconds": timing.best, "seconds_spread": timing.spread}
 
@@ -281,6 +282,11 @@ def titled(cell: xr.Dataset) -> str:
     return f"{name} ({'SciPy' if method and method.family == 'library' else 'Python'})"
 
 
+def period_word(data: xr.Dataset) -> str:
+    """What ``steps_per_nutation`` of a comparison counts in."""
+    return "natural period" if str(data["variant"].values.flat[0]).endswith("[body]") else "nutation"
+
+
 def failed_setting(cell: xr.Dataset) -> str:
     """Where a variant on a scene fails, "fails at 5.3 steps a nutation": the finest of its coarsest failed runs."""
     control = cell["step_size" if cell["step_size"].notnull().any() else "tolerance"].values
@@ -295,4 +301,4 @@ def failed_setting(cell: xr.Dataset) -> str:
     if "steps_per_nutation" not in cell or cell["step_size"].isnull().all():
         return f"fails at {control[k]:.2g}, {word}"
     steps = cell["steps_per_nutation"].values[k]
-    return f"fails at {steps if steps < 100.0 else round(steps):.4g} steps a nutation, {word}"
+    return f"fails at {steps if steps < 100.0 else round(steps):.4g} steps a {period_word(cell)}, {word}"

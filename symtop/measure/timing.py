@@ -27,6 +27,7 @@ from symtop.run.simulation import make_plan
 BATCH = 0.02  # seconds
 CLEAR = 1e-3  # seconds: a trial that long shows how many calls make a batch
 STRIDE = 16  # the calls of a trial grow at most so much
+ENOUGH = 5  # samples whose three least may agree
 NOISY = 0.25  # relative spread beyond which a timing is not called reliable
 
 
@@ -82,15 +83,18 @@ def timings(
     *,
     warm: bool = False,
     patience: float = math.inf,
+    close: float = 0.0,
+    least: int = 2,
     exact: bool = True,
 ) -> list[Timing]:
     """Time several functions against each other.
 
     Those that are `warm`, called before, have no first call (NaN), and a call that turns out to be longer than a batch
-    is the first sample of its function: a long run costs no more calls than it has samples. A function whose samples
-    have taken `patience` seconds together has no more of them, but two at least: a long one meets both fast and slow
-    moments of the machine. The closed form is compiled before anything is timed, whoever calls it; if nothing that
-    is timed does (not `exact`), it stays as it is.
+    is the first sample of its function: a long run costs no more calls than it has samples. A function has no more
+    samples, but two at least, if they have taken `patience` seconds together: a long one meets both fast and slow
+    moments of the machine. It has no more either once its two least differ by less than the part `close`: noise only
+    adds, and seldom adds the same twice. The closed form is compiled before anything is timed, whoever calls it; if
+    nothing that is timed does (not `exact`), it stays as it is.
     """
     if exact:
         closed_form.compile_now()
@@ -105,10 +109,19 @@ def timings(
     for number in range(batches):
         for index in draw.sample(range(len(functions)), len(functions)):
             taken = samples[index]
-            tired = len(taken) > 1 and calls[index] * sum(taken) >= patience
-            if len(taken) <= number and not tired:
+            done = (len(taken) >= least and calls[index] * sum(taken) >= patience) or agree(taken, close)
+            if len(taken) <= number and not done:
                 taken.append(_batch(functions[index], calls[index]) / calls[index])
     return [Timing(tuple(taken), first) for taken, first in zip(samples, firsts, strict=True)]
+
+
+def agree(samples: Sequence[float], close: float) -> bool:
+    """Do the three least of `ENOUGH` samples differ by less than the part `close`?
+
+    Fewer may agree on what is wrong: on a busy machine a batch that is interrupted takes one slice of time longer.
+    """
+    least = sorted(samples)[:3]
+    return len(samples) >= ENOUGH and least[2] < (1.0 + close) * least[0]
 
 
 def bare_run(

@@ -2,9 +2,9 @@
 
 A process that needs a handful of numbers should neither import numba nor compile. `LazyKernel` adds up what it
 interprets, and goes over to the compiled function after `LOADING` seconds if the kernel is in the cache (`IMPORTING`
-more without numba), or after `patience` seconds, what compiling costs, if it is not: no process spends more than twice
-what the better way would have cost it. Results do not depend on the way: the function keeps the rules of
-`symtop.core.jit_functions`.
+more without numba, half of what that takes: who has made 400 forms makes more), or after `patience` seconds, what
+compiling costs, if it is not. If its bitcode is there, the part `GENERATING` is enough: what is made of it is kept.
+Results do not depend on the way: the function keeps the rules of `symtop.core.jit_functions`.
 """
 
 import sys
@@ -12,7 +12,8 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-LOADING, IMPORTING = 0.05, 0.3  # seconds: a kernel from the cache, numba
+LOADING, IMPORTING = 0.05, 0.15  # seconds: a kernel from the cache, numba
+GENERATING = 0.02  # of what compiling costs
 LAZY: "list[LazyKernel]" = []  # of the modules that have been imported
 
 
@@ -35,7 +36,7 @@ class LazyKernel:
         if self._spent < (LOADING if "numba" in sys.modules else LOADING + IMPORTING):
             return False
         with self._lock:
-            if self._spent < self.patience and not self._is_cached():
+            if self._spent < self._worth():
                 return False
         self.compile()
         return True
@@ -44,19 +45,20 @@ class LazyKernel:
         """Compile now, or load from the cache."""
         with self._lock:
             if self.compiled is None:
-                self._is_cached()
+                self._worth()
                 self._kernel.compile(self._signature)
                 self.compiled = self._kernel
 
     def load(self) -> bool:
-        """Load it if it is in the cache; whether the compiled function is there now."""
+        """Load it if it is in the cache, or its bitcode; whether the compiled function is there now."""
         with self._lock:
-            known = self.compiled is not None or self._is_cached()
+            known = self.compiled is not None or self._worth() < self.patience
         if known:
             self.compile()
         return known
 
-    def _is_cached(self) -> bool:
+    def _worth(self) -> float:
+        """Seconds of interpreting that are worth the compiled function."""
         if self._kernel is None:
             from numba.core import sigutils  # 0.3 s
 
@@ -64,5 +66,6 @@ class LazyKernel:
 
             self._kernel = compile_kernel(self.py_func)
             self._signature, _ = sigutils.normalize_signature(self.arguments)
-            self._in_cache = is_cached(self._kernel, self._signature)
-        return self._in_cache
+            on_disk = [is_cached(self._kernel, self._signature, bitcode=which) for which in (False, True)]
+            self._price = 0.0 if on_disk[0] else self.patience * (GENERATING if on_disk[1] else 1.0)
+        return self._price

@@ -99,6 +99,11 @@ class Scene:
         """Time of one full nutation, infinite on a separatrix; of a body its natural period."""
         return _nutation_period(self.top, self.start)
 
+    @property
+    def period_word(self) -> str:
+        """What a `nutation_period` is called."""
+        return "natural period" if self.of_body else "nutation"
+
     def time_scale(self, horizon: float | None = None) -> float:
         """The time on which the motion changes: a nutation, or an eighth of a horizon (the scene's) on a separatrix."""
         period = self.nutation_period

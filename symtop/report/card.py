@@ -18,9 +18,9 @@ import numpy as np
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home
 from symtop.judging.findings import Finding, StepLedger, claim_name, description
+from symtop.report.figures import SMALLEST
 from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels, slope_guide
 
-LEAST = 1e-17  # what is smaller is drawn here
 LETTER = 6.6  # width of a letter of the badge, pixels
 LONGEST = 72  # letters of what a badge says
 SIGNS = {"confirmed": "✓", "refuted": "✗", "measured": "=", "undecided": "?", "inapplicable": "–"}
@@ -75,7 +75,9 @@ def _energy(axis: Any, ledger: StepLedger) -> None:
     if not valid.any():
         _nothing(axis, finding)
         return
-    axis.plot(times[valid], np.maximum(change[valid], LEAST), color=ORANGE, label=f"{int(traces['steps_run'])} steps")
+    axis.plot(
+        times[valid], np.maximum(change[valid], SMALLEST), color=ORANGE, label=f"{int(traces['steps_run'])} steps"
+    )
     axis.set(xscale="log", yscale="log")
     if math.isfinite(finding.resolution):
         axis.axhline(finding.resolution, color=GREY, lw=0.9, ls=(0, (5, 3)), label="what rounding explains")

@@ -15,10 +15,10 @@ import xarray as xr
 from symtop.core.errors import SymtopError, at_home, one_of
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES, errors
-from symtop.measure.sweep import failed_setting, titled
+from symtop.measure.sweep import failed_setting, period_word, titled
 from symtop.model.scenes import Scene
 from symtop.report import spread
-from symtop.report.figures import error_band, name_ends
+from symtop.report.figures import SMALLEST, error_band, name_ends
 from symtop.report.style import (
     BLACK,
     BLUE,
@@ -41,7 +41,6 @@ from symtop.run.trajectory import Trajectory
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LEAST = 1e-17  # what is smaller is drawn here
 LINES = ("-", "--", "-.", ":")  # of a sweep's scenes
 AXES = {"seconds": "time of a run, one core (s)", "force_evaluations": "force evaluations of a run"}
 COLORS = {"axis": BLACK, "attitude": GREY, "theta": SKY, "energy": VERMILLION, "p_phi": GREEN, "p_psi": PURPLE}
@@ -94,9 +93,9 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         if quantity not in wrong:
             shows = ", ".join(str(shown) for shown in wrong.data_vars if shown in QUANTITIES)
             raise SymtopError(f"this run does not show the {quantity}; it shows {shows}")
-        ax.plot(wrong["time"].values[1:], np.maximum(wrong[quantity].values[1:], LEAST), color=color, lw=1.2)
+        ax.plot(wrong["time"].values[1:], np.maximum(wrong[quantity].values[1:], SMALLEST), color=color, lw=1.2)
         if known:
-            ax.plot(times, np.maximum(data[f"{quantity}_bound"].values, LEAST), color="0.6", lw=0.8, ls=":")
+            ax.plot(times, np.maximum(data[f"{quantity}_bound"].values, SMALLEST), color="0.6", lw=0.8, ls=":")
         ax.set(yscale="log", ylabel=QUANTITIES[quantity])
     else:
         shown = {name: variable for name, variable in data.data_vars.items() if variable.dims == ("time",)}
@@ -140,7 +139,7 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
             options = line(variant) | ({"ls": LINES[number % len(LINES)]} if data.sizes["scene"] > 1 else {})
             label = titled(cell.assign_coords(variant=variant))
             label = label if data.sizes["scene"] == 1 else f"{label} on {scene}"
-            across, errors = cell[x].values, np.maximum(cell[quantity].values, LEAST)
+            across, errors = cell[x].values, np.maximum(cell[quantity].values, SMALLEST)
             good = np.flatnonzero(np.isfinite(across) & np.isfinite(errors))
             good = good if compared else good[np.argsort(across[good])]  # which goes from coarse to fine, time or not
             ax.plot(across[good], errors[good], lw=1.4, label=label, **options)
@@ -153,8 +152,7 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
     ax.set_ylim(bottom=0.1 * level)
     if compared:
         nutations, end = data.attrs["nutations"], data.attrs["horizon"]
-        unit = "natural periods" if str(data["variant"].values[0]).endswith("[body]") else "nutations"
-        runs = f"{nutations:.3g} {unit}" if nutations > 0.0 else f"t = {end:g}"
+        runs = f"{nutations:.3g} {period_word(data)}s" if nutations > 0.0 else f"t = {end:g}"
         ax.set_title(f"{data['scene'].item()}, {runs}", loc="left", weight="bold")
         if x == "seconds" and data["exact_seconds"].notnull():
             ax.axvline(exact := data["exact_seconds"].item(), color="0.35", ls=(0, (1, 2)), lw=1.0)
@@ -193,7 +191,7 @@ def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Datase
 
 
 def _line(axis: Any, times: Any, values: Any, color: str, label: str) -> None:
-    axis.plot(times[1:], np.maximum(values[1:], LEAST), color=color, lw=1.0, label=label)
+    axis.plot(times[1:], np.maximum(values[1:], SMALLEST), color=color, lw=1.0, label=label)
 
 
 def draw_ensemble(members: xr.Dataset, data: xr.Dataset, path: str | Path) -> None:
@@ -217,26 +215,22 @@ def draw_ensemble(members: xr.Dataset, data: xr.Dataset, path: str | Path) -> No
 def _bands(axis: Any, members: xr.Dataset, data: xr.Dataset, quantity: str) -> None:
     """Quantiles over members of an error against time, on one Axes, at places of `symtop.report.spread.at_places`.
 
+    The median is a line, with two bands about it, named at their right ends.
+
     Errors beyond `MOST` are drawn there: angles do not exceed pi, and a quantile of runs that failed is named so. Where
     all members have as many steps a nutation, a sample at a whole nutation is one for all of them, and energy errors
     that return there, as those of a symplectic method do, dip: that is no error of the samples, which are dithered.
     """
     horizons = data["horizon"].values
     shared = (horizons == horizons[0]).all()
-    places, errors = spread.at_places(data, spread.member_errors(members, data, quantity))
-    quantiles = spread.spread(errors)
+    places, own = spread.at_places(data, spread.member_errors(members, data, quantity))
+    quantiles = spread.spread(own)
     known = np.isfinite(places) & ~np.isnan(quantiles).any(axis=0) & (places > 0.0)
     if not known.any():
         raise SymtopError("there is nothing to draw: the closed form of no member is known")
-    times, quantiles = (places * (horizons[0] if shared else 1.0))[known], quantiles[:, known]
-    _draw_quantiles(axis, times, quantiles, MOST[quantity], look(data.attrs["integrator"]).color)
-    label = "time" if shared else "time, as a fraction of each member's horizon"
-    axis.set(yscale="log", ylabel=spread.QUANTITIES[quantity], xlabel=label)
-
-
-def _draw_quantiles(axis: Any, times: Any, errors: Any, most: float, color: str) -> None:
-    """The median as a line and two bands about it, labelled at their right ends."""
-    quantiles = np.clip(errors, LEAST, most)
+    times, errors = (places * (horizons[0] if shared else 1.0))[known], quantiles[:, known]
+    most, color = MOST[quantity], look(data.attrs["integrator"]).color
+    quantiles = np.clip(errors, SMALLEST, most)
     for low, high, opaque in BANDS:
         axis.fill_between(times, quantiles[low], quantiles[high], color=color, alpha=opaque, lw=0.0)
     marker = "o" if times.size == 1 else None  # a line has two points at least
@@ -246,7 +240,8 @@ def _draw_quantiles(axis: Any, times: Any, errors: Any, most: float, color: str)
     names = ["median" if level == 0.5 else f"{100.0 * level:g} %" for level in spread.LEVELS]
     ends = {f"{name}: failed" if np.isinf(error) else name: (float(times[-1]), float(shown), color)
             for name, error, shown in zip(names, errors[:, -1], quantiles[:, -1], strict=True)}  # fmt: skip
-    axis.set(xlim=(0.0, times[-1]), yscale="log")
+    label = "time" if shared else "time, as a fraction of each member's horizon"
+    axis.set(xlim=(0.0, times[-1]), yscale="log", ylabel=spread.QUANTITIES[quantity], xlabel=label)
     name_ends(axis, ends)
 
 

@@ -386,7 +386,7 @@ def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected:
         )
     if not expected.axis_error > EXPECTED:
         return None
-    second = motion.scene.second
+    second, period = motion.scene.second, motion.scene.period_word
     reached = min(expected.axis_error, math.pi)
     size = f"expect an {motion.watches} error of {reached:.1g} rad by t = {plan.horizon:.4g}{second}"
     if (coarse := _coarse(motion, method, chart, plan, expected, size)) is not None:
@@ -400,13 +400,13 @@ def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected:
         )
         if expected.unstable >= expected.axis_error:
             return Trouble(f"{size}: the motion is unstable, and a change of its start grows large; {advice}")
-        return Trouble(f"{size}: errors add up over {plan.horizon / marks.period:.3g} nutations; {advice}")
+        return Trouble(f"{size}: errors add up over {plan.horizon / marks.period:.3g} {period}s; {advice}")
     if method.order is None:
         words = "it has no order, so that a smaller step need not help; take another method, such as strang"
         return Trouble(f"{size}: {words}")
     return Trouble(
-        f"{size}: a step is 1/{expected.steps_per_nutation:.3g} of a nutation, and errors add up over "
-        f"{plan.horizon / marks.period:.3g} nutations", _smaller(method, plan, expected),
+        f"{size}: a step is 1/{expected.steps_per_nutation:.3g} of a {period}, and errors add up over "
+        f"{plan.horizon / marks.period:.3g} {period}s", _smaller(method, plan, expected),
     )  # fmt: skip
 
 

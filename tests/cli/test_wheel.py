@@ -1,6 +1,7 @@
 """An installed wheel, without a checkout: it carries the studies and runs nothing of the working directory."""
 
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 TRAP = "raise SystemExit('a study of the working directory was run')\n"
 
 
@@ -52,3 +54,57 @@ def test_a_wheel_in_an_empty_folder(tmp_path):
     assert "@article" in run(symtop, "integrators", "midpoint")
     assert "BAD" not in run(symtop, "doctor")
     assert {path.name for path in home.iterdir()} == {"studies", "results"}
+
+
+RUN = """
+import hashlib, sys, symtop
+name, setting = sys.argv[1:]
+data = symtop.simulate("spheroid", name, step_size=float(setting), samples=20, guard=False)
+print(hashlib.sha256(data["theta"].values.tobytes() + data["energy"].values.tobytes()).hexdigest())
+"""
+
+
+@pytest.mark.slow
+def test_a_wheel_brings_the_kernels_of_first_runs(tmp_path):
+    """The commands of the README compile nothing with an empty cache; bits are those of kernels compiled here."""
+    home, made, site = tmp_path / "home", tmp_path / "made", tmp_path / "site"
+    home.mkdir()
+    environment = {**os.environ, "SYMTOP_COMPILE_WITH": sys.executable, "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
+
+    def run(*command, **more):
+        done = subprocess.run(
+            list(map(str, command)), cwd=home, env={**environment, **more}, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", made, ROOT)
+    (wheel,) = made.glob("symtop-*.whl")
+    zipfile.ZipFile(wheel).extractall(site)
+    kernels = list((site / "symtop" / "kernels").rglob("*.bitcode"))
+    assert len(kernels) >= 25
+    assert sum(path.stat().st_size for path in kernels) < 2e6
+    environment["PYTHONPATH"] = str(site)
+    assert str(site) in run(sys.executable, "-c", "import symtop; print(symtop.__file__)")
+
+    lines = re.findall(
+        r"^(?:\$ )?symtop ((?:run|compare|recommend|ensemble|long) .*?)(?: +#.*)?$", README, re.MULTILINE
+    )
+    assert len(lines) == 6
+    cache = tmp_path / "cache"
+    for line in lines:
+        words = line.replace("--steps 1e9", "--steps 1e6").replace('"', "").split()
+        run(sys.executable, "-m", "symtop", *words, SYMTOP_CACHE=str(cache))
+    assert list(cache.rglob("*.code"))
+    assert not list(cache.rglob("*.bitcode"))  # nothing was compiled
+
+    plain = {"SYMTOP_CACHE": str(tmp_path / "x86-64"), "NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": ""}
+    for name in ("strang[axis]", "series[axis]", "rk4[angles]", "vern9-fixed[axis]"):  # fused products, and vectors
+        words = (sys.executable, "-c", RUN, name, "0.01")
+        compiled = run(*words, PYTHONPATH=str(ROOT), SYMTOP_CACHE=str(tmp_path / "own"))
+        assert run(*words, SYMTOP_CACHE=str(cache)) == compiled
+        assert run(*words, **plain) == compiled  # for a processor without the instructions of this one
+    assert not list((tmp_path / "x86-64").rglob("*.bitcode"))
+
+    run(sys.executable, "-c", RUN, "yoshida-4[attitude]", "0.01", SYMTOP_CACHE=str(cache))
+    assert list(cache.rglob("*.bitcode"))  # the control: a kernel that the wheel has not

@@ -148,7 +148,7 @@ def test_an_import_inside_a_function_is_followed_at_every_level():
 
 
 def kernels_of(root: Path, store: Path) -> dict[str, int]:
-    """The index files of the cache and when they were written, after one run; and what it returned."""
+    """The machine code in the cache and when they were written, after one run; and what it returned."""
     code = (
         "import symtop; from symtop.run import long_run as L; "
         "w, m = symtop.scene('spheroid'), symtop.integrator('gauss-4'); "
@@ -159,7 +159,7 @@ def kernels_of(root: Path, store: Path) -> dict[str, int]:
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=240, check=True, cwd=root,
         env={**os.environ, "PYTHONPATH": str(root), "SYMTOP_CACHE": str(store)},
     )  # fmt: skip
-    files = {str(path.relative_to(store)): path.stat().st_mtime_ns for path in (store / "kernels").rglob("*.nbi")}
+    files = {str(path.relative_to(store)): path.stat().st_mtime_ns for path in (store / "kernels").rglob("*.code")}
     return {"said": done.stdout.split(), "files": files}
 
 
@@ -257,7 +257,7 @@ def test_the_cache_keeps_what_was_used_last(tmp_path):
     for age, name in enumerate(("a", "b", "c", "d")):
         folder = tmp_path / name
         folder.mkdir()
-        (folder / "kernel.nbc").write_bytes(b"\0" * 1000)
+        (folder / "kernel.code").write_bytes(b"\0" * 1000)
         used = time.time() - age * 2 * files.DAY
         os.utime(folder, (used, used))
     old = time.time() - (files.UNUSED + 1) * files.DAY

@@ -1,12 +1,14 @@
-"""A compiled cache that somebody else may write is never read: its index is a pickle, and a pickle is a program."""
+"""A compiled cache that somebody else may write is never read: what it holds is a program."""
 
+import json
 import os
-import pickle
 import stat
+import zlib
 
 import pytest
 
 from symtop.cli import doctor
+from symtop.core import jit
 from symtop.core.errors import SymtopWarning
 from symtop.core.jit import compile_kernel
 
@@ -17,33 +19,34 @@ def _doubled(x):
     return x + x
 
 
-class Planted:
-    """Writes a file when it is unpickled."""
-
-    def __init__(self, mark):
-        self.mark = mark
-
-    def __reduce__(self):
-        return os.mkdir, (str(self.mark),)
+def _planted(x):
+    return x * x * x
 
 
 @pytest.fixture
 def planted(tmp_path, monkeypatch):
-    """A cache that holds a kernel and a program in its index, and the folder that the program makes."""
-    root, mark = tmp_path / "new" / "cache", tmp_path / "ran"
+    """A cache that holds a kernel whose bitcode is another's."""
+    root = tmp_path / "new" / "cache"
     monkeypatch.setenv("SYMTOP_CACHE", str(root))
     before = os.umask(0o002)
     try:
         assert compile_kernel(_doubled)(2.0) == 4.0
     finally:
         os.umask(before)
-    (index,) = root.rglob("*.nbi")
-    index.write_bytes(pickle.dumps(Planted(mark)))
-    return root, index, mark
+    (file,), (code,) = root.rglob("*.bitcode"), root.rglob("*.code")
+    kernel = compile_kernel(_planted)
+    monkeypatch.setattr(kernel, "_cache", jit._Cache(root / "kernels" / "aside"))
+    assert kernel(2.0) == 8.0
+    (other,) = (root / "kernels" / "aside").glob("*.bitcode")
+    jit._write(file, jit._read(other, jit._name(other)), jit._name(file))
+    for path in [*other.parent.iterdir(), code]:
+        path.unlink()
+    other.parent.rmdir()
+    return root, file
 
 
 def test_what_is_made_is_the_users_alone(planted):
-    root, *_ = planted
+    root, _ = planted
     modes = {path.is_dir(): stat.S_IMODE(path.stat().st_mode) for path in (root.parent, root, *root.rglob("*"))}
     assert modes == {True: 0o700, False: 0o600}
     assert not [finding for finding in doctor._caches(root) if not finding.healthy]
@@ -51,15 +54,29 @@ def test_what_is_made_is_the_users_alone(planted):
 
 def test_a_program_in_a_cache_of_our_own_is_ours_to_run(planted):
     """The control: this is what is refused below."""
-    assert compile_kernel(_doubled)(2.0) == 4.0
-    assert planted[2].exists()
+    assert compile_kernel(_doubled)(2.0) == 8.0
 
 
-@pytest.mark.parametrize("at", ["root", "kernels", "kernel", "index"])
+def test_machine_code_in_a_cache_of_our_own_is_ours_to_run_too(planted):
+    assert compile_kernel(_doubled)(2.0) == 8.0
+    (code,) = planted[0].rglob("*.code")
+    written = code.stat().st_mtime_ns
+    assert compile_kernel(_doubled)(2.0) == 8.0
+    assert code.stat().st_mtime_ns == written
+
+
+def test_what_is_kept_of_a_kernel_is_no_pickle(planted):
+    """Reading it runs nothing: a line of JSON, and bitcode or machine code."""
+    head, _, bitcode = planted[1].read_bytes()[jit.HASH :].partition(b"\n")
+    assert json.loads(head)["returned"] == "float64"
+    assert zlib.decompress(bitcode).startswith(b"BC\xc0\xde")
+
+
+@pytest.mark.parametrize("at", ["root", "kernels", "kernel", "file"])
 @pytest.mark.parametrize("fault", ["group", "anybody", "owner"])
 def test_what_others_may_write_is_not_read(planted, monkeypatch, at, fault):
-    root, index, mark = planted
-    path = {"root": root, "kernels": root / "kernels", "kernel": index.parent, "index": index}[at]
+    root, file = planted
+    path = {"root": root, "kernels": root / "kernels", "kernel": file.parent, "file": file}[at]
     if fault == "owner":
         if os.geteuid() != 0:
             pytest.skip("only the administrator gives files away")
@@ -73,4 +90,3 @@ def test_what_others_may_write_is_not_read(planted, monkeypatch, at, fault):
     with pytest.warns(SymtopWarning, match=words) as told:
         assert [compile_kernel(_doubled)(2.0) for _ in range(2)] == [4.0, 4.0]
     assert len(told) == 1
-    assert not mark.exists()

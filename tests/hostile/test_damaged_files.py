@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import symtop
-from symtop.core import netcdf
+from symtop.core import jit, netcdf
 from symtop.core.jit import compile_kernel, is_cached
 from symtop.run import long_run as longrun
 from symtop.run.reference.truth import cached
@@ -36,30 +36,25 @@ def test_a_damaged_kernel_is_compiled_again(tmp_path, monkeypatch, flips):
     draw, kernel = random.Random(5), compile_kernel(_tripled)
     assert kernel(2.0) == 6.0
     (signature,) = kernel.overloads
-    (code,), (index,) = tmp_path.rglob("*.nbc"), tmp_path.rglob("*.nbi")
-    key = kernel._cache._index_key(
-        signature.args if hasattr(signature, "args") else signature, kernel.targetctx.codegen()
-    )
-    files = kernel._cache._cache_file
-    assert files.load(key) is not None  # the control
-    for _ in range(flips):
-        whole = flipped(code, draw)
-        with pytest.raises(ValueError, match="damaged"):
-            files.load(key)
-        code.write_bytes(whole)
-    for file in (code, index, code):
-        flipped(file, draw)
+    code, bitcode, _ = kernel._cache.files(signature, kernel.targetctx.codegen())
+    entry = jit._read(bitcode, jit._name(bitcode))
+    assert jit._read(code, entry)  # the control
+    for file, of in ((code, entry), (bitcode, jit._name(bitcode))):
+        for _ in range(flips):
+            whole = flipped(file, draw)
+            with pytest.raises(ValueError, match="damaged"):
+                jit._read(file, of)
+            file.write_bytes(whole)
+    for damaged in ([code], [bitcode], [code, bitcode]):
+        for file in damaged:
+            flipped(file, draw)
         again = compile_kernel(_tripled)
-        assert is_cached(again, signature) in (True, False)
+        assert is_cached(again, signature)  # as far as one can tell without reading
         assert again(2.0) == 6.0
-        assert compile_kernel(_tripled)._cache._cache_file.load(key) is not None  # it is whole on disk again
-    for k in range(flips):
-        whole = flipped(index, draw)
-        again = compile_kernel(_tripled)
-        if k < 10:
-            assert again(2.0) == 6.0
-        assert is_cached(again, signature) in (True, False)
-        index.write_bytes(whole)
+        assert jit._read(code, jit._read(bitcode, jit._name(bitcode)))  # they are whole on disk again
+    for length in (0, 10, 40):
+        bitcode.write_bytes(whole[:length])
+        assert compile_kernel(_tripled)(2.0) == 6.0
 
 
 def _whole(data):

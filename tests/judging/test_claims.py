@@ -140,6 +140,16 @@ def test_a_law_is_named_only_if_the_interval_excludes_its_neighbours(size, slope
     assert behaviour(size, slope, interval, rounding=1e-11) == kind
 
 
+@pytest.mark.parametrize(
+    ("a_step", "plain", "kind"), [(1e-16, False, "drift"), (1e-16, True, "kept"), (1e-15, True, "drift")]
+)
+def test_a_bias_of_a_unit_of_rounding_a_step_is_rounding_where_sums_are_plain(a_step, plain, kind):
+    """As of products of quaternions: 144,000 steps make 1.6e-11."""
+    steps, rounding = 144_000, 6e-16 * np.sin(np.arange(400.0))
+    residual = a_step * steps * 1.1 * TIME / TIME[-1]
+    assert long.change_of(TIME, residual, rounding, steps, plain=plain).kind == kind
+
+
 def test_what_changes_at_once_is_said_unless_the_run_has_blown_up():
     jump = np.where(TIME > 4000.0, 1e-6, 0.0) + 1e-12 * np.sin(TIME)
     assert long.change_of(TIME, jump, WAVE[:9] * 1e-10, 1000).sudden.startswith("after t = 4000 it changes ")

@@ -1,7 +1,7 @@
 """The measures themselves, on data whose answer is known: orders, trends, scales, counts, ladders."""
 
+import itertools
 import math
-import time
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from symtop.measure.accuracy import error_table
 from symtop.measure.conservation import trend
 from symtop.measure.order import order, power_law
 from symtop.measure.settings import ladder
-from symtop.measure.timing import Timing, timings
+from symtop.measure.timing import Timing, agree, timings
 from symtop.runner.study import Case
 
 STEPS = 0.1 / 1.5 ** np.arange(16)
@@ -125,13 +125,39 @@ def test_combining_refuses_cases_with_different_coordinates():
         datasets.combine([case("a", [8.0, 100.0]), case("b", [8.0, 1000.0])])
 
 
-def test_a_function_that_has_taken_long_is_asked_no_more_but_twice_at_least():
-    def nap(seconds):
-        return lambda: time.sleep(seconds)
+@pytest.fixture
+def clock(monkeypatch):
+    """The time that `timings` reads, in a list; a function that is timed adds to it."""
+    seconds = [0.0]
+    monkeypatch.setattr("symtop.measure.timing.time.perf_counter", lambda: seconds[0])
+    return seconds
 
-    for patience, counts in ((math.inf, [4, 4, 4]), (0.05, [4, 3, 2])):
-        taken = timings([nap(1e-3), nap(0.02), nap(0.06)], 4, 5e-3, warm=True, patience=patience)
+
+def taking(clock, each):
+    """A function whose calls take these seconds."""
+    left = iter(each)
+
+    def call():
+        clock[0] += next(left)
+
+    return call
+
+
+def test_a_function_that_has_taken_long_is_asked_no_more_but_so_often_at_least(clock):
+    for patience, least, counts in ((math.inf, 2, [4, 4, 4]), (0.05, 2, [4, 3, 2]), (0.05, 1, [4, 3, 1])):
+        naps = [taking(clock, itertools.repeat(seconds)) for seconds in (1e-3, 0.02, 0.06)]
+        taken = timings(naps, 4, 5e-3, warm=True, patience=patience, least=least, exact=False)
         assert [len(timing.samples) for timing in taken] == counts
+
+
+def test_a_function_whose_three_least_samples_agree_is_asked_no_more(clock):
+    for close, count in ((0.5, 6), (0.0, 8)):
+        calls = taking(clock, (0.01, 0.011, 0.03, 0.03, 0.03, 0.012, 0.03, 0.03))
+        (timing,) = timings([calls], 8, 2e-3, warm=True, close=close, exact=False)
+        assert len(timing.samples) == count
+    assert agree([1.0, 3.0, 1.005, 3.0, 1.009], 0.01)
+    assert not agree([1.0, 3.0, 1.005, 3.0, 1.02], 0.01)
+    assert not agree([1.0, 1.0, 1.0, 1.0], 0.01)
 
 
 def test_timings_know_when_they_are_noisy():

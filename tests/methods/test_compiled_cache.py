@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from symtop.core import jit
@@ -50,6 +51,54 @@ def test_a_second_process_finds_the_kernels_of_every_family_on_disk(names, lanes
     assert (missed, without_cache) == (0, 0)
 
 
+BITS = """
+import hashlib, sys, symtop
+from symtop.core import jit
+way, count = sys.argv[1], int(sys.argv[2])
+if way == "numba alone":
+    jit.LEAN = False
+if way == "bitcode":
+    jit.on_cold[:] = [lambda: sys.exit("compiled")]
+every = [f"{one.name}[{chart}]" for one in symtop.integrators().values() if one.implementation == "compiled"
+         for chart in one.charts()]
+for k in range(count):
+    one = symtop.integrator(every[k * (len(every) - 1) // (count - 1)])
+    setting = one.setting(0.02 if one.fixed_step else 1e-7).kwargs()
+    runs = [symtop.simulate("spheroid", one, **setting, samples=30, guard=False)]
+    if k % 3 == 0:
+        runs.append(symtop.ensemble(["spheroid", "goldstein"] * 20, one, **setting, horizon=3.0, threads=1, quiet=True))
+    for run in runs:
+        values = [run[name].values for name in sorted(run.data_vars) if run[name].dtype.kind == "f" and run[name].ndim]
+        print(one.name, hashlib.sha256(b"".join(value.tobytes() for value in values)).hexdigest())
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [3, 36], ids=["few", "many"])
+def test_kernels_return_the_same_bits_whichever_way_they_were_made(count, tmp_path):
+    """By numba alone, compiled here, from bitcode, and from that for a processor without this one's instructions."""
+    plain, said = {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": ""}, {}
+    ways = {"numba alone": {}, "compiled": {}, "bitcode": {}, "bitcode, x86-64": plain}
+    for way, processor in ways.items():
+        made = {file: file.read_bytes() for file in tmp_path.rglob("*.code")}
+        for file in made:
+            file.unlink()
+        done = subprocess.run(
+            [sys.executable, "-c", BITS, way.partition(",")[0], str(count)],
+            env={**os.environ, "SYMTOP_CACHE": str(tmp_path), **processor}, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, (way, done.stderr)
+        said[way] = done.stdout.splitlines()
+        assert len(said[way]) == count + -(-count // 3)
+        assert said[way] == said["numba alone"], way
+        if way == "bitcode":  # mostly the same machine code, and so as fast
+            assert np.mean([file.read_bytes() == code for file, code in made.items()]) > 0.8
+        if way == "bitcode, x86-64":
+            assert not any(file.exists() for file in made)
+    if count == 36:
+        assert all(any(f"[{chart}]" in line for line in said["compiled"]) for chart in ("angles", "axis", "attitude"))
+
+
 def _doubled(x):
     return x + x
 
@@ -59,31 +108,48 @@ def _kept_twice(monkeypatch, folder):
     monkeypatch.setenv("SYMTOP_CACHE", str(folder))
     kernel = compile_kernel(_doubled)
     assert (kernel(2), kernel(2.5)) == (4, 5.0)
-    files = sorted(folder.rglob("*.nbc"))
+    files = sorted(folder.rglob("*.code"))
     assert len(files) == 2
     return kernel, files
 
 
 def test_a_file_is_named_after_the_signature_whose_code_it_holds(monkeypatch, tmp_path):
-    """Two processes that save at once, each with the index from before, give two signatures two files."""
+    """And after the processor, so that two processes that save at once write two files."""
     kernel, files = _kept_twice(monkeypatch, tmp_path)
-    index, named = kernel._cache._cache_file, []
-    for signature in index._load_index():
-        index._save_index({})
-        index.save(signature, "code")
-        named.append(index._load_index()[signature])
-    assert len(set(named)) == 2
-    assert sorted(tmp_path.rglob("*.nbc")) == files
+    codegen = kernel.targetctx.codegen()
+    assert sorted(kernel._cache.files(signature, codegen)[0] for signature in kernel.overloads) == files
+    monkeypatch.setattr(codegen, "magic_tuple", lambda: ("this system", "another processor", ""))
+    assert not set(files) & {kernel._cache.files(signature, codegen)[0] for signature in kernel.overloads}
 
 
-def test_the_code_of_another_signature_is_not_run(monkeypatch, tmp_path):
-    _, (one, other) = _kept_twice(monkeypatch, tmp_path)
-    aside = one.read_bytes()
-    one.write_bytes(other.read_bytes())
-    other.write_bytes(aside)
+@pytest.mark.parametrize("swapped", [["code"], ["bitcode"], ["code", "bitcode"]])
+def test_the_code_of_another_signature_is_not_run(monkeypatch, tmp_path, swapped):
+    _kept_twice(monkeypatch, tmp_path)
+    for kind in swapped:
+        one, other = tmp_path.rglob(f"*.{kind}")
+        aside = one.read_bytes()
+        one.write_bytes(other.read_bytes())
+        other.write_bytes(aside)
     again = compile_kernel(_doubled)
     assert (again(2), again(2.5)) == (4, 5.0)
     assert {signature[0].name for signature in again.signatures} == {"int64", "float64"}
+
+
+def test_machine_code_is_run_with_the_bitcode_that_it_was_made_of(monkeypatch, tmp_path):
+    """Names in it hang on the process that compiled: with another's, a process ended."""
+    kernel, files = _kept_twice(monkeypatch, tmp_path)
+    old = [file.read_bytes() for file in files]
+    for file in tmp_path.rglob("*.bitcode"):
+        file.unlink()
+    for number in range(3):  # more names of numba's
+        compile_kernel(lambda x, number=number: x + number)(1)
+    monkeypatch.setattr(jit, "_pruned", [])
+    assert compile_kernel(_doubled)(2) == 4
+    for file, code in zip(files, old, strict=True):
+        file.write_bytes(code)
+    again = compile_kernel(_doubled)
+    assert (again(2), again(2.5)) == (4, 5.0)
+    assert kernel.signatures == again.signatures
 
 
 def test_a_full_disk_costs_time_and_no_run(monkeypatch, tmp_path):
@@ -92,11 +158,11 @@ def test_a_full_disk_costs_time_and_no_run(monkeypatch, tmp_path):
 
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
     with monkeypatch.context() as patch:
-        patch.setattr(jit._Index, "_save_data", full)
+        patch.setattr(jit, "_write", full)
         assert compile_kernel(_doubled)(2.0) == 4.0
-    assert not list(tmp_path.rglob("*.nbc"))
+    assert not list(tmp_path.rglob("*.code"))
     assert compile_kernel(_doubled)(2.0) == 4.0
-    assert list(tmp_path.rglob("*.nbc"))
+    assert list(tmp_path.rglob("*.code"))
 
 
 def test_kernels_of_one_factory_have_names_of_their_own():
@@ -112,3 +178,43 @@ def test_kernels_of_one_factory_have_names_of_their_own():
     assert (one(1.0), same(1.0), other(1.0)) == (2.0, 2.0, 3.0)
     names = [kernel.py_func.__qualname__ for kernel in (one, same, other)]
     assert names[0] == names[1] != names[2]
+
+
+CLASH = """
+import math, sys
+from symtop.core import jit
+def made(number):
+    def within(x):
+        for k in range(40):
+            x = math.sin(x) + number * math.cos(x * k) + math.exp(-x * x) / (1.0 + x * x)
+            for power in (3, 4, 5, 6):  # more than LLVM copies into its three callers
+                x = x - math.floor(x) + math.sqrt(abs(x)) + number * x ** power / (1.0 + x ** 4 + math.tan(x) ** 2)
+                x = math.atan2(x, 1.0 + power) + math.log1p(abs(x)) - math.cosh(0.1 * x) * math.sinh(0.2 * x)
+        return x
+    jit.register_jitable(within, jit.OPTIONS | jit.WITHIN)
+    def kernel(x):
+        return within(x) + within(x + 1.0) + within(x + number)
+    return jit.compile_kernel(kernel)
+for number in sys.argv[1:]:
+    print(made(float(number))(0.5))
+"""
+
+
+@pytest.mark.slow
+def test_kernels_of_two_processes_do_not_call_each_others_inner_functions(tmp_path):
+    """numba names an inner function by a count: those of two processes share names, and a third one loads both."""
+    script = tmp_path / "clash.py"
+    script.write_text(CLASH, encoding="utf-8")
+    environment = {**os.environ, "SYMTOP_CACHE": str(tmp_path / "cache")}
+
+    def said(*numbers):
+        command = [sys.executable, str(script), *numbers]
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
+
+    alone = [*said("0.1"), *said("0.2")]
+    assert alone[0] != alone[1]
+    assert said("0.1", "0.2") == alone
+    for file in (tmp_path / "cache").rglob("*.code"):
+        file.unlink()  # and once more from bitcode
+    assert said("0.2", "0.1") == alone[::-1]
+    assert len(list((tmp_path / "cache").rglob("*.bitcode"))) == 2

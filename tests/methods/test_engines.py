@@ -247,7 +247,7 @@ def test_comparisons_and_recommendations_leave_engines_out():
     assert {entry.family for entry in engines.values()} == {"engine"}
     assert not set(engines) & set(registry.methods())
     assert set(engines) | set(registry.methods()) == set(symtop.integrators())
-    for rows in (registry.variants(), compared("axis"), compared("attitude"), grid_variants("nutation", attitude=True)):
+    for rows in (registry.variants(), compared("axis"), compared("attitude"), grid_variants("nutation")):
         assert not {row.method for row in rows} & set(engines)
 
 

@@ -15,6 +15,7 @@ import symtop
 from symtop.core import netcdf
 from symtop.measure import datasets
 from symtop.measure.verdicts import judgement
+from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
@@ -344,3 +345,10 @@ def test_the_page_says_what_was_measured(measured, tmp_path):
     text = checked("stability", measured, tmp_path)
     answers = facts.facts(measured)
     assert f"{answers['angles_halved']} of 2 variants in Euler's angles" in text
+
+
+def test_a_run_whose_steps_shrink_until_they_vanish_ends_at_the_budget():
+    loose = np.geomspace(1e-10, 0.5, 25)[[12, 22]].tolist()
+    top = family("cusp")(float(np.geomspace(0.1, 30.0, 120)[23]))
+    made = outcome_maps.one_by_one(row_plan(integrator("adams[axis]"), loose, 10.0), "axis", top)
+    assert [OUTCOMES[k] for k in made.outcome[0]] == ["ok", "out_of_budget"]

@@ -54,4 +54,3 @@ def test_the_rows_of_a_grid_are_every_method_and_no_chart_that_repeats_another()
     assert {split_name(name)[0] for name in rows} == set(methods())
     assert {"rk4[angles]", "rk4[axis]", "strang[axis]", "exact[attitude]"} <= set(rows)
     assert "strang[attitude]" not in rows
-    assert "strang[attitude]" in [row.name for row in grid_variants("nutation", attitude=True)]

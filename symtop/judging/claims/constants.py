@@ -3,12 +3,13 @@
 A constant is kept, bounded, a random walk, a drift or just growing by the rule of every study,
 `symtop.measure.conservation.behaviour`: by its size, and by the exponent of its growth (0, 1/2, 1) if the 95 % interval
 excludes the others. Somebody else's sums may be plain. So a change that grows is rounding, too, while it is no more
-than `KEPT`, relative, or than the random walk that the rounding seen in one step makes, n^1/2 times as much: a bias
-beyond a thousandth of that rounding is visible in a million steps. A drift that hides below a bounded oscillation shows
-in the means of 24 equal stretches, and counts if the line through them exceeds `SURE` of its own intervals. A random
-walk passes a plain test of the slope in one case in three, and not this one; at the size of rounding only the size is
-judged. While it has changed little, no constant changes from one sample to the next by `SUDDEN` times what as many of
-the largest steps at the beginning add up to: else the step is another one somewhere, whatever is claimed of it.
+than `KEPT`, relative, or than the random walk that the rounding seen in one step makes, n^1/2 times as much, or than a
+bias of a unit of rounding a step, as of products of quaternions that nothing brings back to length one. A drift that
+hides below a bounded oscillation shows in the means of 24 equal stretches, and counts if the line through them exceeds
+`SURE` of its own intervals. A random walk passes a plain test of the slope in one case in three, and not this one; at
+the size of rounding only the size is judged. While it has changed little, no constant changes from one sample to the
+next by `SUDDEN` times what as many of the largest steps at the beginning add up to: else the step is another one
+somewhere, whatever is claimed of it.
 
 A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 tau, whatever its tau: c is fitted, and it
 is the rest of the fit that must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
@@ -24,6 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError
+from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import AdapterSolver
 from symtop.judging.claims.subject import CONSTANTS, PLANE, STEPS_A_NUTATION, Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
@@ -174,14 +176,17 @@ def long_run(
     _, other, _ = _run(method, scene, inside, PILOT, 0.21 * step, PILOT + 1)
     steady = len({one.force_evaluations / max(one.steps, 1) for one in (first, other)}) == 1
     reported = None
-    if not isinstance(method.solvers[inside], AdapterSolver):  # whose momenta are those of its states
+    plain = isinstance(method.solvers[inside], AdapterSolver)
+    if not plain:  # else its momenta are those of its states
         reported = _reported(method, scene, chart, shown, (run, plan))
         if method.fixed_step:
             reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
     changes, every_step = constants(scene, shown), constants(scene, pilot)
     made, grains = max(run.steps, 1), {"energy": scene.energy_grain}
     kept = {
-        name: change_of(plan.times, changes[name], every_step[name], made, grains.get(name, 1.0), changes["energy"])
+        name: change_of(
+            plan.times, changes[name], every_step[name], made, grains.get(name, 1.0), changes["energy"], plain=plain
+        )
         for name in (changes if chart != PLANE else ("energy",))
     }
     message, nutations = sentence(run.outcome, run.reached, float(plan.times[-1])), run.reached / unit
@@ -252,15 +257,18 @@ def _cayley_residual(top: SymmetricTop, run: Trajectory) -> Array:
 
 
 def change_of(
-    time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0, energy: Any = 0.0
-) -> Constant:
+    time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0, energy: Any = 0.0, *,
+    plain: bool = False,
+) -> Constant:  # fmt: skip
     """Size, growth and trend of a residual over so many steps; `every_step` holds it at consecutive ones.
 
-    Where the change of the `energy` is beyond `BLOWN_UP`, rounding is larger, and nothing is sudden.
+    Where the change of the `energy` is beyond `BLOWN_UP`, rounding is larger, and nothing is sudden. Of `plain` sums
+    half of what rounding makes in one step may be a bias, and add up, but no more than a unit of rounding a step.
     """
     jumps = np.abs(np.diff(every_step))
     a_step = float(np.max(jumps[np.isfinite(jumps)])) if np.isfinite(jumps).any() else math.nan
     rounding = a_step * math.sqrt(steps) if a_step <= ROUNDING_OF_A_STEP * grain else 0.0
+    rounding = max(rounding, min(0.5 * a_step, EPSILON * grain) * steps * plain * (rounding > 0.0))
     floor = max(KEPT * grain, rounding)
     with np.errstate(all="ignore"):  # a run may blow up
         ratio = np.abs(np.diff(values)) / max(a_step * steps / (time.size - 1), floor)

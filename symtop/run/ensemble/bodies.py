@@ -15,7 +15,7 @@ epsilon v off the third axis, |v| up to 1, rates across it up to 3/2. Attitudes 
     chaotic          and those whose grow more: by an exponent of 0.69 a natural period
     lagrange         heavy with epsilon = 0: a symmetric top as a body
 
-The growth is that of the largest of two disturbances of `SMALL`, by the Taylor series `series-general`; of a rotation
+The growth is that of the largest of two disturbances of `SMALL`, by the series `series-general-adaptive`; of a rotation
 that is not unstable it grows with the time, and not by as much. Drawn numbers have nine digits, so that sines of
 another machine change nothing; directions are then brought to length one. The first n members of more are those of
 fewer, and member i of `heavy` is drawn from the same numbers for each epsilon.
@@ -46,7 +46,7 @@ STRATA = (*FREE, *HEAVY)
 KINDS = (*STRATA, "heavy", "all", "free")
 DRAWS, MOST = 16, 1_000_000
 PERIODS, CHAOS, SMALL = 10.0, 1000.0, 1e-8
-STEPS = 64  # of the series in a natural period
+ACCURATE = 1e-13  # tolerance of the series
 FARTHEST, NEAREST = 0.5, 0.02  # epsilon at most; and at least where chaos is asked for, which nothing below has
 VECTORS = {"centre": "component", "quaternion": "part", "omega_body": "component"}
 PRINCIPAL = {name: {"long_name": "principal moment of inertia", "units": "1"} for name in ("I1", "I3")}
@@ -186,9 +186,9 @@ def _heavy(u: Array, epsilon: float | None) -> Array:
 
 def growth(scene: Scene) -> float:
     """How many times the attitude's disturbance of the start has grown at most over `PERIODS` natural periods."""
-    solver, start = integrator("series-general").solvers[BODY], scene.start
-    steps = round(PERIODS * STEPS)
-    plan = Plan.steps(scene.nutation_period / STEPS, np.arange(0, steps + 1, STEPS // 4))
+    solver, start = integrator("series-general-adaptive").solvers[BODY], scene.start
+    times = scene.nutation_period * np.linspace(0.0, PERIODS, 4 * round(PERIODS) + 1)[1:]
+    plan = Plan.until(times, ACCURATE)
     w, x, y, z = start.quaternion
     a, b, c = start.omega_body
     scale = SMALL * math.hypot(a, b, c)
