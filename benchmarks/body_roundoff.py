@@ -56,11 +56,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Round-off of bodies over very many steps")
     parser.add_argument("--steps", type=float, default=1e6)
     parser.add_argument("--starts", type=int, default=8)
+    parser.add_argument("--methods", nargs="+", choices=RUNS, default=list(RUNS))
     options = parser.parse_args()
     ends = windows(int(options.steps))
     print(f"{'scene':<14}{'method':<16}{'constant':<10}{'rms at the end':>15}{'exponent':>18}{'ns a step':>11}")
     for name in SCENES:
-        for method, parts in RUNS.items():
+        for method in options.methods:
+            parts = RUNS[method]
             rng, own = np.random.default_rng(1), symtop.scene(name, bodies=True)
             starts = [changed(own.start, rng) for _ in range(options.starts)]
             residuals(own, method, parts, ends[:1])  # compiles

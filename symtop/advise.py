@@ -91,7 +91,7 @@ SETTINGS = {  # the maps of an engine by its settings, the default first
     "cannon-es": {"default": "no-gyro-linear"},
     "ode": {"default": "ode", "gyroscopic mode off": "no-gyro-linear"},
     "lammps": {"fix rigid": "lammps-rigid", "fix rigid/nve": "no-squish"},
-    "yade": {"exactAsphericalRot": "yade"},
+    "yade": {"exactAsphericalRot": "yade", "rotAlgorithm delValle2023": "spiral"},
     "jsbsim": {"default": "jsbsim-default", "Buss2 and AB2": "jsbsim-buss2"},
     "exudyn": {"RK44": "rkmk4"},
 }  # fmt: skip

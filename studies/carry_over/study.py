@@ -53,9 +53,9 @@ FULL: dict[str, dict[str, Any]] = {
     GROWTH: {"count": 40, "doublings": 6, "seed": SEED},
 }
 QUICK: dict[str, dict[str, Any]] = {
-    SHORT: {"count": 10, "periods": 10.0, "seed": SEED, "budget": 1.5e3},
+    SHORT: {"count": 7, "periods": 10.0, "seed": SEED, "budget": 1.0e3},
     LONG: {"count": 5, "periods": 20.0, "seed": SEED, "budget": 2e3},
-    GROWTH: {"count": 5, "doublings": 3, "seed": SEED},
+    GROWTH: {"count": 4, "doublings": 3, "seed": SEED},
 }
 
 

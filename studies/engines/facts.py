@@ -11,7 +11,7 @@ import xarray as xr
 from symtop.methods.framework.registry import integrator, split_name
 from symtop.model.scenes import scene
 
-from .measures import HORIZON, SCENES
+from .measures import BODIES, FREQUENCIES, HORIZON, SCENES
 
 SLOW, FAST = SCENES
 BETWEEN = (400.0, 3000.0)  # steps a nutation that the measured order is taken between
@@ -57,8 +57,10 @@ def frame(data: xr.DataTree, variable: str, variant: str, scene: str = SLOW, *, 
 
 def lines(data: xr.DataTree) -> pd.DataFrame:
     """A line a variant, by name; errors are rad, `share` that of the population, `group` the order of its map."""
-    names = dict.fromkeys(str(name) for group in data.children.values() for name in group["variant"].values)
-    return pd.DataFrame(_lines(data, names)).set_index("variant", drop=False)
+    groups = (group for key, group in data.children.items() if key != "bodies")
+    names = dict.fromkeys(str(name) for group in groups for name in group["variant"].values)
+    every = pd.DataFrame(_lines(data, names or {BESIDE: None})).set_index("variant", drop=False)
+    return every if names else every.iloc[:0]
 
 
 def _lines(data: xr.DataTree, names: dict[str, None]) -> Iterator[dict[str, Any]]:
@@ -82,6 +84,21 @@ def _lines(data: xr.DataTree, names: dict[str, None]) -> Iterator[dict[str, Any]
         }  # fmt: skip
 
 
+def on_bodies(data: xr.DataTree) -> pd.DataFrame:
+    """A line a variant, by name: largest attitude errors (rad) on each free body at each frequency, and whose it is."""
+    names = [str(name) for name in data["bodies"]["variant"].values] if "bodies" in data.children else []
+    every = pd.DataFrame(index=pd.Index(names, name="variant"))
+    entries = [integrator(name) for name in names]
+    every["order"] = [0.0 if one.method.startswith("no-gyro") else float(one.order or math.nan) for one in entries]
+    every["engine"] = [one.family == "engine" and one.precision == "double" for one in entries]
+    for one in BODIES:
+        for rate in FREQUENCIES:
+            every[f"{one}, 1/{rate:g} s"] = [
+                float(read(data, "bodies", "attitude", scene=one, variant=name, rate=rate)) for name in names
+            ]
+    return every
+
+
 def facts(data: xr.DataTree) -> dict[str, Any]:
     """The two ends of the field, at equal steps and equal cost, and what decides. Errors are rad."""
     every = lines(data)
@@ -90,6 +107,9 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     floors = every[every["single"] & every["term"]]["best"]
     beside = every.loc[BESIDE] if BESIDE in every.index else dict.fromkeys(every.columns)
     members = read(data, "population", "steps_a_nutation")
+    bodies = on_bodies(data)
+    racket, case = (bodies[bodies["engine"] & (bodies["order"] > 0)][f"{one}, 1/{USUAL:g} s"] for one in BODIES)
+    still = bodies[bodies["engine"] & (bodies["order"] == 0)][[f"{BODIES[1]}, 1/{rate:g} s" for rate in FREQUENCIES]]
     long = {name: maps[name].abs()[maps["slow"].notna()] for name in ("energy", "spin")}
     answers: dict[str, Any] = {
         "slow": SLOW, "fast": FAST, "fast_nutation": scene(FAST).nutation_period,  # s
@@ -102,6 +122,11 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         "share_least": maps["share"].min(), "share_most": maps["share"].max(),
         "singles": floors.count() or None, "single_best": floors.min(),
         "lost": int((turned["fast_level"] > LOST).sum()) if turned["fast_level"].notna().any() else None,
+        "racket": BODIES[0], "case": BODIES[1], "body_maps": int(case.count()) or None,
+        "racket_best": racket.min(), "racket_worst": racket.max(),
+        "case_best": case.min(), "case_worst": case.max(), "case_wall": still.min(axis=None),
+        "case_best_variant": case.idxmin() if case.count() else None,
+        "case_worst_variant": case.idxmax() if case.count() else None,
         "turned": len(turned) or None,  # maps with the term
         "limit": LOST, "kept": KEPT,
         # a run that ended early has no energy or spin
@@ -132,4 +157,10 @@ def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
         "energy": f"energy, {long_time(data):g} s", "spin": f"spin, {long_time(data):g} s",
         "spherical": "off the spherical top (rad)",
     }  # fmt: skip
-    return {"orders": orders[["order", "maps", *ranges.columns]], "maps": every[list(names)].rename(columns=names)}
+    bodies = on_bodies(data).drop(columns="engine").reset_index()
+    bodies = bodies.sort_values(f"{BODIES[1]}, 1/{USUAL:g} s", kind="stable")
+    return {
+        "bodies": bodies,
+        "orders": orders[["order", "maps", *ranges.columns]],
+        "maps": every[list(names)].rename(columns=names),
+    }

@@ -6,6 +6,9 @@ energy      the change of the energy at the end, over |E| + |mgl|
 spin        the change of L.e at the end, over the largest |L.e| and |L_z| of the start
 precession  the azimuth that the axis has run through, less the true one, over the true one: the mean rate's error
 forces      evaluations of the torque
+
+On a body without symmetry: the largest angle of attitude and third axis, and relative change of the energy, at the
+steps that people use.
 """
 
 import math
@@ -14,6 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
+from symtop.measure.errors import errors
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
@@ -21,8 +25,10 @@ from symtop.model.charts import axis_of, space_energy, space_momenta
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop, flat
+from symtop.run.simulation import simulate
 
 SCENES = ("goldstein", "fast")
+BODIES = ("tennis-racket", "check-case-2")  # free
 HORIZON = 10.0  # s
 PER_NUTATION = 16.0 * 2.0 ** np.arange(16)  # steps
 FREQUENCIES = (60.0, 240.0, 1000.0)  # steps a second
@@ -87,3 +93,15 @@ def frames(there: Scene, variant: Integrator, horizons: tuple[float, float]) -> 
     shown["level_axis"] = [[one["axis"] for one in part] for part in level]
     table = xr.Dataset({name: (("rate", "horizon"), values) for name, values in shown.items()})
     return table.assign(forces_a_step=float(a_step)).assign_coords(rate=list(FREQUENCIES), horizon=list(horizons))
+
+
+def followed(there: Scene, variant: Integrator) -> xr.Dataset:
+    """The largest errors on a body without symmetry within `HORIZON`, at so many steps a second; pi of a lost run."""
+    rows = {"attitude": [], "axis": [], "energy": []}
+    for rate in FREQUENCIES:
+        run = simulate(there, variant, step_size=1.0 / rate, horizon=HORIZON, samples=SAMPLES + 1, guard=False)
+        wrong = errors(run)
+        for name, row in rows.items():
+            value = float(wrong[name].max(skipna=False))
+            row.append(value if math.isfinite(value) or name == "energy" else math.pi)
+    return xr.Dataset({name: ("rate", row) for name, row in rows.items()}, coords={"rate": list(FREQUENCIES)})

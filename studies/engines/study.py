@@ -1,7 +1,8 @@
 """How well do the integrators of physics engines follow a top?
 
 Their maps run a slow top and a fast one: from few steps a nutation to many, at the steps that people use, over 10 s and
-over 1000 s, and on tops that nobody picked. Some methods of the catalogue run beside them.
+over 1000 s, and on tops that nobody picked, and two free bodies without symmetry, a racket that flips and NASA's check
+case 2. Some methods of the catalogue run beside them.
 """
 
 import functools
@@ -10,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.methods.framework.registry import engines, integrator
+from symtop.model.charts import BODY
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.scenes import scene
 from symtop.run.ensemble.ensemble import ensemble
@@ -17,9 +19,10 @@ from symtop.run.ensemble.population import NUMBERS, population
 from symtop.runner.study import Case, Study
 
 from . import facts, figures
-from .measures import HORIZON, SCENES, axis_angle, frames, ladder
+from .measures import BODIES, HORIZON, SCENES, axis_angle, followed, frames, ladder
 
 COMPARED = ("strang[axis]", "rk4[axis]", "srkn-11-6[axis]")
+ON_BODIES = ("strang[body]", "rk4[body]", "kahan-li-6[body]")
 SEED = 1
 ORDINARY = {"steps": 1.5e6, "long": 1000.0, "members": 400}
 QUICK = {"steps": 3e4, "long": 20.0, "members": 100}
@@ -38,7 +41,9 @@ def cases(quick: bool) -> list[Case]:
     plan, names = {"steps": chosen["steps"], "long": chosen["long"]}, variant_names()
     runs = [Case(one, name, plan, group="tops") for one in SCENES for name in names]
     many = {"members": chosen["members"], "seed": SEED}
-    return [*runs, *(Case("population", name, many, group="population") for name in names)]
+    free = *(f"{name}[{BODY}]" for name, entry in engines().items() if BODY in entry.solvers), *ON_BODIES
+    bodies = [Case(one, name, {}, group="bodies") for one in BODIES for name in free]
+    return [*runs, *(Case("population", name, many, group="population") for name in names), *bodies]
 
 
 @functools.lru_cache(maxsize=2)
@@ -50,11 +55,13 @@ def _members(count: int, seed: int) -> tuple[xr.Dataset, np.ndarray, np.ndarray]
 
 
 def measure(case: Case) -> xr.Dataset:
-    """The table of a variant on a scene, or the angles at the end on the population."""
+    """The table of a variant on a scene, the angles at the end on the population, or errors on a body."""
     chosen, row = case.settings, integrator(case.integrator)
     if case.group == "tops":
         there = scene(case.scene)
         return ladder(there, row, chosen["steps"]).merge(frames(there, row, (HORIZON, chosen["long"])))
+    if case.group == "bodies":
+        return followed(scene(case.scene, bodies=True), row)
     tops, true, per_nutation = _members(chosen["members"], chosen["seed"])
     run = ensemble(tops, row, step_size=FRAME, horizon=HORIZON, samples=2, threads=1, quiet=True)
     off = axis_angle(run["axis"].values[:, -1], true)

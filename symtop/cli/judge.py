@@ -136,8 +136,9 @@ def _draw_beside(target: str, scene: str, file: str | None, quiet: bool, options
 def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> None:
     """Measure every claim of each INTEGRATOR: order, symplecticity, symmetry, conserved quantities, cost.
 
-    The exit code is 1 if a claim is refuted, or if nothing can be measured of an integrator. Without a name: the
-    integrators of the plug-in, or all. A plug-in runs in a process of its own.
+    Of a body without symmetry: order, energy, and L in space, of a heavy one L_z. The exit code is 1 if a claim is
+    refuted, or if nothing can be measured of an integrator. Without a name: the integrators of the plug-in, or all. A
+    plug-in runs in a process of its own.
 
     \b
     symtop claims midpoint rk4
@@ -148,7 +149,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
         from symtop.methods.framework import registry
         from symtop.model import scenes
 
-        chosen = scenes.scene(scene)
+        chosen = scenes.scene(scene, bodies=True)
         added = [name for name in registry.integrators() if not registry.is_built_in(name)]
     refuted, entries = False, []
     for name in names or added or registry.integrators():

@@ -48,7 +48,7 @@ from symtop.core.jit_functions import Function, fused, marked, two_product
 from symtop.core.sines import polynomials, sincos
 
 __all__ = [
-    "code_of", "compile_kernel", "fused", "is_cached", "register_jitable", "set_item", "to_fixed_tuple",
+    "by_length", "code_of", "compile_kernel", "fused", "is_cached", "register_jitable", "set_item", "to_fixed_tuple",
 ]  # fmt: skip
 
 set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple
@@ -86,6 +86,20 @@ def register_jitable(function: Function, options: dict[str, Any] = INLINED) -> F
         _registered.add(function)
         _register(**options)(function)
     return function
+
+
+@by_name
+def by_length(*functions: tuple[int, Callable[..., Any]]) -> Callable[..., Any]:
+    """A function (par, x, ...) that is one of several by the length of the tuple x, in Python and in kernels."""
+    known = dict(functions)
+    for function in known.values():
+        register_jitable(function)
+
+    def chosen(par: Any, x: Any, *rest: Any) -> Any:
+        return known[len(x)](par, x, *rest)
+
+    overload(chosen, jit_options=INLINED, strict=False)(lambda _par, x, *_rest: known[len(x)])
+    return chosen
 
 
 def _register_parts() -> None:

@@ -9,7 +9,7 @@ from itertools import groupby
 from typing import NamedTuple
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims import calls, constants, order, structure
+from symtop.judging.claims import bodies, calls, constants, order, structure
 from symtop.judging.claims.subject import Subject, declared
 from symtop.judging.findings import AS, Finding, Ledger, claim_name, inapplicable, undecided
 from symtop.methods.framework.registry import Integrator
@@ -74,7 +74,9 @@ def unmeasured(stage: Stage, method: Integrator, why: str) -> list[Finding]:
 
 
 def judge(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
-    """Measure every claim of a registered method on a scene; `quick` shortens the runs."""
+    """Measure every claim of a registered method on a scene; `quick` shortens the runs. On a body there are three."""
+    if scene.of_body:
+        return bodies.judge(method, scene, quick=quick)
     subject = Subject(method, scene, quick)
     findings = [finding for stage in stages("integrator") for finding in measure(stage, subject)]
     return Ledger(method.name, scene.name, tuple(findings), subject.traces)

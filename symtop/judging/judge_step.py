@@ -38,6 +38,7 @@ from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, who
 from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import heartbeat
 from symtop.judging.battery import Stage, measure, stages, unmeasured
+from symtop.judging.claims import bodies
 from symtop.judging.claims.constants import KEPT, Constant
 from symtop.judging.claims.subject import Subject, open_target, timed
 from symtop.judging.findings import NOTHING, About, Finding, Ledger, Measured, StepLedger, error_units, undecided
@@ -305,6 +306,8 @@ def apart(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
     heartbeat.reset(quick=quick)
     limits = PLUGIN, math.inf, PLUGIN
     with Process(lambda: solvers_of(method)) as process:
+        if scene.of_body:
+            return bodies.judge(separated(method, process), scene, quick=quick)
         subject = Subject(separated(method, process), scene, quick, seed=secrets.randbelow(SEEDS))
         findings = tuple(_measured("integrator", subject, process, time.monotonic(), limits))
     return Ledger(method.name, scene.name, findings, subject.traces)

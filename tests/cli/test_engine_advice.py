@@ -45,7 +45,7 @@ def test_an_engine_without_a_gyroscopic_term_has_nothing_to_match():
 
 @pytest.mark.parametrize(
     ("engine", "step", "message"),
-    [("unreal", 0.01, "mujoco"), ("mujoco", -1.0, "step_size"), ("mujoco", 20.0, "below the horizon")],
+    [("frostbite", 0.01, "mujoco"), ("mujoco", -1.0, "step_size"), ("mujoco", 20.0, "below the horizon")],
 )
 def test_bad_input_is_refused_in_a_sentence(engine, step, message):
     with pytest.raises(symtop.SymtopError, match=message):

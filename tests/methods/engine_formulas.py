@@ -113,8 +113,11 @@ def lammps_rigid(attitude, w, h, inertia, tau):
 
 def no_squish(attitude, w, h, inertia, tau):
     L = inertia @ attitude.inv().apply(w) + 0.5 * h * attitude.inv().apply(tau(attitude))
-    order = (0, 1, 2, 1, 0) if inertia[2, 2] < inertia[0, 0] else (2, 1, 0, 1, 2)
-    for axis, share in zip(order, (0.5, 0.5, 1.0, 0.5, 0.5), strict=True):
+    moments = np.diag(inertia)
+    outer = 2 if moments[2] == moments.max() else int(np.argmax(moments))
+    inner = 2 if outer != 2 and moments[2] == moments.min() else int(np.argmin(moments))
+    middle = 3 - outer - inner
+    for axis, share in zip((outer, middle, inner, middle, outer), (0.5, 0.5, 1.0, 0.5, 0.5), strict=True):
         turn = Rotation.from_rotvec(share * h * L[axis] / inertia[axis, axis] * np.eye(3)[axis])
         attitude, L = attitude * turn, turn.inv().apply(L)
     L = L + 0.5 * h * attitude.inv().apply(tau(attitude))
@@ -142,6 +145,19 @@ def yade(attitude, w, h, inertia, tau):
 
 def fincham(attitude, w, h, inertia, tau):
     return _leapfrog(attitude, w, h, inertia, tau, published=True)
+
+
+def _three_stages(attitude, b, h, inertia, tau):
+    k1 = h * _rates(attitude, b, inertia, tau)
+    k2 = h * _rates(attitude, b + k1, inertia, tau)
+    k3 = h * _rates(attitude, b + (k1 + k2) / 4.0, inertia, tau)
+    return b + (k1 + k2 + 4.0 * k3) / 6.0
+
+
+def spiral(attitude, w, h, inertia, tau):
+    b = _three_stages(attitude, attitude.inv().apply(w), h / 2.0, inertia, tau)
+    attitude = attitude * Rotation.from_rotvec(h * b)
+    return attitude, attitude.apply(_three_stages(attitude, b, h / 2.0, inertia, tau))
 
 
 def _kutta(attitude, w, h, inertia, tau, corrected):

@@ -16,7 +16,18 @@ GOLDSTEIN = symtop.scene("goldstein")
 
 
 @pytest.fixture(scope="module")
-def measured():
+def bodies():
+    """Three maps and a method of the catalogue on both free bodies."""
+    names = ["mujoco-euler[body]", "rkmk4[body]", "no-gyro[body]", "strang[body]"]
+    rows = [
+        xr.concat([study.measure(study.Case(one, name, {}, group="bodies")) for one in measures.BODIES], "scene")
+        for name in names
+    ]
+    return xr.concat(rows, "variant").assign_coords(scene=list(measures.BODIES), variant=names)
+
+
+@pytest.fixture(scope="module")
+def measured(bodies):
     """Two maps and a method of the catalogue on both tops and on twenty tops of the population."""
     names = ("mujoco-euler[axis]", "rapier-float32[attitude]", "no-gyro[axis]", "strang[axis]")
     settings = {"steps": 1e4, "long": 20.0}
@@ -30,7 +41,7 @@ def measured():
     many = [study.measure(study.Case("population", name, {"members": 20, "seed": 1}, group="pop")) for name in names]
     tops = xr.concat(by_row, "variant", join="outer").assign_coords(scene=list(measures.SCENES), variant=list(names))
     drawn = xr.concat(many, "variant").expand_dims("scene").assign_coords(scene=["population"], variant=list(names))
-    return xr.DataTree.from_dict({"tops": tops, "population": drawn})
+    return xr.DataTree.from_dict({"tops": tops, "population": drawn, "bodies": bodies})
 
 
 def test_every_map_of_an_engine_has_a_row_that_shows_the_axis():
@@ -104,6 +115,25 @@ def test_what_was_not_measured_is_none(measured):
     many = xr.DataTree.from_dict({"population": measured["population"].to_dataset()})
     assert facts.facts(many)["share_most"] == facts.facts(measured)["share_most"]
     assert list(study.STUDY.pictures(many)) == []
+
+
+def test_on_free_bodies_the_order_and_the_term_decide(bodies):
+    names = [str(name) for name in bodies["variant"].values]
+    data = xr.DataTree.from_dict({"bodies": bodies})
+    brick = bodies["attitude"].sel(scene="check-case-2")
+    by_rate = dict(zip(names, np.log2(brick.sel(rate=60.0) / brick.sel(rate=240.0)) / 2.0, strict=True))
+    assert float(by_rate["mujoco-euler[body]"]) == pytest.approx(1.0, abs=0.1)
+    assert float(by_rate["rkmk4[body]"]) == pytest.approx(4.0, abs=0.1)
+    assert float(by_rate["strang[body]"]) == pytest.approx(2.0, abs=0.1)
+    assert abs(float(by_rate["no-gyro[body]"])) < 0.01
+    assert float(bodies["energy"].sel(scene="check-case-2", variant="no-gyro[body]").max()) < 1e-13
+    answers = facts.facts(data)
+    assert (answers["body_maps"], answers["case_best_variant"]) == (2, "rkmk4[body]")
+    assert answers["case_worst"] == float(brick.sel(variant="mujoco-euler[body]", rate=240.0))
+    assert answers["case_wall"] == pytest.approx(1.23, abs=0.01)
+    assert len(facts.lines(data)) == 0
+    assert next(iter(facts.tables(data)["bodies"]["variant"])) == "rkmk4[body]"
+    assert len(facts.tables(xr.DataTree())["bodies"]) == 0
 
 
 @pytest.mark.parametrize("rate", [2.5, -0.7])

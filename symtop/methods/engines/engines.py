@@ -16,6 +16,9 @@ in space beside the new v, which is what the engine carries, w or L:
 
     step(par, rule, e, v, carry, h) -> (p, v, carry),      e <- p e p*,  q <- p q/|p q|.
 
+A *body without symmetry* has I_s = q I q*, and the attitude itself stands where the axis does: the same functions, but
+for what has I_s or the lever in it (`by_length`), and two equations solved in closed form, which are three there.
+
 Two rotations are in use. With u = h w/2,
 
     exponential   p = (cos |u|, u sin |u|/|u|)                    the body turns at the rate w for a time h
@@ -52,13 +55,18 @@ turn of the last is the flow of one term of the kinetic energy, so that the step
 of order 2; L.e is the momentum of one of the three turns only and wobbles. s3 is the axis of the smallest moment, as
 LAMMPS sorts them: the result hangs on where the transverse axes of a symmetric body are put, here psi.
 
+*SPIRAL* in its leapfrog version, with velocities at whole steps: rates in body axes by half a step of Shu and Osher's
+method of three stages, the torque as it stands, q <- q exp(h b/2), and rates by the other half with the new torque. Its
+authors call it of order three; the turn is the midpoint's, and the order two.
+
 *Stages* of a Runge-Kutta method in the axes of the start of the step, q_i = q exp(Theta_i) and rates b_i:
 
     b_i = b + h sum_j a_ij b'_j,      Theta_i = h sum_j a_ij k_j,      k_i = dexp^-1(Theta_i) b_i   (Munthe-Kaas)
 
 k_i = b_i, without dexp^-1, is of order 2 at most on a body that turns about more than one axis, whatever the tableau.
 Sources: each engine's own file (`Integrator.reference`); Munthe-Kaas, Appl. Numer. Math. 29 (1999) 115; Fincham, Mol.
-Simul. 8 (1992) 165; Miller, Eleftheriou, Pattnaik, Ndirango, Newns, Martyna, J. Chem. Phys. 116 (2002) 8649.
+Simul. 8 (1992) 165; del Valle and others, Comput. Phys. Commun. 297 (2024) 109077; Miller, Eleftheriou, Pattnaik,
+Ndirango, Newns, Martyna, J. Chem. Phys. 116 (2002) 8649.
 """
 
 from collections.abc import Callable, Mapping
@@ -66,7 +74,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.jit import register_jitable
+from symtop.core.jit import by_length, register_jitable
+from symtop.methods.framework.body import prepared
 from symtop.methods.framework.loop import FixedStep, Loop, as_stepped, kernel_loop, no_carry
 from symtop.methods.framework.preparation import Body, Preparation
 from symtop.methods.framework.registry import ENGINE, Integrator
@@ -88,6 +97,20 @@ class EngineTop(NamedTuple):
     one: float = 1.0
 
 
+class EngineBody(NamedTuple):
+    """Those of a body without symmetry."""
+
+    I1: float
+    I2: float
+    I3: float
+    c1: float
+    c2: float
+    c3: float
+    zero: float = 0.0
+    half: float = 0.5
+    one: float = 1.0
+
+
 def _prepared(place_at: Callable[..., Any], size: int, *, rates: bool) -> Preparation:
     """A start as (e, L) or (q, L), or with `rates` w for L: the angular momentum of a body whose moments are one."""
 
@@ -98,22 +121,59 @@ def _prepared(place_at: Callable[..., Any], size: int, *, rates: bool) -> Prepar
     return Preparation(prepare, size)
 
 
-@register_jitable
-def momentum(par: Any, e: Any, w: Any) -> Any:
-    """I_s w."""
+def _top_momentum(par: Any, e: Any, w: Any) -> Any:
     return plus(scaled(par.I1, w), (par.I3 - par.I1) * dot(e, w), e)
 
 
-@register_jitable
-def velocity(par: Any, e: Any, L: Any) -> Any:
-    """I_s^-1 L."""
+def _top_velocity(par: Any, e: Any, L: Any) -> Any:
     return plus(scaled(par.one / par.I1, L), (par.one / par.I3 - par.one / par.I1) * dot(e, L), e)
 
 
-@register_jitable
-def torque(par: Any, e: Any) -> Any:
-    """Gravity about the fixed point."""
+def _top_torque(par: Any, e: Any) -> Any:
     return -par.mgl * e[1], par.mgl * e[0], par.zero
+
+
+def _top_pulled(par: Any, e: Any, up: Any) -> Any:
+    return scaled(par.mgl, cross(up, e))
+
+
+def _top_oriented(par: Any, e: Any, p: Any) -> Any:
+    return rotated(par, p, e)
+
+
+@register_jitable
+def conjugate(q: Any) -> Any:
+    """q*."""
+    return q[0], -q[1], -q[2], -q[3]
+
+
+def _body_momentum(par: Any, q: Any, w: Any) -> Any:
+    b = rotated(par, conjugate(q), w)
+    return rotated(par, q, (par.I1 * b[0], par.I2 * b[1], par.I3 * b[2]))
+
+
+def _body_velocity(par: Any, q: Any, L: Any) -> Any:
+    M = rotated(par, conjugate(q), L)
+    return rotated(par, q, (M[0] / par.I1, M[1] / par.I2, M[2] / par.I3))
+
+
+def _body_pulled(par: Any, q: Any, up: Any) -> Any:
+    return cross(up, rotated(par, q, (par.c1, par.c2, par.c3)))
+
+
+def _body_torque(par: Any, q: Any) -> Any:
+    return _body_pulled(par, q, (par.zero, par.zero, par.one))
+
+
+def _body_oriented(par: Any, q: Any, p: Any) -> Any:
+    return product(p, q)
+
+
+momentum = by_length((3, _top_momentum), (4, _body_momentum))  # I_s w
+velocity = by_length((3, _top_velocity), (4, _body_velocity))  # I_s^-1 L
+torque = by_length((3, _top_torque), (4, _body_torque))  # gravity about the fixed point
+pulled = by_length((3, _top_pulled), (4, _body_pulled))  # the same where the vertical is `up`
+oriented = by_length((3, _top_oriented), (4, _body_oriented))  # after a rotation p
 
 
 @register_jitable
@@ -175,6 +235,11 @@ def axis(q: Any) -> Any:
 
 
 @register_jitable
+def _itself(q: Any) -> Any:
+    return q
+
+
+@register_jitable
 def _double(x: Any) -> Any:
     return np.float64(x)
 
@@ -190,9 +255,8 @@ def _nothing(par: Any, e: Any, v: Any) -> Any:
 
 
 @register_jitable
-def _momenta(par: Any, e: Any, w: Any) -> Any:
+def _momenta(L: Any, e: Any) -> Any:
     """p_phi = L_z and p_psi = L.e."""
-    L = momentum(par, e, w)
     return L[2], L[0] * e[0] + L[1] * e[1] + L[2] * e[2]
 
 
@@ -202,11 +266,18 @@ def _after(before: Any, dstate: Any, i: int) -> Any:
 
 
 def _observe_rates_on_axis(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
-    return _momenta(par, _after(before, dstate, 0), _after(before, dstate, 3))
+    e = _after(before, dstate, 0)
+    return _momenta(momentum(par, e, _after(before, dstate, 3)), e)
 
 
 def _observe_rates_on_attitude(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
-    return _momenta(par, axis((before[0] + dstate[0], *_after(before, dstate, 1))), _after(before, dstate, 4))
+    e = axis((before[0] + dstate[0], *_after(before, dstate, 1)))
+    return _momenta(momentum(par, e, _after(before, dstate, 4)), e)
+
+
+def _observe_rates_on_body(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+    q = before[0] + dstate[0], *_after(before, dstate, 1)
+    return _momenta(momentum(par, q, _after(before, dstate, 4)), axis(q))
 
 
 def _present_rates_on_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
@@ -217,6 +288,29 @@ def _present_rates_on_axis(par: Any, rule: Any, state: Any, k: int, h: float) ->
 def _present_rates_on_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     q = state[0], state[1], state[2], state[3]
     return (*q, *momentum(par, axis(q), (state[4], state[5], state[6])))
+
+
+def _present_rates_on_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
+    q = state[0], state[1], state[2], state[3]
+    b = rotated(par, conjugate(q), (state[4], state[5], state[6]))
+    return (*q, par.I1 * b[0], par.I2 * b[1], par.I3 * b[2])
+
+
+def _present_momentum_on_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
+    q = state[0], state[1], state[2], state[3]
+    return (*q, *rotated(par, conjugate(q), (state[4], state[5], state[6])))
+
+
+def _body_with_momentum(body: Any, at: Any) -> Any:
+    q = at.w, at.x, at.y, at.z
+    par = EngineBody(body.I1, body.I2, body.I3, body.c1, body.c2, body.c3, 0.0, 0.5, 1.0)
+    return par, (*q, *rotated(par, q, (at.M1, at.M2, at.M3)))
+
+
+def _body_with_rates(body: Any, at: Any) -> Any:
+    q = at.w, at.x, at.y, at.z
+    par = EngineBody(body.I1, body.I2, body.I3, body.c1, body.c2, body.c3, 0.0, 0.5, 1.0)
+    return par, (*q, *rotated(par, q, (body.a1 * at.M1, body.a2 * at.M2, body.a3 * at.M3)))
 
 
 class Carried(NamedTuple):
@@ -230,10 +324,12 @@ class Carried(NamedTuple):
 VELOCITY = {
     "axis": Carried(_prepared(e_at, 6, rates=True), _observe_rates_on_axis, _present_rates_on_axis),
     "attitude": Carried(_prepared(q_at, 7, rates=True), _observe_rates_on_attitude, _present_rates_on_attitude),
+    BODY: Carried(prepared(_body_with_rates), _observe_rates_on_body, _present_rates_on_body),
 }
 ANGULAR_MOMENTUM = {
     "axis": Carried(_prepared(e_at, 6, rates=False), observe_axis),
     "attitude": Carried(_prepared(q_at, 7, rates=False), observe_attitude),
+    BODY: Carried(prepared(_body_with_momentum), observe_attitude, _present_momentum_on_body),
 }
 
 
@@ -257,25 +353,41 @@ def axis_loop(step: Callable[..., Any], carried: Carried, reused: Callable[..., 
     return kernel_loop(begin, increment, carried.observe, present=carried.present)
 
 
+def _of_top(number: Callable[..., Any]) -> Callable[..., Any]:
+    @register_jitable
+    def narrowed(par):  # type: ignore[no-untyped-def]
+        numbers = number(par.I1), number(par.I3), number(par.mgl)
+        return EngineTop(*numbers, number(par.zero), number(par.half), number(par.one))
+
+    return narrowed
+
+
+def _of_body(number: Callable[..., Any]) -> Callable[..., Any]:
+    @register_jitable
+    def narrowed(par):  # type: ignore[no-untyped-def]
+        moments, c = (number(par.I1), number(par.I2), number(par.I3)), (number(par.c1), number(par.c2), number(par.c3))
+        return EngineBody(*moments, *c, number(par.zero), number(par.half), number(par.one))
+
+    return narrowed
+
+
 def attitude_loop(
     step: Callable[..., Any], carried: Carried, reused: Callable[..., Any] = _nothing,
-    number: Callable[..., Any] = _double,
+    number: Callable[..., Any] = _double, *, body: bool = False,
 ) -> Loop:  # fmt: skip
-    """The loop on the attitude around a map, in the precision of `number`."""
+    """The loop on the attitude around a map, of a top or of a `body` without symmetry, in the precision of `number`."""
     register_jitable(step)
+    narrowed, orientation = (_of_body(number), _itself) if body else (_of_top(number), axis)
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        return reused(par, axis((state[0], state[1], state[2], state[3])), (state[4], state[5], state[6]))
+        return reused(par, orientation((state[0], state[1], state[2], state[3])), (state[4], state[5], state[6]))
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        top = EngineTop(
-            number(par.I1), number(par.I3), number(par.mgl), number(par.zero), number(par.half), number(par.one)
-        )
-        cut = Substeps(rule.parts, number(rule.share))
+        there, cut = narrowed(par), Substeps(rule.parts, number(rule.share))
         q = number(state[0]), number(state[1]), number(state[2]), number(state[3])
         v = number(state[4]), number(state[5]), number(state[6])
-        p, v, carry = step(top, cut, axis(q), v, carry, number(h))
-        q = normalised(top, product(p, q))
+        p, v, carry = step(there, cut, orientation(q), v, carry, number(h))
+        q = normalised(there, product(p, q))
         dstate = (
             _double(q[0]) - state[0], _double(q[1]) - state[1], _double(q[2]) - state[2], _double(q[3]) - state[3],
             _double(v[0]) - state[4], _double(v[1]) - state[5], _double(v[2]) - state[6],
@@ -299,11 +411,36 @@ def _pulled(par: Any, e: Any, w: Any, h: Any) -> Any:
     return plus(w, h, velocity(par, e, torque(par, e)))
 
 
-@register_jitable
-def _implicit(par: Any, e: Any, w: Any, r: Any, h: Any) -> Any:
-    """J^-1 r of a right side across the axis."""
+def _top_implicit(par: Any, e: Any, w: Any, r: Any, h: Any) -> Any:
     k = h * (par.I1 - par.I3) * dot(e, w)
     return scaled(par.one / (par.I1 * par.I1 + k * k), plus(scaled(par.I1, r), -k, cross(e, r)))
+
+
+@register_jitable
+def _solved(par: Any, h: Any, columns: Any, y: Any) -> Any:
+    """x of (I + h A) x = y, the columns of A as vectors."""
+    a, b, c = columns
+    a, b = plus((par.I1, par.zero, par.zero), h, a), plus((par.zero, par.I2, par.zero), h, b)
+    c = h * c[0], h * c[1], par.I3 + h * c[2]
+    bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
+    return scaled(par.one / dot(a, bc), (dot(bc, y), dot(ca, y), dot(ab, y)))
+
+
+@register_jitable
+def _columns(par: Any, u: Any, v: Any) -> Any:
+    """The columns (I_k u + v) x b_k."""
+    x, y, z = plus(v, par.I1, u), plus(v, par.I2, u), plus(v, par.I3, u)
+    return (par.zero, x[2], -x[1]), (-y[2], par.zero, y[0]), (z[1], -z[0], par.zero)
+
+
+def _body_implicit(par: Any, q: Any, w: Any, r: Any, h: Any) -> Any:
+    back = conjugate(q)
+    b = rotated(par, back, w)
+    columns = _columns(par, b, (-par.I1 * b[0], -par.I2 * b[1], -par.I3 * b[2]))
+    return rotated(par, q, _solved(par, h, columns, rotated(par, back, r)))
+
+
+implicit = by_length((3, _top_implicit), (4, _body_implicit))  # J^-1 r, of a top of a right side across the axis
 
 
 @register_jitable
@@ -323,12 +460,12 @@ def _explicit(par: Any, e: Any, w: Any, h: Any) -> Any:
 
 @register_jitable
 def _newton_step(par: Any, e: Any, w: Any, h: Any) -> Any:
-    return plus(w, h, _implicit(par, e, w, moment(par, e, w), h))
+    return plus(w, h, implicit(par, e, w, moment(par, e, w), h))
 
 
 @register_jitable
 def _implicit_then_torque(par: Any, e: Any, w: Any, h: Any) -> Any:
-    return _pulled(par, e, plus(w, -h, _implicit(par, e, w, cross(w, momentum(par, e, w)), h)), h)
+    return _pulled(par, e, plus(w, -h, implicit(par, e, w, cross(w, momentum(par, e, w)), h)), h)
 
 
 @register_jitable
@@ -347,20 +484,32 @@ def _torque_then_rescaled(par: Any, e: Any, w: Any, h: Any) -> Any:
     return plus(w, par.one, velocity(par, e, plus(scaled(stretch, N), -par.one, L)))
 
 
-@register_jitable
-def _projected_then_torque(par: Any, e: Any, w: Any, h: Any) -> Any:
-    """(I_s - h [L]) w' = L, then the torque.
+def _top_projected(par: Any, e: Any, L: Any, h: Any) -> Any:
+    """w' of (I_s - h [L]) w' = L.
 
     With L = a + l e and a across the axis: w3' = l (D + h^2 a.a)/(I3 D + h^2 I1 a.a) where D = I1^2 + h^2 l^2, and
     D w_a' = (I1 + h^2 l w3') a + h (l - I1 w3') e x a.
     """
-    L = momentum(par, e, w)
     spin = dot(e, L)
     across = plus(L, -spin, e)
     D, stretch = par.I1 * par.I1 + h * h * spin * spin, h * h * dot(across, across)
     w3 = spin * (D + stretch) / (par.I3 * D + par.I1 * stretch)
     turn = plus(scaled(par.I1 + h * h * spin * w3, across), h * (spin - par.I1 * w3), cross(e, across))
-    return _pulled(par, e, plus(scaled(par.one / D, turn), w3, e), h)
+    return plus(scaled(par.one / D, turn), w3, e)
+
+
+def _body_projected(par: Any, q: Any, L: Any, h: Any) -> Any:
+    M = rotated(par, conjugate(q), L)
+    rest = par.zero, par.zero, par.zero
+    return rotated(par, q, _solved(par, h, _columns(par, rest, scaled(-par.one, M)), M))
+
+
+projected = by_length((3, _top_projected), (4, _body_projected))
+
+
+@register_jitable
+def _projected_then_torque(par: Any, e: Any, w: Any, h: Any) -> Any:
+    return _pulled(par, e, projected(par, e, momentum(par, e, w), h), h)
 
 
 def _kicked(rate: Callable[..., Any], turn: Callable[..., Any] = exponential) -> Callable[..., Any]:
@@ -381,7 +530,7 @@ def substepped(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
     for _ in range(rule.parts):
         w = _rescaled(par, e, plus(w, par.one, pull), part)
         turn = linear(par, w, part)
-        e, p = rotated(par, turn, e), product(turn, p)
+        e, p = oriented(par, e, turn), product(turn, p)
     return p, w, carry
 
 
@@ -401,10 +550,10 @@ def richardson(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: Any) -> Any:
     L = plus(L, 0.5 * h, torque(par, e))
     w = velocity(par, e, L)
     full, half = linear(par, w, h), linear(par, w, 0.5 * h)
-    half = product(linear(par, velocity(par, rotated(par, half, e), L), 0.5 * h), half)
+    half = product(linear(par, velocity(par, oriented(par, e, half), L), 0.5 * h), half)
     a, b, c, d = half
     p = normalised(par, (2.0 * a - full[0], 2.0 * b - full[1], 2.0 * c - full[2], 2.0 * d - full[3]))
-    return p, plus(L, 0.5 * h, torque(par, rotated(par, p, e))), carry
+    return p, plus(L, 0.5 * h, torque(par, oriented(par, e, p))), carry
 
 
 def _leapfrog(*, published: bool) -> Callable[..., Any]:
@@ -415,9 +564,9 @@ def _leapfrog(*, published: bool) -> Callable[..., Any]:
         middle = _advanced(one, velocity(par, e, L), one, 0.5 * h)
         L = plus(L, 0.5 * h, torque(par, e))
         turn = normalised(par, middle)
-        w = velocity(par, rotated(par, turn, e), L) if published else rotated(par, turn, velocity(par, e, L))
+        w = velocity(par, oriented(par, e, turn), L) if published else rotated(par, turn, velocity(par, e, L))
         p = normalised(par, _advanced(one, w, middle, h))
-        return p, plus(L, 0.5 * h, torque(par, rotated(par, p, e))), carry
+        return p, plus(L, 0.5 * h, torque(par, oriented(par, e, p))), carry
 
     return step
 
@@ -425,8 +574,8 @@ def _leapfrog(*, published: bool) -> Callable[..., Any]:
 @register_jitable
 def _slope(par: Any, e: Any, p: Any, b: Any) -> Any:
     """b' of rates in the axes of the start, where the body stands p further."""
-    up = rotated(par, (p[0], -p[1], -p[2], -p[3]), (0.0, 0.0, 1.0))
-    rest = plus(scaled(par.mgl, cross(up, e)), -1.0, cross(b, momentum(par, e, b)))
+    up = rotated(par, conjugate(p), (0.0, 0.0, 1.0))
+    rest = plus(pulled(par, e, up), -1.0, cross(b, momentum(par, e, b)))
     return velocity(par, e, rest)
 
 
@@ -458,6 +607,23 @@ def _kutta(*, munthe_kaas: bool) -> Callable[..., Any]:
         return p, rotated(par, p, plus(b, 1.0, gain)), carry
 
     return step
+
+
+@register_jitable
+def _three_stages(par: Any, e: Any, b: Any, h: Any) -> Any:
+    """b after a time h by Shu and Osher's method, in the axes of the body, which stands still."""
+    first = scaled(h, acceleration(par, e, b))
+    second = scaled(h, acceleration(par, e, plus(b, 1.0, first)))
+    both = plus(first, 1.0, second)
+    third = scaled(h, acceleration(par, e, plus(b, 0.25, both)))
+    return plus(b, 1.0 / 6.0, plus(both, 4.0, third))
+
+
+def spiral(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
+    """Rates to the half step, a turn by them, which leaves them as they are in both axes, rates to the whole step."""
+    w = _three_stages(par, e, w, 0.5 * h)
+    p = exponential(par, w, h)
+    return p, _three_stages(par, oriented(par, e, p), w, 0.5 * h), carry
 
 
 def explicit_euler(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
@@ -551,10 +717,11 @@ def _engine(
     name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, keeps: str = "", *,
     carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = _nothing, **more: Any,
 ) -> Integrator:  # fmt: skip
-    """A map in double, on the axis and on the attitude."""
+    """A map in double, on the axis, on the attitude, and of a body without symmetry."""
     loops = {
         "axis": axis_loop(step, carried["axis"], reused),
         "attitude": attitude_loop(step, carried["attitude"], reused),
+        BODY: attitude_loop(step, carried[BODY], reused, body=True),
     }
     return _entry(name, loops, order, summary, reference, keeps, carried=carried, **more)
 
@@ -564,10 +731,11 @@ def _both(
     rule: Any = None, energy_error: str | None = None,
 ) -> list[Integrator]:  # fmt: skip
     """A map in double and in the single precision of the engine, there on the attitude as the engine steps it."""
-    rounded, words = attitude_loop(step, VELOCITY["attitude"], number=_single), f"{summary}, in single precision"
+    words, charts = f"{summary}, in single precision", ("attitude", BODY)
+    rounded = {at: attitude_loop(step, VELOCITY[at], number=_single, body=at == BODY) for at in charts}
     return [
         _engine(name, step, order, summary, reference, keeps, rule=rule, energy_error=energy_error),
-        _entry(f"{name}-float32", {"attitude": rounded}, None, words, reference, rule=rule, precision="single"),
+        _entry(f"{name}-float32", rounded, None, words, reference, rule=rule, precision="single"),
     ]
 
 
@@ -602,6 +770,8 @@ def built_in() -> list[Integrator]:
                 "yade", "p_phi", carried=ANGULAR_MOMENTUM),
         _engine("fincham", _leapfrog(published=True), 2, "the rotational leapfrog as published", "fincham-1992",
                 "p_phi", carried=ANGULAR_MOMENTUM),
+        _engine("spiral", spiral, 2, "SPIRAL, YADE's later choice and JaxDEM's: a turn between halves of three stages",
+                "del-valle-2024", "p_psi"),
         _engine("mujoco3-rk4", _kutta(munthe_kaas=False), 2, "MuJoCo RK4 up to 3.17: stages turn by their rates",
                 "mujoco-3", "p_psi", forces=4),
         _engine("rkmk4", _kutta(munthe_kaas=True), 4, "MuJoCo 4.0 RK4, Exudyn: Runge-Kutta-Munthe-Kaas",

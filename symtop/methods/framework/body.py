@@ -97,8 +97,14 @@ def _in_space(par: Any, t: float, y: Any) -> Any:
 
 
 of_top, in_space = Preparation(_of_top, 7), Shown(_in_space, 7)  # a top as (q, M), shown as (q, L)
-on_body = _OfBody(_on_body, 7, opened=opened, momenta=_momenta, given=14)
-turned, turned_back = _OfBody(_turned, 7, opened=opened, momenta=_momenta, given=14), Shown(_turned_back, 7)
+
+
+def prepared(numbers: Any) -> Preparation:
+    """What a kernel of seven numbers steps, by ``numbers(body, start)`` of a `General` and a `Pose`."""
+    return _OfBody(numbers, 7, opened=opened, momenta=_momenta, given=14)
+
+
+on_body, turned, turned_back = prepared(_on_body), prepared(_turned), Shown(_turned_back, 7)
 
 
 @register_jitable

@@ -42,7 +42,7 @@ HIGHEST = 24  # of a tolerance: N = 21 at the least one
 
 
 @register_jitable
-def _axis_products(total: Any, a: Any, b: Any) -> Any:
+def _axis_products(par: Any, total: Any, a: Any, b: Any) -> Any:
     """Add L x e, L of `a` and e of `b`, one product after the other."""
     x, y, z = total
     x, y, z = fused(a[4], b[2], x), fused(a[5], b[0], y), fused(a[3], b[1], z)
@@ -56,7 +56,7 @@ def _axis_slope(par: Any, total: Any, y: Any) -> Any:
 
 
 @register_jitable
-def _attitude_products(total: Any, a: Any, b: Any) -> Any:
+def _attitude_products(par: Any, total: Any, a: Any, b: Any) -> Any:
     """Add L q, L of `a` and q of `b`, and half of e_x and e_y."""
     w, x, y, z, right, back = total
     w, x, y, z = fused(-a[4], b[1], w), fused(a[4], b[0], x), fused(a[5], b[0], y), fused(a[6], b[0], z)
@@ -90,7 +90,7 @@ class Quadratic(NamedTuple):
             for n in range(order):
                 total = zeros
                 for j in range(n + 1):
-                    total = products(total, row_of(c, 1 + j, state), row_of(c, 1 + n - j, state))
+                    total = products(par, total, row_of(c, 1 + j, state), row_of(c, 1 + n - j, state))
                 rate = slope(par, total, row_of(c, 1 + n, state))
                 for m in range(len(state)):
                     c[2 + n, m] = rate[m] / (n + 1)
@@ -136,38 +136,37 @@ def tail(state: Any, c: Any, order: int, h: float) -> Any:
 
 
 @register_jitable
-def _body_products(total: Any, a: Any, b: Any) -> Any:
-    """Add half of q M by components, two q's for Gamma, and M x M less its signs; q and M of `a` and `b`.
+def _body_products(par: Any, total: Any, a: Any, b: Any) -> Any:
+    """Add q omega, two q's for Gamma, and M x omega; q and M of `a`, q and omega of `b`.
 
-    The moments are in `_body_slope`: nine products q_i M_j, six of q for Gamma, three of M.
+    One rounded omega turns q and M, so that its rounding, which is biased where 1/I has a short period as 1/1.2 has,
+    leaves |q| and L_z alone, and the energy but for a function of M. (1/I3 - 1/I2) M2 M3 in its place drifts.
     """
-    p, q, r, s, t, u, v, w, x, y1, z, o, g1, g2, g3, m1, m2, m3 = total
-    p, q, r = fused(a[1], b[4], p), fused(a[2], b[5], q), fused(a[3], b[6], r)
-    s, t, u = fused(a[0], b[4], s), fused(a[2], b[6], t), fused(a[3], b[5], u)
-    v, w, x = fused(a[0], b[5], v), fused(a[1], b[6], w), fused(a[3], b[4], x)
-    y1, z, o = fused(a[0], b[6], y1), fused(a[1], b[5], z), fused(a[2], b[4], o)
+    w, x, y1, z, g1, g2, g3, t1, t2, t3 = total
+    w1, w2, w3 = par.a1 * b[4], par.a2 * b[5], par.a3 * b[6]
+    w = fused(-a[1], w1, fused(-a[2], w2, fused(-a[3], w3, w)))
+    x = fused(a[0], w1, fused(a[2], w3, fused(-a[3], w2, x)))
+    y1 = fused(a[0], w2, fused(-a[1], w3, fused(a[3], w1, y1)))
+    z = fused(a[0], w3, fused(a[1], w2, fused(-a[2], w1, z)))
     g1 = fused(-a[0], b[2], fused(a[1], b[3], g1))
     g2 = fused(a[0], b[1], fused(a[2], b[3], g2))
     g3 = fused(-a[1], b[1], fused(-a[2], b[2], fused(a[3], b[3], fused(a[0], b[0], g3))))
-    m1, m2, m3 = fused(a[5], b[6], m1), fused(a[6], b[4], m2), fused(a[4], b[5], m3)
-    return p, q, r, s, t, u, v, w, x, y1, z, o, g1, g2, g3, m1, m2, m3
+    t1 = fused(a[5], w3, fused(-a[6], w2, t1))
+    t2 = fused(a[6], w1, fused(-a[4], w3, t2))
+    return w, x, y1, z, g1, g2, g3, t1, t2, fused(a[4], w2, fused(-a[5], w1, t3))
 
 
 @register_jitable
 def _body_slope(par: Any, total: Any, y: Any) -> Any:
-    p, q, r, s, t, u, v, w, x, y1, z, o, g1, g2, g3, m1, m2, m3 = total
-    a, b, c = 0.5 * par.a1, 0.5 * par.a2, 0.5 * par.a3
-    t1, t2, t3 = torque(par, 2.0 * g1, 2.0 * g2, g3)
-    return (
-        -(a * p + b * q + c * r), a * s + c * t - b * u, b * v - c * w + a * x, c * y1 + b * z - a * o,
-        (par.a3 - par.a2) * m1 + t1, (par.a1 - par.a3) * m2 + t2, (par.a2 - par.a1) * m3 + t3,
-    )  # fmt: skip
+    w, x, y1, z, g1, g2, g3, t1, t2, t3 = total
+    pull1, pull2, pull3 = torque(par, 2.0 * g1, 2.0 * g2, g3)
+    return 0.5 * w, 0.5 * x, 0.5 * y1, 0.5 * z, t1 + pull1, t2 + pull2, t3 + pull3
 
 
 CHARTS = {
     "axis": Quadratic(_axis_products, _axis_slope, (0.0,) * 3),
     "attitude": Quadratic(_attitude_products, _attitude_slope, (0.0,) * 6),
-    BODY: Quadratic(_body_products, _body_slope, (0.0,) * 18),
+    BODY: Quadratic(_body_products, _body_slope, (0.0,) * 10),
 }
 
 

@@ -1,0 +1,62 @@
+"""The claims of a method on a body without symmetry, and those of methods that make false ones."""
+
+import dataclasses
+import json
+
+import pytest
+from click.testing import CliRunner
+
+import symtop
+from symtop.cli.main import main
+from symtop.judging.battery import judge
+from symtop.judging.findings import Ledger
+from symtop.methods.framework.registry import Integrator
+from symtop.model.body import Attitude, RigidBody
+from symtop.model.scenes import body_scenes
+
+FREE, HEAVY = (body_scenes()[name] for name in ("check-case-2", "heavy-brick"))
+
+
+def said(method: Integrator, scene: symtop.Scene) -> Ledger:
+    """What the battery finds, quickly."""
+    return judge(method, scene, quick=True)
+
+
+@pytest.mark.parametrize(("name", "energy", "momentum"), [
+    ("strang", "bounded", "kept"), ("commutator-free-4", "drift", "kept"), ("gauss-4", "kept", "bounded"),
+    ("lammps-rigid", "drift", "kept"),
+])  # fmt: skip
+def test_what_methods_claim_on_a_body_holds(name: str, energy: str, momentum: str) -> None:
+    for scene in (FREE, HEAVY):
+        ledger = said(symtop.integrator(name), scene)
+        assert ledger.refuted == []
+        assert ledger["order"].verdict == "confirmed"
+        assert (ledger["energy"].measured.kind, ledger["momentum"].measured.kind) == (energy, momentum)
+
+
+def test_false_claims_on_a_body_are_refuted() -> None:
+    rk4 = symtop.integrator("rk4")
+    lie = dataclasses.replace(rk4, name="lie", family="splitting", order=3, symplectic=True)
+    assert said(lie, FREE).refuted == ["energy", "momentum"]  # order 4 where 3 is claimed is no false claim
+    assert said(dataclasses.replace(rk4, name="higher", order=5), HEAVY).refuted == ["order"]
+    ledger = said(symtop.integrator("no-gyro"), FREE)
+    assert ledger["order"].verdict == "undecided"
+    assert said(symtop.integrator("stormer-verlet"), FREE)["energy"].verdict == "undecided"
+
+
+def test_five_rotations_are_of_a_higher_order_on_the_body_of_fasso() -> None:
+    start = Attitude((0.8, 0.6, 0.0, 0.0), (0.5, 0.7, 1.1))
+    slopes = {}
+    for moments, mgl in (((0.25, 0.75, 1.0), 0.0), ((1.0, 0.75, 0.25), 0.0), ((0.25, 0.75, 1.0), 1.0)):
+        scene = symtop.Scene("of-fasso", RigidBody(*moments, mgl, (0.3, 0.2, 1.0)), start, 10.0)
+        ledger = said(symtop.integrator("five-rotations"), scene)
+        assert ledger.refuted == []
+        slopes[moments, mgl] = ledger["order"].value
+    assert list(slopes.values()) == pytest.approx([4.0, 2.0, 2.0], abs=0.05)
+
+
+def test_the_command_judges_on_a_body() -> None:
+    done = CliRunner().invoke(main, ["claims", "strang", "--scene", "check-case-2", "--quick", "--json"])
+    assert done.exit_code == 0
+    findings = {one["claim"]: one["verdict"] for one in json.loads(done.stdout)}
+    assert findings == {"order": "confirmed", "energy": "confirmed", "momentum": "confirmed"}
