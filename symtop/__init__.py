@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from symtop.run.ensemble.population import population as population
     from symtop.run.long_run import long_run as long_run
     from symtop.run.reference.truth import reference as reference
+    from symtop.run.right_hand_side import guard as guard
     from symtop.run.simulation import simulate as simulate
     from symtop.runner.study import Case as Case, Picture as Picture, Study as Study
 
@@ -78,6 +79,7 @@ _NAMES = {  # by the module that holds them
     "run.long_run": "long_run",
     "run.ensemble.population": "population",
     "run.reference.truth": "reference",
+    "run.right_hand_side": "guard",
     "run.simulation": "simulate",
     "judging.comparison": "compare",
     "report.card": "card",

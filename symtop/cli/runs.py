@@ -22,6 +22,7 @@ SAME = 0.01  # relative difference of the step used from --step-size that is pri
 KERNELS = 5  # of an ensemble: periods, samples, starts, the step in lanes and alone
 COMPARED = 100_000  # tops whose errors are shown, the first of the population: those of a million take 1 GB
 
+GUARD = "Warn of a large error by the closed form (exact, of tops) or by an integration (series)."
 OUTCOME = {"ok": "reached the horizon"}  # which says nothing yet of their errors
 EXECUTION = {
     "lanes": "32 tops at a time in vector registers (lanes)",
@@ -40,14 +41,15 @@ EXECUTION = {
 @click.option("--samples", type=int, default=501, show_default=True, help="Number of samples in the output.")
 @click.option("--observe", help="nutation, axis or attitude; by default what the scene names and the method shows.")
 @click.option("--budget", type=float, help="Most steps, or force evaluations of an adaptive method.")
-@click.option("--guard/--no-guard", default=True, help="Warn before the run if a large error is expected.")
+@click.option("--guard", is_flag=False, flag_value="on", default="on", metavar="exact|series", help=GUARD)
+@click.option("--no-guard", "guard", flag_value="off", help="Do not warn before the run of a large error.")
 @click.option("--output", type=File(), help="Write the run to this netCDF file.")
 @click.option("--figure", type=File(), help="Draw the run and its errors: .png, .svg or .pdf.")
 @common.body_options
 @common.plugin_option
 @common.json_option
 def run(
-    scene: Any, integrator: str, guard: bool, output: str | None, figure: str | None, as_json: bool, **settings: Any
+    scene: Any, integrator: str, guard: str, output: str | None, figure: str | None, as_json: bool, **settings: Any
 ) -> None:
     """Run one INTEGRATOR on one SCENE and compare it with the exact motion.
 
@@ -75,7 +77,7 @@ def run(
         horizon = settings["horizon"] or scenes.scene(scene, bodies=True).horizon
         estimate(horizon / h, lambda few: few_steps(horizon=few * h))
     with ticking("running"):
-        data = simulate(scene, integrator, guard=warn if guard else False, **settings)
+        data = simulate(scene, integrator, guard={"on": True, "off": False}.get(guard, guard), **settings)
         if output is not None:
             netcdf.write(data, output)
         chosen = scenes.scene(scene, bodies=True)

@@ -41,14 +41,13 @@ from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.run.linear_stability import Growth, nutation_growth, trace
-from symtop.run.motion import MOST_FOLDS, MOVED, Exact, Integrated, Landmarks, Motion
+from symtop.run.motion import MOST_FOLDS, MOVED, UNSTABLE, Exact, Integrated, Landmarks
 from symtop.run.reference.sensitivity import SMALL
 
 STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take these
 AT_LEAST = 0.25  # of them a probe takes in any case, up to the whole run
-SHARE = 0.1  # of the run, which a probe may always take, but no more than so many nutations (`Motion`) and steps:
+SHARE = 0.1  # of the run, which a probe may always take, but no more than so many nutations (`Integrated`) and steps:
 MOST_PROBED = 20_000  # steps
-POINTS = 300  # of a probe that are compared with the true motion
 ROUNDED = 1e-13  # rad; a probe that is closer than this shows rounding, which grows as n^1.5
 PARTIAL = 10.0  # distrust of a probe shorter than a nutation: it may have missed where errors are made, or stretched
 AFFORDED = {"compiled": 12_000, "python": 1200}  # evaluations of a longer probe of an adaptive method
@@ -58,7 +57,6 @@ LOOSE = 1e-4  # tolerance from which a method in Python is probed for a whole nu
 LEAST_GROWTH = 0.05  # of the error of a piece: less growth from the first to the second is luck
 COMMITTED = 1e4, 1e7  # tolerances: an error that an adaptive method commits now and then, and one of variable order
 CLOSE, PASSING = 0.2, 100.0  # rad from a pole; tolerances that a step past it in the angles chart commits now and then
-UNSTABLE = 50.0  # times that a stable motion may amplify a change of its start in a nutation
 WORTH = 1e-2  # rad: a law that grows an error faster is looked into where it leads beyond this
 RESOLVED = 0.3  # rad that the axis may precess in one step at a pole: coarser probes say nothing about the passage
 
@@ -103,28 +101,28 @@ class Forecast(NamedTuple):
 
 
 @functools.cache
-def _places() -> Array:
-    """Where a probe of length `POINTS` is sampled: not commensurate with the nutation."""
-    place = np.arange(1.0, POINTS + 1.0)
+def _places(points: int) -> Array:
+    """Where a probe of so long is sampled: not commensurate with the nutation."""
+    place = np.arange(1.0, points + 1.0)
     place[:-1] += np.mod(GOLDEN * place[:-1], 1.0) - 0.5
     return place
 
 
 @functools.lru_cache(maxsize=256)
-def _marks(steps: int) -> Any:
+def _marks(steps: int, points: int) -> Any:
     """The same in whole steps of a probe; there are few such numbers of steps (`STEPS`)."""
-    return np.unique(np.maximum(np.rint(_places() * (steps / POINTS)).astype(np.int64), 1))
+    return np.unique(np.maximum(np.rint(_places(points) * (steps / points)).astype(np.int64), 1))
 
 
 def _probe(
-    motion: Motion, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
+    motion: Integrated, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
 ) -> Probe:
     """Run `method` from the time `since` of the true motion for `duration`, with `step` or the plan's tolerance."""
     if method.fixed_step:
-        piece = Plan.steps(step, _marks(max(1, round(duration / step))))
+        piece = Plan.steps(step, _marks(max(1, round(duration / step)), motion.points))
     else:
         most = min(plan.most(math.inf), MOST_WORK[method.implementation])
-        piece = Plan.until(duration * (_places() / POINTS), plan.tolerance, most)
+        piece = Plan.until(duration * (_places(motion.points) / motion.points), plan.tolerance, most)
     run = solve(method, chart, motion.scene.top, motion.start(since), piece)
     with np.errstate(all="ignore"):
         error = motion.error(piece.times, chart, run.states, since)
@@ -150,17 +148,17 @@ def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
     return n * first + 0.5 * max(abs(whole - 2.0 * first), LEAST_GROWTH * whole) * n * (n - 1.0)
 
 
-def _amplifies(motion: Motion, change: float, horizon: float) -> bool:
+def _amplifies(motion: Integrated, change: float, horizon: float) -> bool:
     """Whether the motion multiplies a change of its start by far more than the shear of a stable one does."""
     return motion.displacement(change, horizon) > change * UNSTABLE * (1.0 + horizon / motion.marks.period)
 
 
-def _amplified(motion: Motion, probe: Probe, horizon: float) -> float:
+def _amplified(motion: Integrated, probe: Probe, horizon: float) -> float:
     """What the motion makes of the largest error of a probe, if it is not known to add errors up by the law."""
     return motion.amplified(float(probe.error.max()), float(probe.times[-1]), horizon)
 
 
-def _fixed(motion: Motion, method: Integrator, probe: Probe, horizon: float) -> float:
+def _fixed(motion: Integrated, method: Integrator, probe: Probe, horizon: float) -> float:
     """The largest error of a probe of steps, grown to the horizon by its law and by what the motion makes of it.
 
     What rounding, or the end of an iteration, leaves is not symmetric, and an unstable motion makes it grow in every
@@ -174,7 +172,7 @@ def _fixed(motion: Motion, method: Integrator, probe: Probe, horizon: float) -> 
     return bent if bent > WORTH and _amplifies(motion, SMALL, horizon) else expected
 
 
-def _grown_tolerance(motion: Motion, method: Integrator, plan: Plan) -> float:
+def _grown_tolerance(motion: Integrated, method: Integrator, plan: Plan) -> float:
     """What becomes of the errors of an adaptive method by the horizon, rad; 0 if the motion is stable.
 
     A method in Python is probed for less than the run, and an unstable motion amplifies what it does elsewhere: in 44
@@ -189,7 +187,7 @@ def _grown_tolerance(motion: Motion, method: Integrator, plan: Plan) -> float:
 
 
 def _adaptive_forecast(
-    motion: Motion, method: Integrator, chart: str, plan: Plan, period: float, share: float, twice: float
+    motion: Integrated, method: Integrator, chart: str, plan: Plan, period: float, share: float, twice: float
 ) -> tuple[float, Probe]:
     """The same of an adaptive method, whose work is known when a first piece has been probed.
 
@@ -215,7 +213,7 @@ def _adaptive_forecast(
     return expected if probe.times[-1] >= plan.horizon else max(expected, plan.tolerance), probe
 
 
-def _expected(motion: Motion, method: Integrator, chart: str, plan: Plan) -> tuple[float, Probe]:
+def _expected(motion: Integrated, method: Integrator, chart: str, plan: Plan) -> tuple[float, Probe]:
     """The largest axis error to expect, and the probe that says so."""
     straight, marks = bool(method.symplectic or method.symmetric), motion.marks
     period = marks.period if math.isfinite(marks.period) else plan.horizon
@@ -245,7 +243,7 @@ def _expected(motion: Motion, method: Integrator, chart: str, plan: Plan) -> tup
     return expected, probe
 
 
-def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: Motion | None = None) -> Forecast:
+def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: Integrated | None = None) -> Forecast:
     """Forecast the error of a run from a short run (a probe) of the same method; the run itself is not changed.
 
     A method without a step or a tolerance, such as the closed form, is not probed. By default the motion of a top is
@@ -263,11 +261,11 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: M
     unstable = _grown_tolerance(motion, method, plan) if partly else 0.0
     whole = bool(probe.times[-1] >= plan.horizon * (1.0 - 1e-9))
     growth = 1.0
-    if isinstance(motion, Integrated) and not whole and plan.step_size * marks.frequency > SMALL_TURN:
+    if not isinstance(motion, Exact) and not whole and plan.step_size * marks.frequency > SMALL_TURN:
         growth = _own_growth(motion, method, chart, plan, float(probe.times[-1]))
         pieces = plan.horizon / float(probe.times[-1]) - 1.0
         error = max(error, float(probe.error.max()) * math.exp(min(pieces * math.log(growth), MOST_FOLDS)))
-    ended, rounding = (probe.outcome, probe.reached), motion.rounding(plan.horizon)
+    ended, rounding = (probe.outcome, probe.reached), motion.rounding(plan.horizon, whole=whole)
     limit = getattr(method.solvers[chart], "limit", None)
     if limit is not None and probe.outcome == "ok" and probe.times[-1] >= min(marks.period, plan.horizon):
         reached = float(probe.times[-1]) * limit(plan) / max(probe.evaluations, 1)
@@ -279,7 +277,7 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: M
 def _own_growth(motion: Integrated, method: Integrator, chart: str, plan: Plan, piece: float) -> float:
     """How many times more than the motion itself a method's steps multiply a small change in a piece; 1 if no more."""
     steps = max(1, round(min(piece, STEPS[method.implementation] * plan.step_size) / plan.step_size))
-    top, marks = motion.scene.top, Plan.steps(plan.step_size, _marks(steps))
+    top, marks = motion.scene.top, Plan.steps(plan.step_size, _marks(steps, motion.points))
     pair = [solve(method, chart, top, start, marks).states for start in (motion.scene.start, motion.moved())]
     with np.errstate(all="ignore"):
         apart = float(np.max(motion.apart(*((chart, one) for one in pair)))) / MOVED
@@ -304,32 +302,32 @@ def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, *, series:
     """
     if method.control is None:
         return ""
-    motion: Motion = Integrated(scene) if series or scene.of_body else Exact(scene)
+    motion: Integrated = Integrated(scene) if series or scene.of_body else Exact(scene)
     expected = forecast(scene, method, chart, plan, motion)
-    trouble = _trouble(motion, method, chart, plan, expected)
-    if trouble is None:
+    found = trouble(motion, method, chart, plan, expected)
+    if found is None:
         return ""
-    remedy = "" if math.isnan(trouble.step) else f"; {_remedy(motion, method, chart, plan, trouble)}"
-    return f"{method.name} on {scene.name}: {trouble.reason}{remedy}"
+    remedy = "" if math.isnan(found.step) else f"; {_remedy(motion, method, chart, plan, found)}"
+    return f"{method.name} on {scene.name}: {found.reason}{remedy}"
 
 
-def _remedy(motion: Motion, method: Integrator, chart: str, plan: Plan, trouble: Trouble) -> str:
+def _remedy(motion: Integrated, method: Integrator, chart: str, plan: Plan, first: Trouble) -> str:
     """A step of two digits of which nothing is expected to go wrong: the first try, or the next smaller ones."""
-    step, word, others = trouble.step, "try", f", or {trouble.otherwise}" if trouble.otherwise else ""
+    step, word, others = first.step, "try", f", or {first.otherwise}" if first.otherwise else ""
     for _ in range(TRIES):
         if not plan.horizon / step <= MOST_STEPS:
-            return f"take {trouble.otherwise or 'another method'}: more than {MOST_STEPS:.0e} steps would be needed"
+            return f"take {first.otherwise or 'another method'}: more than {MOST_STEPS:.0e} steps would be needed"
         step = float(f"{step:.2g}")
         tried = plan._replace(step_size=step)  # a forecast looks at the step and the horizon
         expected = forecast(motion.scene, method, chart, tried, motion)
-        if expected.outcome == "ok" and _trouble(motion, method, chart, tried, expected) is None:
+        if expected.outcome == "ok" and trouble(motion, method, chart, tried, expected) is None:
             word = "take"
             break
         step = min(LESS * step, _smaller(method, tried, expected))
     return f"{word} a step of about {step:.2g}{others}"
 
 
-def _trouble(motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
+def trouble(motion: Integrated, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
     """Why a run will go wrong; None if it will not."""
     known = isinstance(motion, Exact) and _instability(motion.scene, method, chart, plan, expected)
     return known or _cause(motion, method, chart, plan, expected)
@@ -371,10 +369,10 @@ def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expec
     )  # fmt: skip
 
 
-def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
+def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
     """The first of the other causes."""
     marks = expected.marks
-    if expected.rounding > EXPECTED and isinstance(motion, Integrated):
+    if expected.rounding > EXPECTED and not isinstance(motion, Exact):
         return Trouble(
             f"the motion multiplies a change of its start by {expected.rounding / EPSILON:.1g} by t = "
             f"{plan.horizon:.4g}, so that rounding alone decides; no method and no step help, shorten the horizon"
@@ -411,7 +409,7 @@ def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected:
 
 
 def _coarse(
-    motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast, size: str
+    motion: Integrated, method: Integrator, chart: str, plan: Plan, expected: Forecast, size: str
 ) -> Trouble | None:
     """A step that is too long for a pole or for the nutation, or in resonance with it."""
     marks, step, frequency = expected.marks, plan.step_size, expected.marks.frequency

@@ -12,7 +12,7 @@ of the run does not show it, because a chaotic motion looks regular on many a pi
 import functools
 import math
 from dataclasses import replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -20,18 +20,23 @@ from symtop.core.numbers import EPSILON
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
-from symtop.model.body import Attitude, RigidBody
 from symtop.model.charts import BODY, Array, attitude_distance, axes, axis_distance
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.reference.sensitivity import displacement
 
-SERIES, PAIR = "series-general-adaptive", "dop853-compiled"
-FINE, CHECK, ROUGH = 1e-15, 1e-13, 1e-9  # tolerances: of the true motion, of its check, of two motions side by side
-MOVED = 1e-8  # of the natural frequency: small enough to show how much a regular motion beside a separatrix shears
+SERIES, PAIR = {BODY: "series-general-adaptive", "axis": "series-adaptive"}, "dop853-compiled-fixed"
+FINE, CHECK = 1e-15, 1e-13  # tolerances: of the true motion, and of its check at one of so many times, the last first:
+CHECKED = 10
+PAIR_STEPS = 5  # of two motions side by side, in a period of the fastest turn
+MOVED = 1e-10  # of the natural frequency: small enough to show how much a motion beside a separatrix shears
 SATURATED = 0.1  # rad; two motions that are farther apart no longer show how fast they part
-WATCHED = 100  # points of A
+WATCHED = {BODY: 200.0, "axis": 20.0}  # natural periods of a run: the motion of a top is integrable
+MOST_WATCHED = 5000  # steps
+POINTS = 100  # of A
 MOST_POWER = 20.0  # of the time by which A grows beyond what is watched
+UNSTABLE = 50.0  # times that a stable motion may amplify a change of its start more than the time goes on
+LATER = 30.0  # of the errors of a piece: those that a method commits later in an unstable motion
 MOST_FOLDS = 100.0  # e times that anything grows: any is too much
 MOST_WORK = 1e6  # steps of an integration
 
@@ -71,52 +76,153 @@ def landmarks(scene: Scene) -> Landmarks:
     return _landmarks(scene.top, scene.start)
 
 
-class Motion(Protocol):
-    """What the guard asks the true motion of a scene."""
+class Growth(NamedTuple):
+    """A, at `times` (n,)."""
 
-    scene: Scene
-    marks: Landmarks
-    watches: str  # axis or attitude
-    longest: float  # nutations of a piece that is a share of the run
-    reach: float  # nutations of any piece that is not the run
+    times: Array
+    size: Array
 
-    def error(self, times: Array, chart: str, states: Array, since: float, /) -> Array:
-        """Rad (n,) by which states (n, dimension) of a run from the time `since` on are off at `times` (n,)."""
+    @classmethod
+    def of(cls, times: Array, apart: Array, most: float) -> Self:
+        """From a distance in units of the first one; beyond `most`, which shows no A, it grows on exponentially."""
+        size = np.maximum.accumulate(np.maximum(np.nan_to_num(apart, nan=math.inf), 1.0))
+        last = int(np.searchsorted(size, most))
+        if last < size.size:
+            size[last:] = np.exp(np.minimum(math.log(most) * times[last:] / times[last], MOST_FOLDS))
+        return cls(times, size)
 
-    def start(self, since: float, /) -> Any:
-        """The state at a time, as a start."""
+    def at(self, until: float) -> float:
+        """A at any time; later than the last one by the power of the time that it grew with in the second half."""
+        last, count = float(self.times[-1]), self.size.size
+        if until <= last:
+            return float(self.size[min(int(np.searchsorted(self.times, until)), count - 1)])
+        power = math.log2(float(self.size[-1] / self.size[count // 2 - 1]))
+        return float(self.size[-1]) * math.pow(until / last, min(max(power, 1.0), MOST_POWER))
+
+
+class Integrated:
+    """The motion of a body, or of a top as if it had no closed form, by Taylor series; what the guard asks of any."""
+
+    longest, reach = 20.0, 40.0  # natural periods of a piece that is a share of the run, and of any other
+    points = 100  # of a piece that are compared
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.known = scene, dict[float, Growth]()
+        self.chart, self.watches = (BODY, "attitude") if scene.of_body else ("axis", "axis")
+        slow, self.fast, self.inertia = _frequencies(scene)
+        self.marks = Landmarks(2.0 * math.pi / slow, slow, math.nan, math.inf, "upper", 0.0, 0.0)
+
+    def states(self, times: Array, tolerance: float) -> Array:
+        """States (n, dimension) at `times` (n,), NaN from where the work is too much."""
+        plan = Plan.until(times, tolerance, MOST_WORK)
+        return solve(integrator(SERIES[self.chart]), self.chart, self.scene.top, self.scene.start, plan).states
+
+    def apart(self, first: tuple[str, Array], second: tuple[str, Array]) -> Array:
+        """Rad (n,) between states (n, dimension) of two charts."""
+        if self.chart == BODY:
+            return attitude_distance(first[1][:, :4], second[1][:, :4])
+        return axis_distance(axes(*first), axes(*second))
+
+    def error(self, times: Array, chart: str, states: Array, _: float, /) -> Array:
+        """Rad (n,) by which states (n, dimension) of a run are off at `times` (n,), with what two orders differ by."""
+        true, check = self.states(times, FINE), self.states(times[::-CHECKED][::-1], CHECK)
+        gap = np.abs(check - true[::-CHECKED][::-1])[:, : 4 if self.chart == BODY else 3].max(initial=0.0)
+        error: Array = self.apart((chart, states), (self.chart, true)) + gap
+        return error
+
+    def start(self, _: float, /) -> Any:
+        """The state at a time, as a start: the start itself, a piece begins nowhere else."""
+        return self.scene.start
 
     def closest(self) -> float:
-        """A time at which a method may have the most to do: when the axis first comes closest to a pole."""
+        """A time at which a method may have the most to do: when the axis first comes closest to a pole; 0 here."""
+        return 0.0
+
+    def moved(self) -> Any:
+        """A start that differs by `MOVED`, of the natural frequency."""
+        at, rate = self.scene.start, MOVED * self.marks.frequency
+        if self.chart == BODY:
+            x, y, z = at.omega_body
+            return replace(at, omega_body=(x + 0.6 * rate, y - 0.48 * rate, z + 0.64 * rate))
+        return replace(at, theta_dot=at.theta_dot + 0.6 * rate, phi_dot=at.phi_dot + 0.8 * rate)
+
+    def growth(self, horizon: float) -> Growth:
+        """A up to the horizon, or as far as it is watched; made once.
+
+        Both motions take the same steps, so that their errors do not hide it.
+        """
+        step = 2.0 * math.pi / self.fast / PAIR_STEPS
+        until = min(horizon, WATCHED[self.chart] * self.marks.period, MOST_WATCHED * step)
+        if until not in self.known:
+            steps = max(math.ceil(until / step), POINTS)
+            plan = Plan.steps(until / steps, np.arange(1, POINTS + 1) * steps // POINTS)
+            near, far = (
+                solve(integrator(PAIR), self.chart, self.scene.top, start, plan).states
+                for start in (self.scene.start, self.moved())
+            )
+            gap, place = far - near, 4 if self.chart == BODY else 3
+            turned = (2.0 if self.chart == BODY else 1.0) * np.linalg.norm(gap[:, :place], axis=1)
+            apart = np.fmax(turned, np.linalg.norm(gap[:, place:], axis=1) / (self.inertia * self.marks.frequency))
+            self.known[until] = Growth.of(plan.times, apart / MOVED, SATURATED / MOVED)
+        return self.known[until]
+
+    def amplification(self, until: float, horizon: float) -> float:
+        """A at a time of a run to the horizon."""
+        return self.growth(horizon).at(until)
 
     def displacement(self, change: float, horizon: float) -> float:
         """How far the run is off by the horizon, rad, if the start is changed by so little."""
+        return min(change * self.amplification(horizon, horizon), math.pi)
 
     def amplified(self, error: float, since: float, horizon: float, /) -> float:
         """What the motion makes by the horizon of an error at the time `since`, rad; 0 if its law is known."""
+        if since >= horizon:
+            return error
+        times = self.amplification(horizon, horizon) / self.amplification(since, horizon)
+        return error * times * (LATER if times > UNSTABLE * horizon / since else 1.0)
 
-    def rounding(self, horizon: float) -> float:
-        """What rounding alone makes of a run, rad: large on a separatrix and in chaos, whatever the method."""
+    def rounding(self, horizon: float, *, whole: bool) -> float:
+        """What rounding alone makes of a run, rad: large on a separatrix and in chaos, whatever the method.
+
+        0 if a piece was the `whole` run: what two orders differ by shows it.
+        """
+        return 0.0 if whole else self.displacement(EPSILON, horizon)
 
 
-class Exact:
-    """The motion of a top by its closed form."""
+def _frequencies(scene: Scene) -> tuple[float, float, float]:
+    """That of the natural period (`symtop.model.body`), one that no turn exceeds by much, and the inertia of both.
 
-    watches, longest, reach = "axis", 20.0, math.inf
+    What turns a body about an axis of little inertia is the part of the weight across it, and the spin of the start.
+    """
+    top, at, slowest = scene.top, scene.start, 2.0 * math.pi / scene.horizon
+    if not scene.of_body:
+        rates = at.theta_dot, at.phi_dot * math.sin(at.theta), top.momenta(at).p_psi / top.I1
+        slow = max(math.hypot(*rates, math.sqrt(abs(top.mgl) / top.I1)), slowest)
+        return slow, slow, top.I1
+    slow = max(2.0 * math.pi / top.nutation_period(at), slowest)
+    least, along = min(zip(top.moments, top.centre, strict=True))
+    swung = 2.0 * math.sqrt(abs(top.mgl) * math.sqrt(max(1.0 - along * along, 0.0)) / least)
+    return slow, max(math.hypot(slow, *at.omega_body), swung), sorted(top.moments)[1]
+
+
+class Exact(Integrated):
+    """The same of a top by its closed form, which knows it for ever."""
+
+    watches, longest, reach, points = "axis", 20.0, math.inf, 300
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.marks, self.form = scene, landmarks(scene), closed_form(scene)
 
-    def error(self, times: Array, chart: str, states: Array, since: float) -> Array:
-        """Of the axis; see `Motion`."""
+    def error(self, times: Array, chart: str, states: Array, since: float, /) -> Array:
+        """See `Integrated`; of the axis."""
         return self.form.axis_distance(since + times if since else times, axes(chart, states))
 
-    def start(self, since: float) -> Any:
-        """See `Motion`."""
+    def start(self, since: float, /) -> Any:
+        """See `Integrated`."""
         return Angles(*(float(value) for value in self.form(since))) if since else self.scene.start
 
     def closest(self) -> float:
-        """See `Motion`."""
+        """See `Integrated`."""
         width = self.marks.period if math.isfinite(self.marks.period) else self.scene.horizon
         middle = 0.5 * width
         for _ in range(4):
@@ -128,109 +234,11 @@ class Exact:
         """See `symtop.run.reference.sensitivity`."""
         return displacement(self.scene, change, horizon)
 
-    def amplified(self, _: float, __: float, ___: float) -> float:
+    def amplified(self, _: float, __: float, ___: float, /) -> float:
         """0: errors of an integrable motion shear, which the law of the guard has."""
         return 0.0
 
-    def rounding(self, horizon: float) -> float:
-        """See `Motion`."""
+    def rounding(self, horizon: float, *, whole: bool) -> float:  # noqa: ARG002
+        """See `Integrated`; of the whole run, too."""
         marks, turns = self.marks, horizon / self.marks.period
         return marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0
-
-
-class Integrated:
-    """The motion of a body, or of a top as if it had no closed form, by Taylor series."""
-
-    longest, reach = 5.0, 10.0
-
-    def __init__(self, scene: Scene) -> None:
-        self.scene, self.known = scene, dict[float, tuple[Array, Array]]()
-        self.chart, self.watches = (BODY, "attitude") if scene.of_body else ("axis", "axis")
-        self.watched = 200.0 if scene.of_body else 20.0  # natural periods: the motion of a top is integrable
-        period = _natural_period(scene)
-        self.marks = Landmarks(period, 2.0 * math.pi / period, math.nan, math.inf, "upper", 0.0, 0.0)
-
-    def states(self, times: Array, tolerance: float, start: Any = None, method: str = SERIES) -> Array:
-        """States (n, dimension) at `times` (n,), NaN from where the work is too much."""
-        plan = Plan.until(times, tolerance, MOST_WORK)
-        return solve(integrator(method), self.chart, self.scene.top, start or self.scene.start, plan).states
-
-    def apart(self, first: tuple[str, Array], second: tuple[str, Array]) -> Array:
-        """Rad (n,) between states (n, dimension) of two charts."""
-        if self.chart == BODY:
-            return attitude_distance(first[1][:, :4], second[1][:, :4])
-        return axis_distance(axes(*first), axes(*second))
-
-    def error(self, times: Array, chart: str, states: Array, _: float) -> Array:
-        """See `Motion`; with what two orders differ by."""
-        true, check = (self.states(times, tolerance) for tolerance in (FINE, CHECK))
-        gap = np.abs(check - true)[:, : 4 if self.chart == BODY else 3].max(initial=0.0)
-        error: Array = self.apart((chart, states), (self.chart, true)) + gap
-        return error
-
-    def start(self, _: float) -> Any:
-        """The start itself: a piece begins nowhere else."""
-        return self.scene.start
-
-    def closest(self) -> float:
-        """0; see `start`."""
-        return 0.0
-
-    def moved(self) -> Any:
-        """A start that differs by `MOVED`, of the natural frequency."""
-        at, rate = self.scene.start, MOVED * 2.0 * math.pi / self.marks.period
-        if self.chart == BODY:
-            x, y, z = at.omega_body
-            return replace(at, omega_body=(x + 0.6 * rate, y - 0.48 * rate, z + 0.64 * rate))
-        return replace(at, theta_dot=at.theta_dot + 0.6 * rate, phi_dot=at.phi_dot + 0.8 * rate)
-
-    def growth(self, horizon: float) -> tuple[Array, Array]:
-        """Times (n,) and A (n,) up to the horizon, or as far as it is watched; made once.
-
-        From where two motions are too far apart to show it, A grows by the exponential that it has reached.
-        """
-        until = min(horizon, self.watched * self.marks.period)
-        if until not in self.known:
-            times = until / WATCHED * np.arange(1.0, WATCHED + 1.0)
-            near, far = (self.states(times, ROUGH, start, PAIR) for start in (self.scene.start, self.moved()))
-            gap, place = far - near, 4 if self.chart == BODY else 3
-            turned = (2.0 if self.chart == BODY else 1.0) * np.linalg.norm(gap[:, :place], axis=1)
-            apart = np.fmax(turned, np.linalg.norm(gap[:, place:], axis=1) / self.scene.momentum_scale)
-            grown = np.maximum.accumulate(np.maximum(np.nan_to_num(apart, nan=math.inf) / MOVED, 1.0))
-            last = int(np.searchsorted(grown, SATURATED / MOVED))
-            if last < WATCHED:
-                folds = math.log(SATURATED / MOVED) * times[last:] / times[last]
-                grown[last:] = np.exp(np.minimum(folds, MOST_FOLDS))
-            self.known[until] = times, grown
-        return self.known[until]
-
-    def amplification(self, until: float, horizon: float) -> float:
-        """A at a time of a run to the horizon."""
-        times, grown = self.growth(horizon)
-        if until <= times[-1]:
-            return float(grown[min(int(np.searchsorted(times, until)), WATCHED - 1)])
-        last, power = float(grown[-1]), math.log2(float(grown[-1] / grown[WATCHED // 2 - 1]))
-        return last * math.pow(until / float(times[-1]), min(max(power, 1.0), MOST_POWER))
-
-    def displacement(self, change: float, horizon: float) -> float:
-        """See `Motion`."""
-        return min(change * self.amplification(horizon, horizon), math.pi)
-
-    def amplified(self, error: float, since: float, horizon: float) -> float:
-        """See `Motion`."""
-        return error * self.amplification(horizon, horizon) / self.amplification(since, horizon)
-
-    def rounding(self, horizon: float) -> float:
-        """See `Motion`."""
-        return self.displacement(EPSILON, horizon)
-
-
-def _natural_period(scene: Scene) -> float:
-    """That of a body (`symtop.model.body`), which needs no closed form, of a top too."""
-    if scene.of_body:
-        return scene.time_scale()
-    top, at = scene.top, scene.start
-    across = top.I1 * math.hypot(at.theta_dot, at.phi_dot * math.sin(at.theta))
-    body = RigidBody(top.I1, top.I1, top.I3, top.mgl)
-    period = body.nutation_period(Attitude(omega_body=(across / top.I1, 0.0, top.momenta(at).p_psi / top.I3)))
-    return min(period, scene.horizon)

@@ -151,7 +151,7 @@ def make_plan(
 def simulate(
     scene: "str | Scene", integrator: "str | Integrator", *, step_size: float | None = None,
     tolerance: float | None = None, horizon: float | None = None, samples: int = 501, observe: str | None = None,
-    guard: bool | Callable[[str], object] = True, budget: float | None = None,
+    guard: bool | str | Callable[[str], object] = True, budget: float | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Run one integrator on one scene and return what it did.
 
@@ -164,16 +164,19 @@ def simulate(
     steps fills the horizon, the one nearest to horizon/step_size: the attribute ``step_size`` is the step made.
 
     Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
-    error is expected; the run is the same either way. Give a function to be handed the sentence instead, or False for
-    no warning. `budget` is the most steps of a fixed-step run (`MOST_STEPS` by default; more are refused) and the most
-    force evaluations, or Taylor steps, of an adaptive one, which then ends `out_of_budget`.
+    error is expected; the run is the same either way. It compares a piece of the run with the closed form ("exact", of
+    tops) or with an accurate integration ("series", as of bodies). Give a function to be handed the sentence instead,
+    or False for no warning. `budget` is the most steps of a fixed-step run (`MOST_STEPS` by default; more are refused)
+    and the most force evaluations, or Taylor steps, of an adaptive one, which then ends `out_of_budget`.
 
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
-    heard = guard if callable(guard) else _warn if boolean("guard", guard) else None
+    heard = guard if callable(guard) else _warn if isinstance(guard, str) or boolean("guard", guard) else None
     given = scene, integrator, step_size, tolerance, horizon, samples, observe, budget
     chosen, method, chart, plan, dithered = _prepared(*given)
-    trajectory, caution = _guarded(chosen, method, chart, plan, heard)
+    if isinstance(guard, str):
+        one_of("guard", guard, ("series",) if chosen.of_body else ("exact", "series"))
+    trajectory, caution = _guarded(chosen, method, chart, plan, heard, series=guard == "series")
     data = dataset(trajectory.time, trajectory.columns, chosen.units)
     data.attrs = netcdf.attributes_of(
         f"{method.name} on {chosen.name}", integrator=method.name, scene=chosen.name, chart=chart,
@@ -211,10 +214,11 @@ def _prepared(
 
 
 def _guarded(
-    scene: Scene, method: Integrator, chart: str, plan: Plan, guard: Callable[[str], object] | None
-) -> tuple[Trajectory, str]:
+    scene: Scene, method: Integrator, chart: str, plan: Plan, guard: Callable[[str], object] | None, *,
+    series: bool = False,
+) -> tuple[Trajectory, str]:  # fmt: skip
     """Make a run, after the guard's sentence if there is one; "off" is the sentence of no guard."""
-    caution = "off" if guard is None else warning(scene, method, chart, plan)
+    caution = "off" if guard is None else warning(scene, method, chart, plan, series=series)
     if caution and guard is not None:
         guard(caution)
     states = solve(method, chart, scene.top, scene.start, plan, f" on {scene.name}")

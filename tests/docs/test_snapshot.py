@@ -137,6 +137,8 @@ def test_what_a_run_of_the_studies_writes_is_not_tracked():
         "peers.json",
         "horizon.json",
         "repeat.json",
+        "guard.json",
+        "figures/guard-curves.png",
         "peers.nc",
         "figures/peers-fronts.png",
     )

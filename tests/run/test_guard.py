@@ -300,6 +300,27 @@ def test_a_top_that_is_integrated_is_forecast_as_by_its_closed_form(scene, name)
     assert 0.25 < series / exact < 4.0
 
 
+def test_the_guard_without_the_truth_is_asked_for_by_its_name():
+    controls = {"step_size": 0.1, "samples": 11, "guard": "series"}
+    with pytest.warns(symtop.SymtopWarning, match="expect an axis error"):
+        symtop.simulate("spheroid", "midpoint", **controls)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        symtop.simulate("spheroid", "gauss-4", **controls | {"step_size": 0.01})
+    with pytest.raises(symtop.SymtopError, match="guard 'closed' is unknown; known: exact, series"):
+        symtop.simulate("spheroid", "midpoint", **controls | {"guard": "closed"})
+    with pytest.raises(symtop.SymtopError, match="guard 'exact' is unknown; known: series"):
+        symtop.simulate("heavy-brick", "rk4", **controls | {"guard": "exact"})
+
+
+def test_an_unstable_motion_is_warned_of_beyond_the_errors_of_its_piece():
+    """What a method commits later than its piece may exceed it; a stable motion has no such margin."""
+    for name, margin in (("heavy-chaotic", 30.0), ("heavy-brick", 1.0)):
+        motion = Integrated(symtop.model.scenes.scene(name, bodies=True))
+        grown = motion.amplification(50.0, 50.0) / motion.amplification(5.0, 50.0)
+        assert motion.amplified(1e-12, 5.0, 50.0) == pytest.approx(1e-12 * grown * margin)
+
+
 def test_what_a_motion_makes_of_a_change_tells_chaos_from_order():
     scenes = (symtop.model.scenes.scene(name, bodies=True) for name in ("heavy-chaotic", "heavy-brick"))
     grown = [Integrated(one).amplification(50.0, 50.0) for one in scenes]

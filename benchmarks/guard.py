@@ -1,0 +1,328 @@
+"""The guard with and without the truth on the same runs: hits against false alarms, and silent wrong runs of bodies.
+
+    python -m benchmarks.guard tops 3600        random tops, every method in its charts, over 10, 100 or 1000 nutations
+    python -m benchmarks.guard bodies 5000      bodies of `symtop.run.ensemble.bodies`, over 1 to 100 natural periods
+    python -m benchmarks.guard hostile 5000     thin, flat and almost round bodies, at rest and spinning, in any units
+    python -m benchmarks.guard page             of the runs that were made: results/guard.json and its figure
+
+Run k is drawn from a seed of its own; runs are kept in results/tables/guard-NAME.csv and not made again. The score of a
+run is what the guard expects, infinite where it warns of something else; it warns from `EXPECTED` on, and another
+limit gives another point of the curve. A run is wrong beyond `EXPECTED`. A run that ends early tells so itself and is
+counted apart. SciPy's methods and those in software arithmetic run over ten periods at most. The truth is the closed
+form of a top, and of a body heyoka's series in long double.
+"""
+
+import argparse
+import csv
+import functools
+import math
+import random
+import warnings
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from benchmarks import measured, pages
+from benchmarks.pages import Table
+from symtop.core import netcdf
+from symtop.methods.framework.calling import solve
+from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.registry import Integrator, integrator, integrators
+from symtop.model.body import Attitude, RigidBody
+from symtop.model.charts import BODY, attitude_distance, axes, axis_distance
+from symtop.model.scenes import Scene, closed_form
+from symtop.model.top import Angles, SymmetricTop
+from symtop.report import style
+from symtop.run import guard
+from symtop.run.ensemble.bodies import body_population, scenes_of
+from symtop.run.ensemble.population import STRATA, population
+from symtop.run.motion import Exact, Integrated
+from symtop.run.simulation import make_plan
+
+SEED, CHUNK = 29, 100
+NUTATIONS = (10.0, 100.0, 1000.0)  # of tops
+SAMPLES = {"tops": 501, "bodies": 201, "hostile": 201}
+MOST_TURNS = 1e3  # of a hostile body about any axis
+TABLES = Path("results") / "tables"
+
+
+class Run(NamedTuple):
+    """What was run, what the guard expected and what came of it."""
+
+    k: int
+    stratum: str
+    method: str
+    needs: str
+    chart: str
+    control: str
+    setting: float  # steps a period, or the tolerance
+    periods: float
+    whole: bool  # the guard's trial was the whole run
+    outcome: str
+    error: float  # rad, largest of the axis or of the attitude
+    exact: float  # scores
+    series: float
+
+
+def tops(k: int) -> tuple[Scene, random.Random]:
+    """Top k: strata in turn."""
+    names = [*STRATA]
+    drawn = _population(names[k % len(names)], k // len(names) // CHUNK)
+    member = drawn.isel(member=k // len(names) % CHUNK)
+    numbers = {name: float(member[name]) for name in member.data_vars if name != "stratum"}
+    top = SymmetricTop(*(numbers.pop(name) for name in ("I1", "I3", "mgl")))
+    return Scene(f"{names[k % len(names)]}.{k}", top, Angles(**numbers), 1.0), random.Random(f"{SEED}/{k}")
+
+
+@functools.lru_cache(maxsize=16)
+def _population(stratum: str, block: int) -> Any:
+    return population(CHUNK, seed=SEED + block, kind=stratum)
+
+
+@functools.lru_cache(maxsize=2)
+def _bodies(block: int) -> list[Scene]:
+    return scenes_of(body_population(CHUNK, seed=SEED + block))
+
+
+def bodies(k: int) -> tuple[Scene, random.Random]:
+    """Body k of the sampler of symtop."""
+    scene = _bodies(k // CHUNK)[k % CHUNK]
+    named = f"{scene.name.rpartition('-')[0]}.{k}"
+    return Scene(named, scene.top, scene.start, 1.0), random.Random(f"{SEED}/{k}")
+
+
+def hostile(k: int) -> tuple[Scene, random.Random]:
+    """Body k of this sampler."""
+    draw = random.Random(f"hostile/{SEED}/{k}")
+    shape = draw.choice(["thin", "flat", "sphere", "any"])
+    small = 10.0 ** draw.uniform(-6.0, -1.0)
+    least = draw.uniform(0.1, 0.9)
+    moments = {
+        "thin": [small, 1.0, 1.0 + small * draw.uniform(-0.99, 0.99)],
+        "flat": [least, 1.0 - least, 1.0 - 1e-6 * draw.random()],
+        "sphere": [1.0, 1.0 + small * draw.random(), 1.0 - small * draw.random()],
+        "any": [least, 1.0, draw.uniform(1.0 - 0.99 * least, 1.0 + 0.99 * least)],
+    }[shape]
+    draw.shuffle(moments)
+    weight = draw.choice([0.0, 10.0 ** draw.uniform(-6.0, 0.0), 1.0, 10.0 ** draw.uniform(0.0, 4.0)])
+    axis = draw.randrange(3)
+
+    def direction() -> list[float]:
+        """Any, or close to one of the axes."""
+        spread = draw.choice([10.0, 10.0 ** draw.uniform(-9.0, -1.0)])
+        return [spread * draw.gauss(0.0, 1.0) + (place == axis) for place in range(3)]
+
+    centre, rates = direction(), direction()
+    size = draw.choice([0.0 if weight else 1.0, 1.0, 10.0 ** draw.uniform(-3.0, 2.0)]) / math.hypot(*rates)
+    turn = [draw.gauss(0.0, 1.0) for _ in range(4)]
+    if draw.random() < 0.2:  # the centre of mass above or below the fixed point
+        turn = [1.0, 1e-6 * draw.random(), 0.0, 0.0] if draw.random() < 0.5 else [1e-6 * draw.random(), 1.0, 0.0, 0.0]
+    mass, clock = (10.0 ** draw.uniform(-9.0, 9.0) if draw.random() < 0.3 else 1.0 for _ in range(2))
+    body = RigidBody(*(mass * part for part in moments), weight * mass / clock**2, tuple(centre))
+    length = math.hypot(*turn)
+    start = Attitude(tuple(part / length for part in turn), tuple(size * rate / clock for rate in rates))
+    return Scene(f"{shape}.{k}", body, start, 1.0), draw
+
+
+SAMPLERS = {"tops": tops, "bodies": bodies, "hostile": hostile}
+
+
+def one(name: str, k: int) -> Run:
+    """Draw run k and do it: 2 to 500 steps a period, or a tolerance of 0.1 to 1e-13."""
+    scene, draw = SAMPLERS[name](k)
+    of_top = name == "tops"
+    known = [m for m in integrators().values() if m.control is not None and (of_top or BODY in m.solvers)]
+    method = draw.choice(known)
+    chart = draw.choice(method.charts()) if of_top else BODY
+    period = scene.nutation_period
+    if not math.isfinite(period):
+        period = 10.0 * math.sqrt(scene.top.I1 / abs(scene.top.mgl))
+    periods = draw.choice(NUTATIONS) if of_top else 10.0 ** draw.uniform(0.0, 2.0)
+    steps, tolerance = 10.0 ** draw.uniform(0.3, 2.7), 10.0 ** draw.uniform(-13.0, -1.0)
+    if method.implementation == "python" or method.speed < 0.1:  # seconds to minutes over more
+        periods = min(periods, 10.0)
+    if name == "hostile":
+        periods = min(periods, 2.0 * math.pi * MOST_TURNS / (Integrated(scene).fast * period))
+    horizon, setting = periods * period, steps if method.fixed_step else max(tolerance, method.least_tolerance)
+    control = {"step_size": min(period / steps, horizon)} if method.fixed_step else {"tolerance": setting}
+    scene = Scene(scene.name, scene.top, scene.start, horizon)
+    plan, _ = make_plan(scene, method, **control, horizon=horizon, samples=SAMPLES[name])
+    series, whole = score(Integrated(scene), method, chart, plan)
+    exact, whole = score(Exact(scene), method, chart, plan) if of_top else (math.nan, whole)
+    run = solve(method, chart, scene.top, scene.start, plan)
+    error = math.inf
+    if run.outcome == "ok":
+        error = float(np.max(_off(scene, chart, plan.times, run.states)))
+    return Run(k, scene.name.split(".")[0], method.name, method.needs, chart, str(method.control), setting, periods,
+               whole, run.outcome, error, exact, series)  # fmt: skip
+
+
+def _off(scene: Scene, chart: str, times: Any, states: Any) -> Any:
+    """Rad by which states are off the truth."""
+    if not scene.of_body:
+        return axis_distance(axes(chart, states), closed_form(scene).axis(times))
+    truth = integrator("taylor-longdouble")
+    true = solve(truth, BODY, scene.top, scene.start, Plan.until(times, truth.least_tolerance))
+    return attitude_distance(states[:, :4], true.states[:, :4])
+
+
+def score(motion: Integrated, method: Integrator, chart: str, plan: Plan) -> tuple[float, bool]:
+    """What the guard expects, rad, and whether its trial was the whole run."""
+    expected = guard.forecast(motion.scene, method, chart, plan, motion)
+    value = max(expected.axis_error, expected.rounding)
+    silent = guard.trouble(motion, method, chart, plan, expected) is None
+    return (value if silent or value > guard.EXPECTED else math.inf), expected.whole
+
+
+def chunk(name: str, first: int) -> list[Run]:
+    """`CHUNK` runs."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return [one(name, k) for k in range(first, first + CHUNK)]
+
+
+def kept(name: str) -> list[Run]:
+    """The runs that were made."""
+    path = TABLES / f"guard-{name}.csv"
+    if not path.exists():
+        return []
+    with path.open() as file:
+        return [
+            Run(*(kind(value) if kind is not bool else value == "True"
+                  for value, kind in zip(row, Run.__annotations__.values(), strict=True)))
+            for row in csv.reader(file)
+        ]  # fmt: skip
+
+
+def make(name: str, count: int) -> None:
+    """Make the runs that are missing."""
+    TABLES.mkdir(parents=True, exist_ok=True)
+    done = {run.k // CHUNK for run in kept(name)}
+    missing = [place for place in range(math.ceil(count / CHUNK)) if place not in done]
+    with ProcessPoolExecutor(2) as pool, (TABLES / f"guard-{name}.csv").open("a") as file:
+        for runs in pool.map(functools.partial(chunk, name), [place * CHUNK for place in missing]):
+            csv.writer(file).writerows(runs)
+            file.flush()
+
+
+PARTS = {  # of runs, by their error; ended early is none of these
+    "beyond 10 limits": (10.0 * guard.EXPECTED, math.inf), "1 to 10 limits": (guard.EXPECTED, 10.0 * guard.EXPECTED),
+    "a tenth to 1": (0.1 * guard.EXPECTED, guard.EXPECTED), "below a tenth": (-1.0, 0.1 * guard.EXPECTED),
+}  # fmt: skip
+
+
+def counts(runs: list[Run], guarded: str) -> list[str]:
+    """Warned of and all, of runs that ended early and of each part."""
+    ended = [run for run in runs if run.outcome != "ok"]
+    rest = [run for run in runs if run.outcome == "ok"]
+    parts = [ended, *([run for run in rest if low < run.error <= high] for low, high in PARTS.values())]
+    return [f"{sum(getattr(run, guarded) > guard.EXPECTED for run in part)} of {len(part)}" for part in parts]
+
+
+def curve(runs: list[Run], guarded: str) -> tuple[Any, Any]:
+    """Shares of right runs that are warned of, and of wrong ones, for every limit of the score."""
+    rest = [run for run in runs if run.outcome == "ok"]
+    score_of, wrong = np.array([[getattr(run, guarded), run.error > guard.EXPECTED] for run in rest]).T
+    order = np.argsort(-score_of, kind="stable")
+    wrong = wrong[order] > 0.0
+    return np.cumsum(~wrong) / max((~wrong).sum(), 1), np.cumsum(wrong) / max(wrong.sum(), 1)
+
+
+def grouped(runs: list[Run], by: str) -> dict[str, list[Run]]:
+    """Runs by a column, by whether the trial was the whole run, or by the control."""
+    parts: dict[str, list[Run]] = {}
+    for run in runs:
+        value = getattr(run, by)
+        name = ("whole run tried" if value else "a piece tried") if by == "whole" else str(value)
+        parts.setdefault(f"{value:g}" if by == "periods" else name, []).append(run)
+    return dict(sorted(parts.items()))
+
+
+def draw(known: dict[str, list[Run]], target: Path) -> None:
+    """Curves of tops with and without the truth, one panel a horizon, and of bodies; a dot is the guard as it is."""
+    style.use()
+    figure, axes = style.panels(1, 4, height=2.6, sharey=True)
+    tops_by = grouped([run for run in known["tops"] if run.periods in NUTATIONS], "periods")
+    panels: list[tuple[str, list[tuple[str, list[Run], str, str]]]] = [
+        (f"tops, {float(name):g} nutations",
+         [("closed form", runs, "exact", style.BLUE), ("integration", runs, "series", style.VERMILLION)])
+        for name, runs in sorted(tops_by.items(), key=lambda item: float(item[0]))
+    ]  # fmt: skip
+    bodies_shown = [
+        ("symtop's", known["bodies"], "series", style.BLUE),
+        ("hostile", known["hostile"], "series", style.VERMILLION),
+    ]
+    for axis, (title, lines) in zip(axes.flat, [*panels, ("bodies", bodies_shown)], strict=True):
+        for label, runs, guarded, color in lines:
+            false, hits = curve(runs, guarded)
+            axis.plot(np.maximum(false, 1e-4), hits, color=color, label=label)
+            rest = [run for run in runs if run.outcome == "ok"]
+            last = sum(getattr(run, guarded) > guard.EXPECTED for run in rest) - 1
+            axis.plot(max(false[last], 1e-4), hits[last], "o", color=color)
+        axis.set(xscale="log", xlim=(1e-4, 1.2), ylim=(0.9, 1.003), title=title)
+        axis.legend(loc="lower left")
+    axes[0, 0].set_ylabel("wrong runs warned of")
+    figure.supxlabel("right runs warned of", fontsize=8)
+    style.save(figure, target)
+
+
+def page(results: Path) -> None:
+    """Write what was found: counts by population, and by stratum, class of method, horizon and control."""
+    facts, known = measured.circumstances(), {name: kept(name) for name in SAMPLERS}
+    header = ["runs", "guard", "ended early", *PARTS]
+    rows = list[list[str]]()
+    for name, every in known.items():
+        parts = {"all": every}
+        for by in ("whole", "control", *(("periods",) if name == "tops" else ()), "stratum", "needs"):
+            parts |= {f"{by} {value}": some for value, some in grouped(every, by).items()}
+        for guarded in ("exact", "series") if name == "tops" else ("series",):
+            rows += [[f"{name}: {part}", guarded, *counts(runs, guarded)] for part, runs in parts.items()]
+    table = Table("Runs that the guard warned of, of all, by the error that they had", header, rows)
+    print("\n".join(" | ".join(row) for row in [header, *rows]))
+    sentences = []
+    for name, runs in known.items():
+        for guarded in ("exact", "series") if name == "tops" else ("series",):
+            wrong = [run for run in runs if run.outcome == "ok" and run.error > guard.EXPECTED]
+            right = [run for run in runs if run.outcome == "ok" and run.error <= guard.EXPECTED]
+            silent = [run for run in wrong if not getattr(run, guarded) > guard.EXPECTED]
+            false = sum(getattr(run, guarded) > guard.EXPECTED for run in right)
+            words = {"tops": f"tops, guard {guarded!r}", "bodies": "bodies", "hostile": "hostile bodies"}[name]
+            sentences.append(
+                f"{len(runs)} runs of {words}: of {len(wrong)} wrong ones {len(silent)} were silent, the worst off by "
+                f"{max((run.error for run in silent), default=0.0):.2g} rad; of {len(right)} right ones {false} were "
+                f"warned of ({100.0 * false / max(len(right), 1):.2g} %)."
+            )
+    title, alt = "hits against false alarms", "Curves of wrong runs warned of against right runs warned of, near one."
+    caption = "Each limit of the forecast gives a point; the dot is the guard as it is."
+    draw(known, results / "figures" / "guard-curves.png")
+    words = pages.findings(
+        "guard", "The guard without the truth", "Does the guard need to know the solution?", sentences,
+        f"Wrong: off by more than {guard.EXPECTED} rad at some sample.", [table],
+        captions={"curves": (f"{title[0].upper()}{title[1:]}. {caption}", alt)}, cases=sum(map(len, known.values())),
+        measured=measured.sentence(facts, "python -m benchmarks.guard"),
+        provenance={key: facts[key] for key in facts if key not in ("measured", "cores", "load_before")},
+    )  # fmt: skip
+    counted = [dict(zip(header, row, strict=True)) for row in rows]
+    pictures = [{"name": "curves", "file": "guard-curves.png"}]
+    netcdf.write_json(results / "guard.json", words | {"pictures": pictures, "counts": counted})
+
+
+def main() -> None:
+    """Make runs, or the page of those that were made."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("name", choices=[*SAMPLERS, "page"])
+    parser.add_argument("count", type=int, nargs="?", default=CHUNK)
+    asked = parser.parse_args()
+    if asked.name == "page":
+        page(Path("results"))
+        return
+    make(asked.name, asked.count)
+    for run in kept(asked.name):
+        if run.outcome == "ok" and run.error > 10.0 * guard.EXPECTED and not run.series > guard.EXPECTED:
+            print("silent and grossly wrong:", run)
+
+
+if __name__ == "__main__":
+    main()

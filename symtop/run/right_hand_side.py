@@ -1,0 +1,166 @@
+"""The guard for anybody's equations y' = f(t, y): what error to expect of a method, and why, before a long run.
+
+The method makes a piece of the run, which is compared with DOP853 at a tight tolerance, since only f is known. Its
+error grows by the law of `symtop.run.guard`, linear to quadratic, or by what the motion makes of a small change, A(t)
+of `symtop.run.motion`, whichever is more; two motions are watched as far as `WATCHED` steps of DOP853 lead. Causes:
+
+    stiffness      f has rates far above that of the motion, and they limit an explicit step
+    instability    steps multiply a small change more than the motion does, or the motion itself is unstable
+    rounding       the piece is as close as DOP853 can tell
+    step           errors of the step or of the tolerance add up
+
+Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, sections II.4 and II.10; II, section IV.2.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from symtop.core.errors import SymtopError, finite, foreign_code, one_of, positive, row
+from symtop.core.numbers import EPSILON, TINY
+from symtop.methods.framework.plan import Array
+from symtop.methods.framework.registry import integrator, integrators
+from symtop.methods.runge_kutta.explicit import Tableau
+from symtop.run.guard import OWN, Probe, grown
+from symtop.run.motion import Growth
+
+SCIPY = {"rk45": ("RK45", 6), "dop853": ("DOP853", 12), "radau": ("Radau", 0), "bdf": ("BDF", 0), "lsoda": ("LSODA", 0)}
+FINE, WATCHED, PROBED = 1e-13, 4000, 5000  # tolerance of the truth; steps of DOP853, and of the method on a piece
+PERIODS, SHARE, POINTS = 10.0, 0.2, 400  # of the motion and of the run in a piece, at least; times that are compared
+MOVED, SATURATED = 1e-7, 1e-2  # of the extent of the motion: how far two motions are apart, and the most
+UNSTABLE, STIFF = 10.0, 20.0  # times that A grows in the second half; times the rate of the motion
+
+
+class Outlook(NamedTuple):
+    """What to expect of a run; printed, it is one sentence."""
+
+    error: float  # the largest distance from the truth up to the horizon, Euclidean, in units of y
+    setting: float  # a step or tolerance that should keep the accuracy; nan if none does
+    cause: str  # of an error beyond the accuracy, see above; "" if there is none
+    amplification: float  # of a small change of y0 by the horizon
+    sentence: str
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+def guard(
+    f: Callable[[float, Array], Any], t0: float, y0: Sequence[float], horizon: float, method: str = "rk4", *,
+    step_size: float | None = None, tolerance: float | None = None, accuracy: float = 1e-3,
+) -> Outlook:  # fmt: skip
+    """Forecast the error of a run of y' = f(t, y) from y0 (n,) at t0 over the time `horizon`.
+
+    `method` is an explicit Runge-Kutta method of symtop with a `step_size`, or rk45, dop853, radau, bdf or lsoda of
+    SciPy with a `tolerance`, relative and absolute. `accuracy` is the error that the run may have, in units of y.
+    Raises SymtopError for arguments that make no sense and for an f that fails.
+    """
+    rules = {name: getattr(next(iter(one.solvers.values())), "rule", None) for name, one in integrators().items()}
+    tables = {name: rule for name, rule in rules.items() if isinstance(rule, Tableau)}
+    rule = tables.get(one_of("method", method, [*SCIPY, *tables]))
+    names, given = ("step_size", "tolerance"), (step_size, tolerance)
+    if given[rule is not None] is not None:
+        raise SymtopError(f"{method} takes {names[rule is None]}, not {names[rule is not None]}", *names)
+    start, setting = np.array(row("y0", y0)), positive(names[rule is None], given[rule is None])
+    begin, end, wanted = finite("t0", t0), positive("horizon", horizon), positive("accuracy", accuracy)
+
+    def rate(t: float, y: Array) -> Array:
+        value = np.asarray(f(t, y), dtype=float)
+        if value.shape != start.shape:
+            raise SymtopError(f"f must return {start.size} numbers, not an array of shape {value.shape}")
+        return value
+
+    with foreign_code("f"), np.errstate(all="ignore"):
+        return _outlook(rate, begin, start, end, method, rule, setting, wanted)
+
+
+def _stepped(f: Any, rule: Tableau, t: float, y: Array, h: float, marks: Any) -> Array:
+    """States after so many steps, (marks, n)."""
+    b = np.array(rule.b)
+    a, slopes, states, done = np.zeros((b.size, b.size)), np.zeros((b.size, y.size)), [], 0
+    a[np.tril_indices(b.size, -1)] = np.array(rule.a)[: b.size * (b.size - 1) // 2]
+    for mark in marks:
+        for k in range(done, int(mark)):
+            for i in range(b.size):
+                slopes[i] = f(t + (k + a[i].sum()) * h, y + h * (a[i, :i] @ slopes[:i]))
+            y = y + h * (b @ slopes)
+        done = int(mark)
+        states.append(y)
+    return np.array(states)
+
+
+def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
+    """The solution by DOP853, a function of the time, and how long it is."""
+    from scipy.integrate import DOP853, OdeSolution  # 0.2 s
+
+    solver, times, parts = DOP853(f, t, y, t + end, rtol=FINE, atol=FINE * float(np.abs(y).max())), [t], list[Any]()
+    while solver.status == "running" and len(parts) < WATCHED and solver.step() is None:
+        times.append(solver.t)
+        parts.append(solver.dense_output())
+    if not parts:
+        raise SymtopError(f"f must let DOP853 make a step from t0 = {t!r}, and does not")
+    return OdeSolution(times, parts), times[-1] - t
+
+
+def _outlook(
+    f: Any, t: float, y: Array, end: float, method: str, rule: Tableau | None, setting: float, wanted: float
+) -> Outlook:
+    """See `guard`."""
+    from scipy.integrate import solve_ivp
+
+    near, watched = _motion(f, t, y, end)
+    seen = watched * np.arange(1.0, POINTS + 1.0) / POINTS
+    true = near(t + seen)
+    spread, extent = np.std(true, axis=1), float(np.linalg.norm(np.ptp(true, axis=1))) or 1.0
+    rates = np.std([f(t + time, state) for time, state in zip(seen, true.T, strict=True)], axis=0)
+    frequency = float(np.linalg.norm(rates)) / max(float(np.linalg.norm(spread)), TINY)
+    moved = y + MOVED * extent / math.sqrt(y.size)
+    far, reached = _motion(f, t, moved, watched)
+    times = seen[seen <= reached * (1.0 + EPSILON)]
+    apart = np.linalg.norm(far(t + times) - near(t + times), axis=0) / (MOVED * extent)
+    growth, kind = Growth.of(times, apart, SATURATED / MOVED), "step" if rule else "tolerance"
+    piece = min(end, watched, max(SHARE * end, PERIODS * 2.0 * math.pi / max(frequency, TINY)))
+
+    def made(start: Array) -> tuple[Array, Array, float]:
+        """Times and states of the piece, and the mean step of an explicit method."""
+        if rule:
+            marks = np.unique(np.rint(np.linspace(0.0, min(round(piece / setting), PROBED), POINTS + 1)[1:]).clip(1.0))
+            return marks * setting, _stepped(f, rule, t, start, setting, marks), setting
+        (name, cost), shown = SCIPY[method], np.minimum(t + piece * seen / watched, t + piece)
+        run = solve_ivp(f, (t, t + piece), start, name, shown, rtol=setting, atol=setting)
+        return run.t - t, run.y.T, piece * cost / run.nfev
+
+    times, states, mean = made(y)
+    error = np.linalg.norm(states - near(t + times).T, axis=1)
+    ended = not np.isfinite(error).all() or times[-1] < 0.99 * min(piece, PROBED * setting if rule else piece)
+    total, since = growth.at(end), growth.at(float(times[-1]))
+    expected = max(grown(Probe(times, error, "ok", end, 0), end, straight=False), float(error.max()) * total / since)
+    expected = math.inf if ended else min(expected, 2.0 * extent)
+    better = setting * (wanted / max(expected, TINY)) ** (1.0 / ((rule and integrator(method).order) or 1))
+    change = math.sqrt(EPSILON) * extent
+    slopes = [(f(t, y + change * unit) - f(t, y)) / change for unit in np.eye(y.size)]
+    fastest, cause = float(np.abs(np.linalg.eigvals(np.array(slopes))).max()), "step"
+    why = f"errors add up over {end * frequency / (2.0 * math.pi):.3g} periods; take a {kind} of about {better:.1g}"
+    if not expected > wanted:
+        cause, why = "", f"a {kind} of {better:.1g} would do for {wanted:.1g}"
+    elif mean * fastest > 1.0 and fastest > STIFF * frequency:
+        cause, better = "stiffness", math.nan
+        why = f"f has rates of {fastest:.1g}, the motion of {frequency:.1g}; take an implicit method, such as radau"
+    elif ended or np.linalg.norm(made(moved)[1] - states, axis=1).max() > OWN * since**2 * MOVED * extent:
+        better = min(better, 0.3 * setting)
+        cause, why = (
+            "instability",
+            f"it multiplies a small change more than the motion does; try a {kind} of {better:.1g}",
+        )
+    elif total > UNSTABLE * growth.at(0.5 * end):
+        lost = total * EPSILON * extent > wanted
+        cause, better = "instability", math.nan if lost else better
+        why = f"the motion multiplies a small change {total:.1g} times; " + (
+            "rounding alone decides, shorten the horizon" if lost else f"try a {kind} of {better:.1g}"
+        )
+    elif float(error.max()) < 10.0 * FINE * float(np.abs(true).max()):
+        cause, better, why = "rounding", math.nan, f"rounding adds up, and no {kind} helps"
+    return Outlook(
+        expected, better, cause, total, f"{method}: expect an error of {expected:.1g} by t = {t + end:.4g}: {why}"
+    )
