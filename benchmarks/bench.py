@@ -22,6 +22,7 @@ def findings(
     items: Sequence[whole_run.Item],
     one_step: Mapping[str, float],
     many: Sequence[ensemble.Item],
+    called: Sequence[ensemble.Call],
     together: lanes.Measured,
     accuracy: float,
     facts: Mapping[str, Any],
@@ -84,7 +85,7 @@ def findings(
         Table("Starting", ["what", "ms"], [[name, f"{seconds * 1e3:.2f}"] for name, seconds in started.items()]),
     ]
     sentences = [
-        *said, *lanes.verdict(together), *ensemble.verdict(many), run,
+        *said, *lanes.verdict(together), *ensemble.verdict(many), *ensemble.said_of(called), run,
         f"A run of one step takes {one_step[slowest] * 1e6:.1f} us at most, with {slowest}.",
     ]  # fmt: skip
     how_to_read = (
@@ -112,7 +113,7 @@ def main() -> None:
     forms = truth.measure()
     reached = targets.measure(options.accuracy)
     items, one_step = whole_run.measure(), whole_run.one_step()
-    many = ensemble.measure()
+    many, called = ensemble.measure(), ensemble.calls()
     together = lanes.measure()
     for table in (
         kernels.lines(rows),
@@ -132,10 +133,11 @@ def main() -> None:
         "closed_form": [row._asdict() for row in forms],
         "run": {"parts": [item._asdict() for item in items], "one_step": one_step},
         "ensemble": [item._asdict() for item in many],
+        "ensemble_calls": [call._asdict() for call in called],
         "lanes": {name: [row._asdict() for row in rows] for name, rows in together._asdict().items()},
         "targets": {"accuracy": options.accuracy, "methods": [row._asdict() for row in reached]},
     }
-    content = findings(rows, started, forms, reached, items, one_step, many, together, options.accuracy, facts)
+    content = findings(rows, started, forms, reached, items, one_step, many, called, together, options.accuracy, facts)
     netcdf.write_json(target, content | numbers)
     print(f"written to {target}")
 

@@ -10,6 +10,10 @@ The setting is what an error of 1e-3 takes: 100 steps a nutation period in the m
 an ensemble can be worth: a step of strang[axis] is 152 sums and products, 76 cycles for eight tops on a processor that
 begins two vector operations a cycle, and no way of calling it makes it less. `verdict` says how often the steps alone,
 on all cores, go into the time of `simulate`.
+
+`calls` times what a user writes, `symtop.ensemble(population, METHOD, samples=2, observe="axis")` of `CALLED` tops on
+all cores, with two numbers of steps: what a step takes, and what a member takes beside its steps; and a step of one
+long `simulate` alone.
 """
 
 import time
@@ -108,6 +112,55 @@ def measure() -> list[Item]:
     return [Item(name, seconds, best["`simulate`"] / seconds) for name, seconds in best.items()]
 
 
+CALLED, ALL_ROUNDS = 4096, 7
+SHORT, LONG, STEPS = (20, 1), (100, 20), 200_000  # steps in a nutation, and nutations; of the run alone
+
+
+class Call(NamedTuple):
+    """One call of `ensemble` as a user makes it: seconds."""
+
+    method: str
+    beside: float  # a member takes beside its steps
+    step: float  # of a member, all that the long call takes divided by its steps
+    alone: float  # a step of one long run
+
+
+def calls() -> list[Call]:
+    """The call with an explicit method and an implicit one."""
+    tops, scene, rows = symtop.population(CALLED, seed=1), symtop.scene("spheroid"), []
+    h = scene.nutation_period / LONG[0]
+    for method in (METHOD, "midpoint"):
+
+        def together(per: int, nutations: int, name: str = method) -> object:
+            lengths = {"per_nutation": per, "nutations": nutations}
+            return symtop.ensemble(tops, name, samples=2, observe="axis", quiet=True, **lengths)
+
+        def alone(name: str = method) -> object:
+            return symtop.simulate(scene, name, step_size=h, horizon=STEPS * h, samples=2, observe="axis", guard=False)
+
+        timed: list[Callable[[], object]] = [lambda: together(*SHORT), lambda: together(*LONG), alone]
+        best = [np.inf] * len(timed)
+        for _ in range(ALL_ROUNDS):
+            for k, call in enumerate(timed):
+                begun = time.perf_counter()
+                call()
+                best[k] = min(best[k], time.perf_counter() - begun)
+        few, many = SHORT[0] * SHORT[1], LONG[0] * LONG[1]
+        short, long = best[0] / CALLED, best[1] / CALLED
+        rows.append(Call(method, short - few * (long - short) / (many - few), long / many, best[2] / STEPS))
+    return rows
+
+
+def said_of(rows: list[Call]) -> list[str]:
+    """What the calls of a user take."""
+    return [
+        f"`symtop.ensemble` of {CALLED} tops, {row.method}, two samples of the axis, {cores()} cores: "
+        f"{row.beside * 1e6:.2f} us a member beside its steps, {row.step * 1e9:.2f} ns a step, "
+        f"{row.alone / row.step:.1f} times the steps a second of one long `simulate`."
+        for row in rows
+    ]
+
+
 def verdict(items: list[Item]) -> list[str]:
     """How much faster an ensemble is, and how much it could be."""
     took = {item.name: item for item in items}
@@ -132,7 +185,7 @@ def lines(items: list[Item]) -> list[str]:
 
 def main() -> None:
     """Measure and print."""
-    print("\n".join(lines(measure())))
+    print("\n".join([*lines(measure()), *said_of(calls())]))
 
 
 if __name__ == "__main__":

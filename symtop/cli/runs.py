@@ -16,6 +16,7 @@ from symtop.core.errors import SymtopError, whole
 from symtop.core.progress import post, ticking
 
 FEWEST, FEW, MANY = 1000, 100_000, 20  # steps that are timed before a run of many times as many
+DECADES = 2.5  # of time, the last of a long run, in which the growth of a change is fitted
 LONG_ENOUGH = 0.5  # seconds of steps that are timed, beside those of a run of few
 SAME = 0.01  # relative difference of the step used from --step-size that is printed
 KERNELS = 5  # of an ensemble: periods, samples, starts, the step in lanes and alone
@@ -132,32 +133,38 @@ def estimate(steps: float, run: Callable[[int], object]) -> None:
 
 
 @click.command(short_help="Run up to billions of steps in little memory.")
-@click.argument("scene", shell_complete=completing("scenes"))
+@click.argument("scene", shell_complete=completing("all scenes"))
 @click.argument("integrator", shell_complete=completing("integrators"))
 @click.option("--steps", type=float, default=1e9, show_default=True, help="Number of steps.")
 @click.option("--step-size", type=float, help="Step; a thousandth of a nutation period by default.")
 @common.per_nutation_option
 @click.option("--checkpoint", type=File(), help="File to resume from; symtop's own by default.")
 @click.option("--output", type=File(), help="Write the windows to this netCDF file.")
+@common.body_options
 @common.plugin_option
 def long(
-    scene: str, integrator: str, steps: float, checkpoint: str | None, output: str | None, **settings: Any
+    scene: Any, integrator: str, steps: float, checkpoint: str | None, output: str | None, **settings: Any
 ) -> None:
     """Run one INTEGRATOR on one SCENE for very many steps, in little memory.
 
     The run is cut into windows, and the output holds the least, largest and mean change of the energy and the momenta
-    in each. A checkpoint is written as it goes: the same command resumes a run that was interrupted.
+    in each, and as what power of the time their sizes grow. A checkpoint is written as it goes: the same command
+    resumes a run that was interrupted.
 
     \b
     symtop long spheroid stormer-verlet --steps 1e9 --output long.nc
     """
     check_outputs(output=output, checkpoint=checkpoint)
     with ticking("loading"):
+        import numpy as np
+
+        from symtop.measure.order import power_law
         from symtop.model import scenes
         from symtop.run.guard import MOST_STEPS
-        from symtop.run.long_run import PER_NUTATION, long_run
+        from symtop.run.long_run import OF_BODY, PER_NUTATION, QUANTITIES, long_run
 
-    period, step_size = scenes.scene(scene).nutation_period, common.step_of(scene, settings)
+    chosen = scenes.scene(scene, bodies=True)
+    period, step_size = chosen.nutation_period, common.step_of(scene, settings)
     if step_size is None and period == math.inf:
         raise SymtopError(f"{scene} has no nutation to take a step from: give --step-size")
     h = period / PER_NUTATION if step_size is None else step_size
@@ -172,10 +179,15 @@ def long(
     say(f"{data.attrs['title']}: {data.attrs['outcome_message']}")
     if data.sizes["window"]:
         rows = []
-        for name in ("energy", "modified_energy", "p_phi", "p_psi"):
-            least, most, mean = (data[f"{name}_{kind}"] for kind in ("least", "largest", "mean"))
-            rows.append([name, *(f"{float(value):+.3e}" for value in (least.min(), most.max(), mean[-1]))])
-        click.echo(table(["change since the start", "least", "largest", "last window's mean"], rows))
+        steps_made = data["steps"].values
+        for name in (OF_BODY if chosen.of_body else QUANTITIES)[:-1]:  # but for theta
+            least, most, mean = (data[f"{name}_{kind}"].values for kind in ("least", "largest", "mean"))
+            sizes = np.maximum.accumulate(np.maximum(np.abs(least), np.abs(most)))
+            grown = power_law(steps_made, sizes, steps_made > steps_made[-1] / 10.0**DECADES)
+            grows = f"t^({grown})" if math.isfinite(grown.slope) else ""
+            words = "|L|" if name == "momentum" else name
+            rows.append([words, *(f"{float(value):+.3e}" for value in (least.min(), most.max(), mean[-1])), grows])
+        click.echo(table(["change since the start", "least", "largest", "last window's mean", "grows as"], rows))
     say_written(output)
     if data.attrs["outcome"] != "ok":
         sys.exit(3)

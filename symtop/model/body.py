@@ -197,8 +197,20 @@ class RigidBody:
         return kinetic + abs(self.mgl)
 
     def flat(self, at: Attitude) -> tuple[float, ...]:
-        """The body and a start as 13 plain numbers: moments, c, q, M."""
-        return (*self.moments, *self.torque, *at.quaternion, *self.momentum(at))
+        """The body and a start as 14 plain numbers: moments, mgl, centre, quaternion, omega."""
+        return (*self.moments, self.mgl, *self.centre, *at.quaternion, *at.omega_body)
+
+
+PARTS = {"I1": 1, "I2": 1, "I3": 1, "mgl": 1, "centre": 3, "quaternion": 4, "omega_body": 3}  # of `RigidBody.flat`
+
+
+def from_flat(row: Sequence[float]) -> tuple[RigidBody, Attitude]:
+    """The body and the start of the numbers that `RigidBody.flat` has made, to the bit: nothing is normalised again."""
+    body, start = object.__new__(RigidBody), object.__new__(Attitude)
+    values = *row[:4], tuple(row[4:7]), tuple(row[7:11]), tuple(row[11:])
+    for name, value in zip((*PARTS, "axes"), (*values, (1.0, 0.0, 0.0, 0.0)), strict=True):
+        object.__setattr__(start if name in Attitude.__slots__ else body, name, value)
+    return body, start
 
 
 @inlined

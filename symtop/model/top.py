@@ -195,7 +195,7 @@ class Angles:
 
 
 def flat(top: "SymmetricTop", at: Angles) -> tuple[float, ...]:
-    """A top and a start as nine plain numbers, in the order of `NUMBERS`; a body as the 13 of its own `flat`."""
+    """A top and a start as nine plain numbers, in the order of `NUMBERS`; a body as the 14 of its own `flat`."""
     if not isinstance(top, SymmetricTop):
         return top.flat(at)
     return top.I1, top.I3, top.mgl, at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot

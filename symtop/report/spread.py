@@ -7,6 +7,8 @@ A member that has failed has an infinite error from there on, so that it counts 
 Quantiles are those of the sample, without interpolation: an infinite one says that so many have failed.
 """
 
+import functools
+
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 from symtop.core.errors import SymtopError, one_of
 from symtop.model import charts, scenes
 from symtop.model.exact.closed_form import ClosedForms
+from symtop.model.top import NUMBERS
 from symtop.run.ensemble.inputs import read_members
 
 Array = NDArray[np.float64]
@@ -40,16 +43,22 @@ def member_errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array
     return np.concatenate([_errors(members.isel(member=one), data.isel(member=one), quantity) for one in parts])
 
 
+@functools.lru_cache(maxsize=1)
+def _forms(plain: bytes) -> ClosedForms:
+    """The closed forms of members, kept from one quantity to the next: they take more than the comparison."""
+    return ClosedForms(np.frombuffer(plain).reshape(-1, len(NUMBERS)))
+
+
 def _errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array:
     numbers, values = read_members(members).numbers, data[quantity].values
     times = np.broadcast_to(data["time"].values, values.shape[:2])
     finite = np.isfinite(times)
     with np.errstate(all="ignore"):  # what a run blew up to is no error of this comparison
         if quantity == "axis":
-            truth = ClosedForms(numbers).axis(np.where(finite, times, 0.0))
+            truth = _forms(numbers.tobytes()).axis(np.where(finite, times, 0.0))
             errors = charts.axis_distance(values, truth)
         else:
-            unit = scenes.energy_scales(numbers, ClosedForms(numbers).theta_range)
+            unit = scenes.energy_scales(numbers, _forms(numbers.tobytes()).theta_range)
             errors = np.abs(values - values[:, :1]) / unit[:, None]
     known = np.isfinite(truth).all(axis=2) if quantity == "axis" else True
     return np.where(finite & known, np.where(np.isfinite(errors), errors, np.inf), np.nan)

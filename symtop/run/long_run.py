@@ -32,10 +32,11 @@ from symtop.core.signals import ending_on_sigterm
 from symtop.methods.framework.loop import FixedStep, Loop, Position, inside
 from symtop.methods.framework.plan import OK, OUTCOMES, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
-from symtop.model.charts import View
+from symtop.model.charts import BODY, View, body_energy
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run import modified_energy as modified
 from symtop.run.guard import MOST_STEPS
+from symtop.run.simulation import chart_of as smallest_chart
 
 Array = np.ndarray
 Gauge = Callable[..., dict[str, Array]]  # states and momenta of samples -> quantities
@@ -47,6 +48,7 @@ LONGEST = 20_000_000  # steps: a window of this length takes a second or two, an
 SAMPLES = 512
 SAVE = 2.0  # seconds
 QUANTITIES = ("energy", "modified_energy", "p_phi", "p_psi", "theta")
+OF_BODY = ("energy", "p_phi", "momentum", "theta")  # of the momentum its length, a constant without a weight
 
 
 def windows(steps: int) -> list[int]:
@@ -66,12 +68,14 @@ def scattered(begin: int, end: int, samples: int = SAMPLES) -> Array:
     return np.unique(np.append(marks[marks <= end], end))
 
 
-def chart_of(method: Integrator) -> tuple[str, FixedStep]:
-    """The smallest chart in which a method has a compiled loop of fixed steps, and the loop."""
+def chart_of(method: Integrator, *, of_body: bool = False) -> tuple[str, FixedStep]:
+    """The smallest chart in which a method has a compiled loop of fixed steps, or that of a body, and the loop."""
     loops = {chart: loop for chart, solver in method.solvers.items() if (loop := inside(solver)) is not None}
     if not loops:
         raise SymtopError(f"{method.name} has no compiled loop of fixed steps, so that it cannot be run in stretches")
-    chart = method.chart_for("axis", among=loops)
+    chart = smallest_chart(method, BODY) if of_body else method.chart_for("axis", among=loops)
+    if chart not in loops:
+        raise SymtopError(f"{method.name} has no compiled loop of fixed steps for bodies without symmetry")
     return chart, loops[chart]
 
 
@@ -80,8 +84,10 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
 
     The oscillation that the modified energy leaves is fitted on the first `FIRST` steps, which are run here. States are
     the loop's own, or, where `shown`, those of the chart. The energy is that of the momenta that the run shows unless
-    the method conserves them: then those of the start have more digits.
+    the method conserves them: then those of the start have more digits. Of a body, `OF_BODY`.
     """
+    if scene.of_body:
+        return _watch_body(scene, method)
     chart, solver = chart_of(method)
     par, rule, state = solver.setup(scene.top, scene.start, h)
     assert isinstance(solver.loop, Loop)  # noqa: S101
@@ -119,6 +125,27 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     return gauge
 
 
+def _watch_body(scene: Scene, method: Integrator) -> Gauge:
+    """Relative changes of energy, p_phi and |L| since the start, and theta."""
+    body, size = scene.top, scene.momentum_scale
+    solver, start = chart_of(method, of_body=True)[1], body.momenta(scene.start)
+    par, _ = solver.prepare(body, scene.start)
+    begun = body_energy(body, np.array([[*scene.start.quaternion, *body.momentum(scene.start)]]))[0]
+
+    def gauge(states: Array, momenta: Array, *, shown: bool = False) -> dict[str, Array]:
+        if not shown and solver.present is not None:
+            states = solver.present(par, np.zeros(len(states)), states)
+        view = View(BODY, body, states)
+        return {
+            "energy": (view.energy - begun) / scene.energy_scale,
+            "p_phi": (momenta[:, 0] - start.p_phi) / size,
+            "momentum": np.linalg.norm(states[:, 4:], axis=1) / size - 1.0,
+            "theta": view.theta,
+        }
+
+    return gauge
+
+
 def long_run(
     scene: "str | Scene", integrator: "str | Integrator", *, steps: int, step_size: float,
     checkpoint: "str | Path | bool" = False, compensated: bool = True, quiet: bool = False,
@@ -127,7 +154,8 @@ def long_run(
     """Run a fixed-step method for any number of steps and return what it did, window by window.
 
     Dimension ``window``; ``steps`` is chosen each ends. For each of energy, modified_energy, p_phi, p_psi (relative
-    changes since the start) and theta (rad): ``NAME_least``, ``NAME_largest``, ``NAME_mean``. `checkpoint` is a file
+    changes since the start) and theta (rad): ``NAME_least``, ``NAME_largest``, ``NAME_mean``; of a body without
+    symmetry for energy, p_phi, momentum (its length, constant without a weight) and theta. `checkpoint` is a file
     that is written as the run goes on and removed at its end, or True for one in symtop's cache: an interrupted run
     resumes from it. `output` is a netCDF file for what is returned: the checkpoint is removed once that is written.
     ``compensated=False`` sums increments plainly, to compare.
@@ -135,9 +163,9 @@ def long_run(
     Raises SymtopError for a method without a compiled loop, for a checkpoint of another run and for an output that
     cannot be written.
     """
-    chosen, method = find_scene(scene), find_integrator(integrator)
+    chosen, method = find_scene(scene, bodies=True), find_integrator(integrator)
     count, h = whole("steps", steps, 1, MOST_STEPS), positive("step_size", step_size)
-    _, solver = chart_of(method)
+    _, solver = chart_of(method, of_body=chosen.of_body)
     assert isinstance(solver.loop, Loop)  # noqa: S101
     loop = solver.loop if compensated else solver.loop.plain()
     par, rule, state = solver.setup(chosen.top, chosen.start, h)
@@ -145,6 +173,7 @@ def long_run(
     result = None if output is None else checkpoints.checked(file_path("output", output))
     at, rows = checkpoints.resumed(loop.start(par, rule, state, h))
     ends, outcome, reached, title = windows(count), OK, at.k, f"{method.name} on {chosen.name}"
+    quantities = OF_BODY if chosen.of_body else QUANTITIES
     gauge = watch(chosen, method, h) if len(rows) < len(ends) else None
     bar = tqdm(total=count, initial=at.k, desc=title, unit="step", unit_scale=True, disable=quiet or None, leave=False)
     with checkpoints.saved_on_failure():
@@ -158,9 +187,9 @@ def long_run(
                     at = after
                     checkpoints.note(at, rows)
         data = netcdf.describe(
-            _windowed(rows, ends), title=f"{title}, {count} steps", units=chosen.units, integrator=method.name,
-            scene=chosen.name, step_size=h, horizon=count * h, compensated=str(compensated).lower(),
-            outcome=OUTCOMES[outcome], reached_time=reached * h,
+            _windowed(rows, ends, quantities), title=f"{title}, {count} steps", units=chosen.units,
+            integrator=method.name, scene=chosen.name, step_size=h, horizon=count * h,
+            compensated=str(compensated).lower(), outcome=OUTCOMES[outcome], reached_time=reached * h,
             outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h, chosen.second),
         )  # fmt: skip
         if result is not None:
@@ -169,11 +198,11 @@ def long_run(
     return data
 
 
-def _windowed(rows: list[list[float]], ends: list[int]) -> xr.Dataset:
+def _windowed(rows: list[list[float]], ends: list[int], quantities: tuple[str, ...]) -> xr.Dataset:
     """The dataset of the windows."""
-    columns = np.array(rows).reshape(len(rows), len(QUANTITIES), 3)
+    columns = np.array(rows).reshape(len(rows), len(quantities), 3)
     variables: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
-    for i, name in enumerate(QUANTITIES):
+    for i, name in enumerate(quantities):
         words, units = ("theta", "rad") if name == "theta" else (f"relative change of {name} since the start", "1")
         for m, part in enumerate(("least", "largest", "mean")):
             attributes = {"long_name": f"{words}, {part} over the window", "units": units}
@@ -183,8 +212,7 @@ def _windowed(rows: list[list[float]], ends: list[int]) -> xr.Dataset:
 
 def summary(values: dict[str, Array]) -> list[float]:
     """Least, largest and mean of each quantity, in their order."""
-    chosen = [values[name] for name in QUANTITIES]
-    return [float(part) for value in chosen for part in (value.min(), value.max(), value.mean())]
+    return [float(part) for value in values.values() for part in (value.min(), value.max(), value.mean())]
 
 
 def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:

@@ -102,11 +102,13 @@ def test_what_the_benchmark_leaves_is_what_the_report_shows(tmp_path):
     lane_rows = [lanes.Row(name, "axis", *numbers) for name, numbers in timed.items()]
     batch = lanes.Batch(1e-6, 1.2e-6, 45, 7e-6, 16e-6, 2.6e-6)
     together = lanes.Measured(lane_rows, [lanes.Threads("strang", "axis", 1.9, 1.8, 2.0)], [batch])
-    content = bench.findings(rows, {}, forms, reached, items, one_step, many, together, 1e-9, facts)
+    called = [ensemble.Call("strang", 0.9e-6, 2.5e-9, 25e-9)]
+    content = bench.findings(rows, {}, forms, reached, items, one_step, many, called, together, 1e-9, facts)
     netcdf.write_json(tmp_path / "bench.json", content)
     text = page.write(tmp_path).read_text()
     markdown = (tmp_path / "report.md").read_text() + (tmp_path / "reference.md").read_text()
-    counted = ("1 of 2 kernels", "3.0 us at most", "123 times faster", "explicit: 1 of 2 methods")
+    calls = "0.90 us a member beside its steps, 2.50 ns a step, 10.0 times"
+    counted = ("1 of 2 kernels", "3.0 us at most", "123 times faster", "explicit: 1 of 2 methods", calls)
     for words in (*counted, "gauss: 1 of 1 methods", "4.5 times with rk4[axis]", "2001-02-03", "an abacus"):
         assert words in text
         assert words in markdown

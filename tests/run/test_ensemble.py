@@ -1,6 +1,7 @@
 """Each member of an ensemble is the run of `simulate`, to the last bit; a bad one is refused or fails alone."""
 
 import dataclasses
+import pickle
 
 import numpy as np
 import pytest
@@ -276,8 +277,28 @@ def test_variables_are_those_of_all_and_need_no_closed_form(monkeypatch):
     assert [name for name in data if "time" in data[name].dims] == ["axis", "energy"]
     xr.testing.assert_identical(data.axis, wanted.axis)
     xr.testing.assert_identical(data.energy, wanted.energy)
+    data = symtop.ensemble(SOME, "strang[attitude]", **asked)  # nor does phi, before it is read
+    xr.testing.assert_identical(data.theta, wanted.theta)
     with pytest.raises(TypeError):
-        symtop.ensemble(SOME, "strang[attitude]", variables=("phi",), **asked)
+        data.phi.values  # noqa: B018
+
+
+@pytest.mark.parametrize("name", ["strang[axis]", "strang[attitude]"])
+def test_angles_are_made_when_they_are_read_with_the_bits_of_a_file(name, tmp_path, monkeypatch):
+    asked = {"per_nutation": 20, "nutations": 3, "samples": 7, "quiet": True}
+    data, again = (symtop.ensemble(SOME, name, **asked) for _ in range(2))
+    angles = [angle for angle in ("phi", "psi") if angle in data]
+    with symtop.ensemble(SOME, name, path=tmp_path / "runs.nc", **asked) as written:
+        whole = {angle: written[angle].values for angle in angles}
+    assert any(np.abs(values).max() > np.pi for values in whole.values())  # more than a turn
+    for angle in angles:
+        np.testing.assert_array_equal(pickle.loads(pickle.dumps(data))[angle], whole[angle])
+        np.testing.assert_array_equal(data[angle].isel(member=[3, 30], time=slice(2, 5)), whole[angle][[3, 30], 2:5])
+        np.testing.assert_array_equal(data[angle].isel(member=4, time=-1), whole[angle][4, -1])
+    xr.testing.assert_identical(data.isel(member=slice(5, 30)).phi, again.load().phi.isel(member=slice(5, 30)))
+    monkeypatch.setattr(chunks, "ClosedForms", None)  # what has been read is kept
+    again["phi"][2, 1] = 9.0
+    assert again.phi.values[2, 1] == 9.0
 
 
 def raising(error, *bad):

@@ -302,6 +302,39 @@ def test_the_command_runs_and_says_what_changed(tmp_path):
     assert bad.exit_code == 2
 
 
+@pytest.mark.parametrize("name", ["strang", "gauss-4"])  # one that shows what it steps, and one that turns it back
+def test_a_body_is_watched_as_simulate_shows_it(name):
+    scene = symtop.scene("heavy-brick", bodies=True)
+    steps, h = 10_000, scene.nutation_period / 50.37
+    found = long_run(scene, name, steps=steps, step_size=h, quiet=True)
+    dense = symtop.simulate(scene, name, step_size=h, horizon=steps * h, samples=steps + 1, guard=False)
+    length = np.linalg.norm(dense.momentum, axis=1)
+    changes = {
+        "energy": (dense.energy - scene.top.energy(scene.start)) / scene.energy_scale,
+        "p_phi": (dense.p_phi - scene.top.momenta(scene.start).p_phi) / scene.momentum_scale,
+        "momentum": length / scene.momentum_scale - 1.0,
+        "theta": dense.theta,
+    }
+    for quantity, values in changes.items():
+        span = float(values.max() - values.min())
+        assert float(found[f"{quantity}_least"].min()) == pytest.approx(float(values.min()), abs=0.05 * span + 1e-15)
+        assert float(found[f"{quantity}_largest"].max()) == pytest.approx(float(values.max()), abs=0.05 * span + 1e-15)
+
+
+def test_what_a_free_body_keeps_grows_as_rounding_and_what_it_does_not_keep_as_the_time(tmp_path):
+    command = ["long", "tennis-racket", "--steps", "1e5", "--per-nutation", "60.37", "--checkpoint"]
+    file = str(tmp_path / "c.nc")
+    kept, lost = (CliRunner().invoke(main, [*command, file, name]) for name in ("strang", "rk4"))
+    assert (kept.exit_code, lost.exit_code) == (0, 0), kept.output + lost.output
+    sizes = {}
+    for name, done in (("strang", kept), ("rk4", lost)):
+        row = next(line.split() for line in done.output.splitlines() if line.startswith("|L|"))
+        sizes[name] = max(abs(float(row[1])), abs(float(row[2]))), float(row[4].removeprefix("t^("))
+    assert sizes["strang"][0] < 1e-14
+    assert sizes["rk4"][0] > 1e-6
+    assert sizes["rk4"][1] == pytest.approx(1.0, abs=0.05)
+
+
 def test_a_checkpoint_does_not_depend_on_what_its_process_has_run():
     """Told before and after other work by a new process, and by this one."""
     script = """

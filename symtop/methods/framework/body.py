@@ -50,9 +50,11 @@ class Pose(NamedTuple):
 
 @register_jitable
 def opened(plain: Any) -> Any:
-    """A body and a start, of their 13 numbers."""
-    I1, I2, I3, c1, c2, c3 = plain[:6]
-    return General(1.0 / I1, 1.0 / I2, 1.0 / I3, I1, I2, I3, c1, c2, c3), Pose(*plain[6:])
+    """A body and a start, of their 14 numbers."""
+    I1, I2, I3, mgl, x, y, z = plain[:7]
+    body = General(1.0 / I1, 1.0 / I2, 1.0 / I3, I1, I2, I3, mgl * x, mgl * y, mgl * z)
+    w, x, y, z, w1, w2, w3 = plain[7:]
+    return body, Pose(w, x, y, z, I1 * w1, I2 * w2, I3 * w3)
 
 
 @register_jitable
@@ -99,7 +101,7 @@ of_top, in_space = Preparation(_of_top, 7), Shown(_in_space, 7)  # a top as (q, 
 
 def prepared(numbers: Any) -> Preparation:
     """What a kernel of seven numbers steps, by ``numbers(body, start)`` of a `General` and a `Pose`."""
-    return _OfBody(numbers, 7, opened=opened, momenta=_momenta)
+    return _OfBody(numbers, 7, opened=opened, momenta=_momenta, given=14)
 
 
 on_body, turned, turned_back = prepared(_on_body), prepared(_turned), Shown(_turned_back, 7)

@@ -47,14 +47,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.core.jit import compile_kernel, register_jitable, set_item
+from symtop.core.jit import compile_kernel, register_jitable, set_item, to_fixed_tuple
 from symtop.core.parallel import heed
 from symtop.methods.framework.angles import in_chart
 from symtop.methods.framework.plan import OK
-from symtop.methods.framework.preparation import Body, Pack, Start, as_fields, conserved
+from symtop.methods.framework.preparation import Pack, as_fields
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.body import from_flat
+from symtop.model.top import NUMBERS, Angles, SymmetricTop
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -135,7 +136,9 @@ class Lanes:
         return 3 * self.dimension
 
 
-def preparing(lanes: Lanes, begin: Any, enter: Any, kind: Any, numbers: Any, scale: Any) -> Any:
+def preparing(
+    lanes: Lanes, begin: Any, enter: Any, kind: Any, numbers: Any, scale: Any, opened: Any, momenta_at: Any, width: int
+) -> Any:
     """The compiled preparation of many members: what their columns in `block` and `table` begin with, a row each."""
     lay, begin = lanes.lay, lanes.begin or begin
 
@@ -143,8 +146,7 @@ def preparing(lanes: Lanes, begin: Any, enter: Any, kind: Any, numbers: Any, sca
         tops, rules, starts, carries = prepared
         for i in range(len(chosen)):
             m = chosen[i]
-            at = given[m]
-            top, start = Body(at[0], at[1], at[2]), Start(at[3], at[4], at[5], at[6], at[7], at[8])
+            top, start = opened(to_fixed_tuple(given[m], width))
             par, state = numbers(top, start)
             rule = scale(kind(coefficients), top, start, h[m])
             state = enter(par, rule, state, h[m])
@@ -157,8 +159,7 @@ def preparing(lanes: Lanes, begin: Any, enter: Any, kind: Any, numbers: Any, sca
             for q in range(len(carry)):
                 carries[i, q] = carry[q]
             if marks[m, 0] == 0:
-                constants = conserved(top, start)
-                momenta[m, 0, 0], momenta[m, 0, 1] = constants.p_phi, constants.p_psi
+                momenta[m, 0, 0], momenta[m, 0, 1] = momenta_at(top, start)
 
     return compile_kernel(prepare)
 
@@ -338,10 +339,15 @@ def in_turn(
         done.momenta[i] = momenta.T
 
 
-def members_of(numbers: Array) -> Iterator[tuple[SymmetricTop, Angles]]:
-    """The top and the start in each row of nine numbers."""
+def of_bodies(numbers: Array) -> bool:
+    """Are these rows of bodies without symmetry, and not of tops?"""
+    return int(numbers.shape[1]) != len(NUMBERS)
+
+
+def members_of(numbers: Array) -> Iterator[tuple[Any, Any]]:
+    """The top, or the body, and the start in each row."""
     for row in numbers.tolist():
-        yield SymmetricTop(*row[:3]), Angles(*row[3:])
+        yield from_flat(row) if of_bodies(numbers) else (SymmetricTop(*row[:3]), Angles(*row[3:]))
 
 
 def refused(check: Callable[..., None] | None, numbers: Array) -> NDArray[np.bool_]:
@@ -400,7 +406,12 @@ def aligned(count: int) -> Array:
 
 
 def turns(numbers: Array, h: Array) -> Array:
-    """About how far each member, nine numbers in a row, moves in its step, in radians; not finite if it overflows."""
+    """About how far each member, a row, moves in its step, in radians; not finite if it overflows."""
+    if of_bodies(numbers):
+        moments = numbers[:, :3]
+        with np.errstate(all="ignore"):
+            square = (numbers[:, 11:] ** 2).sum(axis=1) + np.abs(numbers[:, 3]) / moments.min(axis=1)
+            return np.asarray(np.abs(h) * np.sqrt(square))
     I1, I3, mgl, theta, _, _, dtheta, dphi, dpsi = numbers.T
     with np.errstate(all="ignore"):
         spin = I3 / I1 * (dpsi + dphi * np.cos(theta))

@@ -195,12 +195,12 @@ def kernel_loop(  # noqa: C901  (one loop, read in one piece)
         return compiled
 
     @functools.cache
-    def together(family: Lanes, kind: Any, numbers: Any, scale: Any, show: Any) -> Blocks:
-        prepare = many.preparing(family, begin, enter, kind, numbers, scale)
+    def together(family: Lanes, show: Any, *parts: Any) -> Blocks:
+        prepare = many.preparing(family, begin, enter, *parts)
         return Blocks(family, prepare, many.marching(family, observe, present, show))
 
-    def blocks(family: Lanes, kind: Any, numbers: Any, scale: Any, sample: Any) -> Blocks:
-        return together(family, kind, numbers, scale, family.show or many.showing(sample))
+    def blocks(family: Lanes, kind: Any, numbers: Any, scale: Any, sample: Any, *plain: Any) -> Blocks:
+        return together(family, family.show or many.showing(sample), kind, numbers, scale, *plain)
 
     @functools.cache
     def plain() -> Loop:
@@ -348,9 +348,11 @@ class FixedStep:
         kind, numbers = pack(rule)
         parts = kind, prepare.numbers, scale, sample
         lanes = loop.lanes(rule)
-        blocks = None if lanes is None else partial(loop.blocks, lanes, lanes.pack(rule)[0], *parts[1:])
+        plain = prepare.opened, prepare.momenta
+        given = *parts[1:], *plain, prepare.given
+        blocks = None if lanes is None else partial(loop.blocks, lanes, lanes.pack(rule)[0], *given)
         costs = self.evaluations, self.each_step, int(self.implicit)
-        whole = loop.whole(*parts, prepare.opened, prepare.momenta)
+        whole = loop.whole(*parts, *plain)
         alone = whole, numbers, prepare.check, size, *costs
         return _Whole(numbers, size, alone, blocks, rule)
 

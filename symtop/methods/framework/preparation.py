@@ -64,7 +64,8 @@ def momenta_at(top: Any, at: Any) -> Any:
 class Preparation:
     """What a kernel steps: `numbers(top, at)` compiles, `check` refuses a start that the kernel cannot step.
 
-    `opened` makes the records that `numbers` takes of the plain numbers of a run, and `momenta` is what these conserve.
+    `opened` makes the records that `numbers` takes of the `given` plain numbers of a run, and `momenta` is what these
+    conserve.
     """
 
     numbers: Callable[..., tuple[Any, Numbers]]
@@ -72,6 +73,7 @@ class Preparation:
     check: Callable[[Any], None] | None = None  # raises SymtopError
     opened: Callable[..., Any] = opened
     momenta: Callable[..., Any] = momenta_at
+    given: int = 9
 
     def __post_init__(self) -> None:
         register_jitable(self.numbers)  # at once: what a kernel is made of must not hang on what has run

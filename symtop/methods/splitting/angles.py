@@ -87,8 +87,8 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
 
 
 @register_jitable
-def _drift_in_lanes(state: Any, step: Any, tau: float) -> Any:
-    return drift_angles(None, None, state, step, tau), True
+def _drift_in_lanes(par: Any, state: Any, step: Any, tau: float) -> Any:
+    return drift_angles(par, None, state, step, tau), True
 
 
 @register_jitable

@@ -37,15 +37,18 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
-from symtop.core.jit import register_jitable
+from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework import body
+from symtop.methods.framework.lanes import Lanes, W, column, put
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
 from symtop.methods.framework.preparation import Scaled, opened
 from symtop.methods.framework.registry import Integrator
+from symtop.methods.simd import wide_vectors
 from symtop.methods.splitting.coefficients import BLANES_MOAN_6, METHODS, STRANG, Table
-from symtop.methods.splitting.loop import Composition, compose, packed, stages
+from symtop.methods.splitting.loop import Composition, compose, composed, no_rest, packed, stages
+from symtop.methods.splitting.rotor import COSINE, SINE, exact, near, series
 from symtop.methods.vectors import cross, plus
 from symtop.model.body import vertical
 from symtop.model.charts import BODY
@@ -78,92 +81,175 @@ def _force(par: Any, state: Any, step: Any) -> Any:
     return vertical(state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3])
 
 
-@register_jitable
-def _kick(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any:
-    x, y, z = body.torque(par, *force)
-    kick = pull * x, pull * y, pull * z
-    if bend != 0.0:
-        slope = cross((par.c1, par.c2, par.c3), (par.a1 * x, par.a2 * y, par.a3 * z))
-        kick = plus(kick, bend, cross(force, slope))
-    return (*step[:4], step[4] + kick[0], step[5] + kick[1], step[6] + kick[2])
+def _kicking(gradient: bool | None) -> Callable[..., Any]:
+    """A kick with a force gradient, without one, or as its table says (None)."""
+
+    @register_jitable
+    def kick(par, force, step, pull, bend):  # type: ignore[no-untyped-def]
+        x, y, z = body.torque(par, *force)
+        kick = pull * x, pull * y, pull * z
+        if gradient or (gradient is None and bend != 0.0):
+            slope = cross((par.c1, par.c2, par.c3), (par.a1 * x, par.a2 * y, par.a3 * z))
+            kick = plus(kick, bend, cross(force, slope))
+        return (*step[:4], step[4] + kick[0], step[5] + kick[1], step[6] + kick[2])
+
+    return kick
 
 
 @register_jitable
-def _about(w: float, x: float, y: float, z: float, M1: float, M2: float, M3: float, turn: float) -> Any:
-    """What a turn by turn M1 about the first of three cyclic axes adds to q, M2 and M3."""
-    quarter = 0.25 * turn * M1
-    q = math.sin(quarter)
-    s, m = 2.0 * q * math.cos(quarter), -2.0 * q * q
-    C, S = -2.0 * s * s, 2.0 * s * (1.0 + m)
-    return m * w - s * x, m * x + s * w, m * y + s * z, m * z - s * y, C * M2 + S * M3, C * M3 - S * M2
+def by_library(x: float) -> Any:
+    """sin x, cos x - 1, and that they are right, of any angle by sine and cosine of its half."""
+    q = math.sin(0.5 * x)
+    return 2.0 * q * math.cos(0.5 * x), -2.0 * q * q, True
 
 
 @register_jitable
-def _about_first(state: Any, d: Any, turn: float) -> Any:
-    w, x, y, z = state[0] + d[0], state[1] + d[1], state[2] + d[2], state[3] + d[3]
-    a, b, c, e, m2, m3 = _about(w, x, y, z, state[4] + d[4], state[5] + d[5], state[6] + d[6], turn)
-    return d[0] + a, d[1] + b, d[2] + c, d[3] + e, d[4], d[5] + m2, d[6] + m3
+def by_series(x: float) -> Any:
+    """The same of an angle below 1; whether it was."""
+    square = x * x
+    return x * series(square, SINE), -square * series(square, COSINE), square < 1.0
 
 
 @register_jitable
-def _about_second(state: Any, d: Any, turn: float) -> Any:
-    w, x, y, z = state[0] + d[0], state[1] + d[1], state[2] + d[2], state[3] + d[3]
-    a, c, e, b, m3, m1 = _about(w, y, z, x, state[5] + d[5], state[6] + d[6], state[4] + d[4], turn)
-    return d[0] + a, d[1] + b, d[2] + c, d[3] + e, d[4] + m1, d[5], d[6] + m3
+def by_either(x: float) -> Any:
+    """The series where it is right."""
+    return by_series(x) if x * x < 1.0 else by_library(x)
+
+
+class _Turns(NamedTuple):
+    """The flows that a drift is made of, ``(state, d, turn)``: what d becomes, and whether the rotor could be used."""
+
+    first: Callable[..., Any]
+    second: Callable[..., Any]
+    third: Callable[..., Any]
+    momentum: Callable[..., Any]
+
+
+def _turns(sine: Callable[..., Any], rotor: Callable[..., Any]) -> _Turns:
+    """The turns by M_k `turn` about the axes of the body, and the flow of turn |M|^2/2 by a rotor of `rotor`."""
+
+    def about(k: int) -> Callable[..., Any]:
+        """The turn about axis k and what it does to the two that follow: numbers of q, and of M three further."""
+        a, b, c = 1 + k, 1 + (k + 1) % 3, 1 + (k + 2) % 3
+
+        @register_jitable
+        def turned(state, d, turn):  # type: ignore[no-untyped-def]
+            w, x, y, z = state[0] + d[0], state[a] + d[a], state[b] + d[b], state[c] + d[c]
+            M2, M3 = state[b + 3] + d[b + 3], state[c + 3] + d[c + 3]
+            s, m, near = sine(0.5 * turn * (state[a + 3] + d[a + 3]))
+            C, S = -2.0 * s * s, 2.0 * s * (1.0 + m)
+            d = set_item(set_item(d, 0, d[0] + (m * w - s * x)), a, d[a] + (m * x + s * w))
+            d = set_item(set_item(d, b, d[b] + (m * y + s * z)), c, d[c] + (m * z - s * y))
+            d = set_item(set_item(d, b + 3, d[b + 3] + (C * M2 + S * M3)), c + 3, d[c + 3] + (C * M3 - S * M2))
+            return d, near
+
+        return turned
+
+    @register_jitable
+    def momentum(state, d, turn):  # type: ignore[no-untyped-def]
+        w, x, y, z = state[0] + d[0], state[1] + d[1], state[2] + d[2], state[3] + d[3]
+        M1, M2, M3 = state[4] + d[4], state[5] + d[5], state[6] + d[6]
+        half = 0.5 * turn
+        square = half * half * (M1 * M1 + M2 * M2 + M3 * M3)
+        s, m = rotor(square, half)
+        m += 0.5 * (1.0 + m) * (1.0 - (w * w + x * x + y * y + z * z))
+        moved = (
+            d[0] + (m * w - s * (M1 * x + M2 * y + M3 * z)), d[1] + (m * x + s * (M1 * w + M3 * y - M2 * z)),
+            d[2] + (m * y + s * (M2 * w + M1 * z - M3 * x)), d[3] + (m * z + s * (M3 * w + M2 * x - M1 * y)),
+            d[4], d[5], d[6],
+        )  # fmt: skip
+        return moved, square < 1.0
+
+    return _Turns(about(0), about(1), about(2), momentum)
+
+
+ALONE, TOGETHER = _turns(by_either, exact), _turns(by_series, near)  # with a branch, and without it for lanes
+PAR, STATE, STEP, FLAG = (0.0,) * 9, (0.0,) * 7, 14, 21  # numbers of a block, as `lanes` has them
 
 
 @register_jitable
-def _about_third(state: Any, d: Any, turn: float) -> Any:
-    w, x, y, z = state[0] + d[0], state[1] + d[1], state[2] + d[2], state[3] + d[3]
-    a, e, b, c, m1, m2 = _about(w, z, x, y, state[6] + d[6], state[4] + d[4], state[5] + d[5], turn)
-    return d[0] + a, d[1] + b, d[2] + c, d[3] + e, d[4] + m1, d[5] + m2, d[6]
-
-
-@register_jitable
-def _about_momentum(state: Any, d: Any, turn: float) -> Any:
-    """The flow of turn |M|^2/2."""
-    w, x, y, z = state[0] + d[0], state[1] + d[1], state[2] + d[2], state[3] + d[3]
-    M1, M2, M3 = state[4] + d[4], state[5] + d[5], state[6] + d[6]
-    size = math.sqrt(M1 * M1 + M2 * M2 + M3 * M3)
-    quarter = 0.25 * turn * size
-    q = math.sin(quarter)
-    m = -2.0 * q * q
-    s = 2.0 * q * math.cos(quarter) / size if size > 0.0 else 0.0
-    m += 0.5 * (1.0 + m) * (1.0 - (w * w + x * x + y * y + z * z))
-    return (
-        d[0] + (m * w - s * (M1 * x + M2 * y + M3 * z)), d[1] + (m * x + s * (M1 * w + M3 * y - M2 * z)),
-        d[2] + (m * y + s * (M2 * w + M1 * z - M3 * x)), d[3] + (m * z + s * (M3 * w + M2 * x - M1 * y)),
-        d[4], d[5], d[6],
-    )  # fmt: skip
+def _ended(state: Any, step: Any) -> int:
+    return body.ended_body(step)
 
 
 def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return _force(par, state, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def _march(drift: Callable[..., Any]) -> Loop:
+def _march(drift: Callable[..., Any], in_lanes: Callable[..., Any] | None, rest: Any = no_rest) -> Loop:
+    kick = _kicking(None)
+
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        step, force = compose(_force, _kick, drift, par, rule, state, carry)
+        step, force = compose(_force, kick, drift, par, rule, state, carry)
         return step, force, rule.forces, body.ended_body(step)
 
-    return kernel_loop(_begin, increment, body.observe_body)
+    @functools.cache
+    def lanes(gradient: bool) -> Lanes:
+        assert in_lanes is not None  # noqa: S101
+        return composed(_force, _kicking(gradient), in_lanes, _ended, top=body.General, dimension=7, carry=3, rest=rest)
+
+    return kernel_loop(
+        _begin, increment, body.observe_body,
+        lanes=lambda rule: None if in_lanes is None or rule.turn != AS_GIVEN else lanes(any(rule.gradient)),
+    )  # fmt: skip
 
 
 @functools.cache
 def march(free: Table) -> Loop:
     """The loop of the tables whose drift is this composition of turns about the third axis and the first."""
-    third, first = free.kick, free.drift
+    outer, inner = free.kick, free.drift
+    first, _, third, momentum = ALONE
 
     @register_jitable
     def drift(par, rule, state, step, time):  # type: ignore[no-untyped-def]
         about_third, about_first = time * (par.a3 - par.a2), time * (par.a1 - par.a2)
-        step = _about_third(state, step, third[0] * about_third)
-        for i in range(len(first)):
-            step = _about_first(state, step, first[i] * about_first)
-            step = _about_third(state, step, third[i + 1] * about_third)
-        return _about_momentum(state, step, time * par.a2)
+        step, _ = third(state, step, outer[0] * about_third)
+        for i in range(len(inner)):
+            step, _ = first(state, step, inner[i] * about_first)
+            step, _ = third(state, step, outer[i + 1] * about_third)
+        return momentum(state, step, time * par.a2)[0]
 
-    return _march(drift)
+    return _march(drift, *_in_lanes(outer, inner))
+
+
+def _in_lanes(outer: tuple[float, ...], inner: tuple[float, ...]) -> tuple[Any, Any]:
+    """The first turn of that drift, and the others, each in a loop over lanes."""
+    first, _, third, momentum = TOGETHER
+
+    @register_jitable
+    def begun(par, state, step, time):  # type: ignore[no-untyped-def]
+        return third(state, step, outer[0] * (time * (par.a3 - par.a2)))
+
+    @register_jitable
+    def opened(block, table, j):  # type: ignore[no-untyped-def]
+        return body.General(*column(table, 0, j, PAR)), column(block, 0, j, STATE), column(block, STEP, j, STATE)
+
+    @register_jitable
+    def turned(block, row, table, i, j):  # type: ignore[no-untyped-def]
+        par, state, step = opened(block, table, j)
+        step, one = first(state, step, inner[i] * (row[2 * W + j] * (par.a1 - par.a2)))
+        step, two = third(state, step, outer[i + 1] * (row[2 * W + j] * (par.a3 - par.a2)))
+        put(block, STEP, j, step)
+        block[FLAG * W + j] = block[FLAG * W + j] if one & two else 1.0
+
+    @register_jitable
+    def ended(block, row, table, j):  # type: ignore[no-untyped-def]
+        par, state, step = opened(block, table, j)
+        step, near = momentum(state, step, row[2 * W + j] * par.a2)
+        put(block, STEP, j, step)
+        put(block, FLAG + 2, j, _force(par, state, step))
+        block[FLAG * W + j] = block[FLAG * W + j] if near else 1.0
+
+    @register_jitable
+    def rest(block, row, table):  # type: ignore[no-untyped-def]
+        wide_vectors()
+        for i in range(len(inner)):
+            for j in range(W):
+                turned(block, row, table, i, j)
+        for j in range(W):
+            ended(block, row, table, j)
+
+    return begun, rest
 
 
 AS_GIVEN, SORTED = range(2)  # the order of the axes of five rotations, in `Composition.turn`
@@ -179,24 +265,46 @@ def _axes(par: Any, turn: int) -> Any:
     return largest, 3 - largest - smallest, smallest
 
 
-@register_jitable
-def _about_axis(par: Any, axis: int, state: Any, step: Any, time: float) -> Any:
-    if axis == 0:
-        return _about_first(state, step, time * par.a1)
-    if axis == 1:
-        return _about_second(state, step, time * par.a2)
-    return _about_third(state, step, time * par.a3)
+def _five(turns: _Turns) -> Callable[..., Any]:
+    """A drift of five rotations."""
+    first, second, third, momentum = turns
+
+    @register_jitable
+    def about(par, axis, state, step, time):  # type: ignore[no-untyped-def]
+        if axis == 0:
+            return first(state, step, time * par.a1)[0]
+        if axis == 1:
+            return second(state, step, time * par.a2)[0]
+        return third(state, step, time * par.a3)[0]
+
+    @register_jitable
+    def drift(par, rule, state, step, time):  # type: ignore[no-untyped-def]
+        (outer, middle, inner), half = _axes(par, rule.turn), 0.5 * time
+        step = about(par, middle, state, about(par, outer, state, step, half), half)
+        step = about(par, middle, state, about(par, inner, state, step, time), half)
+        return momentum(state, about(par, outer, state, step, half), 0.0)[0]  # the length of q
+
+    return drift
 
 
-@register_jitable
-def _five_rotations(par: Any, rule: Any, state: Any, step: Any, time: float) -> Any:
-    (outer, middle, inner), half = _axes(par, rule.turn), 0.5 * time
-    step = _about_axis(par, middle, state, _about_axis(par, outer, state, step, half), half)
-    step = _about_axis(par, middle, state, _about_axis(par, inner, state, step, time), half)
-    return _about_momentum(state, _about_axis(par, outer, state, step, half), 0.0)  # the length of q
+def _five_in_lanes() -> Callable[..., Any]:
+    """The same about the axes as they are given."""
+    first, second, third, momentum = TOGETHER
+
+    @register_jitable
+    def drift(par, state, step, time):  # type: ignore[no-untyped-def]
+        half = 0.5 * time
+        step, a = first(state, step, half * par.a1)
+        step, b = second(state, step, half * par.a2)
+        step, c = third(state, step, time * par.a3)
+        step, d = second(state, step, half * par.a2)
+        step, e = first(state, step, half * par.a1)
+        return momentum(state, step, 0.0)[0], a & b & c & d & e
+
+    return drift
 
 
-march_five = _march(_five_rotations)
+march_five, march_five_of_top = _march(_five(ALONE), _five_in_lanes()), _march(_five(_turns(by_library, exact)), None)
 
 
 def five_rotations(order_of_axes: int) -> FixedStep:
@@ -208,7 +316,8 @@ def five_rotations(order_of_axes: int) -> FixedStep:
 def built_in() -> list[Integrator]:
     """`five-rotations`."""
     on_body = five_rotations(AS_GIVEN)
-    on_top = replace(on_body, rule=replace(on_body.rule, opened=opened), prepare=body.of_top, present=body.in_space)
+    rule = replace(on_body.rule, opened=opened)
+    on_top = replace(on_body, loop=march_five_of_top, rule=rule, prepare=body.of_top, present=body.in_space)
     return [
         Integrator(
             name="five-rotations", family="splitting", order=2, explicit=True, symplectic=True, symmetric=True,

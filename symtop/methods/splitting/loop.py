@@ -168,18 +168,24 @@ def read(numbers: Any) -> Any:
     return Stages(numbers[2:last:3], numbers[0:last:3], numbers[1:last:3], 0, 0, numbers[last])
 
 
+@register_jitable
+def no_rest(block: Any, row: Any, table: Any) -> None:
+    """Of a drift that is one loop over lanes."""
+
+
 def composed(
     force: Callable[..., Any], kick: Callable[..., Any], drift: Callable[..., Any], ended: Callable[..., Any], *,
-    top: Any, dimension: int, carry: int, still: int = 0,
+    top: Any, dimension: int, carry: int, still: int = 0, rest: Callable[..., None] = no_rest,
 ) -> Lanes:  # fmt: skip
     """A composition in lanes, from the functions that `compose` takes, but for the drift.
 
-    ``drift(state, step, a)`` returns the step and whether it can do without a branch. ``ended(state, step)`` is the
-    outcome of a step, `carry` how many numbers a force has. The last `still` components of a state never move: of their
-    sums only the one is made that turns -0 into 0.
+    ``drift(par, state, step, a)`` returns the step and whether it can do without a branch. ``ended(state, step)`` is
+    the outcome of a step, `carry` how many numbers a force has. The last `still` components of a state never move: of
+    their sums only the one is made that turns -0 into 0. ``rest(block, row, table)`` is what of a long drift remains,
+    in loops of its own, the force at its end included.
     """
     zeros, none, numbers = (0.0,) * dimension, (0.0,) * carry, (0.0,) * len(top._fields)
-    moving, rest = zeros[: dimension - still], zeros[dimension - still :]
+    moving, unmoved = zeros[: dimension - still], zeros[dimension - still :]
     coefficients, step_at, flag, still_at = len(numbers), 2 * dimension, 3 * dimension, len(moving)
     force_at = flag + 2
 
@@ -187,14 +193,14 @@ def composed(
     def stage(block, row, table, step, j):  # type: ignore[no-untyped-def]
         state, par = column(block, 0, j, zeros), top(*column(table, 0, j, numbers))
         step = kick(par, column(block, force_at, j, none), step, row[j], row[W + j])
-        step, near = drift(state, step, row[2 * W + j])
+        step, near = drift(par, state, step, row[2 * W + j])
         put(block, step_at, j, step[:still_at])
         put(block, force_at, j, force(par, state, step))
         block[flag * W + j] = block[flag * W + j] if near else 1.0
 
     @register_jitable
     def last(block, row, table, j):  # type: ignore[no-untyped-def]
-        state, step = column(block, 0, j, zeros), column(block, step_at, j, moving) + rest
+        state, step = column(block, 0, j, zeros), column(block, step_at, j, moving) + unmoved
         par = top(*column(table, 0, j, numbers))
         step = kick(par, column(block, force_at, j, none), step, row[j], row[W + j])
         block[flag * W + j] = block[flag * W + j] if ended(state, step) == OK else 1.0
@@ -211,10 +217,12 @@ def composed(
         row = table[coefficients * W :]
         for j in range(W):  # on its own: the sums begin with 0, which need not be written and read
             stage(block, row, table, zeros, j)
+        rest(block, row, table)
         for i in range(1, drifts):
             row = table[(coefficients + 3 * i) * W :]
             for j in range(W):
-                stage(block, row, table, column(block, step_at, j, moving) + rest, j)
+                stage(block, row, table, column(block, step_at, j, moving) + unmoved, j)
+            rest(block, row, table)
         row = table[(coefficients + 3 * drifts) * W :]
         for j in range(W):
             last(block, row, table, j)

@@ -58,8 +58,12 @@ def near(square: float, half: float) -> Any:
 @register_jitable
 def rotor(rule: Any, square: float, half: float) -> Any:
     """s and m: the rotation about L by the angle 2 half |L| has the quaternion (1 + m, s L)."""
-    if rule.turn != EXACT:
-        return cayley(square, half)
+    return cayley(square, half) if rule.turn != EXACT else exact(square, half)
+
+
+@register_jitable
+def exact(square: float, half: float) -> Any:
+    """s and m of an exact drift, for any angle."""
     if square < 1.0:
         return near(square, half)
     x = np.sqrt(square)
@@ -68,14 +72,14 @@ def rotor(rule: Any, square: float, half: float) -> Any:
 
 
 def without_branch(turned: Callable[..., Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """An exact and a Cayley drift for lanes: ``(state, step, tau)`` to the step and whether it is that of `rotor`."""
+    """An exact and a Cayley drift for lanes, as `loop.composed` takes them; right where the step is that of `rotor`."""
 
-    def exact(state, step, half):  # type: ignore[no-untyped-def]
+    def exact(par, state, step, half):  # type: ignore[no-untyped-def]
         square = half_square(state, step, half)
         s, m = near(square, half)
         return turned(state, step, s, m), square < 1.0
 
-    def by_cayley(state, step, half):  # type: ignore[no-untyped-def]
+    def by_cayley(par, state, step, half):  # type: ignore[no-untyped-def]
         s, m = cayley(half_square(state, step, half), half)
         return turned(state, step, s, m), True
 

@@ -32,7 +32,7 @@ from symtop.core import netcdf
 from symtop.core.errors import SymtopError, finite, one_of, whole
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
-from symtop.model.body import Attitude, RigidBody
+from symtop.model.body import PARTS, Attitude, RigidBody
 from symtop.model.charts import BODY, attitude_distance
 from symtop.model.scenes import Scene
 from symtop.run.ensemble.population import between, check_memory, octaves, signs
@@ -50,7 +50,7 @@ ACCURATE = 1e-13  # tolerance of the series
 FARTHEST, NEAREST = 0.5, 0.02  # epsilon at most; and at least where chaos is asked for, which nothing below has
 VECTORS = {"centre": "component", "quaternion": "part", "omega_body": "component"}
 PRINCIPAL = {name: {"long_name": "principal moment of inertia", "units": "1"} for name in ("I1", "I3")}
-SPLIT = (1, 2, 3, 4, 7, 11)  # of the 14 numbers of a member: I1, I2, I3, mgl, and the vectors
+SPLIT = np.cumsum([*PARTS.values()])[:-1]  # of the 14 numbers of a member
 
 
 def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float | None = None) -> xr.Dataset:
@@ -78,7 +78,7 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
     for place, one in enumerate(kinds[:count]):
         rows[place :: len(kinds)] = _members(one, first, len(range(place, count, len(kinds))), epsilon)
         strata[place :: len(kinds)] = one
-    parts = dict(zip(("I1", "I2", "I3", "mgl", *VECTORS), np.split(rows, SPLIT, axis=1), strict=True))
+    parts = dict(zip(PARTS, np.split(rows, SPLIT, axis=1), strict=True))
     columns: dict[str, Any] = {
         name: (("member", VECTORS[name]), part) if name in VECTORS else ("member", part[:, 0], PRINCIPAL.get(name))
         for name, part in parts.items()
@@ -89,7 +89,7 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
 
 def scenes_of(members: xr.Dataset) -> list[Scene]:
     """Members as scenes over `PERIODS` natural periods, named by stratum and number within it."""
-    rows = np.column_stack([members[name].values for name in ("I1", "I2", "I3", "mgl", *VECTORS)])
+    rows = np.column_stack([members[name].values for name in PARTS])
     seen: dict[str, int] = {}
     scenes = list[Scene]()
     for row, kind in zip(rows, members["stratum"].values.tolist(), strict=True):

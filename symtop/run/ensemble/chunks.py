@@ -20,24 +20,26 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from xarray.backends import BackendArray
+from xarray.core import indexing
 
 from symtop.core.errors import SymtopError
-from symtop.core.jit import compile_kernel, register_jitable
+from symtop.core.jit import compile_kernel, register_jitable, to_fixed_tuple
 from symtop.core.numbers import GOLDEN
-from symtop.core.parallel import heed
+from symtop.core.parallel import cores, heed, in_threads
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.lanes import Many, W, column, members_of, put
+from symtop.methods.framework.lanes import Many, W, column, members_of, of_bodies, put
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, off_length
-from symtop.methods.framework.preparation import Body, Start
+from symtop.methods.framework.preparation import opened
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
 from symtop.methods.simd import wide_vectors
 from symtop.model import charts, top as model
-from symtop.model.charts import View
+from symtop.model.charts import BODY, View
 from symtop.model.exact.closed_form import ClosedForms
-from symtop.model.top import SymmetricTop
+from symtop.model.top import NUMBERS, SymmetricTop
 from symtop.run.simulation import STRETCHES, WIDEST_GAP
 from symtop.run.trajectory import LABELS
 
@@ -49,6 +51,7 @@ CHUNK_STEPS = 5_000_000  # in a chunk: a hundredth of a second in lanes, to a se
 SHARES, LEAST_STEPS = 16, 200_000  # threads share even a small ensemble, in chunks of a millisecond or more
 HARMLESS = 1e100  # states and momenta below it have a finite energy: no inertia is below 1e-40
 UNKNOWN_STEPS = 1000  # what a member counts for that chooses its steps, or makes none
+READ_TOGETHER = 4096  # members of which a thread makes angles continuous
 RAISED = "raised"  # outcome of a member on which a solver raised an exception
 ENDS = (*OUTCOMES, RAISED)
 IN_LANES = "lanes"
@@ -59,6 +62,7 @@ SHOWN = {  # by each chart
     "angles": ("theta", "phi", "psi", "axis", "energy", "p_theta", "p_phi", "p_psi"),
     "axis": ("theta", "phi", "axis", "energy", "p_theta", "p_phi", "p_psi"),
     "attitude": ("theta", "phi", "psi", "axis", "quaternion", "energy", "p_theta", "p_phi", "p_psi"),
+    BODY: ("theta", "axis", "quaternion", "energy", "p_phi", "momentum"),
 }
 PER_MEMBER = (  # columns, beside what a member shows
     "outcome", "steps", "force_evaluations", "newton_iterations", "reached_time", "step_size", "horizon", "dithered",
@@ -91,7 +95,9 @@ def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -
 
 
 def nutation_periods(numbers: Array) -> Array:
-    """`SymmetricTop.nutation_period` of tops and starts (n, 9), to the bit; infinite on a separatrix."""
+    """`Scene.nutation_period` of tops and starts (n, 9), to the bit, or of bodies (n, 14); infinite on a separatrix."""
+    if of_bodies(numbers):
+        return np.array([body.nutation_period(start) for body, start in members_of(numbers)])
     periods = np.empty(len(numbers))
     _all_periods()(np.ascontiguousarray(numbers), periods)
     return periods
@@ -101,18 +107,14 @@ def nutation_periods(numbers: Array) -> Array:
 def _all_periods() -> Any:
     """The compiled loop over members, whose bisections run in lanes: a third of the time."""
     period_between, cubic_of, bisected, none = model.period_between, model.nutation_cubic, model.bisected, (0.0,) * 9
-
-    @register_jitable
-    def member(numbers, i):  # type: ignore[no-untyped-def]
-        at = numbers[i]
-        return Body(at[0], at[1], at[2]), Start(at[3], at[4], at[5], at[6], at[7], at[8])
+    width = len(none)
 
     def all_periods(numbers, periods):  # type: ignore[no-untyped-def]
         wide_vectors()
         n, lanes = len(numbers), np.empty(len(none) * W)
         for first in range(0, n, W):
             for j in range(W):
-                top, start = member(numbers, min(first + j, n - 1))
+                top, start = opened(to_fixed_tuple(numbers[min(first + j, n - 1)], width))
                 cosine = math.cos(start.theta)
                 put(lanes, 0, j, (*cubic_of(top, start), cosine, -1.0, cosine, 1.0, cosine))
             for _ in range(model.BISECTIONS):
@@ -120,7 +122,7 @@ def _all_periods() -> Any:
                     at = column(lanes, 0, j, none)
                     put(lanes, 5, j, bisected(at[:4], at[4], *at[5:]))
             for j in range(min(W, n - first)):
-                top, start = member(numbers, first + j)
+                top, start = opened(to_fixed_tuple(numbers[first + j], width))
                 low, below, high, above = column(lanes, 5, j, none[:4])
                 periods[first + j] = period_between(top, start, 0.5 * (low + below), 0.5 * (high + above))
 
@@ -219,6 +221,7 @@ class Job:
     shown: tuple[str, ...]  # of `SHOWN`
     period: Array | None = None  # of nutation, where it is known
     names: Any = None  # what members are called (n,), where they have labels
+    continuous: bool = True  # are angles; otherwise modulo a turn where that takes the closed form (`Turns`)
     first: int = 0  # number of the first member
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -265,10 +268,7 @@ class Job:
         plan = schedule(period, self.horizon, self.samples, self.steps)
         with np.errstate(all="ignore"):  # a run may blow up, and that is a result
             runs = _of_length_one(self._runs(plan), plan, self.chart)
-            columns = {name: self.numbers[:, k : k + 1] for k, name in enumerate(("I1", "I3", "mgl"))}
-            top: Any = SimpleNamespace(**columns)
-            top.reduced_energy = functools.partial(SymmetricTop.reduced_energy, top)  # of all tops at once
-            view = View(self.chart, top, runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
+            view = View(self.chart, together(self.numbers), runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
             runs, columns = _whole(runs, view, plan), self._observables(view, plan.times)
         each: tuple[Any, ...] = (
             np.array(ENDS)[runs.outcome], runs.steps, runs.force_evaluations, runs.newton_iterations, runs.reached,
@@ -334,14 +334,78 @@ class Job:
     def _observables(self, view: View, times: Array) -> dict[str, Array]:
         """Of what a `Trajectory` shows of one run, what is asked for, of all."""
         columns = {name: getattr(view, name) for name in self.shown}
-        turned = [name for name in ("phi", "psi") if name in self.shown and self.chart != "angles"]
-        truth = ClosedForms(self.numbers)(np.nan_to_num(times)) if turned else None
-        return columns | {name: charts.unwrapped(columns[name], getattr(truth, name)) for name in turned}
+        turned = self.turned if self.continuous else ()
+        return columns | Turns(self.numbers, times, {name: columns[name] for name in turned}).of(slice(None))
+
+    @property
+    def turned(self) -> tuple[str, ...]:
+        """The angles that are shown and that the chart knows modulo a turn."""
+        return tuple(name for name in ("phi", "psi") if name in self.shown and self.chart in ("axis", "attitude"))
+
+
+@dataclass(frozen=True, eq=False)
+class Turns:
+    """phi and psi of members, (n, samples), modulo a turn, and the closed forms that make them continuous."""
+
+    numbers: Array
+    times: Array
+    angles: dict[str, Array]
+
+    def of(self, members: Any) -> dict[str, Array]:
+        """Continuous angles of some members."""
+        if not self.angles:
+            return {}
+        guides = ClosedForms(self.numbers[members]).turns(np.nan_to_num(self.times[members]))
+        guide = dict(zip(("phi", "psi"), guides, strict=True))
+        return {name: charts.unwrapped(values[members], guide[name]) for name, values in self.angles.items()}
+
+    @functools.cached_property
+    def all(self) -> dict[str, Array]:
+        """Those of all, on all cores."""
+        parts = list(in_threads(self.of, _slices(len(self.numbers), READ_TOGETHER), cores()))
+        return {name: np.concatenate([part[name] for part in parts]) for name in self.angles}
+
+
+class Later(BackendArray):
+    """One of the angles of `Turns`, made when it is looked at: the constants of a closed form take 4 us."""
+
+    def __init__(self, turns: Turns, name: str) -> None:
+        self.turns, self.name = turns, name
+        self.shape, self.dtype = turns.angles[name].shape, np.dtype(float)
+
+    def __getitem__(self, key: Any) -> Any:
+        return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
+
+    def _read(self, key: tuple[Any, ...]) -> Any:
+        chosen = np.arange(len(self.turns.numbers))[key[0]]
+        few = 2 * chosen.size < len(self.turns.numbers)
+        values = self.turns.of(np.atleast_1d(chosen))[self.name] if few else self.turns.all[self.name][chosen]
+        return values.reshape(*chosen.shape, -1)[..., key[1]]
+
+    def variable(self) -> xr.Variable:
+        """A variable that keeps what it has read."""
+        layers: Any = indexing  # whose types know no array but NumPy's
+        data = layers.MemoryCachedArray(layers.CopyOnWriteArray(layers.LazilyIndexedArray(self)))
+        return xr.Variable(("member", "time"), data)
+
+
+def _slices(n: int, size: int) -> Iterator[slice]:
+    return (slice(first, first + size) for first in range(0, n, size))
 
 
 def _received(values: dict[str, Any]) -> Job:
     """A job as it was before it was sent."""
     return Job(**values | {"method": find_integrator(values["method"])})
+
+
+def together(numbers: Array) -> Any:
+    """All tops at once, or all bodies, as a `View` takes one."""
+    if of_bodies(numbers):
+        torque = (numbers[:, 3:4] * numbers[:, 4:7]).T[..., None]
+        return SimpleNamespace(moments=numbers[:, None, :3], torque=torque)
+    top: Any = SimpleNamespace(**{name: numbers[:, k : k + 1] for k, name in enumerate(NUMBERS[:3])})
+    top.reduced_energy = functools.partial(SymmetricTop.reduced_energy, top)
+    return top
 
 
 def sampled(solver: FixedStep, numbers: Array, plan: Schedule) -> Many:
@@ -365,7 +429,8 @@ def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
     """A run whose states or energy are not finite, and that reports nothing of it, ends there, as in `simulate`."""
     if all(values.min() > -HARMLESS and values.max() < HARMLESS for values in runs[:2]):  # a tenth of the time
         return runs
-    finite = np.isfinite(runs.states).all(axis=2) & np.isfinite(view.energy + view.p_phi) | np.isnan(plan.times)
+    readings = view.energy if view.chart == BODY else view.energy + view.p_phi
+    finite = np.isfinite(runs.states).all(axis=2) & np.isfinite(readings) | np.isnan(plan.times)
     bad = np.flatnonzero((runs.outcome == OK) & ~finite.all(axis=1))
     if not bad.size:
         return runs
@@ -395,17 +460,23 @@ def same_times(times: Any, row: Any) -> bool:
     return bool(np.isnan(row).any() and np.array_equal(times, np.broadcast_to(row, times.shape), equal_nan=True))
 
 
-def as_dataset(columns: dict[str, Any], labels: dict[str, Any], *, shared: bool | None = None) -> xr.Dataset:
+def as_dataset(
+    columns: dict[str, Any], labels: dict[str, Any], *, shared: bool | None = None, of: Job | None = None
+) -> xr.Dataset:
     """Columns (n, ...) and labels (n,) as a dataset; times that all members share are one row.
 
-    `shared` says so where the columns are not those of all members.
+    `shared` says so where the columns are not those of all members. Angles `of` a job that leaves them modulo a turn
+    are made continuous when they are read.
     """
-    columns, vectors = columns | labels, {"axis": "component", "quaternion": "part"}
+    columns, vectors = columns | labels, {"axis": "component", "momentum": "component", "quaternion": "part"}
     times = columns.pop("time")
     shared = same_times(times, times[0]) if shared is None else shared
-    variables = {
+    variables: dict[str, Any] = {
         name: (("member", "time", vectors.get(name, ""))[: values.ndim], values) for name, values in columns.items()
     }
-    coordinates = {dim: list(LABELS[dim]) for name, dim in vectors.items() if name in columns}
+    if of is not None:
+        turns = Turns(of.numbers, times, {name: columns[name] for name in of.turned})
+        variables |= {name: Later(turns, name).variable() for name in of.turned}
+    coordinates = {dim: list(LABELS[dim]) for dim in LABELS if any(vectors.get(name) == dim for name in columns)}
     clock = ("time", times[0]) if shared else (("member", "time"), times)
     return xr.Dataset(variables, {"time": clock, **coordinates})

@@ -1,4 +1,4 @@
-"""ensemble(): many tops, one integrator, each with a step and a horizon of its own -> one dataset.
+"""ensemble(): many tops or bodies, one integrator, each with a step and a horizon of its own -> one dataset.
 
 Members are computed in chunks (`symtop.run.ensemble.chunks`), on threads or on a cluster, and a member has the bits of
 `simulate` alone. What does not fit into memory goes to a file as it is computed (`Stream`), and is resumed from there.
@@ -8,6 +8,7 @@ import contextlib
 import warnings
 import zipfile
 from collections.abc import Callable, Generator, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +26,10 @@ from symtop.core.jit import code
 from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
 from symtop.core.progress import beating
 from symtop.core.signals import ending_on_sigterm
+from symtop.methods.framework.lanes import of_bodies
 from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
+from symtop.model.charts import BODY
 from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run import cluster
@@ -49,19 +52,21 @@ def ensemble(
     budget: float | None = None, path: str | Path | None = None, threads: int | None = None,
     scheduler: str | None = None, quiet: bool = False,
 ) -> xr.Dataset:  # fmt: skip
-    """Run one integrator on many tops; each member has the bits of `simulate` alone.
+    """Run one integrator on many tops, or on many bodies; each member has the bits of `simulate` alone.
 
     `members` is a list of scenes or their names, or a dataset over ``member`` with ``I1``, ``I3``, ``mgl``, ``theta``
     and, where they are not zero, ``phi``, ``psi``, ``theta_dot``, ``phi_dot``, ``psi_dot`` (`symtop.population` makes
-    one; a scalar counts for all members). What follows may be one number or one for each member:
+    one; a scalar counts for all members). A dataset with ``I2`` is of bodies without symmetry, as
+    `symtop.body_population` makes them. What follows may be one number or one for each member:
 
         step_size or per_nutation    the step, or how many steps a nutation period of the member has
         tolerance                    of an adaptive method
         horizon or nutations         the time, or the number of nutation periods, to run to; scenes have their own
 
     Dimensions ``member``, ``time``, ``component`` (x, y, z). Variables as `simulate` has them: ``theta``, ``phi``,
-    ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, or those of them that `variables`
-    names (``phi`` and ``psi`` of the space frame take the closed form); for each member ``outcome``, ``steps``,
+    ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, of bodies ``momentum``, or those
+    that `variables` names (``phi`` and ``psi`` of the space frame take the closed form, 4 us a member, and are made
+    when they are first read); for each member ``outcome``, ``steps``,
     ``force_evaluations``, ``newton_iterations``, ``reached_time``, ``step_size``, ``horizon``, ``dithered``. ``time``
     is a row where all members are sampled at the same times, and otherwise an array over ``member`` and ``time``;
     ``data.isel(member=i)`` has a row either way. A member of fewer steps than `samples` shows every step, and the rest
@@ -97,14 +102,14 @@ def ensemble(
         cluster.check_sent(scheduler, job.part(slice(0, 1)), method.name)
     chunks = list(job.chunks())
     words = {
-        "title": f"{method.name} on {n} tops", "units": read.units, "integrator": method.name, "chart": chart,
-        "implementation": method.implementation, "execution": job.execution,
+        "title": f"{method.name} on {n} {'bodies' if chart == BODY else 'tops'}", "units": read.units, "chart": chart,
+        "integrator": method.name, "implementation": method.implementation, "execution": job.execution,
     }  # fmt: skip
 
     def compute(rest: list[slice], keep: Callable[[slice, dict[str, Any]], object]) -> tuple[int, str]:
         """On how many members a solver raised an exception, and the first one's message."""
         raised, first, left = 0, "", sum(chunk.stop - chunk.start for chunk in rest)
-        bar = tqdm(total=n, initial=n - left, desc=words["title"], unit="top", disable=silent or None, leave=False)
+        bar = tqdm(total=n, initial=n - left, desc=words["title"], unit="run", disable=silent or None, leave=False)
         with beating(bar), contextlib.closing(_computed(job, rest, workers, scheduler)) as parts:
             for chunk, part in zip(rest, parts, strict=True):
                 if message := part.pop(RAISED, ""):
@@ -114,11 +119,12 @@ def ensemble(
         return raised, first
 
     if path is None:
-        columns = dict[str, Any]()
+        job, columns = replace(job, continuous=False), dict[str, Any]()
         raised, first = compute(chunks, lambda chunk, part: _fill(columns, part, chunk, n))
         if raised == n:
             raise SymtopError(first)
-        data = netcdf.describe(as_dataset(columns, read.labels), **words, **({RAISED: first} if raised else {}))
+        data = as_dataset(columns, read.labels, of=job)
+        data = netcdf.describe(data, **words, **({RAISED: first} if raised else {}))
     else:
         with _stream(file_path("path", path), job, read.labels, words) as stream:
             raised, first = compute(stream.missing(chunks), stream.keep)
@@ -166,7 +172,7 @@ def _shown(variables: Iterable[str] | None, chart: str) -> tuple[str, ...]:
 
 def _check_memory(n: int, samples: int, shown: tuple[str, ...]) -> None:
     """Refuse a dataset that does not fit into memory."""
-    values = n * samples * (1 + sum({"axis": 3, "quaternion": 4}.get(name, 1) for name in shown))
+    values = n * samples * (1 + sum({"axis": 3, "momentum": 3, "quaternion": 4}.get(name, 1) for name in shown))
     if values > MOST_VALUES:
         size = f"{n} members with {samples} samples are {values:.3g} numbers, more than the {MOST_VALUES:.3g} that are"
         remedy = "give a path to stream them to a netCDF file, fewer samples, or fewer variables"
@@ -251,7 +257,8 @@ def _steps(step: Array, horizon: Array, most: float, names: Any) -> NDArray[np.i
 def _tolerances(method: Integrator, tolerance: object, members: Members, horizon: Array, period: Array) -> Array:
     """Tolerance of each member; a horizon that `simulation.make_plan` would refuse is refused."""
     numbers, names = members.numbers, members.names
-    pendulum = np.sqrt(np.abs(numbers[:, 2]) / numbers[:, 0]) / (2.0 * np.pi)
+    mgl = numbers[:, 3 if of_bodies(numbers) else 2]
+    pendulum = np.sqrt(np.abs(mgl) / numbers[:, 0]) / (2.0 * np.pi)
     swings = horizon * np.maximum(1.0 / period, pendulum)
     for i in np.flatnonzero(swings > MOST_SWINGS)[:1]:
         words = f"{swings[i]:.3g} swings of the top; an adaptive method may take {MOST_SWINGS:.3g}"

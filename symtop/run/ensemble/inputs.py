@@ -1,8 +1,9 @@
-"""Who takes part in an ensemble: rows of nine numbers, read from a dataset or from scenes, and refused by number."""
+"""Who takes part in an ensemble: tops or bodies as rows of numbers, from a dataset or scenes, refused by number."""
 
 import difflib
 import re
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,13 +12,17 @@ from numpy.typing import NDArray
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, positive, shown
+from symtop.model.body import PARTS, from_flat
+from symtop.model.charts import BODY
 from symtop.model.exact.closed_form import checked_numbers
 from symtop.model.scenes import OBSERVABLES, Scene, scene
 from symtop.model.top import NUMBERS, flat
 
 Array = NDArray[np.float64]
 
-NEEDED = NUMBERS[:4]  # the others are zero where nobody gives them, as in `Angles`
+TOP = dict.fromkeys(NUMBERS, 1)
+NEEDED = {"nine": NUMBERS[:4], "14": ("I1", "I2", "I3", "omega_body")}  # the others are as in `Angles`, or
+USUAL = {"centre": (0.0, 0.0, 1.0), "quaternion": (1.0, 0.0, 0.0, 0.0)}
 WRITTEN = {*netcdf.VARIABLES, "scene", "member", "period"}  # names that symtop gives, which no one misspells
 NEAR = 0.8  # likeness of a name that is taken for a misspelled one: thetadot and theta0, not p_phi and theta_max
 RATE = re.compile(r"(d|v|w|omega)_?(theta|phi|psi)(_?d?t)?|(theta|phi|psi)_?(d|dt|t|prime|rate|speed|vel|velocity)")
@@ -25,9 +30,9 @@ UNNAMED = "dim_0"  # what xarray calls a dimension that nobody has named
 
 
 class Members(NamedTuple):
-    """Tops and starts, and what else is known of them."""
+    """Tops or bodies and their starts, and what else is known of them."""
 
-    numbers: Array  # (n, 9), columns as `NUMBERS`
+    numbers: Array  # (n, 9), columns as `NUMBERS`, or (n, 14) as `RigidBody.flat` has them
     horizon: Array | None  # (n,) of scenes; None where nobody has said it
     observes: str  # the smallest observable that shows what every scene is watched for
     units: str  # "SI", or empty
@@ -42,8 +47,9 @@ class Members(NamedTuple):
 def read_members(given: "xr.Dataset | Iterable[str | Scene]") -> Members:
     """Members from a dataset over ``member`` (scalars count for all) or from scenes or their names.
 
-    Raises SymtopError for a variable that is missing or has another dimension, for one that looks like a misspelled one
-    of the nine, and for members that are no top or no start: by label or number, and reason.
+    A dataset with ``I2`` is of bodies, as `symtop.body_population` has them. Raises SymtopError for a variable that is
+    missing or has another dimension, for one that looks like a misspelled one of theirs, for tops beside bodies, and
+    for members that are no top, no body or no start: by label or number, and reason.
     """
     if isinstance(given, xr.Dataset):
         return _from_dataset(given)
@@ -53,47 +59,70 @@ def read_members(given: "xr.Dataset | Iterable[str | Scene]") -> Members:
     if tables or isinstance(given, (dict, xr.DataArray)):  # which go through their names or numbers
         raise SymtopError(f"members must be an xarray.Dataset or a list of scenes, not a {type(given).__name__}")
     try:
-        chosen = [scene(entry) for entry in given]
+        chosen = [scene(entry, bodies=True) for entry in given]
     except TypeError:  # an array without dimensions
         raise SymtopError(f"members must be a dataset or a list of scenes, not {shown(given)}") from None
     if not chosen:
         raise SymtopError("members must be at least one")
+    if len({entry.of_body for entry in chosen}) > 1:
+        raise SymtopError("members must be all tops or all bodies without symmetry, not some of each")
     numbers = np.array([flat(entry.top, entry.start) for entry in chosen])
     horizons, names = (np.array([getattr(entry, name) for entry in chosen]) for name in ("horizon", "name"))
-    observes = max((entry.observes for entry in chosen), key=OBSERVABLES.index)
+    observes = max((entry.observes for entry in chosen), key=(*OBSERVABLES, BODY).index)
     units = "SI" if all(entry.units == "SI" for entry in chosen) else ""
     return Members(numbers, horizons, observes, units, {"scene": names})
 
 
 def _from_dataset(data: xr.Dataset) -> Members:
-    missing = [name for name in NEEDED if name not in data]
+    parts, count, observes = (PARTS, "14", BODY) if "I2" in data else (TOP, "nine", "axis")
+    missing = [name for name in NEEDED[count] if name not in data]
     if missing:
-        raise SymtopError(f"members must have the variables {', '.join(NEEDED)}, not lack {', '.join(missing)}")
+        words = f"{', '.join(NEEDED[count])}, not lack {', '.join(missing)}"
+        raise SymtopError(f"members must have the variables {words}")
     n = data.sizes.get("member", 1)
     if n == 0:
         raise SymtopError("members must be at least one")
-    numbers = np.zeros((n, len(NUMBERS)))
-    for name in NUMBERS:
+    columns = []
+    for name, width in parts.items():
+        column = np.broadcast_to(np.reshape(USUAL.get(name, 0.0), (1, -1)), (n, width))
         if name in data:
-            if data[name].dims not in ((), ("member",)) or data[name].dtype.kind not in "fiu":
-                over = f"{data[name].dtype} over {', '.join(map(str, data[name].dims)) or 'nothing'}"
-                raise SymtopError(f"{name} of members must be numbers over member, or one for all, not {over}")
-            numbers[:, NUMBERS.index(name)] = data[name].values
-    _check_names(data)
+            given, vector = data[name], width > 1
+            over = given.dims[:-1] if vector else given.dims
+            fits = not vector or given.shape[-1:] == (width,)
+            if over not in ((), ("member",)) or given.dtype.kind not in "fiu" or not fits:
+                wrong = f"{given.dtype} {given.shape} over {', '.join(map(str, given.dims)) or 'nothing'}"
+                each = f"rows of {width} numbers" if vector else "numbers"
+                raise SymtopError(f"{name} of members must be {each} over member, or one for all, not {wrong}")
+            column = np.broadcast_to(given.values.reshape(-1, width), (n, width))
+        columns.append(column)
+    numbers = np.concatenate(columns, axis=1, dtype=float)
+    _check_names(data, parts)
     named = [name for name in ("scene", "stratum") if name in data]
     labels = {name: np.broadcast_to(data[name].values.astype(str, copy=False), n) for name in named}
     if "member" in data.indexes and "member" in data.dims:
         labels["member"] = _plain(data.indexes["member"])
-    numbers, units = checked_numbers(numbers, labels.get("member")), str(data.attrs.get("units", ""))
-    return Members(numbers, None, "axis", units, labels)
+    check = _checked_bodies if observes == BODY else checked_numbers
+    units = str(data.attrs.get("units", ""))
+    return Members(check(numbers, labels.get("member")), None, observes, units, labels)
 
 
-def _check_names(data: xr.Dataset) -> None:
-    """Refuse a variable that looks like one of the nine, in case, letters, underscores or another word for a rate."""
-    known = {name.lower(): name for name in NUMBERS}
-    for name in (name for name in map(str, data.variables) if name not in NUMBERS and name not in WRITTEN):
+def _checked_bodies(numbers: Array, names: NDArray[Any] | None) -> Array:
+    """The rows of bodies and starts as their records have them, directions of length one."""
+    for i, row in enumerate(numbers.tolist()):
+        try:
+            top, start = from_flat(row)
+            numbers[i] = replace(top).flat(replace(start))  # which checks what they hold
+        except SymtopError as error:
+            raise SymtopError(f"{called(names, i)}: {error}") from None
+    return numbers
+
+
+def _check_names(data: xr.Dataset, parts: dict[str, int]) -> None:
+    """Refuse a variable that looks like one of theirs, in case, letters, underscores or another word for a rate."""
+    known = {name.lower(): name for name in parts}
+    for name in (name for name in map(str, data.variables) if name not in parts and name not in WRITTEN):
         near = [known[like] for like in difflib.get_close_matches(name.lower(), known, n=1, cutoff=NEAR)]
-        if (rate := RATE.fullmatch(name.lower())) is not None:
+        if parts is TOP and (rate := RATE.fullmatch(name.lower())) is not None:
             near = [f"{rate[2] or rate[4]}_dot"]
         if near:
             raise SymtopError(f"members have no variable {name!r}; did you mean {near[0]}?")
