@@ -151,4 +151,5 @@ STUDY = Study(
     question="My body is no symmetric top: which of these verdicts hold for it?",
     cases=lambda quick: grid(quick=quick), measure=measure, follow_up=follow_up,
     facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
+    uses=lambda case: [*case.integrators, "series-general-adaptive"],  # the truth of heavy bodies
 )  # fmt: skip
