@@ -90,16 +90,30 @@ def _stepped(f: Any, rule: Tableau, t: float, y: Array, h: float, marks: Any) ->
     return np.array(states)
 
 
+def _finite(f: Any) -> Any:
+    """f, refused where it is not finite: SciPy's solvers would shrink their steps for ever."""
+
+    def rate(t: float, y: Array) -> Array:
+        value: Array = f(t, y)
+        if not np.isfinite(value).all():
+            raise SymtopError(f"f must be finite, not {value.tolist()} at t = {t!r}")
+        return value
+
+    return rate
+
+
 def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
     """The solution by DOP853, a function of the time, and how long it is."""
     from scipy.integrate import DOP853, OdeSolution  # 0.2 s
 
-    solver, times, parts = DOP853(f, t, y, t + end, rtol=FINE, atol=FINE * float(np.abs(y).max())), [t], list[Any]()
+    solver, times, parts = (
+        DOP853(_finite(f), t, y, t + end, rtol=FINE, atol=FINE * float(np.abs(y).max())),
+        [t],
+        list[Any](),
+    )
     while solver.status == "running" and len(parts) < WATCHED and solver.step() is None:
         times.append(solver.t)
         parts.append(solver.dense_output())
-    if not parts:
-        raise SymtopError(f"f must let DOP853 make a step from t0 = {t!r}, and does not")
     return OdeSolution(times, parts), times[-1] - t
 
 
@@ -128,7 +142,7 @@ def _outlook(
             marks = np.unique(np.rint(np.linspace(0.0, min(round(piece / setting), PROBED), POINTS + 1)[1:]).clip(1.0))
             return marks * setting, _stepped(f, rule, t, start, setting, marks), setting
         (name, cost), shown = SCIPY[method], np.minimum(t + piece * seen / watched, t + piece)
-        run = solve_ivp(f, (t, t + piece), start, name, shown, rtol=setting, atol=setting)
+        run = solve_ivp(_finite(f), (t, t + piece), start, name, shown, rtol=setting, atol=setting)
         return run.t - t, run.y.T, piece * cost / run.nfev
 
     times, states, mean = made(y)

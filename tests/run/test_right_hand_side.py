@@ -119,7 +119,7 @@ def test_the_step_that_is_advised_keeps_the_accuracy():
         (swing, "ab", {"step_size": 0.1}, "y0 must be a row of numbers, not 'ab'"),
         (swing, [1.0, 0.0, 2.0], {"step_size": 0.1}, "f must return 3 numbers, not an array of shape (2,)"),
         (lambda _t, _y: 1 / 0, [1.0], {"step_size": 0.1}, "f failed: ZeroDivisionError"),
-        (lambda _t, _y: [math.nan], [1.0], {"step_size": 0.1}, "f must let DOP853 make a step from t0 = 0.0"),
+        (lambda _t, _y: [math.nan], [1.0], {"step_size": 0.1}, "f must be finite, not [nan] at t = 0.0"),
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused_in_one_sentence(f, y0, control, words):
