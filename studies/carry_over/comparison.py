@@ -20,12 +20,14 @@ from symtop.methods.framework.registry import NEEDS, integrator
 from symtop.model.charts import BODY, Array
 
 from .bodies import ASKED, CHAOTIC, FAMILIES, FREE, SYMMETRIC
+from .limits import MOST
 from .measures import STATUS
 
 SAME, PART = 0.9, 0.8  # tau
 LEVEL, DOUBLE, SEVERAL = 1.1, 2.0, 5.0  # factors
 EXPONENT, LOWER = 0.25, 0.5
 STEPS = 69.92  # a period, of the count of silent wrong runs
+LEAST = 0.01  # share of grown steps that counts where there are fewer
 CHAOS = 1000.0  # growth in ten periods
 DRAWS = 100
 ANY = "any body"
@@ -330,6 +332,51 @@ def orders(data: xr.DataTree) -> Iterator[tuple[str, str, float, float]]:
             yield label(name), family, float(order.sel(variant=name, family=family)), first
 
 
+# ---- steady rotations and engines ------------------------------------------------------------------------------------
+
+
+def steady(data: xr.DataTree, name: str, family: str) -> Array:
+    """Limits or grown shares of steps, (methods, bodies); empty where nothing was measured."""
+    if "steady" not in data.children or family not in data["steady"]["family"].values:
+        return np.empty((0, 0))
+    return np.asarray(group_of(data, "steady")[name].sel(family=family).transpose("variant", "member").values)
+
+
+def limit_factors(data: xr.DataTree, family: str) -> Array:
+    """Linear limits over those of the same draws at epsilon = 0, (methods, bodies); NaN of an unstable rotation."""
+    first, other = (steady(data, "limit", name) for name in (SYMMETRIC, family))
+    if not other.size:
+        return other
+    ratio = np.nan_to_num(other, nan=MOST) / np.where(first == 0.0, np.nan, np.nan_to_num(first, nan=MOST))
+    return np.where(other == 0.0, np.nan, ratio)
+
+
+def resonant(data: xr.DataTree, family: str) -> float:
+    """The mean share of steps below the limit at which a tilt grows."""
+    shares = steady(data, "grown", family)
+    return float(np.nanmean(shares)) if np.isfinite(shares).any() else float("nan")
+
+
+def engine_errors(data: xr.DataTree, family: str, place: int, name: str = "error") -> Costs:
+    """Errors of engines' maps in the place of costs, or whether bodies are lost, at one of the two steps."""
+    group = group_of(data, "engines").sel(family=family).isel(steps=place).transpose("variant", "member")
+    names = [str(one) for one in group["variant"].values]
+    return Costs(names, [""] * len(names), group[name].values, np.zeros(len(names)))
+
+
+@of_one_dataset
+def engine_tau(data: xr.DataTree, family: str, place: int) -> Interval:
+    """The ranking of engines' maps by error against that at epsilon = 0."""
+    first, second = (engine_errors(data, name, place) for name in (SYMMETRIC, family))
+    rows = [*range(len(first.names))]
+    return _bootstrapped(first, second, (rows, rows), family not in (CHAOTIC, FREE))
+
+
+def lost(data: xr.DataTree, family: str, place: int) -> float:
+    """The share of bodies lost in the first period, in the mean over maps."""
+    return float(np.nanmean(engine_errors(data, family, place, "lost").values))
+
+
 # ---- verdicts --------------------------------------------------------------------------------------------------------
 
 
@@ -342,3 +389,8 @@ def factor_verdict(factor: float, with_factor: float = DOUBLE) -> str:
     """Of a factor, either way."""
     size = max(factor, 1.0 / factor) if factor > 0.0 else np.inf
     return YES if size <= LEVEL else FACTOR if size <= with_factor else NO
+
+
+def worst(verdicts: Iterator[str]) -> str:
+    """The verdict that is furthest from carrying over."""
+    return max(verdicts, key=(YES, FACTOR, PARTLY, NO).index)

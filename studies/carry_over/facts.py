@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import xarray as xr
+from symtop_studies.cost.tops import FIRST
 
 from symtop.methods.framework.registry import NEEDS, integrator
 from symtop.report.formats import duration, number, percent
@@ -13,6 +14,7 @@ from symtop.report.formats import duration, number, percent
 from . import comparison as by
 from .bodies import ASKED, CHAOTIC, FAMILIES, FREE, SYMMETRIC
 from .comparison import ANY, FACTOR, LEVEL, MOST_OF, NO, OTHERS, PARTLY, SEVERAL, YES, label
+from .limits import LEVELS, MOST
 
 SHOWN = ("0.1", "0.3", CHAOTIC, FREE)  # families of the short table
 NEEDLE = "needle"  # a stratum of free bodies whose spin the natural period does not tell
@@ -95,6 +97,46 @@ def order_gap(data: xr.DataTree, family: str) -> tuple[float, str]:
     return max((gap for gap in gaps if not math.isnan(gap[0])), default=(math.nan, ""))
 
 
+def limit_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
+    """Linear limits over those at epsilon = 0: median, and what 5 % fall below."""
+    low, middle = limit_ends(data, family)
+    return f"{number(middle, 3)}, down to {number(low, 2)} times", by.factor_verdict(min(low, 1.0))
+
+
+def limit_ends(data: xr.DataTree, family: str) -> tuple[float, float]:
+    """What 5 % of the factors of linear limits fall below, and their median."""
+    ratio = by.limit_factors(data, family)
+    return tuple(np.nanquantile(ratio, (1.0 - MOST_OF, 0.5)).tolist()) if ratio.size else (math.nan, math.nan)
+
+
+def resonance_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
+    """Shares of steps at which a tilt grows."""
+    share, before = (by.resonant(data, name) for name in (family, SYMMETRIC))
+    ratio = max(share, by.LEAST) / max(before, by.LEAST)
+    return f"{percent(share, 1)} of steps, {percent(before, 1)} of tops", by.factor_verdict(ratio, SEVERAL)
+
+
+def worst_engine_tau(data: xr.DataTree, family: str) -> by.Interval:
+    """Tau of engines' maps with the step that has the lesser."""
+    return min((by.engine_tau(data, family, place) for place in range(len(LEVELS))), key=lambda one: one.value)
+
+
+def engine_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
+    """Tau of engines' maps, of the step with the lesser, and the bodies lost at once with the longer step."""
+    if "engines" not in data.children:
+        return "nan", NO
+    places = range(len(LEVELS))
+    each = [by.engine_tau(data, family, place) for place in places]
+    gone = [(by.lost(data, family, place), by.lost(data, SYMMETRIC, place)) for place in places]
+    verdicts = [*map(by.ranking_verdict, each),
+                *(by.factor_verdict(share / before if before else 1.0 + share / by.LEAST, SEVERAL)
+                  for share, before in gone)]  # fmt: skip
+    tau = worst_engine_tau(data, family)
+    told = f"tau {number(tau.value, 2)} [{number(tau.low, 2)}, {number(tau.high, 2)}]"
+    shares = f"{percent(gone[0][0], 0)}, {percent(gone[0][1], 0)} of tops"
+    return f"{told}; lost at once {shares}", by.worst(iter(verdicts))
+
+
 def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
     """By line of the table the number of a family and its verdict; no number where nothing was measured."""
     tau, best, (middle, most) = worst_tau(data, family), worst_winner(data, family), steps(data, family)
@@ -117,6 +159,8 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
         "growth": (f"{within} of {told} exponents within {by.EXPONENT}, all within {number(gap, 2)}",
                    YES if gap <= by.EXPONENT else NO),
         "order": (f"lower by at most {number(max(order, 0.0), 2)}", YES if order <= by.LOWER else NO),
+        "limit": limit_cell(data, family), "resonances": resonance_cell(data, family),
+        "engines": engine_cell(data, family),
     }  # fmt: skip
 
 
@@ -125,6 +169,8 @@ LINES = {
     "steps": "safe steps a period, to those of a top as a body", "own": "safe steps, to those in the top's own charts",
     "first": "the same of the cheapest with f(t, y)",
     "silent": "wrong without a sign", "growth": "growth of errors with time", "order": "order of a method",
+    "limit": "linear limit of the step", "resonances": "steps that resonate below it",
+    "engines": "ranking of engines' maps",
 }  # fmt: skip
 
 
@@ -179,6 +225,15 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     named["heavy_steps"] = max((steps(data, family)[1] for family in heavy), default=None)
     named["heavy_tau"] = min((worst_tau(data, family).value for family in heavy), default=None)
     named["verdicts"] = count(data)
+    each = [by.tau(data, family, target) for family in OTHERS for target in ASKED]
+    known = [one for one in each if math.isfinite(one.value) and math.isfinite(one.low)]
+    named |= {"taus": len(known), "outside": sum(not one.low <= one.value <= one.high for one in known)}
+    if "engines" in data.children:
+        named |= {"engines": data["engines"].sizes["variant"], "engine_bodies": data["engines"].sizes["member"]}
+        named |= {f"lost_{key(family)}": by.lost(data, family, 0) for family in FAMILIES}
+        named |= {f"engine_tau_{key(family)}": worst_engine_tau(data, family).value for family in OTHERS}
+    if "steady" in data.children:
+        named |= {"resonant_0": by.resonant(data, SYMMETRIC), "grid": float(data["steady"]["grid"].max())}
     return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in named.items()}
 
 
@@ -195,6 +250,12 @@ def _of_family(data: xr.DataTree, family: str) -> dict[str, Any]:
         f"order_{place}": order[0], f"order_{place}_of": order[1] or None,
     }  # fmt: skip
     named |= dict(zip((f"growth_{place}_within", f"growth_{place}_told"), exponents_within(data, family), strict=True))
+    ratio = by.limit_factors(data, family)
+    if ratio.size:
+        named[f"limit_{place}_low"], named[f"limit_{place}"] = limit_ends(data, family)
+        least = np.nanquantile(ratio, 1.0 - MOST_OF, axis=1)
+        named[f"limit_{place}_of"] = label(str(data["steady"]["variant"].values[int(np.argmin(least))]))
+        named[f"limit_{place}_least"], named[f"resonant_{place}"] = float(least.min()), by.resonant(data, family)
     if family == FREE:
         named |= dict(zip(("round_steps", "round_steps_high"), own_steps(data, family, NEEDLE), strict=True))
     for name, kind, seen, first in by.orders(data) if order[1] else ():
@@ -222,10 +283,11 @@ def count(data: xr.DataTree) -> str:
 
 
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
-    """The answer; taus; winners by class; safe steps by method; silent wrong runs by stratum; growth; order."""
+    """The answer; taus; winners by class; safe steps by method; silent wrong runs by stratum; growth; order; limits."""
     return {
         "carry": carry(data), "rankings": rankings(data), "winners": winners(data), "steps": step_table(data),
         "silent": silent_table(data), "growth": growth_table(data), "order": order_table(data),
+        "limits": limit_table(data),
     }  # fmt: skip
 
 
@@ -311,3 +373,26 @@ def order_table(data: xr.DataTree) -> pd.DataFrame:
         line = rows.setdefault(name, {"method": name, "declared": integrator(name).order, words(SYMMETRIC): first})
         line[words(family)] = value
     return pd.DataFrame([*rows.values()])
+
+
+def limit_table(data: xr.DataTree) -> pd.DataFrame:
+    """Linear limits and resonances by method, errors and lost bodies by engine's map, each by family."""
+    rows: list[dict[str, Any]] = []
+    measures = {
+        "linear limit, h omega": lambda shown: np.nanmedian(np.nan_to_num(shown, nan=MOST), axis=1),
+        "share of steps that resonate": lambda shown: np.nanmean(shown, axis=1),
+    }
+    for (told, of), name in zip(measures.items(), ("limit", "grown"), strict=True):
+        each = {family: by.steady(data, name, family) for family in FAMILIES}
+        names = map(label, map(str, data["steady"]["variant"].values)) if "steady" in data.children else []
+        columns = {words(family): of(shown) for family, shown in each.items() if shown.size}
+        rows += [{"measured": told, "method": one} | {name: column[k] for name, column in columns.items()}
+                 for k, one in enumerate(names)]  # fmt: skip
+    for place, level in enumerate(LEVELS) if "engines" in data.children else ():
+        for name, told in (("error", "median error of the axis, rad"), ("lost", "share lost in the first period")):
+            each = {family: by.engine_errors(data, family, place, name) for family in FAMILIES}
+            for k, one in enumerate(each[SYMMETRIC].names):
+                line = {"measured": f"{told}, {number(FIRST * 2**level, 2)} steps a period", "method": label(one)}
+                middle = np.nanmedian if name == "error" else np.nanmean
+                rows.append(line | {words(family): float(middle(taken.values[k])) for family, taken in each.items()})
+    return pd.DataFrame(rows)

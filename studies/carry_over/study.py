@@ -54,26 +54,32 @@ from typing import Any
 import xarray as xr
 from symtop_studies.cost.prices import BATCHES, PROCESSES, measured
 
-from symtop.methods.framework.registry import Integrator, integrator, methods
+from symtop.methods.framework.registry import Integrator, engines, integrator, methods
 from symtop.model.charts import BODY
 from symtop.runner.study import Case, Study
 
 from . import comparison, facts, figures
 from .bodies import FAMILIES, bodies_of
+from .limits import engine_table, steady_table
 from .measures import GROWN, about, growth_table, own_table, table
 
 SEED = 1
 SHORT, LONG, OWN, BODIES, GROWTH, PRICES = "short", "long", "own", "bodies", "growth", "prices"  # groups of cases
+STEADY, ENGINES = "steady", "engines"
 LEFT_OUT = ("taylor-longdouble", "taylor-quad")  # the same steps as taylor in slower arithmetic
 FULL: dict[str, dict[str, Any]] = {
     SHORT: {"count": 400, "periods": 10.0, "seed": SEED, "budget": 2.5e4},
     LONG: {"count": 100, "periods": 100.0, "seed": SEED, "budget": 6e4},
     GROWTH: {"count": 40, "doublings": 6, "seed": SEED},
+    STEADY: {"count": 24, "seed": SEED, "grid": 0.02, "places": 60},
+    ENGINES: {"count": 24, "periods": 10.0, "seed": SEED},
 }
 QUICK: dict[str, dict[str, Any]] = {
     SHORT: {"count": 7, "periods": 10.0, "seed": SEED, "budget": 1.0e3},
     LONG: {"count": 5, "periods": 20.0, "seed": SEED, "budget": 2e3},
     GROWTH: {"count": 4, "doublings": 3, "seed": SEED},
+    STEADY: {"count": 4, "seed": SEED, "grid": 0.4, "places": 8},
+    ENGINES: {"count": 5, "periods": 10.0, "seed": SEED},
 }
 
 
@@ -91,8 +97,13 @@ def of_tops() -> list[Integrator]:
     return [one.variant(one.chart_for("axis")) for one in rows if one.charts()]
 
 
+def of_engines() -> list[str]:
+    """The maps of engines that step a body without symmetry."""
+    return [name for name, one in engines().items() if BODY in one.solvers]
+
+
 def grid(*, quick: bool = False) -> list[Case]:
-    """Every method on all bodies over ten periods, on the tops; growth; prices; and what is known of the bodies."""
+    """Every method on all bodies over ten periods, on the tops; growth; steady bodies; engines; prices; bodies."""
     asked, bodies, tops = QUICK if quick else FULL, of_bodies(), of_tops()
     timing = {
         "integrators": [one.name for one in (*bodies, *tops)], "rounds": 1 if quick else 4,
@@ -103,6 +114,8 @@ def grid(*, quick: bool = False) -> list[Case]:
         *(Case("tops", one.name, asked[SHORT], group=OWN) for one in tops),
         *(Case(span, "exact", asked[span], group=BODIES) for span in (SHORT, LONG)),
         *(Case("regular", f"{name}[{BODY}]", asked[GROWTH], group=GROWTH) for name in GROWN),
+        *(Case("upright", f"{name}[{BODY}]", asked[STEADY], group=STEADY) for name in GROWN),
+        *(Case("bodies", f"{name}[{BODY}]", asked[ENGINES], group=ENGINES) for name in of_engines()),
         *(Case(f"{BATCHES[0]}-{k}", "together", timing, timed=True, group=PRICES)
           for k in range(1 if quick else PROCESSES)),
     ]  # fmt: skip
@@ -115,15 +128,19 @@ def follow_up(data: xr.DataTree) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """The table of a method on bodies or tops, growth exponents, prices, or what is known of the bodies."""
+    """The table of a method on bodies or tops, growth, limits, engines, prices, or what is known of bodies."""
     asked = case.settings
     if case.group == PRICES:
         return measured(asked["integrators"], asked["rounds"], asked["batch"])
     if case.group == GROWTH:
         return growth_table(integrator(case.integrator), asked["count"], asked["doublings"], asked["seed"])
+    if case.group == STEADY:
+        return steady_table(integrator(case.integrator), **asked)
     drawn = {name: bodies_of(name, asked["count"], asked["seed"], asked["periods"]) for name in FAMILIES}
     if case.group == BODIES:
         return about(drawn, long=case.scene == LONG).assign(periods=asked["periods"])
+    if case.group == ENGINES:
+        return engine_table(integrator(case.integrator), drawn)
     of = own_table if case.group == OWN else table
     return of(integrator(case.integrator), drawn, asked["budget"])
 
@@ -134,4 +151,5 @@ STUDY = Study(
     question="My body is no symmetric top: which of these verdicts hold for it?",
     cases=lambda quick: grid(quick=quick), measure=measure, follow_up=follow_up,
     facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
+    uses=lambda case: [*case.integrators, "series-general-adaptive"],  # the truth of heavy bodies
 )  # fmt: skip
