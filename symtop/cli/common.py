@@ -205,7 +205,9 @@ def _in_options(error: SymtopError, command: click.Command | None) -> str:
     """An error's sentence with the options of a command, and what helps where a scene or an integrator is unknown."""
     parameters = command.params if command is not None else []
     options = [one for one in parameters if isinstance(one, click.Option)]
-    sentence = error.renamed({str(one.name): max(one.opts, key=len) for one in options})
+    sentence = error.renamed(
+        {str(one.name): max(one.opts, key=len) for one in reversed(options)}
+    )  # the first of a name
     if not isinstance(error, UnknownNameError) or error.parameters[0] not in ("scene", "integrator"):
         return sentence
     from symtop.methods.framework.registry import integrators, split_name

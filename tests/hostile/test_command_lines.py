@@ -50,7 +50,7 @@ BAD = {
     "--per-nutation": NUMBERS, "--nutations": NUMBERS, "--budget": NUMBERS, "--steps": [*NUMBERS, "1e300"],
     "--accuracy": [*NUMBERS, "1e300"], "--limit": NUMBERS, "--max-step": NUMBERS, "--time-a-step": NUMBERS,
     "--scene": NAMES, "--kind": NAMES, "--observe": NAMES, "--quantity": NAMES, "--i-use": NAMES, "--chart": NAMES,
-    "--needs": NAMES, "--keeps": NAMES,
+    "--needs": NAMES, "--keeps": NAMES, "--guard": NAMES,
     "--variables": NAMES, "--form": NAMES, "--cost": NAMES, "--energy": NAMES, "--only": NAMES, "--conserves": NAMES,
     "--output": WRITTEN, "--figure": WRITTEN, "--card": WRITTEN, "--badge": WRITTEN, "--checkpoint": WRITTEN,
     "--results": FOLDERS, "--plugin": PLUGINS, "--scheduler": ADDRESSES, "--body": [*NUMBERS, "1,2,4", "1,2"],
@@ -85,7 +85,8 @@ def lines():
             elif part.is_flag:
                 yield from ([*good, f"{option}{value}"] for value in FLAGS)
             else:
-                yield [*good, option]
+                if option != "--guard":  # which has a default
+                    yield [*good, option]
                 assert option in BAD, f"{name} {option} is not tried"
                 yield from ([*good, f"{option}={value}"] for value in BAD[option])
 
@@ -139,3 +140,10 @@ def test_every_bad_command_line_is_one_sentence(name, folder, monkeypatch):
     if sorted(path.name for path in folder.parent.iterdir()) != above:
         faults.append("wrote beside the folder")
     assert not faults, "\n".join(repr(fault).replace("a" * 290, "aaa").replace("x" * 4990, "xxx") for fault in faults)
+
+
+@pytest.mark.parametrize("words", [["--guard", "x"], ["--step-size", "-1", "--no-guard"]])
+def test_a_sentence_names_the_option_that_was_given(words):
+    done = outcome(["run", "spheroid", "strang", *(() if "--step-size" in words else ("--step-size", "0.01")), *words])
+    assert done.exit_code == 2
+    assert f"symtop: {words[0]} " in done.output

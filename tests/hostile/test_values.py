@@ -59,6 +59,7 @@ RUN = symtop.simulate("spheroid", "strang", step_size=0.01, horizon=0.5, samples
 NO_TIMES = [{"time": [0.0]}, {"time": "x", "theta": [1.0]}, xr.Dataset(), {"axis": [[0, 0, 1.0]]}]
 NOT_DATA = [None, 3, "x", [], {}, object(), *NO_TIMES]
 NOT_HORIZONS = [value for value in NOT_POSITIVE if value is not None]
+NAMED = [value for value in UNKNOWN if value is not None]  # where None asks for the default
 NO_NUMBER = [value for value in NOT_POSITIVE if not isinstance(value, np.ndarray | list)]
 SMALL = symtop.population(3, seed=1)
 
@@ -83,7 +84,7 @@ MORE = {
         symtop.recommend,
         {"scene": "spheroid", "accuracy": 1e-2, "horizon": 0.1},
         {
-            "scene": UNKNOWN, "accuracy": NOT_POSITIVE, "quantity": UNKNOWN, "horizon": NOT_HORIZONS,
+            "scene": UNKNOWN, "accuracy": NOT_POSITIVE, "quantity": NAMED, "horizon": NOT_HORIZONS,
             **dict.fromkeys(("step_size", "max_step", "time_a_step"), NOT_HORIZONS), "general": ["yes", 2],
             "keeps": ["time", 3],
         },
@@ -97,7 +98,7 @@ MORE = {
         {
             "members": [*NOT_DATA[:4], xr.Dataset({"I1": 1.0}), [symtop.scene("spheroid"), 3], SMALL.to_dataframe()],
             "integrator": UNKNOWN, "step_size": NO_NUMBER, "horizon": NO_NUMBER[1:],
-            "samples": [*NOT_WHOLE, 1], "observe": [value for value in UNKNOWN if value is not None],
+            "samples": [*NOT_WHOLE, 1], "observe": NAMED,
             "threads": [value for value in NOT_WHOLE if value is not None],
         },
     ),
