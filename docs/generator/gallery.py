@@ -15,7 +15,10 @@ from sphinx.errors import ExtensionError
 ROOT = Path(__file__).resolve().parents[2]
 SNAPSHOT = ROOT / "docs" / "snapshot"
 PAGE, MARK = "reference/gallery", "<!-- gallery -->"
-OTHERS = {"peers": ("make peers", "benchmarks/peers/figures.py")}  # a command and the code, by the name's beginning
+OTHERS = {  # a command and the code, by the name's beginning
+    "peers": ("make peers", "benchmarks/peers/figures.py"),
+    "guard": ("python -m benchmarks.guard", "benchmarks/guard.py"),
+}
 FRONT = "Front page"
 SHOWN = re.compile(
     r"^(?:\*\*(?P<title>[^*\n]+)\*\*\n\n)?!\[(?P<alt>.*)\]\(figures/(?P<file>[^)]+)\)\n\n(?P<caption>\S(?:.|\n(?!\n))*)",
