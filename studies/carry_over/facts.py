@@ -166,9 +166,10 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
 
 LINES = {
     "ranking": "ranking of methods by cost", "winner": "the cheapest method, its cost",
-    "own": "safe steps a period, to those of a top", "first": "the same of the cheapest with f(t, y)",
+    "own": "safe steps a period, to those of a top",
     "silent": "wrong without a sign", "growth": "growth of errors with time",  # so far on the front page
-    "steps": "safe steps, to those of a top as a body", "order": "order of a method",
+    "first": "safe steps of the cheapest with f(t, y)", "steps": "safe steps, to those of a top as a body",
+    "order": "order of a method",
     "limit": "linear limit of the step", "resonances": "steps that resonate below it",
     "engines": "ranking of engines' maps",
 }  # fmt: skip
