@@ -227,7 +227,7 @@ def test_without_a_claim_it_says_the_order_that_a_step_has_and_not_the_slope(onl
     ledger = symtop.judge(wrong.rounded_triple, quick=True)
     assert ledger.refuted == []
     text, _, doubt = str(ledger["order"].measured).partition(" +- ")
-    assert text == "2, a step wrong from its h^3 term on, by 1e-07"
+    assert text == "2: in one step the term in h^3 is the first that is wrong, by 1e-07"
     assert 0.0 < float(doubt.removesuffix(" of it")) < 1e-9
     assert description(ledger.findings) == "order 2"
 

@@ -153,7 +153,7 @@ def _terms(series: Series) -> Measured:
     text, term = f"{series.order} or more", series.order + 1
     if series.is_exact:
         off = f"{series.defect[term]:.1g} +- {series.noise[term]:.0g} of it"
-        text = f"{series.order}, a step wrong from its h^{term} term on, by {off}"
+        text = f"{series.order}: in one step the term in h^{term} is the first that is wrong, by {off}"
     return Measured("by a term", series.order, text=text)
 
 
