@@ -14,23 +14,18 @@ import math
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims.constants import SAMPLES, Constant, change_of
-from symtop.judging.claims.subject import STEPS_A_NUTATION, declared
-from symtop.judging.findings import NOTHING, Finding, Ledger, Measured, undecided, yes_no
+from symtop.judging.claims.constants import constant_finding, long_run
+from symtop.judging.claims.subject import declared
+from symtop.judging.findings import Finding, Ledger, Measured, undecided, yes_no
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import CLEARLY, order, order_verdict
-from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan, Run
 from symtop.methods.framework.registry import ENGINE, Integrator
-from symtop.model.charts import BODY, View
+from symtop.model.charts import BODY
 from symtop.model.scenes import Scene
 
 PERIODS = 3.0  # natural periods, of the runs of the order
 LEAST, COARSEST, FINEST, FALLS = 3.0, 300.0, 1e5, 11.0  # steps a natural period, and decades that errors fall by
 RUNS = {False: 40, True: 20}  # of the order; the second with --quick
-STEPS = {False: 1_000_000, True: 50_000}
-PILOT = 400  # steps of the run that is sampled at every step
-TOLERANCE = 1e-9  # of an adaptive method in the long run
 KEEPING = ("splitting", "discrete-lagrangian", "lie-group")  # families
 
 
@@ -45,7 +40,10 @@ def judge(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
     try:
         if BODY not in method.solvers:
             raise SymtopError("it has no chart for bodies without symmetry")  # noqa: TRY301
-        findings = _order(method, scene, quick), *_constants(method, scene, quick)
+        run = long_run(method, scene, BODY, quick=quick)
+        claims = {"energy": declared(method, "energy"), "momentum": "kept" if keeps_momentum(method) else ""}
+        kept = (constant_finding(method, *claim, run, run.constants[claim[0]]) for claim in claims.items())
+        findings = _order(method, scene, quick), *kept
     except SymtopError as error:
         findings = tuple(undecided(name, "", str(error)) for name in ("order", "energy", "momentum"))
     return Ledger(method.name, scene.name, findings, {})
@@ -69,41 +67,3 @@ def _order(method: Integrator, scene: Scene, quick: bool) -> Finding:
         verdict, why = "measured", f"{why}: here the error falls with a higher power"
     measured = Measured("order", fit.slope, text=f"{fit.slope:.2f}")
     return Finding("order", yes_no(method.order), measured, verdict, why, fit.slope, fit.interval)
-
-
-def _constants(method: Integrator, scene: Scene, quick: bool) -> list[Finding]:
-    """The findings on energy and momentum, of a long run and of its first steps."""
-    h = scene.nutation_period / STEPS_A_NUTATION
-
-    def run(steps: int, samples: int) -> tuple[np.ndarray, Run]:
-        marks = np.unique(np.rint(np.linspace(0.0, steps, samples)).astype(np.int64))
-        plan = Plan.steps(h, marks)
-        if method.adaptive:
-            plan = Plan.until(plan.times, max(TOLERANCE, method.least_tolerance))
-        return plan.times, solve(method, BODY, scene.top, scene.start, plan, f" on {scene.name}")
-
-    steps = max(round(STEPS[quick] * method.speed), PILOT) if method.fixed_step else STEPS[True]
-    (times, long), (_, first) = run(steps, SAMPLES), run(PILOT, PILOT + 1)
-    changes = zip(_changes(scene, long), _changes(scene, first), strict=True)
-    with np.errstate(over="ignore", invalid="ignore"):
-        energy, momentum = (change_of(times, *rows, max(long.steps, 1)) for rows in changes)
-    kept = "kept" if keeps_momentum(method) else ""
-    return [_constant("energy", declared(method, "energy"), energy, long), _constant("momentum", kept, momentum, long)]
-
-
-def _changes(scene: Scene, run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Relative change of the energy since the start, and of L in space, or of L_z under a weight."""
-    with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up
-        seen = View(BODY, scene.top, run.states)
-        moved = seen.momentum - seen.momentum[0]
-        size = np.linalg.norm(moved, axis=1) if scene.top.free else moved[:, 2]
-        return (seen.energy - seen.energy[0]) / scene.energy_scale, size / scene.momentum_scale
-
-
-def _constant(claim: str, claimed: str, constant: Constant, run: Run) -> Finding:
-    kind, changed = constant.kind, constant.changed
-    why = f"largest relative change {changed.largest:.1e} in {run.steps} steps"
-    if run.outcome != "ok":
-        return undecided(claim, claimed, f"{why}; the run ended: {run.outcome}")
-    measured = Measured(kind, changed.largest) if kind != "unknown" else NOTHING
-    return Finding(claim, claimed, measured, constant.verdict(claimed), why, changed.largest, constant.floor)

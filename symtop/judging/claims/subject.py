@@ -20,7 +20,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, foreign_code, one_of
 from symtop.core.files import execute, python_file
-from symtop.judging.adapters.adapter import Stepper, integrator
+from symtop.judging.adapters.adapter import Stepper
 from symtop.judging.adapters.external import BatchStep, DiffraxSolver, Program, SharedObject, is_solver
 from symtop.judging.adapters.python_step import REDUCED, PythonStep, RotationStep, ScipySolver, SeparableStep
 from symtop.judging.findings import yes_no
@@ -120,15 +120,8 @@ class Subject:
         return max(steps, FEWEST)
 
 
-def timed(stepper: Stepper, scene: Scene, claims: dict[str, Any], **options: Any) -> Subject:
-    """A bare step and what it claims, after its steps have been timed; SymtopError if it makes none."""
-    method = integrator(stepper, **claims)
-    seconds = seconds_a_step(stepper, scene) if method.fixed_step else 0.0
-    return Subject(method, scene, stepper=stepper, seconds_a_step=seconds, **options)
-
-
 def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
-    """Seconds a step, from runs of more and more steps; what a run costs at its start is left out.
+    """Seconds a step, from runs of more and more steps without what a run costs at its start; SymtopError without one.
 
     A run that blows up is no longer than its last finite state: then the longest run before it is timed, start and all.
     """
@@ -168,28 +161,21 @@ def declared(method: Integrator, claim: str) -> str:
     return yes_no(getattr(method, "order" if claim == "time" else claim, None))
 
 
-def form_of(target: Any) -> str:
-    """The form of what is given, where it shows: a class, a function, FILE.py:NAME or a library."""
-    if isinstance(target, type):
-        return "scipy"
-    if callable(target) or is_solver(target):
-        return "diffrax" if is_solver(target) else "ode"
-    path = str(target).partition(":")[0]
-    if path.endswith(".py") or path.endswith(LIBRARIES):
-        return "ode" if path.endswith(".py") else "shared"
-    raise SymtopError(f"a step must be FILE.py:NAME or FILE.so, or a command with form program, not {str(target)!r}")
-
-
 def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = False) -> Stepper:
     """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else."""
-    kind = one_of("form", form_of(target) if form is None else form, FORMS)
     one_of("chart", chart, CHARTS)
+    path, _, symbol = str(target).partition(":")
+    shared = isinstance(target, (str, Path)) and path.endswith(LIBRARIES)
+    kind = one_of("form", ("shared" if shared else "ode") if form is None else form, FORMS)
     if kind == "program":
         return Program(str(target), chart)
     if kind == "shared":
-        path, _, symbol = str(target).partition(":")
         return SharedObject(path, chart, symbol or "step")
-    thing, name = _from_file(target) if isinstance(target, (str, Path)) else (target, "")
+    return _python_step(*_thing(target), chart, kind, adaptive=adaptive)
+
+
+def _python_step(thing: Any, name: str, chart: str, kind: str, *, adaptive: bool) -> Stepper:
+    """The stepper of something in Python."""
     if kind == "diffrax" or is_solver(thing):
         return DiffraxSolver(thing, chart, name)
     if isinstance(thing, type):
@@ -199,14 +185,12 @@ def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = F
     arguments = ARGUMENTS.get(kind, ARGUMENTS["ode"])
     try:
         inspect.signature(thing).bind(*arguments.split(","))
+    except TypeError:
+        hint = "; a rotation, q = (w, x, y, z), takes (q, w, h, inertia, torque): form rotation" * (kind == "ode")
+        given = f"{inspect.signature(thing)}{hint}"
+        raise SymtopError(f"a step of the form {kind} must take {arguments}, not {given}") from None
     except ValueError:  # built in, without a signature
         pass
-    except TypeError:
-        signature = inspect.signature(thing)
-        hint = (
-            "; a rotation, q = (w, x, y, z), takes (q, w, h, inertia, torque): form rotation" if kind == "ode" else ""
-        )
-        raise SymtopError(f"a step of the form {kind} must take {arguments}, not {signature}{hint}") from None
     if kind in ("torch", "jax"):
         return BatchStep(thing, chart, kind, name)
     if kind == "ode":
@@ -214,9 +198,14 @@ def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = F
     return RotationStep(thing, name) if kind == "rotation" else SeparableStep(thing, name)
 
 
-def _from_file(target: str | Path) -> tuple[Any, str]:
-    """What FILE.py:NAME names, and its name; without a name the function ``step``."""
+def _thing(target: Any) -> tuple[Any, str]:
+    """What is given, or FILE.py:NAME names, and its name; without a name the function ``step``."""
+    if callable(target) or is_solver(target):
+        return target, ""
     path, _, name = str(target).partition(":")
+    if not path.endswith(".py"):
+        words = "a step must be FILE.py:NAME or FILE.so, or a command with form program"
+        raise SymtopError(f"{words}, not {str(target)!r}")
     file = python_file(path, "a step", "FILE.py:NAME with a file that is there (a command needs form program)")
     with foreign_code(f"the file {file.name}"):
         sys.path.insert(0, str(file.parent))  # what stands beside it, as Python has it for a script
