@@ -21,7 +21,7 @@ class Stage(NamedTuple):
     """Claims that are measured together."""
 
     claims: tuple[str, ...]
-    applies: tuple[str, ...]  # to a registered "integrator", a bare "step", such a map of the "plane" (theta, p_theta)
+    applies: tuple[str, ...]  # to a registered "integrator", on a "body" or not, a bare "step", such a map of a "plane"
     measure: Callable[[Subject], list[Finding]]
 
 
@@ -33,12 +33,14 @@ TABLE = (
     Stage(("symplectic", "symmetric"), EVERY, structure.measure),
     Stage(constants.OF_A_RUN, EVERY, constants.measure),
     Stage(("pole",), ("integrator", "step"), structure.pole),
+    Stage(("order",), ("body",), bodies.measure),
+    Stage(("energy", "momentum"), ("body",), constants.measure),
 )
 CLAIMS = tuple(claim for stage in TABLE if "integrator" in stage.applies for claim in stage.claims)
 
 
 def stages(kind: str) -> list[Stage]:
-    """What applies to an "integrator" or a "step"."""
+    """What applies to a `Subject.kind`."""
     return [stage for stage in TABLE if kind in stage.applies]
 
 
@@ -63,8 +65,6 @@ def unmeasured(claims: tuple[str, ...], method: Integrator, why: str) -> list[Fi
 
 def judge(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
     """Measure every claim of a registered method on a scene; `quick` shortens the runs. On a body there are three."""
-    if scene.of_body:
-        return bodies.judge(method, scene, quick=quick)
     subject = Subject(method, scene, quick)
-    findings = [finding for stage in stages("integrator") for finding in measure(stage, subject)]
+    findings = [finding for stage in stages(subject.kind) for finding in measure(stage, subject)]
     return Ledger(method.name, scene.name, tuple(findings), subject.traces)

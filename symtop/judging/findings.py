@@ -80,11 +80,13 @@ def yes_no(value: bool | int | None) -> str:
     return ("yes" if value else "no") if isinstance(value, bool) else str(value)
 
 
-def agreement(*, declared: bool | None, measured: bool | None) -> str:
-    """The verdict on a claim that is true or false."""
-    if measured is None:
-        return "undecided"
-    return "measured" if declared is None else "confirmed" if declared == measured else "refuted"
+def agreement(
+    claim: str, declared: bool | None, yes: bool | None, why: str, value: float, resolution: float
+) -> Finding:
+    """The finding on a claim that is true or false; `yes` is None of neither."""
+    verdict = "measured" if declared is None else "confirmed" if declared == yes else "refuted"
+    measured, verdict = (NOTHING, "undecided") if yes is None else (Measured(yes_no(yes), value), verdict)
+    return Finding(claim, yes_no(declared), measured, verdict, why, value, resolution)
 
 
 def undecided(claim: str, declared: str, why: str) -> Finding:

@@ -39,7 +39,6 @@ from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import heartbeat, integrator
 from symtop.judging.adapters.python_step import CONJUGATE
 from symtop.judging.battery import measure, stages, unmeasured
-from symtop.judging.claims import bodies
 from symtop.judging.claims.constants import KEPT, Constant
 from symtop.judging.claims.subject import Subject, open_target, seconds_a_step
 from symtop.judging.findings import About, Finding, Ledger, Measured, error_units, undecided
@@ -146,7 +145,7 @@ def judge(
         facts = stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step
         about = About(*facts, drawn, chosen.time_scale())
         listen(about)
-        for finding in _measured("step", subject, process, began, QUICK_VERDICT if quick else VERDICT):
+        for finding in _measured(subject, process, began, QUICK_VERDICT if quick else VERDICT):
             listen(finding)
             findings.append(finding)
     follow = frozenset(name for name, follows in implied.items() if follows)
@@ -272,11 +271,11 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
 
 
 def _measured(
-    kind: str, subject: Subject, process: Process, began: float, limits: tuple[float, float, float]
+    subject: Subject, process: Process, began: float, limits: tuple[float, float, float]
 ) -> Iterator[Finding]:
     """The findings on each claim, undecided where the process was lost: all of a step that makes no call."""
     most, together, least = limits
-    todo = stages(kind)
+    todo = stages(subject.kind)
     for stage in todo:
         tried = subject
         for _ in range(2):
@@ -304,8 +303,6 @@ def apart(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
     heartbeat.reset(quick=quick)
     limits = PLUGIN, math.inf, PLUGIN
     with Process(lambda: solvers_of(method)) as process:
-        if scene.of_body:
-            return bodies.judge(separated(method, process), scene, quick=quick)
         subject = Subject(separated(method, process), scene, quick, seed=secrets.randbelow(SEEDS))
-        findings = tuple(_measured("integrator", subject, process, time.monotonic(), limits))
+        findings = tuple(_measured(subject, process, time.monotonic(), limits))
     return Ledger(method.name, scene.name, findings, subject.traces)

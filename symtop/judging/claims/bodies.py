@@ -1,55 +1,27 @@
-"""The claims of a method on a body without symmetry: its order, the energy, and L in space, of a heavy body L_z.
+"""The order of a method on a body without symmetry.
 
-The order is the slope of attitude errors against the exact motion, or the integrated one of a heavy body, by the rule
-of every study (`symtop.measure.order`). Energy and momentum are judged over a long run as on a top (`constants`). L_z,
-and all of L without a weight, is kept to rounding by methods that turn q and M by the same rotation and kick by the
-torque: splittings, variational and Lie-group methods, and maps of engines that carry L in space. M.Gamma is a cubic of
-the state, so that p_phi, which a Runge-Kutta method keeps on the axis of a top, is no claim of it here.
-
-A method may be of higher order on one body than on others, as Fasso's is: that refutes nothing.
+It is the slope of attitude errors against the exact motion, or the integrated one of a heavy body, by the rule of every
+study (`symtop.measure.order`). Energy and momentum are judged over a long run as on a top (`constants`). A method may
+be of higher order on one body than on others, as Fasso's is: that refutes nothing.
 """
 
 import math
 
 import numpy as np
 
-from symtop.core.errors import SymtopError
-from symtop.judging.claims.constants import constant_finding, long_run
-from symtop.judging.claims.subject import declared
-from symtop.judging.findings import Finding, Ledger, Measured, undecided, yes_no
+from symtop.judging.claims.subject import Subject
+from symtop.judging.findings import Finding, Measured, undecided, yes_no
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import CLEARLY, order, order_verdict
-from symtop.methods.framework.registry import ENGINE, Integrator
-from symtop.model.charts import BODY
-from symtop.model.scenes import Scene
 
 PERIODS = 3.0  # natural periods, of the runs of the order
 LEAST, COARSEST, FINEST, FALLS = 3.0, 300.0, 1e5, 11.0  # steps a natural period, and decades that errors fall by
 RUNS = {False: 40, True: 20}  # of the order; the second with --quick
-KEEPING = ("splitting", "discrete-lagrangian", "lie-group")  # families
 
 
-def keeps_momentum(method: Integrator) -> bool:
-    """Does L, or L_z of a heavy body, not move but by rounding?"""
-    return method.family in KEEPING or (method.family == ENGINE and "p_phi" in (method.conserves or ()))
-
-
-def judge(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
-    """Measure what a method claims on a body; undecided where it has no chart for one, or a run fails."""
-    findings: tuple[Finding, ...]
-    try:
-        if BODY not in method.solvers:
-            raise SymtopError("it has no chart for bodies without symmetry")  # noqa: TRY301
-        run = long_run(method, scene, BODY, quick=quick)
-        claims = {"energy": declared(method, "energy"), "momentum": "kept" if keeps_momentum(method) else ""}
-        kept = (constant_finding(method, *claim, run, run.constants[claim[0]]) for claim in claims.items())
-        findings = _order(method, scene, quick), *kept
-    except SymtopError as error:
-        findings = tuple(undecided(name, "", str(error)) for name in ("order", "energy", "momentum"))
-    return Ledger(method.name, scene.name, findings, {})
-
-
-def _order(method: Integrator, scene: Scene, quick: bool) -> Finding:
+def measure(subject: Subject) -> list[Finding]:
+    """The finding on the order."""
+    method, scene, quick = subject.method, subject.scene, subject.quick
     period, power = scene.nutation_period, method.order or 1
     coarsest, horizon = max(LEAST, COARSEST / power**2), PERIODS * period
     counts = np.geomspace(coarsest, min(coarsest * 10.0 ** (FALLS / power), FINEST), RUNS[quick])
@@ -62,8 +34,8 @@ def _order(method: Integrator, scene: Scene, quick: bool) -> Finding:
     fit = order(step, error, bound, 2.0 * math.pi / period, method.order, symmetric=method.symmetric)
     verdict, why = order_verdict(method.order, fit), f"attitude {fit} on {scene.name}"
     if not math.isfinite(fit.slope):
-        return undecided("order", yes_no(method.order), fit.reason)
+        return [undecided("order", yes_no(method.order), fit.reason)]
     if verdict == "refuted" and fit.slope - fit.interval > (method.order or 0) + CLEARLY:
         verdict, why = "measured", f"{why}: here the error falls with a higher power"
     measured = Measured("order", fit.slope, text=f"{fit.slope:.2f}")
-    return Finding("order", yes_no(method.order), measured, verdict, why, fit.slope, fit.interval)
+    return [Finding("order", yes_no(method.order), measured, verdict, why, fit.slope, fit.interval)]

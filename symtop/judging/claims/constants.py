@@ -37,10 +37,10 @@ from symtop.measure.step_map import one_step
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Array, Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator
-from symtop.model.charts import space_momenta
+from symtop.model.charts import BODY, space_momenta
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop
-from symtop.run.simulation import make_plan
+from symtop.run.simulation import chart_of, make_plan
 from symtop.run.trajectory import Trajectory
 
 STEPS, QUICK_STEPS = 1_000_000, 50_000
@@ -59,6 +59,7 @@ SURE = 8.0
 VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
 SUDDEN, LITTLE, FROM = 100.0, 1e-2, "changes as it begins"
 OF_A_RUN = (*CONSTANTS, "reported", "invariant", "explicit", "work")  # reported: momenta beside those of the states
+OF_MOTION = (*CONSTANTS, "momentum")  # the last of a body: L in space, of a heavy one L_z
 KINDS = ("kept", "bounded", "random walk", "growing", "drift", "blows up")  # from best to worst
 OWN = "its states'"  # what every run says of the momenta that it reports
 BADNESS = ("inapplicable", "measured", "confirmed", "undecided", "refuted")
@@ -208,10 +209,9 @@ def long_run(
     }
     message, nutations = sentence(run.outcome, run.reached, float(plan.times[-1])), run.reached / unit
     costs = run.force_evaluations / made, run.newton_iterations / made, steady
-    energy, times = np.full((2, WINDOWS), math.nan), plan.times / unit
-    shown_by = tops(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS)  # fewer, where no sample is
-    for row, values in zip(energy, shown_by, strict=True):
-        row[: len(values)] = values
+    times = plan.times / unit
+    rows = tops(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS)  # fewer, where no sample is
+    energy = np.array([np.pad(row, (0, WINDOWS - len(row)), constant_values=math.nan) for row in rows])
     return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *costs, reported, energy, blown_up)
 
 
@@ -297,14 +297,16 @@ def change_of(
 
 def measure(subject: Subject) -> list[Finding]:
     """Everything that one long run in each chart shows; the worst chart decides, and the finding names it."""
-    method, runs, by_chart = subject.method, [], []
+    method, scene, runs, by_chart = subject.method, subject.scene, [], []
+    charts = (chart_of(method, BODY),) if scene.of_body else (PLANE,) if subject.in_plane else method.charts()
     options: dict[str, Any] = {"quick": subject.quick, "most": subject.long_steps, "seed": subject.seed}
-    for chart in (PLANE,) if subject.in_plane else method.charts():
+    for chart in charts:
         try:
-            runs.append(long_run(method, subject.scene, chart, **options))
+            runs.append(long_run(method, scene, chart, **options))
             findings = of_run(method, runs[-1])
         except SymtopError as error:
-            findings = [undecided(claim, declared(method, claim), str(error)) for claim in OF_A_RUN]
+            every = (*OF_A_RUN, "momentum")
+            findings = [undecided(claim, declared(method, claim), str(error)) for claim in every]
         by_chart.append([_named(one, chart) for one in findings])
     if runs:
         subject.traces.update(min(runs, key=lambda run: run.steps).traces())
@@ -313,7 +315,7 @@ def measure(subject: Subject) -> list[Finding]:
 
 def of_run(method: Integrator, run: LongRun) -> list[Finding]:
     """What one long run shows of each claim of `OF_A_RUN`."""
-    motion = [constant_finding(method, one, declared(method, one), run, run.constants.get(one)) for one in CONSTANTS]
+    motion = [_constant(method, one, declared(method, one), run, run.constants.get(one)) for one in OF_MOTION]
     return [*motion, _of_states(run), _invariant(method, run), *_costs(method, run)]
 
 
@@ -329,8 +331,7 @@ def _badness(one: Finding) -> tuple[int, int, float]:
     return BADNESS.index(one.verdict), growth, one.value if math.isfinite(one.value) else -1.0
 
 
-def constant_finding(method: Integrator, claim: str, claimed: str, run: LongRun, constant: Constant | None) -> Finding:
-    """What a long run shows of the claim that a constant is kept or bounded."""
+def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, constant: Constant | None) -> Finding:
     if constant is None:
         return inapplicable(claim, f"the {run.chart} chart has no such constant", claimed)
     kind, changed, ended = constant.kind, constant.changed, run.outcome != "ok"
@@ -381,7 +382,7 @@ def _invariant(method: Integrator, run: LongRun) -> Finding:
     if unknown:
         return undecided("invariant", claimed, f"the battery has no formula for {unknown}")
     worst = max(names, key=lambda name: run.constants[name].changed.largest)
-    return constant_finding(method, "invariant", "kept", run, run.constants[worst])._replace(declared=claimed)
+    return _constant(method, "invariant", "kept", run, run.constants[worst])._replace(declared=claimed)
 
 
 def _costs(method: Integrator, run: LongRun) -> list[Finding]:
@@ -401,6 +402,5 @@ def _costs(method: Integrator, run: LongRun) -> list[Finding]:
     why = f"it reports no iterations and {run.evaluations:.2f} forces a step, always"
     why += "; so does a method that solves linear equations" * (answer is None)
     why = f"it reports {run.iterations:.2f} iterations a step" if iterates else why
-    measured = NOTHING if answer is None else Measured(yes_no(answer))
-    verdict = agreement(declared=method.explicit, measured=answer)
-    return [Finding("explicit", claimed, measured, verdict, why, run.iterations, 0.0), work]
+    finding = agreement("explicit", method.explicit, answer, why, run.iterations, 0.0)
+    return [finding._replace(measured=Measured(yes_no(answer))), work]

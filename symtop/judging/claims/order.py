@@ -407,8 +407,8 @@ class Hastened:
         """y'."""
         self.times.add(t)
         pace = 1.0 + self.uneven * math.cos(self.rate * (t - self.begin) + 1.0)
-        rates: Array = np.array(FORMULATIONS["axis"].field(self.par, np.asarray(y).tolist()))
-        return pace * rates
+        rates = np.array(FORMULATIONS["axis"].field(self.par, np.asarray(y).tolist()))
+        return np.asarray(pace * rates)
 
 
 def series_by_clock(subject: Subject, uneven: float) -> tuple[Series, set[float]]:
@@ -421,8 +421,7 @@ def series_by_clock(subject: Subject, uneven: float) -> tuple[Series, set[float]
     def motion(h: float) -> Array:
         return true(h + uneven * (math.sin(rate * h + 1.0) - math.sin(1.0)) / rate)
 
-    def image(h: float) -> Array:
-        end: Array = subject.stepper.along(f, begin, np.array(state), h, np.array([1]))[0]
-        return end / unit
+    def image(h: float) -> Any:
+        return subject.stepper.along(f, begin, np.array(state), h, np.array([1]))[0] / unit
 
     return compared(image, motion, scale, "axis"), f.times

@@ -22,7 +22,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError
 from symtop.judging.claims.subject import Subject, declared
-from symtop.judging.findings import NOTHING, Finding, Measured, agreement, undecided, yes_no
+from symtop.judging.findings import Finding, Measured, agreement, undecided
 from symtop.measure import step_map as maps
 from symtop.measure.errors import errors
 from symtop.methods.framework.plan import Array
@@ -102,9 +102,7 @@ def map_of(subject: Subject, chart: str) -> tuple[maps.StepMap, Angles]:
 
 def _in_chart(chart: str, method: Integrator, claim: str, answer: Answer) -> Finding:
     yes, value, resolution, why = answer
-    claimed, measured = getattr(method, claim), NOTHING if yes is None else Measured(yes_no(yes), value)
-    verdict = agreement(declared=claimed, measured=yes)
-    return Finding(claim, yes_no(claimed), measured, verdict, f"{why}, in the {chart} chart", value, resolution)
+    return agreement(claim, getattr(method, claim), yes, f"{why}, in the {chart} chart", value, resolution)
 
 
 def _badness(one: Finding) -> tuple[int, float]:

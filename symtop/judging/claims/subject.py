@@ -26,7 +26,7 @@ from symtop.judging.adapters.python_step import REDUCED, PythonStep, RotationSte
 from symtop.judging.findings import yes_no
 from symtop.measure.conservation import CONSTANTS as MOTION
 from symtop.measure.step_map import drawn, generic_start
-from symtop.methods.framework.registry import Integrator
+from symtop.methods.framework.registry import ENGINE, Integrator
 from symtop.model.charts import CHARTS
 from symtop.model.scenes import Scene
 
@@ -34,6 +34,7 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 ARGUMENTS = {"ode": "(f, t, y, h)", "separable": "(state, h, dT, dV)", "rotation": "(q, w, h, inertia, torque)"}
 LIBRARIES = (".so", ".dylib", ".dll")
 CONSTANTS = (*MOTION, "axis_length")
+KEEPING = ("splitting", "discrete-lagrangian", "lie-group")  # families that keep the momentum of a body
 PLANE = "nutation"  # the chart of a map of (theta, p_theta)
 LONG, SLOPES = (10.0, 2.5), (6.0, 1.5)  # seconds of a long run and of the runs of the order; the second with --quick
 STEPS = 1_000_000  # most steps of a long run
@@ -63,6 +64,11 @@ class Subject:
     seed: int = 0  # of the starts, times and steps that are drawn
     autonomous: bool = False  # was a step written for f(y)?
     traces: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """A bare "step", or a registered "integrator", or one on a "body" without symmetry."""
+        return "step" if self.stepper else "body" if self.scene.of_body else "integrator"
 
     @property
     def in_plane(self) -> bool:
@@ -146,12 +152,19 @@ def declared(method: Integrator, claim: str) -> str:
 
     Nothing claimed of the energy means what the other claims imply: kept if it is among the conserved quantities,
     bounded if the method is symplectic and its step fixed (Benettin, Giorgilli, J. Stat. Phys. 74 (1994) 1117).
+
+    On a body L_z, and all of L without a weight, is kept by methods that turn q and M by the same rotation and kick by
+    the torque: splittings, variational and Lie-group methods, and maps of engines that carry L in space. M.Gamma is a
+    cubic of the state, so that p_phi, which a Runge-Kutta method keeps on the axis of a top, is no claim of it there.
     """
     conserves = method.conserves or frozenset()
     if claim == "energy" and method.energy_error is not None:
         return method.energy_error
     if claim == "energy" and "energy" not in conserves:
         return "bounded" if method.symplectic and method.fixed_step else ""
+    if claim == "momentum":
+        keeps = method.family in KEEPING or (method.family == ENGINE and "p_phi" in conserves)
+        return "kept" if keeps else ""
     if claim in CONSTANTS:
         return "kept" if claim in conserves else ""
     if claim == "invariant":
