@@ -137,7 +137,7 @@ class LongRun(NamedTuple):
     steady_cost: bool  # every run of the same number of steps cost the same, at two step sizes
     reported: Difference | None  # of the momenta from those of the states; None where the states show none
     energy: Array  # times, in nutations, and the largest relative change around each, shape (2, WINDOWS)
-    blown_up: str = ""  # when it blew up; the run is that until then
+    blown_up: float = math.nan  # the time at which it blew up; the run is that until then
 
     @property
     def span(self) -> str:
@@ -195,12 +195,11 @@ def long_run(
         reported = _reported(method, scene, chart, shown, (run, plan))
         if method.fixed_step:
             reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
-    changes, every_step, blown_up = constants(scene, shown), constants(scene, pilot), ""
+    changes, every_step, blown_up = constants(scene, shown), constants(scene, pilot), math.nan
     risen = np.flatnonzero(changes["energy"] > 1.0 + 2.0 * abs(scene.top.mgl) / scene.energy_scale)
     if risen.size:
-        until = float(plan.times[risen[0]])
-        blown_up = f"blows up at t = {until:.3g}, after {until / step:.0f} steps, {unit / step:.0f} a nutation"
-        shown, run, plan = _run(method, scene, inside, until / step, step, SAMPLES)
+        blown_up = float(plan.times[risen[0]])
+        shown, run, plan = _run(method, scene, inside, blown_up / step, step, SAMPLES)
         changes = constants(scene, shown)
     made, grains = max(run.steps, 1), {"energy": scene.energy_grain}
     kept = {
@@ -341,9 +340,12 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
     finding = finding if run.steps else finding._replace(measured=NOTHING)
     # an error that returns with the nutation cannot exceed the largest change of a step, all one way
     most = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
-    if claim == "energy" and run.blown_up:
-        measured, verdict = Measured("blows up", changed.largest, run.blown_up), "refuted" if claimed else "measured"
-        return finding._replace(measured=measured, verdict=verdict, why=f"it {run.blown_up}; until then {why}")
+    if claim == "energy" and run.blown_up > 0.0:
+        when, pace = f"t = {run.blown_up:.3g}", run.steps / run.nutations
+        text = f"blows up at {when}, after {run.steps} steps, {pace:.0f} a nutation"
+        why = f"by {when} it rises by more than that of the nutation and 2 |mgl|: {why}"
+        measured, verdict = Measured("blows up", changed.largest, text), "refuted" if claimed else "measured"
+        return finding._replace(measured=measured, verdict=verdict, why=why)
     if run.outcome not in ("ok", "not_finite", "not_normalised") or (ended and kind in ("kept", "bounded")):
         return finding._replace(verdict="undecided", why=f"{why}; but the run {run.message}")
     if method.fixed_step and constant.sudden:

@@ -44,7 +44,7 @@ FEWEST = 300  # steps of the longest run of the order, however slow
 LADDER = 2.5  # times the steps of the longest run: what all of them take
 ENOUGH_STEPS, AT_REST = 50.0, 1e-9  # steps a nutation with a right-hand side of zero, and how far they may go
 STEPS_A_NUTATION = 118.02  # of a long run, and of the steps that are timed: an implicit one costs more if it is long
-ENOUGH = 0.03  # seconds after which the time of a step is known
+ENOUGH, LEAST = 0.03, 1e-9  # seconds after which the time of a step is known, and the least that it is
 
 
 def rest(_: float, y: Any) -> Any:
@@ -144,7 +144,8 @@ def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
         steps *= 4 if finite else 1
         if not finite or taken - first > max(ENOUGH, first) or steps > 1e7:  # a start's cost scatters as much as it is
             taken = min(seconds(steps)[0] for _ in range(3))  # others may have been at work
-            return max(taken - first * finite, 0.5 * taken) / steps  # the start alone may have been disturbed
+            # the start alone may have been disturbed; a process that waited before is told of its waiting later
+            return max(taken - first * finite, 0.5 * taken, LEAST * steps) / steps
 
 
 def declared(method: Integrator, claim: str) -> str:
