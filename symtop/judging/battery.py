@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims import bodies, calls, constants, order, structure
+from symtop.judging.claims import calls, constants, order, structure
 from symtop.judging.claims.subject import Subject, declared
 from symtop.judging.findings import AS, Finding, Ledger, claim_name, inapplicable, undecided
 from symtop.methods.framework.registry import Integrator
@@ -33,7 +33,7 @@ TABLE = (
     Stage(("symplectic", "symmetric"), EVERY, structure.measure),
     Stage(constants.OF_A_RUN, EVERY, constants.measure),
     Stage(("pole",), ("integrator", "step"), structure.pole),
-    Stage(("order",), ("body",), bodies.measure),
+    Stage(("order",), ("body",), order.on_body),
     Stage(("energy", "momentum"), ("body",), constants.measure),
 )
 CLAIMS = tuple(claim for stage in TABLE if "integrator" in stage.applies for claim in stage.claims)

@@ -44,7 +44,7 @@ from symtop.judging.claims.structure import ONE_MAP, map_of
 from symtop.judging.claims.subject import FINEST, Subject
 from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, undecided, yes_no
 from symtop.measure.accuracy import error_table
-from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order_verdict
+from symtop.measure.order import BESIDE, CLEARLY, LARGEST_ERROR, Fit, order_verdict
 from symtop.measure.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
@@ -143,6 +143,21 @@ def _lower(sizes: Array, misses: Array, power: int, short: float) -> tuple[float
     return (float(orders[jumps[0]]), float(sizes[jumps[0]])) if jumps.size else (math.inf, math.nan)
 
 
+def on_body(subject: Subject) -> list[Finding]:
+    """The finding on a body without symmetry: the slope of attitude errors alone.
+
+    A method may be of higher order on one body than on others, as Fasso's is: that refutes nothing.
+    """
+    claim, scene = subject.method.order, subject.scene
+    fitted = measured_order(subject.method, scene, quick=subject.quick, main="attitude")
+    fit, verdict, why = fitted.main, order_verdict(claim, fitted.main), f"attitude {fitted.main} on {scene.name}"
+    if not fitted.measured:
+        return [undecided("order", yes_no(claim), fit.reason)]
+    if verdict == "refuted" and fit.slope - fit.interval > (claim or 0) + CLEARLY:
+        verdict, why = "measured", f"{why}: here the error falls with a higher power"
+    return [Finding("order", yes_no(claim), fitted.measured, verdict, why, fit.slope, fit.interval)]
+
+
 def _terms(series: Series) -> Measured:
     """The order that a series shows, or the least that it can be."""
     text, term = f"{series.order} or more", series.order + 1
@@ -195,7 +210,8 @@ def measured_order(
     runs, shown = [(scene, NUTATIONS)], observable(method)
     if finest is not None and method.fixed_step:
         runs.append((scene, SHARE))  # the same number of steps, and smaller errors
-    if not (quick or not method.fixed_step or method.order is None or method.implementation == "python"):
+    known = method.fixed_step and method.order is not None and not scene.of_body
+    if known and not quick and method.implementation == "compiled":
         runs += [(find_scene(FALLBACK), nutations) for nutations in LONGER]
     count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # steps that are chosen scatter
     most = FINEST[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
