@@ -176,8 +176,8 @@ class Passage(NamedTuple):
         return "passes" if self.passes else "wrong" if self.outcome == "ok" else "ends there"
 
     def __str__(self) -> str:
-        how = f"off by {self.error:.0e} and {self.finer:.0e} with finer steps"
-        return f"{self.chart}: {self.word}, {self.outcome if self.word == 'ends there' else how}"
+        how = f", off by {self.error:.0e} and {self.finer:.0e} with finer steps"
+        return f"{self.chart}: {self.word}{how if self.outcome == 'ok' else f' ({self.outcome})'}"
 
 
 def passages(method: Integrator) -> list[Passage]:
