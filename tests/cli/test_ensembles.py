@@ -1,7 +1,6 @@
 """`symtop ensemble`: what it writes, draws and prints, and what it refuses."""
 
 import functools
-import importlib
 import json
 
 import numpy as np
@@ -113,9 +112,7 @@ def test_a_few_variables_are_kept_and_compared_and_a_budget_is_one(tmp_path, mon
     assert "largest error" not in done.output
 
 
-def test_members_that_raise_are_told_in_one_sentence(tmp_path, monkeypatch):
-    registry = importlib.import_module("symtop.methods.framework.registry")
-    monkeypatch.setattr(registry, "_registry", registry.integrators())
+def test_members_that_raise_are_told_in_one_sentence(tmp_path, clean_registry):
     plugin = tmp_path / "raises_for_some.py"
     plugin.write_text(
         "import symtop\n"
