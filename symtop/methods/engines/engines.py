@@ -74,7 +74,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.jit import by_length, register_jitable
+from symtop.core.jit import by_length, register_jitable, set_item
 from symtop.methods.framework.body import prepared
 from symtop.methods.framework.loop import FixedStep, Loop, as_stepped, kernel_loop, no_carry
 from symtop.methods.framework.preparation import Body, Preparation
@@ -301,16 +301,24 @@ def _present_momentum_on_body(par: Any, rule: Any, state: Any, k: int, h: float)
     return (*q, *rotated(par, conjugate(q), (state[4], state[5], state[6])))
 
 
-def _body_with_momentum(body: Any, at: Any) -> Any:
-    q = at.w, at.x, at.y, at.z
-    par = EngineBody(body.I1, body.I2, body.I3, body.c1, body.c2, body.c3, 0.0, 0.5, 1.0)
-    return par, (*q, *rotated(par, q, (at.M1, at.M2, at.M3)))
+def _on_body(vector: Callable[..., Any]) -> Preparation:
+    """A body and its start as (q, v), v in space from ``vector(body, start)`` in body axes."""
+    vector = register_jitable(vector)
+
+    def prepare(body, at):  # type: ignore[no-untyped-def]
+        q = at.w, at.x, at.y, at.z
+        par = EngineBody(body.I1, body.I2, body.I3, body.c1, body.c2, body.c3, 0.0, 0.5, 1.0)
+        return par, (*q, *rotated(par, q, vector(body, at)))
+
+    return prepared(prepare)
 
 
-def _body_with_rates(body: Any, at: Any) -> Any:
-    q = at.w, at.x, at.y, at.z
-    par = EngineBody(body.I1, body.I2, body.I3, body.c1, body.c2, body.c3, 0.0, 0.5, 1.0)
-    return par, (*q, *rotated(par, q, (body.a1 * at.M1, body.a2 * at.M2, body.a3 * at.M3)))
+def _own_momentum(_: Any, at: Any) -> Any:
+    return at.M1, at.M2, at.M3
+
+
+def _own_rates(body: Any, at: Any) -> Any:
+    return body.a1 * at.M1, body.a2 * at.M2, body.a3 * at.M3
 
 
 class Carried(NamedTuple):
@@ -324,12 +332,12 @@ class Carried(NamedTuple):
 VELOCITY = {
     "axis": Carried(_prepared(e_at, 6, rates=True), _observe_rates_on_axis, _present_rates_on_axis),
     "attitude": Carried(_prepared(q_at, 7, rates=True), _observe_rates_on_attitude, _present_rates_on_attitude),
-    BODY: Carried(prepared(_body_with_rates), _observe_rates_on_body, _present_rates_on_body),
+    BODY: Carried(_on_body(_own_rates), _observe_rates_on_body, _present_rates_on_body),
 }
 ANGULAR_MOMENTUM = {
     "axis": Carried(_prepared(e_at, 6, rates=False), observe_axis),
     "attitude": Carried(_prepared(q_at, 7, rates=False), observe_attitude),
-    BODY: Carried(prepared(_body_with_momentum), observe_attitude, _present_momentum_on_body),
+    BODY: Carried(_on_body(_own_momentum), observe_attitude, _present_momentum_on_body),
 }
 
 
@@ -640,32 +648,37 @@ def adams_bashforth(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> 
     return p, rotated(par, p, w), rotated(par, p, now)
 
 
-@register_jitable
-def _first_turn(par: Any, q: Any, L: Any, h: float) -> Any:
-    """About the body's first axis, with L in body axes."""
-    x = 0.5 * h * L[0] / par.I1
-    c, s = np.cos(x), np.sin(x)
-    C, S = c * c - s * s, 2.0 * s * c
-    q = q[0] * c - q[1] * s, q[1] * c + q[0] * s, q[2] * c + q[3] * s, q[3] * c - q[2] * s
-    return q, (L[0], C * L[1] + S * L[2], C * L[2] - S * L[1])
+def _turn(k: int) -> Callable[..., Any]:
+    """The turn about axis k of the body, with L in body axes."""
+    a, b, c = 1 + k, 1 + (k + 1) % 3, 1 + (k + 2) % 3
+
+    @register_jitable
+    def turned(par, q, L, h):  # type: ignore[no-untyped-def]
+        x = 0.5 * h * L[k] / (par.I3 if k == 2 else par.I1)
+        cos, sin = np.cos(x), np.sin(x)
+        C, S = cos * cos - sin * sin, 2.0 * sin * cos
+        about = set_item(set_item(q, 0, q[0] * cos - q[a] * sin), a, q[a] * cos + q[0] * sin)
+        across = set_item(set_item(about, b, q[b] * cos + q[c] * sin), c, q[c] * cos - q[b] * sin)
+        i, j = b - 1, c - 1
+        return across, set_item(set_item(L, i, C * L[i] + S * L[j]), j, C * L[j] - S * L[i])
+
+    return turned
 
 
-@register_jitable
-def _second_turn(par: Any, q: Any, L: Any, h: float) -> Any:
-    y = 0.5 * h * L[1] / par.I1
-    c, s = np.cos(y), np.sin(y)
-    C, S = c * c - s * s, 2.0 * s * c
-    q = q[0] * c - q[2] * s, q[1] * c - q[3] * s, q[2] * c + q[0] * s, q[3] * c + q[1] * s
-    return q, (C * L[0] - S * L[2], L[1], C * L[2] + S * L[0])
+def _five_turns(outer: int, inner: int) -> Callable[..., Any]:
+    first, second, third = _turn(outer), _turn(1), _turn(inner)
+
+    @register_jitable
+    def turned(par, q, L, h):  # type: ignore[no-untyped-def]
+        half = 0.5 * h
+        q, L = second(par, *first(par, q, L, half), half)
+        q, L = second(par, *third(par, q, L, h), half)
+        return first(par, q, L, half)
+
+    return turned
 
 
-@register_jitable
-def _third_turn(par: Any, q: Any, L: Any, h: float) -> Any:
-    z = 0.5 * h * L[2] / par.I3
-    c, s = np.cos(z), np.sin(z)
-    C, S = c * c - s * s, 2.0 * s * c
-    q = q[0] * c - q[3] * s, q[1] * c + q[2] * s, q[2] * c - q[1] * s, q[3] * c + q[0] * s
-    return q, (C * L[0] + S * L[1], C * L[1] - S * L[0], L[2])
+_thin_inside, _thick_inside = _five_turns(0, 2), _five_turns(2, 0)
 
 
 def _increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
@@ -674,18 +687,7 @@ def _increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) 
     kick = scaled(half, torque(par, axis(q)))
     kicked = state[4] + kick[0], state[5] + kick[1], state[6] + kick[2]
     L = plus(kicked, 1.0, turned((q[0], -q[1], -q[2], -q[3]), kicked))
-    if par.I3 < par.I1:
-        q, L = _first_turn(par, q, L, half)
-        q, L = _second_turn(par, q, L, half)
-        q, L = _third_turn(par, q, L, h)
-        q, L = _second_turn(par, q, L, half)
-        q, L = _first_turn(par, q, L, half)
-    else:
-        q, L = _third_turn(par, q, L, half)
-        q, L = _second_turn(par, q, L, half)
-        q, L = _first_turn(par, q, L, h)
-        q, L = _second_turn(par, q, L, half)
-        q, L = _third_turn(par, q, L, half)
+    q, _ = _thin_inside(par, q, L, h) if par.I3 < par.I1 else _thick_inside(par, q, L, h)
     q = normalised(par, q)
     kick = plus(kick, half, torque(par, axis(q)))
     dstate = (q[0] - state[0], q[1] - state[1], q[2] - state[2], q[3] - state[3], *kick)
