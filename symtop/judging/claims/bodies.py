@@ -67,7 +67,7 @@ def _order(method: Integrator, scene: Scene, quick: bool) -> Finding:
         return undecided("order", yes_no(method.order), fit.reason)
     if verdict == "refuted" and fit.slope - fit.interval > (method.order or 0) + CLEARLY:
         verdict, why = "measured", f"{why}: here the error falls with a higher power"
-    elif verdict == "refuted" and method.adaptive and method.explicit is False:  # SciPy's Radau: h^4, h^5 if solved well
+    elif verdict == "refuted" and method.adaptive and method.explicit is False:  # Radau: h^4
         verdict, why = "undecided", f"{why}: its equations, too, are solved no better than to the tolerance"
     measured = Measured("order", fit.slope, text=f"{fit.slope:.2f}")
     return Finding("order", yes_no(method.order), measured, verdict, why, fit.slope, fit.interval)
