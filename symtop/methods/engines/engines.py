@@ -301,24 +301,16 @@ def _present_momentum_on_body(par: Any, rule: Any, state: Any, k: int, h: float)
     return (*q, *rotated(par, conjugate(q), (state[4], state[5], state[6])))
 
 
-def _on_body(vector: Callable[..., Any]) -> Preparation:
-    """A body and its start as (q, v), v in space from ``vector(body, start)`` in body axes."""
-    vector = register_jitable(vector)
-
-    def prepare(body, at):  # type: ignore[no-untyped-def]
-        q = at.w, at.x, at.y, at.z
-        par = EngineBody(body.I1, body.I2, body.I3, body.c1, body.c2, body.c3, 0.0, 0.5, 1.0)
-        return par, (*q, *rotated(par, q, vector(body, at)))
-
-    return prepared(prepare)
+def _body_with_momentum(body: Any, at: Any) -> Any:
+    q = at.w, at.x, at.y, at.z
+    par = EngineBody(body.I1, body.I2, body.I3, body.c1, body.c2, body.c3, 0.0, 0.5, 1.0)
+    return par, (*q, *rotated(par, q, (at.M1, at.M2, at.M3)))
 
 
-def _own_momentum(_: Any, at: Any) -> Any:
-    return at.M1, at.M2, at.M3
-
-
-def _own_rates(body: Any, at: Any) -> Any:
-    return body.a1 * at.M1, body.a2 * at.M2, body.a3 * at.M3
+def _body_with_rates(body: Any, at: Any) -> Any:
+    q = at.w, at.x, at.y, at.z
+    par = EngineBody(body.I1, body.I2, body.I3, body.c1, body.c2, body.c3, 0.0, 0.5, 1.0)
+    return par, (*q, *rotated(par, q, (body.a1 * at.M1, body.a2 * at.M2, body.a3 * at.M3)))
 
 
 class Carried(NamedTuple):
@@ -332,12 +324,12 @@ class Carried(NamedTuple):
 VELOCITY = {
     "axis": Carried(_prepared(e_at, 6, rates=True), _observe_rates_on_axis, _present_rates_on_axis),
     "attitude": Carried(_prepared(q_at, 7, rates=True), _observe_rates_on_attitude, _present_rates_on_attitude),
-    BODY: Carried(_on_body(_own_rates), _observe_rates_on_body, _present_rates_on_body),
+    BODY: Carried(prepared(_body_with_rates), _observe_rates_on_body, _present_rates_on_body),
 }
 ANGULAR_MOMENTUM = {
     "axis": Carried(_prepared(e_at, 6, rates=False), observe_axis),
     "attitude": Carried(_prepared(q_at, 7, rates=False), observe_attitude),
-    BODY: Carried(_on_body(_own_momentum), observe_attitude, _present_momentum_on_body),
+    BODY: Carried(prepared(_body_with_momentum), observe_attitude, _present_momentum_on_body),
 }
 
 
@@ -665,20 +657,7 @@ def _turn(k: int) -> Callable[..., Any]:
     return turned
 
 
-def _five_turns(outer: int, inner: int) -> Callable[..., Any]:
-    first, second, third = _turn(outer), _turn(1), _turn(inner)
-
-    @register_jitable
-    def turned(par, q, L, h):  # type: ignore[no-untyped-def]
-        half = 0.5 * h
-        q, L = second(par, *first(par, q, L, half), half)
-        q, L = second(par, *third(par, q, L, h), half)
-        return first(par, q, L, half)
-
-    return turned
-
-
-_thin_inside, _thick_inside = _five_turns(0, 2), _five_turns(2, 0)
+_first_turn, _second_turn, _third_turn = map(_turn, range(3))
 
 
 def _increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
@@ -687,7 +666,18 @@ def _increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) 
     kick = scaled(half, torque(par, axis(q)))
     kicked = state[4] + kick[0], state[5] + kick[1], state[6] + kick[2]
     L = plus(kicked, 1.0, turned((q[0], -q[1], -q[2], -q[3]), kicked))
-    q, _ = _thin_inside(par, q, L, h) if par.I3 < par.I1 else _thick_inside(par, q, L, h)
+    if par.I3 < par.I1:
+        q, L = _first_turn(par, q, L, half)
+        q, L = _second_turn(par, q, L, half)
+        q, L = _third_turn(par, q, L, h)
+        q, L = _second_turn(par, q, L, half)
+        q, L = _first_turn(par, q, L, half)
+    else:
+        q, L = _third_turn(par, q, L, half)
+        q, L = _second_turn(par, q, L, half)
+        q, L = _first_turn(par, q, L, h)
+        q, L = _second_turn(par, q, L, half)
+        q, L = _third_turn(par, q, L, half)
     q = normalised(par, q)
     kick = plus(kick, half, torque(par, axis(q)))
     dstate = (q[0] - state[0], q[1] - state[1], q[2] - state[2], q[3] - state[3], *kick)
