@@ -44,13 +44,6 @@ def test_false_claims_on_a_body_are_refuted() -> None:
     assert said(symtop.integrator("stormer-verlet"), FREE)["energy"].verdict == "undecided"
 
 
-@pytest.mark.slow
-def test_the_order_of_a_method_that_solves_its_equations_to_the_tolerance_is_left_open() -> None:
-    radau = symtop.integrator("radau")
-    assert said(radau, FREE)["order"].verdict == "undecided"
-    assert said(dataclasses.replace(radau, name="other", explicit=True), FREE)["order"].verdict == "refuted"
-
-
 def test_five_rotations_are_of_a_higher_order_on_the_body_of_fasso() -> None:
     start = Attitude((0.8, 0.6, 0.0, 0.0), (0.5, 0.7, 1.1))
     slopes = {}
