@@ -7,11 +7,12 @@ A row of the table is a greedy cover of the random tops of the study: the varian
 least on most of them, then the one that does so on most of those that are left, and so on. One whose cost is next to
 the least on a few hard tops comes before a second one that is good where the first is.
 
-A check draws scenes that the table was not made from, with accuracies and lengths of its own. The cost of a method is
-the force evaluations of the run that its search over the whole horizon ends with (`symtop.measure.settings`), moved to
-the very accuracy along the method's order, times the seconds of one, and the seconds of a call. Those of the best
-method in the table and of the advised one are compared with the least. The advice compares single runs, whose errors
-lie between 0.3 times the accuracy and it, and whose times vary: it may take the second best of two that are close.
+A check draws scenes that the table was not made from, with accuracies and lengths of its own. What a method costs is
+foreseen by the force evaluations of the run that its search over the whole horizon ends with (`symtop.measure.settings`)
+times the seconds of one, and the seconds of a call. The runs of those that are foreseen to be within `NEXT` of the
+least, of the table's and of the advised one are then timed against each other, `ROUNDS` times in turn, and the least of each
+moved to the very accuracy along the method's order. Those of the best method in the table and of the advised one are
+compared with the least.
 """
 
 import functools
@@ -38,7 +39,8 @@ CLASSES = {ranking.ANY: advise.OF_ANY, **{need: (need,) for need in NEEDS if nee
 SEED = 2027  # of the scenes of a check; the study draws with another
 SPANS, ACCURACIES = (3.0, 300.0), (1e-10, 1e-3)  # nutations and errors that are drawn, evenly in the logarithm
 QUANTITIES = ("axis", "axis", "axis", "attitude", "energy")
-PRICED = 1e-6  # accuracy of the runs that are timed
+PRICED = 1e-6  # accuracy of the runs that prices are made of
+NEXT, ROUNDS = 1.5, 15  # foreseen cost, over the least, of what is timed; how often
 PATIENCE = 8.0  # times the least cost so far that a run may be foreseen to take
 MOST = 1e6  # evaluations of it
 LONGEST = 1e7  # evaluations of a run of the advice: a minute or more of vain trials elsewhere
@@ -116,21 +118,23 @@ def prices(quantity: str) -> dict[str, tuple[float, float]]:
     return {one.name: pair for one, *pair in zip(each, price.tolist(), call.tolist(), strict=True)}  # type: ignore[misc]
 
 
-def costs(scene: symtop.Scene, quantity: str, accuracy: float, advised: str | None) -> dict[str, float]:
-    """Seconds of the candidates that meet the accuracy and may be the cheapest, and of the advised one."""
-    each, spent, first = prices(quantity), dict[str, float](), ranking.cheapest((), quantity, accuracy, 100.0)
+def costs(scene: symtop.Scene, quantity: str, accuracy: float, asked: set[str]) -> dict[str, float]:
+    """Seconds of the candidates that meet the accuracy and may be the cheapest, and of those that are asked for."""
+    each, first = prices(quantity), ranking.cheapest((), quantity, accuracy, 100.0)
+    mets, spent = dict[str, settings.Met](), dict[str, float]()
     for name in sorted(each, key=lambda name: (name not in first, -(integrator(name).order or 0))):
         price, call = each[name]
-        most = math.inf if name == advised else min(PATIENCE * min(spent.values(), default=math.inf) / price, MOST)
+        most = math.inf if name in asked else min(PATIENCE * min(spent.values(), default=math.inf) / price, MOST)
         met = settings.search(scene, integrator(name), accuracy, quantity, scene.horizon, patience=most)
         if isinstance(met, settings.Met):
-            spent[name] = work(met, accuracy) * price + call
-    return spent
-
-
-def work(met: settings.Met, accuracy: float) -> float:
-    """Evaluations at the very accuracy: those of a method of order p grow as error^(-1/p)."""
-    return met.evaluations * (met.error / accuracy) ** (1.0 / (met.integrator.order or math.inf))
+            mets[name] = met
+            part = settings.at_accuracy(met.integrator, met.error / accuracy)
+            spent[name] = met.evaluations * price * part + call
+    least = min(spent.values(), default=math.inf)
+    near = [name for name in mets if spent[name] <= NEXT * least or name in asked]
+    taken = settings.seconds(scene, [mets[name] for name in near], quantity, scene.horizon, ROUNDS)
+    left = [settings.at_accuracy(integrator(name), mets[name].error / accuracy) for name in near]
+    return {name: time * part for name, time, part in zip(near, taken, left, strict=True)}
 
 
 class Row(NamedTuple):
@@ -148,8 +152,8 @@ def excess(count: int) -> list[Row]:
     rows = []
     for scene, quantity, accuracy in scenes(count):
         advised = str(symtop.recommend(scene, accuracy=accuracy, quantity=quantity).integrator)
-        each = costs(scene, quantity, accuracy, advised)
         menu = advise._menu(advise._Question(scene, accuracy, quantity, scene.horizon, ()))
+        each = costs(scene, quantity, accuracy, {advised, *menu})
         if each:
             words = f"{scene.name} {quantity} {accuracy:.1e} over {scene.horizon / scene.nutation_period:.3g} nutations"
             best = min(each, key=each.__getitem__)

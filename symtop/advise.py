@@ -6,8 +6,9 @@
        fastest. Where it does not answer, or nothing of it gets there, every compiled method is a candidate.
     2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
        (`symtop.measure.settings`), against the closed form and a target lowered by the law of growth; one run is timed.
+       Settings are found to a factor: times are compared as they would be at the very accuracy.
     3. Confirmation. The three fastest candidates are run to the whole horizon, if a budget of force evaluations allows
-       it, and their settings are corrected.
+       it, and their settings are corrected, to some 5 % of a step.
 
 The confidence of the advice is one of:
 
@@ -98,6 +99,8 @@ SETTINGS = {  # the maps of an engine by its settings, the default first
 MISSES_AT_STEP, FAILS_AT_STEP = "Not accurate enough at this step", "No run ends well at this step"
 STEP = 1.0 / 240.0  # s
 WORST = 0.5  # rad: an axis that is further off needs no method to match it
+CLOSE = 0.95  # of the longest step that serves: so near is that of a finalist
+ROUNDS = 15  # in which finalists are timed
 MARGIN = 0.8  # fraction of the accuracy that a run must meet at its samples; between them its error may be larger
 
 
@@ -175,6 +178,11 @@ class _Trial(NamedTuple):
     def a_step(self) -> float:
         """Seconds of a step; infinite for a method that has none."""
         return self.seconds * self.met.setting / self.horizon if self.met.integrator.fixed_step else math.inf
+
+    def cost(self, question: _Question) -> float:
+        """Seconds at the very accuracy; those of the run itself where the step is the user's."""
+        ratio = 1.0 if question.step is not None else self.error / question.accuracy
+        return self.seconds * settings.at_accuracy(self.met.integrator, ratio)
 
     def words(self) -> str:
         return f"{self.met.integrator.name} with {self.met.integrator.setting(self.met.setting).label}"
@@ -277,7 +285,7 @@ class _Search:
             rest = {*everyone} - {*self.guesses, *self.menu}
             self._try(rest)
             ranked = self._confirmed([name for name in self._names() if name in rest], FINALISTS)
-        return _timed(self.question, ranked, self.fails)
+        return _timed(self.question, ranked, self.fails, ROUNDS)
 
     def beside(self) -> list[_Trial]:
         """The fastest that is made for this very top, run to the end."""
@@ -294,7 +302,8 @@ class _Search:
             rivals = (one.met.evaluations for one in self.trials if one.met.integrator.needs not in THIS_TOP)
             patience = TOO_DEAR * min(rivals, default=math.inf)
             self._sort_in(_try(self.question, method, self.guesses.get(method.name), patience), self.trials, method)
-        self.trials = _timed(self.question, self.trials, self.fails)
+        timed = _timed(self.question, self.trials, self.fails)
+        self.trials = sorted(timed, key=lambda one: one.cost(self.question))
 
     def _confirmed(self, names: Sequence[str], most: int) -> list[_Trial]:
         """Of the trials with these names, so many of the first, or as many as it takes to have one, run to the end."""
@@ -407,9 +416,10 @@ def _at_step(question: _Question, method: Integrator, step: float) -> "_Trial | 
     return _Trial(met, met.error, math.nan, confidence, horizon)
 
 
-def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]]) -> list[_Trial]:
+def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]], rounds: int = 5) -> list[_Trial]:
     """The trials by their times, measured against each other; steps that take too long fail."""
-    times = settings.seconds(question.scene, [one.met for one in trials], question.quantity, question.horizon)
+    mets = [one.met for one in trials]
+    times = settings.seconds(question.scene, mets, question.quantity, question.horizon, rounds)
     pairs = zip(trials, times, strict=True)
     timed = sorted((one._replace(seconds=time) for one, time in pairs), key=lambda one: one.seconds)
     slow = [one.met.integrator.name for one in timed if one.a_step > question.pace]
@@ -432,9 +442,27 @@ def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
     )
     if isinstance(best, str):
         return f"Good enough over a short run but not to the end ({best[0].lower()}{best[1:]})"
-    met = settings.rounded(scene, best, MARGIN * accuracy, quantity)
+    met = settings.rounded(scene, _coarser(question, best), MARGIN * accuracy, quantity)
     confidence = "checked" if met.error + met.bound <= accuracy else "at the reference's limit"
     return _Trial(met, met.error, math.nan, confidence, horizon)
+
+
+def _coarser(question: _Question, met: settings.Met) -> settings.Met:
+    """The coarsest setting that meets the margin, as far as three runs find it along the order of the method."""
+    scene, accuracy, quantity, horizon = question[:4]
+    method, goal = met.integrator, MARGIN * accuracy
+    highest = min(settings.limits(scene, method, horizon, quantity)[1], question.max_step)
+    for _ in range(3):
+        room = CLOSE * goal / max(met.error, 1e-3 * goal)
+        longer = min(met.setting * room ** (1.0 / (method.order or 2) if method.fixed_step else 1.0), highest)
+        if longer < met.setting / CLOSE:
+            break
+        again = settings.attempt(scene, method, longer, horizon, quantity)
+        if again.error <= goal:
+            met = again
+        else:
+            highest = math.sqrt(met.setting * longer)
+    return met
 
 
 def _advice(
@@ -516,11 +544,10 @@ def _lines(question: _Question, method: Integrator, setting: float | None) -> di
 
 
 def _exact_seconds(question: _Question) -> float:
-    """Seconds of the exact motion at the horizon, interpreted where it is not compiled yet, which takes 20 s."""
+    """Seconds of the exact motion at the horizon, once it is compiled."""
     scene, _, quantity, horizon = question[:4]
     exact = integrator("exact")
     call = bare_run(scene, exact, exact.chart_for(settings.observed(quantity)), math.nan, horizon)
-    closed_form.load()
     return timings([call], batches=5, batch=0.002, exact=False)[0].best
 
 
@@ -529,14 +556,16 @@ def _without_steps(question: _Question, best: float) -> str:
     scene, _, quantity, horizon = question[:4]
     if scene.of_body:
         return "A free body needs no integrator: symtop.reference evaluates its exact motion." if scene.top.free else ""
-    taken, way = _exact_seconds(question), "" if closed_form.load() else ", interpreted"
     limit = settings.judgeable(scene, quantity, horizon)
     error = f", with an error below {limit:.1g}" if math.isfinite(limit) else ""
+    if not closed_form.load():  # to compile it takes 10 s, and its time interpreted says nothing
+        return f"The closed form, integrator exact, takes no step{error}."
+    taken = _exact_seconds(question)
     if not best > taken:
         more = f", {taken / best:.2g} times that" if math.isfinite(best) else ""
-        return f"The closed form, integrator exact, takes {taken * 1e6:.2g} us{way}{more}{error}, and no step."
+        return f"The closed form, integrator exact, takes {taken * 1e6:.2g} us{more}{error}, and no step."
     return (
-        f"The fastest way is no integrator: the closed form (exact) takes {taken * 1e6:.2g} us{way}, {best / taken:.2g}"
+        f"The fastest way is no integrator: the closed form (exact) takes {taken * 1e6:.2g} us, {best / taken:.2g}"
         f" times less{error}. The integrators are compared for what they do where there is no closed form."
     )
 
