@@ -7,8 +7,8 @@
     2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
        (`symtop.measure.settings`), against the closed form and a target lowered by the law of growth; one run is timed.
        Settings are found to a factor: times are compared as they would be at the very accuracy.
-    3. Confirmation. The three fastest candidates are run to the whole horizon, if a budget of force evaluations allows
-       it, and their settings are corrected, to some 5 % of a step.
+    3. Confirmation. The three fastest candidates, and others as fast, are run to the whole horizon, if a budget of
+       force evaluations allows it, and their settings are corrected, to some 5 % of a step.
 
 The confidence of the advice is one of:
 
@@ -70,8 +70,9 @@ KERNELS = 0.65  # of a method: some have one in common
 CANDIDATES = 8  # methods of the stored study that are tried
 FEW = 5  # methods of the table that are tried
 AGREED = 3  # of them meet the accuracy at least, and the fastest is one of so many first
-FINALISTS = 3  # methods that are run to the whole horizon
+FINALISTS, LEVEL = 3, 1.3  # methods that are run to the whole horizon, and those that cost so little more than the best
 TOO_DEAR = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
+CHEAP = 1e5  # evaluations that no search ends at: it may have begun with a step that is far too fine
 CONFIDENCE = {
     "checked": "measured to the end",
     "at the reference's limit": "measured to the end, as far as the reference can tell",
@@ -300,7 +301,7 @@ class _Search:
         for number, method in enumerate(sorted(map(integrator, names), key=lambda method: -(method.order or 0)), 1):
             post(f"trying method {number} of {len(names)}")
             rivals = (one.met.evaluations for one in self.trials if one.met.integrator.needs not in THIS_TOP)
-            patience = TOO_DEAR * min(rivals, default=math.inf)
+            patience = max(TOO_DEAR * min(rivals, default=math.inf), CHEAP)
             self._sort_in(_try(self.question, method, self.guesses.get(method.name), patience), self.trials, method)
         timed = _timed(self.question, self.trials, self.fails)
         self.trials = sorted(timed, key=lambda one: one.cost(self.question))
@@ -308,8 +309,10 @@ class _Search:
     def _confirmed(self, names: Sequence[str], most: int) -> list[_Trial]:
         """Of the trials with these names, so many of the first, or as many as it takes to have one, run to the end."""
         ranked: list[_Trial] = []
-        for number, tried in enumerate([one for one in self.trials if one.met.integrator.name in names]):
-            if number < most or not ranked:
+        trials = [one for one in self.trials if one.met.integrator.name in names]
+        costs = [one.cost(self.question) for one in trials]
+        for number, tried in enumerate(trials):
+            if number < most or not ranked or costs[number] <= LEVEL * costs[0]:
                 self._sort_in(_confirm(self.question, tried), ranked, tried.met.integrator)
         return ranked
 

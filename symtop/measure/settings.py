@@ -250,5 +250,5 @@ def seconds(scene: Scene, mets: Sequence[Met], quantity: str, horizon: float, ba
     for met in mets:
         chart = chart_of(met.integrator, scene.observes, observed(quantity))
         runs.append(bare_run(scene, met.integrator, chart, met.setting, met.horizon))
-    taken = timings(runs, batches, batch=0.002, patience=0.02 * batches, exact=False)
+    taken = timings(runs, batches, batch=0.002, patience=0.06 * batches, exact=False)
     return [timing.best * horizon / met.horizon for timing, met in zip(taken, mets, strict=True)]

@@ -25,7 +25,6 @@ import numpy as np
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
-from symtop.methods.framework.plan import OK
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 

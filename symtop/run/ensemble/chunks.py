@@ -259,14 +259,15 @@ class Job:
     def of(self, members: Any) -> "Job":
         """The same for some members."""
         arrays = ("numbers", "horizon", "steps", "tolerance", "period", "names")
-        return replace(self, **{name: values[members] for name in arrays if (values := getattr(self, name)) is not None})
+        cut = {name: values[members] for name in arrays if (values := getattr(self, name)) is not None}
+        return replace(self, **cut)
 
     def part(self, members: slice) -> "Job":
         """The same for a stretch of members, which know their numbers."""
         return replace(self.of(members), first=self.first + members.start)
 
     def order(self) -> Any:
-        """Members in lanes by the work of a step, so that a block's end together, the most first; others as they are."""
+        """Members in lanes by the work of a step, as neighbours end together, the most first; others as they are."""
         members = np.arange(len(self.numbers))
         if self.execution != IN_LANES:
             return members
