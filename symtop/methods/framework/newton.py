@@ -140,10 +140,10 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
         put(block, dimension, j, low)
         put(block, 2 * dimension, j, step)
         put(block, carry_at, j, newest + before)
-        converged, before_it = block[live_at * W + j] == 0.0, block[flag * W + j]
-        now = (-outcome if converged else 1.0) if before_it == 0.0 else before_it
-        block[flag * W + j] = now
-        block[steps_at * W + j] += 1.0 if now == 0.0 else 0.0
+        ended = -float(outcome) if block[live_at * W + j] == 0.0 else 1.0
+        ended = ended if block[flag * W + j] == 0.0 else block[flag * W + j]
+        block[flag * W + j] = ended
+        block[steps_at * W + j] += 1.0 if ended == 0.0 else 0.0
 
     def step(block, table):  # type: ignore[no-untyped-def]
         wide_vectors()
