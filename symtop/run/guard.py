@@ -51,6 +51,7 @@ MOST_PROBED = 20_000  # steps
 ROUNDED = 1e-13  # rad; a probe that is closer than this shows rounding, which grows as n^1.5
 PARTIAL = 10.0  # distrust of a probe shorter than a nutation: it may have missed where errors are made, or stretched
 AFFORDED = {"compiled": 12_000, "python": 1200}  # evaluations of a longer probe of an adaptive method
+THROUGH = 20.0  # times as many where the axis passes a pole closer than the tolerance: each passage may end the run
 MOST_WORK = {"compiled": 5e6, "python": 5e5}  # evaluations of any probe: 20 nutations take a hundredth; beside a pole
 # the steps of a solver may shrink to nothing, and the probe would take as long as the run
 LOOSE = 1e-4  # tolerance from which a method in Python is probed for a whole nutation: a few of its steps
@@ -207,6 +208,8 @@ def _adaptive_forecast(
     piece = max(share, least)
     expected, probe = probed(piece)
     afforded = AFFORDED[cheap.implementation] * min(cheap.speed, 1.0)
+    if chart == "angles" and motion.marks.gap < plan.tolerance and cheap.implementation == "compiled":
+        afforded *= THROUGH
     longer = min(plan.horizon, piece * afforded / max(probe.evaluations, 1))
     if longer > 1.5 * piece:
         expected, probe = probed(longer)

@@ -18,7 +18,7 @@ from pebble import ProcessExpired
 
 from symtop.core import code_hash, files, netcdf
 from symtop.core.errors import label, positive, shown
-from symtop.core.progress import beating, progress_bar
+from symtop.core.progress import progress_bar
 from symtop.measure import columns
 from symtop.measure.datasets import Combined, combine
 from symtop.model.scenes import scenes
@@ -92,7 +92,7 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
 
     def result() -> Findings:
         begin = time.monotonic()
-        with beating(progress_bar(f"{study.name}: combining and drawing", quiet=quiet)):
+        with progress_bar(f"{study.name}: combining and drawing", quiet=quiet):
             findings = None
             with contextlib.suppress(BrokenExecutor, CancelledError, ProcessExpired):  # its process was ended
                 findings = None if future is None else future.result()

@@ -222,7 +222,8 @@ def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
     drawn = []
 
     class Bar:
-        disable = False
+        def __init__(self, disable, **_):
+            self.disable = disable
 
         def __enter__(self):
             return self
@@ -233,15 +234,16 @@ def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
         def refresh(self):
             drawn.append("refreshed")
 
-    with progress.beating(Bar()) as bar:
+    monkeypatch.setattr("tqdm.tqdm", Bar)
+    monkeypatch.setattr(progress, "is_terminal", lambda _: True)
+    with progress.progress_bar("a bar"):
         time.sleep(0.1)
     assert drawn.count("refreshed") >= 3
     count = len(drawn)
     time.sleep(0.05)
     assert drawn[-1] == "closed"
     assert len(drawn) == count
-    monkeypatch.setattr(bar, "disable", True, raising=False)
-    with progress.beating(bar):
+    with progress.progress_bar("a bar", quiet=True):
         time.sleep(0.05)
     assert drawn[count:] == ["closed"]
 

@@ -15,11 +15,11 @@ from symtop.run.ensemble import population
 
 SLOW = """\
 import sys, time
-from symtop.core import progress
-progress.FIRST, progress.EVERY = 0.2, 0.3
-with progress.telling("judge"):
+from symtop.cli import clock
+clock.FIRST, clock.EVERY = 0.2, 0.3
+with clock.telling("judge"):
     time.sleep(float(sys.argv[1]))
-    with progress.ticking("trying methods"):
+    with clock.ticking("trying methods"):
         time.sleep(float(sys.argv[1]))
 """
 
@@ -42,7 +42,7 @@ def test_a_command_that_is_quick_says_nothing():
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_the_lines_end_with_a_command_that_is_killed():
-    code = SLOW.replace("with progress", "print('on', flush=True)\nwith progress", 1)
+    code = SLOW.replace("with clock", "print('on', flush=True)\nwith clock", 1)
     process = subprocess.Popen([sys.executable, "-c", code, "60"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     process.stdout.readline()
     time.sleep(0.5)

@@ -19,7 +19,7 @@ from symtop_studies.drift.runs import members, rounding
 import symtop
 from symtop.cli.main import main
 from symtop.core.errors import SymtopError
-from symtop.core.jit import fused
+from symtop.core.jit_functions import fused
 from symtop.methods.framework import loop as drive
 from symtop.run import long_run as longrun
 from symtop.run.long_run import chart_of, leaves, long_run, regrown, scattered, windows

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from symtop.core.errors import SymtopError, foreign_code, one_of
-from symtop.core.files import execute, python_file
 from symtop.judging.adapters.adapter import Stepper, integrator
 from symtop.judging.adapters.external import BatchStep, DiffraxSolver, Program, SharedObject, is_solver
 from symtop.judging.adapters.python_step import REDUCED, PythonStep, RotationStep, ScipySolver, SeparableStep
@@ -29,6 +28,7 @@ from symtop.measure.step_map import drawn, generic_start
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import CHARTS
 from symtop.model.scenes import Scene
+from symtop.run.plugins import execute, python_file
 
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
 ARGUMENTS = {"ode": "(f, t, y, h)", "separable": "(state, h, dT, dV)", "rotation": "(q, w, h, inertia, torque)"}

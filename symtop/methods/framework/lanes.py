@@ -31,9 +31,10 @@ calls and that has a loop of its own, which is made into vectors before it is in
 ``kernel.inspect_asm()`` (zmm).
 
 *Who stands beside whom.* A block takes as long as its longest member and about as long as `LEAST` members alone.
-Members enter in the order of their numbers of steps, the longest first, and `W` neighbours in it whose members together make fewer steps than
-`LEAST` times the longest are left to the loop for one, a call of `loop.Loop.whole` without Python's lock. A step that
-iterates takes as many passes as its slowest lane: there, members whose steps are alike in number stand in the order of
+Members enter in the order of their numbers of steps, the longest first, and `W` neighbours in it that together make
+fewer steps than `LEAST` times the longest are left to the loop for one, a call of `loop.Loop.whole` without Python's
+lock. A step that iterates takes as many passes as its slowest lane: there, members whose steps are alike in number
+enter in the order of
 
     h sqrt(|L|^2 / I1^2 + |mgl| / I1),    how far the top turns and the pendulum swings in a step, in radians,
 
