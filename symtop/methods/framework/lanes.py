@@ -1,7 +1,8 @@
 """Many tops at once: a loop over lanes around the kernels of a family, which LLVM turns into vector instructions.
 
 A *block* is `W` members, each with a top, a start, a step and marks of its own; all make a step together, each in its
-lane, which takes the next member when its own has ended. The functions of a kernel are inlined into the loop over lanes as they stand: a member has the bits of `simulate`.
+lane, which takes the next member when its own has ended. The functions of a kernel are inlined into the loop over lanes
+as they stand: a member has the bits of `simulate`.
 
 What a block steps is one array, `block`; number r of lane j is ``block[r W + j]``. With d numbers in a state:
 
