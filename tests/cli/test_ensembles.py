@@ -1,29 +1,27 @@
 """`symtop ensemble`: what it writes, draws and prints, and what it refuses."""
 
+import functools
 import importlib
 import json
 
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 from PIL import Image
 
 import symtop
-from symtop.cli.main import main
 from symtop.core import netcdf
+from tests import commands
 
 STEPS = ("--per-nutation", 30, "--nutations", 2)
 
 
-def call(*arguments):
-    return CliRunner().invoke(main, ["ensemble", *map(str, arguments)])
+call = functools.partial(commands.call, "ensemble")
 
 
 def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path):
     path, figure = tmp_path / "runs.nc", tmp_path / "spread.png"
     done = call("--members", 50, "--seed", 3, "strang", *STEPS, "--samples", 21, "-o", path, "--figure", figure)
-    assert done.exit_code == 0, done.output
     assert "strang on 50 tops: 50 reached the horizon" in done.output
     assert "in vector registers (lanes)" in done.output
     assert f"written to {figure}" in done.output
@@ -41,14 +39,14 @@ def test_a_file_of_runs_holds_the_tops_their_starts_and_the_errors(tmp_path):
     words = ("strang", "--members", 7, "--seed", 2, "--per-nutation", 50, "--nutations", 2, "--output")
     file, tops = tmp_path / "runs.nc", symtop.population(7, seed=2)
     for _ in range(2):  # the second call runs them again, into the same file
-        assert call(*words, file).exit_code == 0
+        call(*words, file)
         data = netcdf.read(file)
         np.testing.assert_array_equal(data["I1"].values, tops["I1"].values)
         np.testing.assert_array_equal(data["start_theta_dot"].values, tops["theta_dot"].values)
         wrong = symtop.errors(data, tops)
         np.testing.assert_allclose(data["axis_error"].values, wrong["axis"].max("time").values, rtol=1e-6, atol=1e-14)
         assert data["axis_error"].attrs["long_name"].startswith("angle between axes")
-    assert call(*words, tmp_path / "theta.nc", "--variables", "theta").exit_code == 0
+    call(*words, tmp_path / "theta.nc", "--variables", "theta")
     assert "axis_error" not in netcdf.read(tmp_path / "theta.nc")
 
 
@@ -64,11 +62,9 @@ def test_json_has_outcomes_and_errors_and_a_finer_step_has_smaller_ones():
 
 def test_members_that_fail_are_counted_and_drawn(tmp_path):
     done = call("--members", 60, "stormer-verlet", *STEPS, "--samples", 21, "--figure", tmp_path / "f.png")
-    assert done.exit_code == 0, done.output
     assert "left_chart" in done.output
     assert (tmp_path / "f.png").stat().st_size > 5000
-    done = call("--members", 20, "--kind", "grazing", "stormer-verlet", *STEPS, "--json")
-    assert done.exit_code == 3, done.output  # all have failed
+    done = call("--members", 20, "--kind", "grazing", "stormer-verlet", *STEPS, "--json", code=3)
     assert json.loads(done.output)["largest_errors"]["axis"] == dict.fromkeys(("0.01", "0.1", "0.5", "0.9", "0.99"))
 
 
@@ -77,7 +73,6 @@ def test_members_that_fail_are_counted_and_drawn(tmp_path):
 )
 def test_runs_of_few_steps_are_drawn(tmp_path, words):
     done = call("strang", *words, "--nutations", 2, "--figure", tmp_path / "f.png")
-    assert done.exit_code == 0, done.output
     assert "Warning" not in done.output
     assert (tmp_path / "f.png").stat().st_size > 5000
 
@@ -101,8 +96,7 @@ def test_runs_of_few_steps_are_drawn(tmp_path, words):
      (["midpoint[attitude]", *STEPS], "known: angles"), (["taylor", *STEPS, "--members", 3], "chooses its own steps")],
 )  # fmt: skip
 def test_bad_input_is_one_sentence_and_code_2(words, says):
-    done = call(*words)
-    assert done.exit_code == 2, done.output
+    done = call(*words, code=2)
     assert says in done.output
     assert "Traceback" not in done.output
 
@@ -111,13 +105,11 @@ def test_a_few_variables_are_kept_and_compared_and_a_budget_is_one(tmp_path, mon
     monkeypatch.setenv("HOME", str(tmp_path))
     words = ("--members", 5, "strang", *STEPS, "--variables", "theta,energy", "--budget", 60, "--output=~/few.nc")
     done = call(*words, "--figure", tmp_path / "few.png")
-    assert done.exit_code == 0, done.output
     assert "energy error" in done.output
     assert "angle between axes" not in done.output
     with xr.open_dataset(tmp_path / "few.nc") as data:
         assert [name for name in data if "time" in data[name].dims] == ["theta", "energy"]
     done = call("--members", 5, "strang", *STEPS, "--variables", "theta")
-    assert done.exit_code == 0, done.output
     assert "largest error" not in done.output
 
 
@@ -134,7 +126,6 @@ def test_members_that_raise_are_told_in_one_sentence(tmp_path, monkeypatch):
         "    name='raises-for-some', family='other', summary='', solvers={'axis': solve}))\n"
     )
     done = call("--plugin", plugin, "--members", 20, "raises-for-some", *STEPS)
-    assert done.exit_code == 0, done.output
     assert "raised an exception, the first: integrator raises-for-some on member" in done.output
     assert "failed: TypeError: too far" in done.output
     assert "SymtopWarning" not in done.output

@@ -6,12 +6,11 @@ import sys
 import time
 
 import pytest
-from click.testing import CliRunner
 
 import symtop
 from symtop.cli import runs
-from symtop.cli.main import main
 from symtop.run.ensemble import population
+from tests.commands import call
 
 SLOW = """\
 import sys, time
@@ -77,8 +76,5 @@ def test_members_that_do_not_fit_into_memory_are_refused_before_they_are_drawn(m
     assert population.population(1000).sizes["member"] == 1000
     with pytest.raises(symtop.SymtopError, match=r"n must be at most 1e\+03 in the .* GiB of this machine.*, not 1001"):
         population.population(1001)
-    result = CliRunner().invoke(
-        main, ["ensemble", "strang", "--members", "1001", "--per-nutation", "20", "--nutations", "1"]
-    )
-    assert result.exit_code == 2
+    result = call("ensemble", "strang", "--members", "1001", "--per-nutation", "20", "--nutations", "1", code=2)
     assert "--members must be at most" in result.stderr

@@ -11,10 +11,9 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
-from click.testing import CliRunner
 
 from symtop.cli.main import main
-from tests.commands import ended, symtop
+from tests.commands import call, ended, symtop
 from tests.pages import LANGUAGES, ROOT, Block, blocks, pages
 
 registry = importlib.import_module("symtop.methods.framework.registry")
@@ -79,8 +78,7 @@ class Page:
             code, out, err = ended(symtop(*rest), seconds=900.0)
             assert code == 0, (line, out, err)
             return out
-        done = CliRunner().invoke(main, rest)
-        assert done.exit_code == 0, (line, done.output)
+        done = call(*rest)
         return done.output
 
 
