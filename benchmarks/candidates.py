@@ -29,10 +29,11 @@ import symtop
 from symtop import advise
 from symtop.core import netcdf
 from symtop.measure import ranking, settings
-from symtop.measure.ranking import MENU, PRICED_AT
+from symtop.measure.ranking import MENU
 from symtop.methods.framework.registry import NEEDS, integrator
 from symtop.run.simulation import likely_step
 
+PRICED_AT = 1e-8  # tolerance at which the study takes the price of an evaluation
 TIE = 1.1  # costs of a ratio below this are level
 SHARE = 0.95  # of the scenes, on which a method of the table costs at most `TIE` times the least
 CLASSES = {ranking.ANY: advise.OF_ANY, **{need: (need,) for need in NEEDS if need != "solution"}}
