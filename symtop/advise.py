@@ -1,8 +1,8 @@
 """`recommend`: the cheapest integrator, with its step or tolerance, that meets an accuracy on a scene.
 
     1. Candidates. A table that was made from the study of cost names five (`symtop.measure.ranking`). One more is tried
-       if the trials disagree with it: three of the five fail, its fourth or fifth is the fastest, or two are level. Where
-       it does not answer, or nothing of it gets there, every compiled method is a candidate.
+       if the trials disagree with it: three of the five fail, its fourth or fifth is the fastest, or two are level.
+       Where it does not answer, or nothing of it gets there, every compiled method is a candidate.
     2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
        (`symtop.measure.settings`), against the closed form and a target lowered by the law of growth; one run is timed.
        Settings are found to a factor: times are compared as they would be at the very accuracy.
