@@ -385,7 +385,7 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
             "the motion passes so close to a separatrix that rounding alone decides when it falls; no method and no "
             f"step help, shorten the horizon to less than one nutation of {marks.period:.4g}"
         )
-    if not expected.axis_error > EXPECTED:
+    if not expected.axis_error > EXPECTED and expected.outcome == "ok":
         return None
     second, period = motion.scene.second, motion.scene.period_word
     reached = min(expected.axis_error, math.pi)

@@ -85,19 +85,17 @@ def test_words_do_not_count_and_numbers_do():
     assert made(dataclasses.replace(method, order=4)) != made(method)
 
 
-def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again():
+def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again(clean_registry):
     from symtop.runner.scripts import load
     from tests.commands import PROBE
 
     study, plain = load(str(PROBE)), symtop.integrator("midpoint")
     case = next(case for case in study.cases(True) if case.integrator == "midpoint")
     digests = []
-    try:
-        for order in range(2, 12):
-            symtop.register(dataclasses.replace(plain, order=order), replace=True)
-            digests.append(fingerprint.digest(study, case))
-    finally:
-        symtop.register(plain, replace=True)
+    for order in range(2, 12):
+        symtop.register(dataclasses.replace(plain, order=order), replace=True)
+        digests.append(fingerprint.digest(study, case))
+    symtop.register(plain, replace=True)
     assert len(set(digests)) == 10
     assert digests[0] == fingerprint.digest(study, case)
 

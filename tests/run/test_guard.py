@@ -268,6 +268,14 @@ def test_an_end_at_a_pole_after_many_passages_is_announced(monkeypatch):
     assert said(scene, "vern9", **controls) == ""
     monkeypatch.setattr(guard, "THROUGH", 1.0)
     assert said(scene, "adams", **controls) == ""  # the control: of the first nutations it sees nothing
+    top = symtop.SymmetricTop(0.21139120105289147, 0.17433412715295638, -0.10207649271382181)
+    rates = -1.3442613475029312, 2.15157297712127, 2.483867050263369
+    start = symtop.Angles(1.8477525261144405, -2.366700800344101, -0.25147517216375936, *rates)
+    for horizon, ends in ((2.8551485700365795, True), (1.3, False)):  # there it is right to 0.0095 rad and ends
+        scene = symtop.Scene("aimed", top, start, horizon)
+        run = symtop.simulate(scene, "extrapolation[angles]", tolerance=0.0012096342552818213, guard=False)
+        assert (run.attrs["outcome"] == "left_chart") is ends
+        assert bool(said(scene, "extrapolation[angles]", tolerance=0.0012096342552818213)) is ends
 
 
 def test_the_end_of_a_run_at_the_limit_of_its_work_is_announced():

@@ -14,7 +14,6 @@ import xarray as xr
 import symtop
 from symtop.core import netcdf
 from symtop.measure.datasets import differences
-from symtop.methods.framework import registry
 from symtop.methods.framework.registry import Integrator
 from symtop.runner import run as runner, store
 from tests.commands import PROBE, call, contents
@@ -163,7 +162,7 @@ def test_the_full_grid_and_the_ordinary_one_keep_each_others_cases(tmp_path):
 # ---- failures --------------------------------------------------------------------------------------------------------
 
 
-def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path):
+def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path, clean_registry):
     def solve(top, start, plan):
         raise RuntimeError("no luck")
 
@@ -173,10 +172,7 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path):
     cases.append(dataclasses.replace(cases[0], integrator="unlucky[angles]"))
     small = dataclasses.replace(whole, cases=lambda quick: cases)
     symtop.register(unlucky)
-    try:
-        found = runner.run(small, tmp_path, quick=True, quiet=True)
-    finally:
-        registry._registry.pop("unlucky")
+    found = runner.run(small, tmp_path, quick=True, quiet=True)
     assert found["failures"] == [
         "unlucky[angles] on goldstein failed: integrator unlucky[angles] failed: RuntimeError: no luck"
     ]
