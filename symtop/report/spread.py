@@ -4,9 +4,8 @@
     attitude    of bodies without symmetry, in its place: angle between the attitude and that of the true motion, rad
     energy      abs(E - E0) / (E0 - min V), or of bodies / (T0 + |mgl|), the units of `errors`
 
-A member that has failed has an infinite error from there on, so that it counts among the worst and is not left out; an
-error is NaN where the true motion is not known, as of a heavy body in chaos. Quantiles are those of the sample, without
-interpolation: an infinite one says that so many have failed.
+A member that has failed has an infinite error from there on, so that it counts among the worst and is not left out.
+Quantiles are those of the sample, without interpolation: an infinite one says that so many have failed.
 """
 
 import functools
@@ -23,7 +22,7 @@ from symtop.model import charts, scenes
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import NUMBERS
 from symtop.run.ensemble.inputs import read_members, refuse_others
-from symtop.run.reference.truth import body_samples
+from symtop.run.reference.truth import body_motion
 
 Array = NDArray[np.float64]
 
@@ -61,6 +60,15 @@ def _forms(plain: bytes) -> ClosedForms:
     return ClosedForms(np.frombuffer(plain).reshape(-1, len(NUMBERS)))
 
 
+@functools.lru_cache(maxsize=1)
+def _attitudes(plain: bytes, times: bytes, shape: tuple[int, ...]) -> Any:
+    """Both halves of the true attitudes of bodies at their times (n, samples), kept for the figure: 20 ms each."""
+    rows, moments = np.frombuffer(times).reshape(shape), "the body with the moments {}, {} and {}"
+    each = zip(members_of(np.frombuffer(plain).reshape(len(rows), -1)), rows, strict=True)
+    motions = [body_motion(moments.format(*body.moments), body, start, row) for (body, start), row in each]
+    return tuple(np.array(part) for part in list(zip(*motions, strict=True))[:2])
+
+
 def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
     values = data[SHOWN_BY[quantity]].values
     known: Any = True
@@ -74,10 +82,7 @@ def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
             truth = _forms(numbers.tobytes()).axis(filled)
             errors, known = charts.axis_distance(values, truth), np.isfinite(truth).all(axis=2)
         else:
-            each = zip(members_of(numbers), filled, strict=True)
-            motions = [body_samples(*one, row.tobytes(), precise=False) for one, row in each]
-            truth, low, _, bound = (np.array(part) for part in zip(*motions, strict=True))
-            errors, known = charts.attitude_distance(values, truth, low), np.isfinite(bound)
+            errors = charts.attitude_distance(values, *_attitudes(numbers.tobytes(), filled.tobytes(), filled.shape))
     return np.where(finite & known, np.where(np.isfinite(errors), errors, np.inf), np.nan)
 
 
