@@ -22,7 +22,7 @@ from symtop.model import charts, scenes
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import NUMBERS
 from symtop.run.ensemble.inputs import read_members, refuse_others
-from symtop.run.reference.truth import body_motion
+from symtop.run.reference.truth import body_samples
 
 Array = NDArray[np.float64]
 
@@ -60,15 +60,6 @@ def _forms(plain: bytes) -> ClosedForms:
     return ClosedForms(np.frombuffer(plain).reshape(-1, len(NUMBERS)))
 
 
-@functools.lru_cache(maxsize=1)
-def _attitudes(plain: bytes, times: bytes, shape: tuple[int, ...]) -> Any:
-    """Both halves of the true attitudes of bodies at their times (n, samples), kept for the figure: 20 ms each."""
-    rows, moments = np.frombuffer(times).reshape(shape), "the body with the moments {}, {} and {}"
-    each = zip(members_of(np.frombuffer(plain).reshape(len(rows), -1)), rows, strict=True)
-    motions = [body_motion(moments.format(*body.moments), body, start, row) for (body, start), row in each]
-    return tuple(np.array(part) for part in list(zip(*motions, strict=True))[:2])
-
-
 def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
     values = data[SHOWN_BY[quantity]].values
     known: Any = True
@@ -82,7 +73,12 @@ def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
             truth = _forms(numbers.tobytes()).axis(filled)
             errors, known = charts.axis_distance(values, truth), np.isfinite(truth).all(axis=2)
         else:
-            errors = charts.attitude_distance(values, *_attitudes(numbers.tobytes(), filled.tobytes(), filled.shape))
+            rows = []
+            for (body, start), when, mine in zip(members_of(numbers), filled, values, strict=True):
+                name = "the body with the moments {}, {} and {}".format(*body.moments)
+                true = body_samples(name, body, start, when.tobytes(), precise=False)
+                rows.append(charts.attitude_distance(mine, true.quaternion, true.quaternion_lo))
+            errors = np.array(rows)
     return np.where(finite & known, np.where(np.isfinite(errors), errors, np.inf), np.nan)
 
 
