@@ -26,6 +26,15 @@ def call(*words: object, code: int | None = 0, **environment: str) -> Result:
     return done
 
 
+def printed_by(code: str, *words: object, cwd: Path | None = None, **environment: object) -> str:
+    """What a new process of Python prints that runs some code, without an error."""
+    settings = {**os.environ, **{name: str(value) for name, value in environment.items()}}
+    command = [sys.executable, "-c", code, *map(str, words)]
+    done = subprocess.run(command, cwd=cwd, env=settings, capture_output=True, text=True, timeout=600, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 def symtop(*words: object, cwd: Path | None = None, **environment: object) -> subprocess.Popen:
     """Start a command; its output is read by `ended`."""
     return subprocess.Popen(

@@ -65,9 +65,7 @@ OPENING = 60.0  # seconds for loading a file and its imports
 # seconds for the claims of one stage: at most, for all stages together, and at least however many were spent
 PLUGIN = 600.0  # of a registered integrator
 VERDICT, QUICK_VERDICT = (45.0, 120.0, 15.0), (12.0, 40.0, 6.0)
-SHORTER = (
-    4.0  # times: the runs of a stage that took too long are shortened by so much beyond their pace, and made again
-)
+SHORTER = 4.0  # times, beyond their pace: the runs of a stage that took too long, made again
 SLOW = "; make a step faster", "; judge it without --quick, or make a step faster"  # the second with --quick
 
 
@@ -264,10 +262,8 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     if time.size < FEWEST:
         changed = changed._replace(exponent=math.nan)
     constant = Constant(changed, math.nan, KEPT * grain, grain)
-    off = abs(values[0] - true) / scale
-    return constant.finding(
-        name, declared, constant.words(f"in {time.size} samples; it begins {off:.1e} from the scene's")
-    )
+    where = f"in {time.size} samples; it begins {abs(values[0] - true) / scale:.1e} from the scene's"
+    return constant.finding(name, declared, constant.words(where))
 
 
 def _measured(

@@ -7,7 +7,6 @@ import importlib.util
 import inspect
 import os
 import shutil
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -19,6 +18,7 @@ import symtop
 from symtop.core import code_hash, files, jit
 from symtop.core.code_hash import Code, by_file, changes, digest, merged
 from symtop.runner import fingerprint
+from tests.commands import printed_by
 
 
 def loaded(path: Path, name: str):
@@ -153,12 +153,9 @@ def kernels_of(root: Path, store: Path) -> dict[str, int]:
         "print(float(symtop.simulate(w, m, step_size=0.02, guard=False)['theta'][-1]).hex(), "
         "L._identity(w, m, 0.01, 100, True))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=240, check=True, cwd=root,
-        env={**os.environ, "PYTHONPATH": str(root), "SYMTOP_CACHE": str(store)},
-    )  # fmt: skip
+    said = printed_by(code, cwd=root, PYTHONPATH=root, SYMTOP_CACHE=store).split()
     files = {str(path.relative_to(store)): path.stat().st_mtime_ns for path in (store / "kernels").rglob("*.code")}
-    return {"said": done.stdout.split(), "files": files}
+    return {"said": said, "files": files}
 
 
 @pytest.mark.slow

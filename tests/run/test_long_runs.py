@@ -21,7 +21,7 @@ from symtop.core.jit_functions import fused
 from symtop.methods.framework import loop as drive
 from symtop.run import long_run as longrun
 from symtop.run.long_run import chart_of, leaves, long_run, regrown, scattered, windows
-from tests.commands import call
+from tests.commands import call, printed_by
 
 WHERE = symtop.scene("spheroid")
 H = WHERE.nutation_period / 400.37
@@ -346,8 +346,6 @@ for name in ("galerkin-simpson", "gauss-4", "stormer-verlet"):  # each builds an
     long_run.chart_of(symtop.integrator(name))[1].loop.plain.__wrapped__()
 print(identity())
 """
-    environment = {**os.environ, "PYTHONPATH": _root()}
-    command = [sys.executable, "-c", script]
-    told = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
+    told = printed_by(script, PYTHONPATH=_root()).split()
     here = longrun._identity(WHERE, symtop.integrator("midpoint"), 0.01, 1000, True)
     assert told == [str(here)] * 2

@@ -1,14 +1,11 @@
 """Plug-ins: what one registers counts by the code that it reaches, and is in the studies beside symtop's own."""
 
-import subprocess
-import sys
-
 import pytest
 
 from symtop.core import netcdf
 from symtop.core.code_hash import changes
 from symtop.methods.framework.registry import split_name
-from tests.commands import call
+from tests.commands import call, printed_by
 
 CODE = """\
 import sys
@@ -36,8 +33,7 @@ symtop.register(symtop.Integrator(name="a-users", family="other", summary="", so
 
 def made_of(plugin):
     """What a new process says that the method of a plug-in is made of."""
-    done = subprocess.run([sys.executable, "-c", CODE, plugin], capture_output=True, text=True, timeout=100, check=True)
-    return dict(line.split("\t") for line in done.stdout.splitlines())
+    return dict(line.split("\t") for line in printed_by(CODE, plugin).splitlines())
 
 
 def write(folder, **files):

@@ -144,12 +144,6 @@ class LongRun(NamedTuple):
         """Its length in words."""
         return f"{f'{self.steps} steps' if self.steps else 'a formula'} over {self.nutations:.3g} nutations"
 
-    def traces(self) -> dict[str, Array]:
-        """What a figure shows of it."""
-        times, change = self.energy
-        length = {"steps_run": np.array(self.steps), "nutations_run": np.array(self.nutations)}
-        return length | {"long_nutations": times, "energy_change": change}
-
 
 def _run(
     method: Integrator, scene: Scene, chart: str, steps: float, step: float, samples: int
@@ -308,7 +302,9 @@ def measure(subject: Subject) -> list[Finding]:
             findings = [undecided(claim, declared(method, claim), str(error)) for claim in every]
         by_chart.append([_named(one, chart) for one in findings])
     if runs:
-        subject.traces.update(min(runs, key=lambda run: run.steps).traces())
+        run = min(runs, key=lambda run: run.steps)
+        length = {"steps_run": np.array(run.steps), "nutations_run": np.array(run.nutations)}
+        subject.traces.update(length, long_nutations=run.energy[0], energy_change=run.energy[1])
     return [max(findings, key=_badness) for findings in zip(*by_chart, strict=True)]
 
 
