@@ -36,7 +36,7 @@ import numpy as np
 
 from symtop.core.numbers import EPSILON, GOLDEN
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan, sentence
+from symtop.methods.framework.plan import Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
@@ -85,6 +85,9 @@ class Probe(NamedTuple):
     evaluations: int  # of the force, at the step of the run
 
 
+Ran = tuple[Array, Run, float]  # a probe that is not yet compared: its times, its run and the time since when
+
+
 class Forecast(NamedTuple):
     """The forecast of one run."""
 
@@ -114,23 +117,32 @@ def _marks(steps: int, points: int) -> Any:
     return np.unique(np.maximum(np.rint(_places(points) * (steps / points)).astype(np.int64), 1))
 
 
-def _probe(
+def _ran(
     motion: Integrated, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
-) -> Probe:
+) -> Ran:
     """Run `method` from the time `since` of the true motion for `duration`, with `step` or the plan's tolerance."""
     if method.fixed_step:
         piece = Plan.steps(step, _marks(max(1, round(duration / step)), motion.points))
     else:
         most = min(plan.most(math.inf), MOST_WORK[method.implementation])
         piece = Plan.until(duration * (_places(motion.points) / motion.points), plan.tolerance, most)
-    run = solve(method, chart, motion.scene.top, motion.start(since), piece)
+    return piece.times, solve(method, chart, motion.scene.top, motion.start(since), piece), since
+
+
+def _compared(motion: Integrated, chart: str, plan: Plan, times: Array, run: Run, since: float) -> Probe:
+    """The short run beside the true motion."""
     with np.errstate(all="ignore"):
-        error = motion.error(piece.times, chart, run.states, since)
+        error = motion.error(times, chart, run.states, since, plan.horizon)
     outcome = run.outcome
     if not math.isfinite(error.sum()):  # no angle is more than pi
         error[~np.isfinite(error)] = math.inf
         outcome = "not_finite" if outcome == "ok" else outcome
-    return Probe(piece.times, error, outcome, since + run.reached, run.force_evaluations)
+    return Probe(times, error, outcome, since + run.reached, run.force_evaluations)
+
+
+def _probe(motion: Integrated, method: Integrator, chart: str, plan: Plan, *piece: float) -> Probe:
+    """Both, of a duration, a step and the time since when."""
+    return _compared(motion, chart, plan, *_ran(motion, method, chart, plan, *piece))
 
 
 def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
@@ -197,19 +209,20 @@ def _adaptive_forecast(
     cheap = method if method.same_steps_as is None else integrator(method.same_steps_as)  # a hundredth of the time
     least = twice if cheap.implementation == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
 
-    def probed(piece: float) -> tuple[float, Probe]:
+    def ran(piece: float) -> tuple[bool, Ran]:
         partial = piece < min(period, 0.5 * plan.horizon)
         since = max(0.0, motion.closest() - 0.5 * piece) if partial else 0.0
-        probe = _probe(motion, cheap, chart, plan, piece, math.nan, since)
-        expected = max(grown(probe, plan.horizon, straight=False), _amplified(motion, probe, plan.horizon))
-        return expected * (PARTIAL if partial else 1.0), probe
+        return partial, _ran(motion, cheap, chart, plan, piece, math.nan, since)
 
     piece = max(share, least)
-    expected, probe = probed(piece)
+    partial, short = ran(piece)
     afforded = AFFORDED[cheap.implementation] * min(cheap.speed, 1.0)
-    longer = min(plan.horizon, piece * afforded / max(probe.evaluations, 1))
+    longer = min(plan.horizon, piece * afforded / max(short[1].force_evaluations, 1))
     if longer > 1.5 * piece:
-        expected, probe = probed(longer)
+        partial, short = ran(longer)
+    probe = _compared(motion, chart, plan, *short)
+    expected = max(grown(probe, plan.horizon, straight=False), _amplified(motion, probe, plan.horizon))
+    expected *= PARTIAL if partial else 1.0
     return expected if probe.times[-1] >= plan.horizon else max(expected, plan.tolerance), probe
 
 
