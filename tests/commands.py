@@ -1,4 +1,4 @@
-"""The command line in processes of its own, on the probe study."""
+"""The command line in this process, and in processes of its own on the probe study."""
 
 import contextlib
 import os
@@ -9,12 +9,30 @@ from collections.abc import Callable
 from pathlib import Path
 
 import xarray as xr
+from click.testing import CliRunner, Result
 
+from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.runner import store
 
 PROBE = Path(__file__).parent / "probe.py"
 ROOT = Path(__file__).resolve().parents[1]
+
+
+def call(*words: object, code: int | None = 0, **environment: str) -> Result:
+    """Run a command in this process; it must end with that exit code, or with any if that is None."""
+    done = CliRunner().invoke(main, [str(word) for word in words], env=environment)
+    assert code is None or done.exit_code == code, done.output
+    return done
+
+
+def printed_by(code: str, *words: object, cwd: Path | None = None, **environment: object) -> str:
+    """What a new process of Python prints that runs some code, without an error."""
+    settings = {**os.environ, **{name: str(value) for name, value in environment.items()}}
+    command = [sys.executable, "-c", code, *map(str, words)]
+    done = subprocess.run(command, cwd=cwd, env=settings, capture_output=True, text=True, timeout=600, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def symtop(*words: object, cwd: Path | None = None, **environment: object) -> subprocess.Popen:

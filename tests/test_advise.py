@@ -6,16 +6,15 @@ import random
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import symtop
 from benchmarks import candidates
 from symtop import advise
-from symtop.cli.main import main
 from symtop.measure import settings
 from symtop.measure.ranking import regime
 from symtop.methods.framework.registry import NEEDS, methods
 from symtop.model.exact import closed_form
+from tests.commands import call
 
 
 def measured(scene, advice, quantity="axis"):
@@ -168,11 +167,10 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
 
 def test_the_command_prints_and_refuses(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    result = CliRunner().invoke(main, ["recommend", "goldstein", "--accuracy", "1e-3", "--json"])
-    assert result.exit_code == 0
+    result = call("recommend", "goldstein", "--accuracy", "1e-3", "--json")
     assert '"confidence": "checked"' in result.output
-    assert CliRunner().invoke(main, ["recommend", "goldstien", "--accuracy", "1e-3"]).exit_code == 2
-    assert CliRunner().invoke(main, ["recommend", "goldstein", "--accuracy", "1e-17"]).exit_code == 1
+    call("recommend", "goldstien", "--accuracy", "1e-3", code=2)
+    call("recommend", "goldstein", "--accuracy", "1e-17", code=1)
 
 
 def test_the_answer_does_not_depend_on_the_working_directory(tmp_path, monkeypatch):
@@ -181,8 +179,7 @@ def test_the_answer_does_not_depend_on_the_working_directory(tmp_path, monkeypat
     (tmp_path / "results" / "cost.nc").write_text("no dataset")
     few(monkeypatch, 1)
     assert symtop.recommend("spheroid", accuracy=1e-3).integrator == "strang"
-    command = CliRunner().invoke(main, ["recommend", "spheroid", "--accuracy", "1e-3"])  # it says what it reads
-    assert command.exit_code == 2
+    command = call("recommend", "spheroid", "--accuracy", "1e-3", code=2)
     assert "cost.nc cannot be read" in command.output
 
 

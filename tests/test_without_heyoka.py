@@ -5,12 +5,10 @@ A `sitecustomize` hides the package from a whole tree of processes, the workers 
 
 import json
 import re
-import subprocess
-import sys
 
 import pytest
 
-from tests.commands import customized
+from tests.commands import customized, printed_by
 
 HIDING = "import sys\nsys.modules['heyoka'] = None  # an import fails, and `find_spec` finds nothing\n"
 
@@ -30,7 +28,7 @@ def test_the_registry_has_everything_but_taylor(hidden):
     pytest.importorskip("heyoka")  # else both lists are the same
     code = "import symtop, json; print(json.dumps(sorted(symtop.integrators())))"
     without = set(json.loads(hidden(python=code).stdout))
-    with_it = set(json.loads(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout))
+    with_it = set(json.loads(printed_by(code)))
     assert {name.split("-")[0] for name in with_it - without} == {"taylor"}
     assert not without - with_it
 

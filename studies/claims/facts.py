@@ -12,6 +12,8 @@ from symtop.methods.framework.registry import integrators
 
 from .planted import LIES
 
+FREE = "check-case-2"  # the scene of the claims on a body without symmetry
+EVERY = [*CLAIMS, "momentum"]  # L in space, of a free body
 FIRST = ("refuted", "undecided", "confirmed", "measured", "inapplicable")  # of the verdicts
 
 
@@ -34,17 +36,22 @@ def ledger(data: xr.Dataset) -> pd.DataFrame:
     frame = frame[frame["verdict"].isin(VERDICTS)].rename(columns={"variant": "integrator"})
     families = {name: method.family for name, method in integrators().items()}
     frame.insert(2, "family", frame["integrator"].map(families).fillna("other"))
-    ranks = {"verdict": FIRST.index, "claim": CLAIMS.index}
+    ranks = {"verdict": FIRST.index, "claim": EVERY.index}
     return frame.sort_values(list(ranks), key=lambda column: column.map(ranks[str(column.name)]), kind="stable")
+
+
+def by_kind(entries: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The findings on tops, and those on the free body."""
+    return entries[entries["scene"] != FREE], entries[entries["scene"] == FREE]
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """How many claims have each verdict, how many lies are caught, and how many steps the long runs have."""
     data, false = parts(data)
     told = caught(false)
-    entries = ledger(data)
-    count = Counter(entries["verdict"])
-    made = data["steps_run"].isel(scene=0).to_series()
+    entries, bodies = by_kind(ledger(data))
+    count, on_body = Counter(entries["verdict"]), Counter(bodies["verdict"])
+    made = data["steps_run"].sel(scene=SCENE).to_series()
     made = made[made > 0].astype(int)
     undecided = Counter(entries["claim"][entries["verdict"] == "undecided"].map(claim_name))
     ((open_claim, open_most),) = undecided.most_common(1) or [(None, None)]
@@ -62,12 +69,17 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "runs": len(made) or None,
         "usual": usual,  # steps of a long run
         "usual_runs": usual_runs,
+        "free": FREE,
+        "free_methods": bodies["integrator"].nunique() or None,
+        "free_declared": on_body["confirmed"] + on_body["refuted"] or None,
+        **{f"free_{word}": on_body[word] for word in ("confirmed", "refuted", "undecided")},
     }
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
-    """Every finding, and what is found of the false claims."""
+    """Every finding, what is found of the false claims, and what each method does on the free body."""
     data, false = parts(data)
     lies = false[false["claim"] == false["integrator"].map(LIES)]
-    named = {"ledger": ledger(data), "planted": lies.drop(columns=["scene", "family"])}
+    entries, bodies = by_kind(ledger(data))
+    named = {"ledger": entries, "planted": lies.drop(columns=["scene", "family"]), "body": bodies}
     return {name: part.assign(claim=part["claim"].map(claim_name)) for name, part in named.items() if len(part)}

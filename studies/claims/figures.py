@@ -12,7 +12,7 @@ from symtop.methods.framework.registry import FAMILIES
 from symtop.report import style
 from symtop.runner.study import Picture
 
-from .facts import FIRST, caught, ledger, parts
+from .facts import FIRST, by_kind, caught, ledger, parts
 from .planted import LIES
 
 SYMBOLS = {"confirmed": "✓", "refuted": "✗", "measured": "○", "undecided": "?", "inapplicable": "∅"}
@@ -38,7 +38,8 @@ CAUGHT = "#BFE3D0"  # a planted false claim that is refuted
 def pictures(data: xr.Dataset) -> Iterator[Picture]:
     """The matrix of verdicts."""
     data, false = parts(data)
-    if len(entries := ledger(data)):
+    entries, _ = by_kind(ledger(data))
+    if len(entries):
         yield draw_ledger(entries, caught(false))
 
 

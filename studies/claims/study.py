@@ -5,6 +5,7 @@ from symtop_studies.grid import grid_scenes
 
 from symtop.judging.battery import judge
 from symtop.methods.framework.registry import integrator, integrators
+from symtop.model.charts import BODY
 from symtop.model.scenes import scene
 from symtop.runner.study import Case, Study
 
@@ -20,21 +21,23 @@ LEFT_OUT = {  # tags of scenes, with the reason; all claims of all integrators t
 
 
 def cases(quick: bool) -> list[Case]:
-    """One case an integrator and scene, and those that make false claims."""
-    names = grid_scenes(LEFT_OUT)
-    every = [Case(name, method.name, {"quick": quick}) for name in names for method in integrators().values()]
-    return every + planted.cases(quick)
+    """One case an integrator and scene, one an integrator on a free body, and those that make false claims."""
+    methods = integrators().values()
+    bodies = [Case(facts.FREE, method.name, {"quick": True}) for method in methods if BODY in method.solvers]
+    every = [Case(name, method.name, {"quick": quick}) for name in grid_scenes(LEFT_OUT) for method in methods]
+    return bodies + every + planted.cases(quick)
 
 
 def measure(case: Case) -> xr.Dataset:
     """The findings on one integrator, in every chart that it works in."""
     if case.integrator in planted.LIES:
         return planted.measured(case)
-    return (
-        judge(integrator(case.integrator), scene(case.scene), quick=case.settings["quick"])
-        .dataset()
-        .assign(chart="every")
-    )
+    where = scene(case.scene, bodies=True)
+    found = judge(integrator(case.integrator), where, quick=case.settings["quick"]).dataset().assign(chart="every")
+    if where.of_body:  # whose claims are others: each has its place among all
+        blank = {name: "" for name, column in found.data_vars.items() if column.dtype.kind == "U"}
+        found = found.reindex(claim=facts.EVERY, fill_value=blank).assign(chart=BODY)
+    return found
 
 
 STUDY = Study(

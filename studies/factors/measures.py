@@ -26,7 +26,7 @@ from .cells import CALLS, COMPILED, NUMPY, SCIPY_NUMBA, SCIPY_PYTHON, Cell, call
 LEAST = 0.7  # of the target: the search ends with an error from here to the target, if nine runs suffice
 PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
 FINER = 1e-3  # of the target: the tolerance that a second search begins with
-NOISY, TRIES = 0.25, 3  # the distance of the quartiles over the median of a time that is taken again; how often
+NOISY, TRIES = 0.25, 2  # the distance of the quartiles over the median of a time that is taken again; how often
 ENOUGH = 0.08  # seconds of a function's samples in one process; a longer one has one, the median of five is of five
 WARM = 0.01  # of the horizon: a run that loads and compiles what the timed one calls
 START = (

@@ -21,7 +21,7 @@ NOT_SLEEPING = {  # variants that do not take part in the mechanism "sleeping"
     )
 }
 QUICK = (5, 3)  # settings and rows of a map of a slow method
-FINER = 10.0  # cells of a map whose runs go side by side in lanes, over those of other maps
+FINER = 5.0  # cells of a map whose runs go side by side in lanes, over those of other maps
 
 
 def solves_slowly(method: Integrator) -> bool:
@@ -64,7 +64,7 @@ def axes(method: Integrator, steps: np.ndarray, values: np.ndarray, quick: bool)
 def cases(quick: bool) -> list[Case]:
     """Maps of 200 steps by 120 spins and of 72 steps by 48 gaps for every variant; then the scans of single mechanisms.
 
-    Methods in lanes have ten times the cells, 632 by 379 and 228 by 152, and take about as long with them. An attitude
+    Methods in lanes have five times the cells, 447 by 268 and 161 by 107, and take about as long with them. An attitude
     chart beside an axis chart is left out: a map is judged by the axis, which both step alike.
     """
     steps = np.geomspace(0.005, 2.0, 24 if quick else 200)

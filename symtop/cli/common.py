@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
+from symtop.cli.clock import telling
 from symtop.core import files
 from symtop.core.errors import (
     SymtopError,
@@ -28,7 +29,6 @@ from symtop.core.errors import (
     file_path,
     positive,
 )
-from symtop.core.progress import telling
 from symtop.core.signals import INTERRUPTED, told_apart
 
 if TYPE_CHECKING:

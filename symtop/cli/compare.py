@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from symtop.cli.clock import ticking
 from symtop.cli.common import (
     File,
     as_text,
@@ -18,7 +19,6 @@ from symtop.cli.common import (
     table,
     warn,
 )  # fmt: skip
-from symtop.core.progress import ticking
 
 if TYPE_CHECKING:
     import xarray as xr

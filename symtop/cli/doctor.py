@@ -23,7 +23,7 @@ import click
 from symtop.cli.common import as_text, json_option, results_option
 from symtop.core.errors import words_of
 from symtop.core.files import DAY, by_last_use, cache_root, distrust, size_of
-from symtop.core.progress import beating
+from symtop.core.progress import progress_bar
 
 LEAST_SPACE = 500_000_000  # free bytes below which a full run of the studies may not fit on the disk
 LARGE_CACHE = 5_000_000_000  # bytes of a cache that the doctor advises to delete
@@ -43,10 +43,8 @@ class Finding(NamedTuple):
 
 def examine(results: Path) -> list[Finding]:
     """Run every check; one that raises becomes a finding that is not healthy."""
-    from tqdm import tqdm
-
     findings = []
-    with beating(tqdm(CHECKS.items(), desc="checking", unit="check", disable=None, leave=False)) as bar:
+    with progress_bar("checking", iterable=CHECKS.items(), unit="check") as bar:
         for topic, check in bar:
             try:
                 findings += check(results)
@@ -223,14 +221,12 @@ def kernels() -> int:
 
 def compile_all(jobs: int | None = None) -> tuple[int, list[str]]:
     """Compile what is not on disk; returns how many kernels came to the cache, and which runs could not be done."""
-    from tqdm import tqdm
-
     from symtop.core.parallel import OneThreadEach, cores
 
     before, names = kernels(), ["", *variants()]
     with concurrent.futures.ProcessPoolExecutor(jobs or cores(), OneThreadEach()) as pool:
         runs = pool.map(_run, names)
-        with beating(tqdm(runs, "compiling", len(names), unit="run", disable=None, leave=False)) as bar:
+        with progress_bar("compiling", iterable=runs, total=len(names), unit="run") as bar:
             reasons = list(filter(None, bar))
     return kernels() - before, reasons
 

@@ -10,24 +10,26 @@ from typing import Any
 import click
 
 from symtop.cli import common
+from symtop.cli.clock import ticking
 from symtop.cli.common import File, as_text, check_outputs, completing, say, say_written, separated, table, warn
 from symtop.core import files
 from symtop.core.errors import SymtopError, whole
-from symtop.core.progress import post, ticking
+from symtop.core.progress import post
 
 FEWEST, FEW, MANY = 1000, 100_000, 20  # steps that are timed before a run of many times as many
 DECADES = 2.5  # of time, the last of a long run, in which the growth of a change is fitted
 LONG_ENOUGH = 0.5  # seconds of steps that are timed, beside those of a run of few
 SAME = 0.01  # relative difference of the step used from --step-size that is printed
 KERNELS = 5  # of an ensemble: periods, samples, starts, the step in lanes and alone
-COMPARED = 100_000  # tops whose errors are shown, the first of the population: those of a million take 1 GB
+COMPARED, COMPARED_BODIES = 100_000, 1000  # members whose errors are shown, the first: of a million tops 1 GB
+PARAMETERS = ("I1", "I2", "I3", "mgl", "centre")  # and of tops: what is no start
 
 GUARD = "Warn of a large error by the closed form (exact, of tops) or by an integration (series)."
 OUTCOME = {"ok": "reached the horizon"}  # which says nothing yet of their errors
 EXECUTION = {
-    "lanes": "32 tops at a time in vector registers (lanes)",
-    "compiled, one after another": "one top after another in compiled code",
-    "one call of Python for each": "one top after another, each by a call of Python",
+    "lanes": "32 at a time in vector registers (lanes)",
+    "compiled, one after another": "one after another in compiled code",
+    "one call of Python for each": "one after another, each by a call of Python",
 }
 
 
@@ -193,20 +195,22 @@ def long(
         sys.exit(3)
 
 
-@click.command(short_help="Run one integrator on many random tops.")
+@click.command(short_help="Run one integrator on many random tops or bodies.")
 @click.argument("integrator", shell_complete=completing("integrators"))
-@click.option("--members", type=int, default=1000, show_default=True, help="Number of tops.")
+@click.option("--members", type=int, default=1000, show_default=True, help="Number of tops or bodies.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the population.")
 @click.option("--kind", default="all", show_default=True, help="A stratum of the population, or all.")
+@click.option("--bodies", is_flag=True, help="Bodies without symmetry in the place of tops.")
+@click.option("--epsilon", type=float, help="With --bodies: how far heavy ones are from a Lagrange top, 0 to 0.5.")
 @click.option("--step-size", type=float, help="Step of a fixed-step method.")
-@click.option("--per-nutation", type=float, help="In place of a step: steps in a nutation period of each top.")
+@click.option("--per-nutation", type=float, help="In place of a step: steps in a nutation period of each member.")
 @click.option("--tolerance", type=float, help="Tolerance of an adaptive method.")
 @click.option("--horizon", type=float, help="Time to run to.")
-@click.option("--nutations", type=float, help="In place of a horizon: nutation periods of each top.")
-@click.option("--samples", type=int, default=101, show_default=True, help="Number of samples of each top.")
-@click.option("--observe", help="nutation, axis or attitude; the axis by default.")
+@click.option("--nutations", type=float, help="In place of a horizon: nutation periods of each member.")
+@click.option("--samples", type=int, default=101, show_default=True, help="Number of samples of each member.")
+@click.option("--observe", help="Of tops: nutation, axis or attitude; the axis by default.")
 @click.option("--variables", metavar="NAME,...", callback=separated, help="What is kept over time; all by default.")
-@click.option("--budget", type=float, help="Most steps of a top, or force evaluations of an adaptive method.")
+@click.option("--budget", type=float, help="Most steps of a member, or force evaluations of an adaptive method.")
 @click.option("--threads", type=int, help="Threads; one a core by default.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on this dask cluster.")
 @click.option("--output", "-o", type=File(), help="Stream the runs to this netCDF file.")
@@ -214,40 +218,47 @@ def long(
 @common.plugin_option
 @common.json_option
 def ensemble(
-    integrator: str, members: int, seed: int, kind: str, variables: list[str] | None, output: str | None,
-    figure: str | None, as_json: bool, **settings: Any,
+    integrator: str, members: int, seed: int, kind: str, bodies: bool, epsilon: float | None,
+    variables: list[str] | None, output: str | None, figure: str | None, as_json: bool, **settings: Any,
 ) -> None:  # fmt: skip
-    """Run one INTEGRATOR on tops of a random population and compare each with the exact motion.
+    """Run one INTEGRATOR on tops of a random population, or on bodies, and compare each with its true motion.
 
-    Each top has the bits of ``symtop run`` alone. With an output, tops are written as they are computed, and the same
-    command resumes a run that was interrupted. A top that fails fails alone; the exit code is 3 if all have failed.
+    Each member has the bits of ``symtop run`` alone. With an output, members are written as they are computed, and the
+    same command resumes a run that was interrupted. One that fails fails alone; the exit code is 3 if all have failed.
 
     \b
     symtop ensemble --members 10000 --seed 1 strang --step-size 0.01 --horizon 20 -o runs.nc
     symtop ensemble --kind grazing "gauss-4[axis]" --per-nutation 50 --nutations 10 --figure spread.png
+    symtop ensemble --bodies --kind heavy --epsilon 0.1 strang --per-nutation 60 --nutations 2
     """
     check_outputs(output=output, figure=figure)
-    whole("members", members, 1)  # which is n in Python
-    with ticking("drawing tops"):
-        from symtop.report.spread import LEVELS, QUANTITIES, largest, member_errors, spread
-        from symtop.run.ensemble import ensemble as runs
+    if epsilon is not None and not bodies:
+        raise SymtopError("--epsilon must come with --bodies: it is how far heavy bodies are from a top")
+    noun, most = ("bodies", COMPARED_BODIES) if bodies else ("tops", COMPARED)
+    with ticking(f"drawing {noun}"):
+        from symtop.report.spread import LEVELS, QUANTITIES, SHOWN_BY, largest, member_errors, spread
+        from symtop.run.ensemble import bodies as random_bodies, ensemble as runs
         from symtop.run.ensemble.population import check_memory, population
 
+        whole("members", members, 1, random_bodies.MOST if bodies else math.inf)  # which is n in Python
         check_memory("members", members)
-        tops = population(members, seed=seed, kind=kind)
-    compared = [name for name in QUANTITIES if variables is None or name in variables]
+        draw = partial(random_bodies.body_population, epsilon=epsilon) if bodies else population
+        drawn = draw(members, seed=seed, kind=kind)
+    words = QUANTITIES[noun]
+    compared = [name for name in words if variables is None or SHOWN_BY[name] in variables]
     if figure is not None and not compared:
-        raise SymtopError("--figure needs axis or energy among --variables, whose errors it shows")
+        needed = " or ".join(SHOWN_BY[name] for name in words)
+        raise SymtopError(f"--figure needs {needed} among --variables, whose errors it shows")
     files.expected[0] = KERNELS
-    post(f"running {members} tops")
+    post(f"running {members} {noun}")
     try:
-        data = runs.ensemble(tops, integrator, variables=variables, path=output, **settings)
+        data = runs.ensemble(drawn, integrator, variables=variables, path=output, **settings)
     except KeyboardInterrupt:
-        warn("interrupted" + ("" if output is None else "; the tops that were run are kept: the same command resumes"))
+        warn("interrupted" + ("" if output is None else "; what was run is kept: the same command resumes"))
         sys.exit(130)
-    few, shown = (part.isel(member=slice(0, COMPARED)) for part in (tops, data))
+    few, shown = (part.isel(member=slice(0, most)) for part in (drawn, data))
     outcomes, steps = Counter(data["outcome"].values.tolist()), int(data["steps"].sum())
-    with ticking("comparing with the exact motion"):
+    with ticking("comparing with the true motion"):
         if figure is not None:
             from symtop.report.plot import draw_ensemble
 
@@ -256,7 +267,7 @@ def ensemble(
         worst = {name: spread(values[:, None])[:, 0].tolist() for name, values in own.items()}
     data.close()
     if output is not None:
-        _add_members(output, tops, own)
+        _add_members(output, drawn, own, words)
     if as_json:
         errors = {name: dict(zip(map("{:g}".format, LEVELS), row, strict=True)) for name, row in worst.items()}
         click.echo(as_text({"outcomes": outcomes, "steps": steps, "largest_errors": errors}))
@@ -264,30 +275,31 @@ def ensemble(
         counts = ", ".join(f"{count} {OUTCOME.get(name, name)}" for name, count in outcomes.items())
         execution = data.attrs["execution"]
         say(f"{data.attrs['title']}: {counts}\n{steps} steps, computed {EXECUTION.get(execution, execution)}")
-        heading = [f"largest error, {few.sizes['member']} tops", *(f"{100.0 * level:g} %" for level in LEVELS)]
+        heading = [f"largest error, {few.sizes['member']} {noun}", *(f"{100.0 * level:g} %" for level in LEVELS)]
         if worst:
-            click.echo(table(heading, [[QUANTITIES[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
+            click.echo(table(heading, [[words[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
         say_written(output, figure)
     if "ok" not in outcomes:
         sys.exit(3)
 
 
-def _add_members(file: str, tops: Any, errors: dict[str, Any]) -> None:
-    """Put the tops, ``I1`` and ``start_theta``, and the largest ``axis_error`` of each into a file of their runs."""
+def _add_members(file: str, drawn: Any, errors: dict[str, Any], words: dict[str, str]) -> None:
+    """Put the members, ``I1`` and ``start_theta``, and the largest ``axis_error`` of each into a file of their runs."""
     import netCDF4
 
-    from symtop.report.spread import QUANTITIES
-
-    numbers = {str(name): tops[name] for name in tops.data_vars if tops[name].dtype.kind == "f"}
+    numbers = {str(name): drawn[name] for name in drawn.data_vars if drawn[name].dtype.kind == "f"}
     with netCDF4.Dataset(file, "a") as data:
+        for dim, size in drawn.sizes.items():
+            if dim not in data.dimensions:
+                data.createDimension(dim, size)
         for name, values in numbers.items():
-            made = data.createVariable(name if name in ("I1", "I3", "mgl") else f"start_{name}", "f8", ("member",))
+            made = data.createVariable(name if name in PARAMETERS else f"start_{name}", "f8", values.dims)
             made[:] = values.values
             made.setncatts(values.attrs)
         for name, values in errors.items():
             made = data.createVariable(f"{name}_error", "f8", ("member",))
             made[: len(values)] = values
-            made.setncatts({"long_name": f"{QUANTITIES[name]}, largest over the run, infinite after a failure"})
+            made.setncatts({"long_name": f"{words[name]}, largest over the run, infinite after a failure"})
 
 
 @click.command(short_help="Open the explorer: one run in a browser, with sliders.")

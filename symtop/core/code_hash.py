@@ -74,10 +74,9 @@ def file_hash(path: Path) -> str:
 @functools.cache
 def version(package: str) -> str:
     """The installed version of a package, or ``absent``."""
-    try:
+    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
         return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "absent"
+    return "absent"
 
 
 @functools.cache
@@ -348,10 +347,8 @@ def held(function: FunctionType) -> Iterator[object]:
     yield from function.__defaults__ or ()
     yield function.__kwdefaults__
     for cell in function.__closure__ or ():
-        try:
+        with contextlib.suppress(ValueError):  # not filled yet
             yield cell.cell_contents
-        except ValueError:  # not filled yet
-            continue
 
 
 def named(function: FunctionType) -> Iterator[tuple[str, object]]:

@@ -57,8 +57,8 @@ def shown(value: object) -> str:
         return f"a {type(value).__name__} that cannot be printed"
 
 
-def finite(name: str, value: object) -> float:
-    """Return `value` as a float; refuse anything that is not one finite real number."""
+def finite(name: str, value: object, least: float = -math.inf) -> float:
+    """Return `value` as a float; refuse anything that is not one finite real number, or is below the least."""
     number = math.nan
     # float() would read a number in them
     if not isinstance(value, (bool, str, bytes, bytearray)) and type(value).__name__ != "MaskedConstant":
@@ -66,13 +66,8 @@ def finite(name: str, value: object) -> float:
             number = value = float(value)  # type: ignore[arg-type]
     if not math.isfinite(number):
         raise SymtopError(f"{name} must be a finite number, not {shown(value)}", name)
-    return number
-
-
-def not_negative(name: str, value: object) -> float:
-    """A finite number that is at least zero."""
-    if (number := finite(name, value)) < 0.0:
-        raise SymtopError(f"{name} must be at least 0, not {number!r}", name)
+    if number < least:
+        raise SymtopError(f"{name} must be at least {least:g}, not {number!r}", name)
     return number
 
 
@@ -127,10 +122,9 @@ def check_replaceable(path: Path) -> None:
 
 def at_home(path: str | os.PathLike[str]) -> Path:
     """A path in which a first ``~`` is the user's folder, as a shell reads it; as it stands if nobody has that name."""
-    try:
+    with contextlib.suppress(RuntimeError):
         return Path(path).expanduser()
-    except RuntimeError:
-        return Path(path)
+    return Path(path)
 
 
 def row(name: str, values: object) -> list[float]:

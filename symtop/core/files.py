@@ -1,4 +1,4 @@
-"""Files: the cache of what can be made again, locks, and Python files that a user names.
+"""Files: the cache of what can be made again, and locks.
 
 The cache holds compiled kernels, references and checkpoints of long runs. Every use of an entry sets its time of
 modification, at most once a day. Entries that nobody used for `UNUSED` days are removed, and those used longest ago
@@ -8,7 +8,6 @@ until the folder is small enough. Another process may be doing the same.
 import contextlib
 import errno
 import functools
-import importlib.util
 import os
 import shutil
 import sys
@@ -16,10 +15,9 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import ModuleType
 from typing import TextIO
 
-from symtop.core.errors import SymtopError, SymtopWarning, at_home
+from symtop.core.errors import SymtopError, SymtopWarning
 
 DAY = 86_400.0  # seconds
 UNUSED = 30  # days
@@ -100,9 +98,8 @@ def touch(entry: Path) -> None:
 
 def size_of(entry: Path) -> int:
     """Bytes of a file, or of all files in a folder."""
-    if not entry.is_dir():
-        return entry.stat().st_size
-    return sum(path.stat().st_size for path in entry.rglob("*") if path.is_file())
+    paths = entry.rglob("*") if entry.is_dir() else [entry]
+    return sum(path.stat().st_size for path in paths if path.is_file())
 
 
 def prune(folder: Path, most_bytes: int) -> None:
@@ -170,32 +167,3 @@ def locked(path: Path, *, wait: bool) -> Iterator[bool]:
             finally:
                 lock.unlink(missing_ok=True)
             return
-
-
-def python_file(path: str | Path, name: str, wanted: str) -> Path:
-    """A file by its path; SymtopError that argument `name` must be what is `wanted` if it is not there."""
-    with contextlib.suppress(OSError, ValueError):  # a name that is too long, or holds a null character
-        if (file := at_home(path).resolve()).is_file():
-            return file
-    raise SymtopError(f"{name} must be {wanted}, not {str(path)!r}", name)
-
-
-def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
-    """A module of that name from a file, or a package if its `places` are given."""
-    for stale in [known for known in sys.modules if known.startswith(f"{name}.")]:
-        del sys.modules[stale]  # of another folder with the same name
-    if file.suffix != ".py":
-        raise SymtopError(f"{str(file)!r} cannot be loaded: its name must end in .py")
-    spec = importlib.util.spec_from_file_location(name, file, submodule_search_locations=places)
-    assert spec is not None and spec.loader is not None  # noqa: PT018, S101  (its suffix has one)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # also because kernels are cached under the name of their module
-    usual, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # no ``__pycache__`` in the user's folder
-    try:
-        spec.loader.exec_module(module)
-    except BaseException:
-        sys.modules.pop(name)
-        raise
-    finally:
-        sys.dont_write_bytecode = usual
-    return module

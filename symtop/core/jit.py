@@ -39,7 +39,7 @@ from numba.core.typing import signature as numba_signature
 from numba.core.typing.templates import builtin_registry
 from numba.cpython.unsafe.tuple import tuple_setitem
 from numba.extending import intrinsic, overload, register_jitable as _register
-from numba.np.unsafe.ndarray import to_fixed_tuple
+from numba.np.unsafe.ndarray import to_fixed_tuple as fixed_tuple
 
 from symtop.core.code_hash import PACKAGE, Code, Part, by_file, by_name, digest, hashed
 from symtop.core.errors import SymtopError
@@ -47,11 +47,8 @@ from symtop.core.files import cache_root, is_trusted, locked, make_private, on_c
 from symtop.core.jit_functions import Function, fused, marked, two_product
 from symtop.core.sines import polynomials, sincos
 
-__all__ = [
-    "by_length", "code_of", "compile_kernel", "fused", "is_cached", "register_jitable", "set_item", "to_fixed_tuple",
-]  # fmt: skip
-
 set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple
+to_fixed_tuple: Any = fixed_tuple  # in a kernel: to_fixed_tuple(array, n)
 
 MOST_BYTES = 200_000_000  # of kernels that are kept, about 2000 of them
 OPTIONS = {"error_model": "numpy", "nogil": True}  # division by zero gives infinity, as in C; threads run at once
@@ -340,7 +337,6 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     A kernel with functions typed at a prompt, which have no source file, compiles without the cache. The constructor of
     a NamedTuple has none either, but follows from the fields, which are part of what the kernel is made of.
     """
-    _register_parts()
     parts = code_of(function)
     made_of = digest(by_file(parts) | {"format": FORMAT})
     kernel = njit(**OPTIONS)(_named(function, made_of))

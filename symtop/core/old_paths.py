@@ -30,20 +30,15 @@ class OldPaths:
         known = package == "symtop" and old in table()
         return ModuleSpec(name, self, is_package=not table()[old]) if known else None  # type: ignore[arg-type]
 
-    def create_module(self, spec: ModuleSpec) -> ModuleType | None:
-        """The module at the new path, with a warning; None, for an empty one, in the place of an old package."""
-        new = table()[spec.name.partition(".")[2]]
-        if not new:
-            return None
-        warnings.warn(f"{spec.name} is now symtop.{new}; its old path is for symtop 0.3 only", DeprecationWarning, 2)
-        module = importlib.import_module(f"symtop.{new}")
-        spec.loader_state = module.__spec__
-        return module
+    def create_module(self, _spec: ModuleSpec) -> None:
+        """An empty module, as an old package remains."""
 
     def exec_module(self, module: ModuleType) -> None:
-        """Give the module back the spec of its new path, in whose place the import has put that of the old one."""
-        if module.__spec__ is not None and module.__spec__.loader_state is not None:
-            module.__spec__ = module.__spec__.loader_state
+        """Put the module at the new path in the place of an empty one, with a warning; the import returns that."""
+        name = module.__name__
+        if new := table()[name.partition(".")[2]]:
+            warnings.warn(f"{name} is now symtop.{new}; its old path is for symtop 0.3 only", DeprecationWarning, 2)
+            sys.modules[name] = importlib.import_module(f"symtop.{new}")
 
 
 if not any(isinstance(finder, OldPaths) for finder in sys.meta_path):

@@ -1,40 +1,32 @@
-"""What a command says while it works: a clock on a terminal, and a line now and then where nobody watches.
-
-Processes of their own write both, which end with this one: a compiler that holds Python's lock stops threads.
-"""
+"""Progress of what takes long: a bar on a terminal, and words for whoever listens elsewhere."""
 
 import contextlib
-import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from symtop.core.files import is_terminal
 
 BEAT = 1.0  # seconds from one drawing to the next
-FIRST, EVERY = 2.0, 9.0  # seconds to the first line of a command in a pipe, and from one to the next
-LINES = "symtop: {words}, {seconds:.0f} s\n", ""  # what is written, and what at the end
-_listeners: "list[subprocess.Popen[str]]" = []  # of the command that runs
-CLOCK = "\r{words}: {minutes:02d}:{rest:02d}", "\r\x1b[K"
-WRITER = """\
-import signal, sys, threading, time
-signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
-began, ended, (words, shape, last), wait = time.monotonic(), threading.Event(), sys.argv[1:4], float(sys.argv[4])
-words = [words]
-threading.Thread(target=lambda: (words.extend(map(str.strip, sys.stdin)), ended.set()), daemon=True).start()
-while not ended.wait(wait):
-    seconds = time.monotonic() - began
-    values = {"words": words[-1], "seconds": seconds, "minutes": int(seconds) // 60, "rest": int(seconds) % 60}
-    print(shape.format(**values), end="", file=sys.stderr, flush=True)
-    wait = float(sys.argv[5])
-print(last, end="", file=sys.stderr, flush=True)
-"""
+listeners: list[Callable[[str], object]] = []  # of the command that runs
+
+
+def post(words: str) -> None:
+    """Say what is being done to those who listen, such as the lines of a command in a pipe."""
+    for hear in listeners:
+        hear(words)
 
 
 @contextlib.contextmanager
-def beating(bar: Any) -> Iterator[Any]:
-    """A progress bar, drawn again each second although nothing is finished; it is closed at the end."""
+def progress_bar(words: str, *, quiet: bool = False, **options: Any) -> Iterator[Any]:
+    """A progress bar of tqdm, or without options the words alone, where somebody is watching.
+
+    It is drawn again each second although nothing is finished, and closed at the end.
+    """
+    from tqdm import tqdm
+
+    options = options or {"total": 1, "bar_format": "{desc}"}
     ended = threading.Event()
 
     def beat() -> None:
@@ -42,7 +34,7 @@ def beating(bar: Any) -> Iterator[Any]:
             bar.refresh()
 
     thread = threading.Thread(target=beat, daemon=True)
-    with bar:
+    with tqdm(desc=words, disable=quiet or not is_terminal(sys.stderr), leave=False, **options) as bar:
         if not bar.disable:
             thread.start()
         try:
@@ -51,49 +43,3 @@ def beating(bar: Any) -> Iterator[Any]:
             ended.set()
             if thread.is_alive():
                 thread.join()
-
-
-@contextlib.contextmanager
-def _writing(form: tuple[str, str], words: str, first: float, every: float) -> "Iterator[subprocess.Popen[str]]":
-    """A process that writes some words, or the last line that it was given, and the time since, until the end."""
-    command = [sys.executable, "-I", "-S", "-c", WRITER, words, *form, str(first), str(every)]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, text=True) as writer:  # noqa: S603  (our own words)
-        yield writer
-
-
-@contextlib.contextmanager
-def telling(words: str) -> Iterator[None]:
-    """Some words, or those of `ticking`, in lines on a standard error that is no terminal, from two seconds on."""
-    if is_terminal(sys.stderr):
-        yield
-        return
-    with _writing(LINES, words, FIRST, EVERY) as lines:
-        _listeners.append(lines)
-        try:
-            yield
-        finally:
-            _listeners.remove(lines)
-            lines.kill()  # it has nothing to finish; its start alone takes longer than most commands that are refused
-
-
-def post(words: str) -> None:
-    """What the next lines say in a pipe."""
-    for lines in _listeners:
-        with contextlib.suppress(OSError):  # somebody has ended it
-            print(words, file=lines.stdin, flush=True)
-
-
-@contextlib.contextmanager
-def ticking(words: str) -> Iterator[None]:
-    """Some words and the time since, on the standard error if that is a terminal, drawn each second until the end."""
-    post(words)
-    with _writing(CLOCK, words, 0.0, BEAT) if is_terminal(sys.stderr) else contextlib.nullcontext():
-        yield
-
-
-def progress_bar(words: str, *, quiet: bool, **options: Any) -> Any:
-    """A progress bar, or without a total the words alone, where somebody is watching."""
-    from tqdm import tqdm
-
-    options = options or {"total": 1, "bar_format": "{desc}"}
-    return tqdm(desc=words, disable=quiet or not is_terminal(sys.stderr), leave=False, **options)

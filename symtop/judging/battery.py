@@ -5,11 +5,10 @@ beyond what the measurement itself leaves in doubt; both numbers are in the ledg
 """
 
 from collections.abc import Callable
-from itertools import groupby
 from typing import NamedTuple
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims import bodies, calls, constants, order, structure
+from symtop.judging.claims import calls, constants, order, structure
 from symtop.judging.claims.subject import Subject, declared
 from symtop.judging.findings import AS, Finding, Ledger, claim_name, inapplicable, undecided
 from symtop.methods.framework.registry import Integrator
@@ -18,65 +17,54 @@ from symtop.model.scenes import Scene
 SCENE = "spheroid"
 
 
-class Claim(NamedTuple):
-    """A claim; those beside one another with the same measurement are measured together."""
+class Stage(NamedTuple):
+    """Claims that are measured together."""
 
-    name: str
-    applies: tuple[str, ...]  # to a registered "integrator", a bare "step", such a map of the "plane" (theta, p_theta)
+    claims: tuple[str, ...]
+    applies: tuple[str, ...]  # to a registered "integrator", on a "body" or not, a bare "step", such a map of a "plane"
     measure: Callable[[Subject], list[Finding]]
 
 
-Stage = tuple[Claim, ...]  # that are measured together
 EVERY = ("integrator", "step", "plane")
 TABLE = (
-    Claim("calls", ("step", "plane"), calls.measure),  # is a step a function of its arguments?
-    Claim("order", EVERY, order.measure),
-    Claim("time", ("step",), order.time_order),  # the order where f depends on time
-    Claim("symplectic", EVERY, structure.measure),
-    Claim("symmetric", EVERY, structure.measure),
-    Claim("energy", EVERY, constants.measure),
-    Claim("p_phi", EVERY, constants.measure),
-    Claim("p_psi", EVERY, constants.measure),
-    Claim("axis_length", EVERY, constants.measure),
-    Claim("reported", ("integrator",), constants.measure),  # momenta beside those of the states
-    Claim("invariant", EVERY, constants.measure),
-    Claim("explicit", EVERY, constants.measure),
-    Claim("work", EVERY, constants.measure),
-    Claim("pole", ("integrator", "step"), structure.pole),
+    Stage(("calls",), ("step", "plane"), calls.measure),  # is a step a function of its arguments?
+    Stage(("order",), EVERY, order.measure),
+    Stage(("time",), ("step",), order.time_order),  # the order where f depends on time
+    Stage(("symplectic", "symmetric"), EVERY, structure.measure),
+    Stage(constants.OF_A_RUN, EVERY, constants.measure),
+    Stage(("pole",), ("integrator", "step"), structure.pole),
+    Stage(("order",), ("body",), order.on_body),
+    Stage(("energy", "momentum"), ("body",), constants.measure),
 )
-CLAIMS = tuple(claim.name for claim in TABLE if "integrator" in claim.applies)
+CLAIMS = tuple(claim for stage in TABLE if "integrator" in stage.applies for claim in stage.claims)
 
 
 def stages(kind: str) -> list[Stage]:
-    """The claims that apply to an "integrator" or a "step", those together that are measured together."""
-    chosen = (claim for claim in TABLE if kind in claim.applies)
-    return [tuple(group) for _, group in groupby(chosen, key=lambda claim: claim.measure)]
+    """What applies to a `Subject.kind`."""
+    return [stage for stage in TABLE if kind in stage.applies]
 
 
 def measure(stage: Stage, subject: Subject) -> list[Finding]:
     """The findings of a stage; undecided, and why, if its measurement breaks. A step that makes no call raises."""
-    first = stage[0]
-    if subject.in_plane and "plane" not in first.applies:
-        return [inapplicable(claim.name, "a map of (theta, p_theta) does not show it") for claim in stage]
+    if subject.in_plane and "plane" not in stage.applies:
+        return [inapplicable(claim, "a map of (theta, p_theta) does not show it") for claim in stage.claims]
     try:
-        findings = {one.claim: one for one in first.measure(subject)}
+        findings = {one.claim: one for one in stage.measure(subject)}
     except SymtopError as error:
-        if first.name == "calls":
+        if "calls" in stage.claims:
             raise
-        return unmeasured(stage, subject.method, str(error))
-    return [findings[claim.name] for claim in stage]
+        return unmeasured(stage.claims, subject.method, str(error))
+    return [findings[claim] for claim in stage.claims]
 
 
-def unmeasured(stage: Stage, method: Integrator, why: str) -> list[Finding]:
-    """The findings of a stage that could not be measured: why not is said once."""
-    reasons = [why, *(AS + claim_name(stage[0].name) for _ in stage[1:])]
-    return [undecided(one.name, declared(method, one.name), words) for one, words in zip(stage, reasons, strict=True)]
+def unmeasured(claims: tuple[str, ...], method: Integrator, why: str) -> list[Finding]:
+    """The findings on claims that could not be measured: why not is said once."""
+    reasons = [why, *[AS + claim_name(claims[0])] * (len(claims) - 1)]
+    return [undecided(claim, declared(method, claim), words) for claim, words in zip(claims, reasons, strict=True)]
 
 
 def judge(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
     """Measure every claim of a registered method on a scene; `quick` shortens the runs. On a body there are three."""
-    if scene.of_body:
-        return bodies.judge(method, scene, quick=quick)
     subject = Subject(method, scene, quick)
-    findings = [finding for stage in stages("integrator") for finding in measure(stage, subject)]
+    findings = [finding for stage in stages(subject.kind) for finding in measure(stage, subject)]
     return Ledger(method.name, scene.name, tuple(findings), subject.traces)

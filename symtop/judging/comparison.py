@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from tqdm import tqdm
 
 from symtop.core import files, netcdf
 from symtop.core.errors import SymtopError, boolean, one_of, positive
 from symtop.core.parallel import cores, in_threads
-from symtop.core.progress import beating, post
+from symtop.core.progress import post, progress_bar
 from symtop.judging.adapters.adapter import integrator as adapted
 from symtop.judging.claims.subject import open_target
 from symtop.measure import columns, settings
@@ -82,7 +81,7 @@ def compare(
         return _runs(chosen, method, end, limit, quantity)
 
     exact = find_integrator("exact")
-    with beating(tqdm(total=len(names), desc="compare", disable=boolean("quiet", quiet) or None, leave=False)) as bar:
+    with progress_bar("compare", quiet=boolean("quiet", quiet), total=len(names)) as bar:
         results = []
         kernels = [one for one in variants if one.implementation == "compiled"]
         files.expected[0] = len(kernels) + (0 if closed_form.load() else files.CLOSED_FORM)

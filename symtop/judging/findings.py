@@ -80,11 +80,13 @@ def yes_no(value: bool | int | None) -> str:
     return ("yes" if value else "no") if isinstance(value, bool) else str(value)
 
 
-def agreement(*, declared: bool | None, measured: bool | None) -> str:
-    """The verdict on a claim that is true or false."""
-    if measured is None:
-        return "undecided"
-    return "measured" if declared is None else "confirmed" if declared == measured else "refuted"
+def agreement(
+    claim: str, declared: bool | None, yes: bool | None, why: str, value: float, resolution: float
+) -> Finding:
+    """The finding on a claim that is true or false; `yes` is None of neither."""
+    verdict = "measured" if declared is None else "confirmed" if declared == yes else "refuted"
+    measured, verdict = (NOTHING, "undecided") if yes is None else (Measured(yes_no(yes), value), verdict)
+    return Finding(claim, yes_no(declared), measured, verdict, why, value, resolution)
 
 
 def undecided(claim: str, declared: str, why: str) -> Finding:
@@ -98,14 +100,33 @@ def inapplicable(claim: str, why: str, declared: str = "") -> Finding:
     return Finding(claim, declared, NOTHING, "inapplicable", why)
 
 
+class About(NamedTuple):
+    """What is judged through an adapter, once it is open."""
+
+    name: str = ""
+    chart: str = ""
+    implementation: str = ""
+    seconds_a_step: float = 0.0
+    seed: int = 0  # of what was drawn at random
+    nutation: float = math.nan  # period of the scene, in its unit of time
+
+
+NOBODY = About()
+
+
 @dataclass(frozen=True)
 class Ledger:
-    """Everything the battery found about one integrator."""
+    """Everything that was found about one integrator; as text the report of the command."""
 
     integrator: str
     scene: str
     findings: tuple[Finding, ...]
     traces: dict[str, np.ndarray]  # errors by step, defects by differencing width, length of the long run
+    about: About = NOBODY  # of a step that came through an adapter
+    implied: frozenset[str] = frozenset()  # claims that follow from those that were made
+
+    def __str__(self) -> str:
+        return "\n".join([heading(self.about, self.scene), *filter(None, map(line, self.findings)), summary(self)])
 
     @property
     def refuted(self) -> list[str]:
@@ -132,33 +153,8 @@ class Ledger:
         axes |= dict.fromkeys(("long_nutations", "energy_change"), "window")
         for name, row in self.traces.items():
             columns[name] = ((axes.get(name, "width"),) if row.ndim else (), row.astype(float))
-        return xr.Dataset(columns, coords={"claim": list(self)})
-
-
-class About(NamedTuple):
-    """What is judged through an adapter, once it is open."""
-
-    name: str
-    chart: str
-    implementation: str
-    seconds_a_step: float
-    seed: int = 0  # of what was drawn at random
-    nutation: float = math.nan  # period of the scene, in its unit of time
-
-
-@dataclass(frozen=True)
-class StepLedger(Ledger):
-    """The findings on a step that came through an adapter; shown as the report of the command."""
-
-    about: About
-    implied: frozenset[str] = frozenset()  # claims that follow from those that were made
-
-    def __str__(self) -> str:
-        return "\n".join([heading(self.about, self.scene), *filter(None, map(line, self.findings)), summary(self)])
-
-    def dataset(self) -> xr.Dataset:
-        """As of any ledger, with attributes that say what was judged."""
-        return super().dataset().assign_attrs(self.about._asdict(), scene=self.scene)
+        attributes = self.about._asdict() | {"scene": self.scene} if self.about.name else {}
+        return xr.Dataset(columns, {"claim": list(self)}, attributes)
 
 
 WIDTH, AS = 100, "as with "  # how the reason begins of a claim that was not judged for the same as another
@@ -230,7 +226,7 @@ def description(findings: Sequence[Finding]) -> str:
     def of_kind(*kinds: str) -> str:
         return _listed([name for claim, name in KEPT.items() if measured.get(claim, NOTHING).kind in kinds])
 
-    kept, bounded, lost = of_kind("kept"), of_kind("bounded"), of_kind("drift", "growing", "random walk")
+    kept, bounded, lost = of_kind("kept"), of_kind("bounded"), of_kind("drift", "growing", "random walk", "blows up")
     words += [f"keeps {kept}"] if kept else []
     words += [f"{bounded} bounded"] if bounded else []
     without = "not" if kept or bounded else "does not keep"
@@ -241,7 +237,7 @@ def _listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), *names[-1:]] if len(names) > 1 else names)
 
 
-def summary(ledger: StepLedger) -> str:
+def summary(ledger: Ledger) -> str:
     """What the method is, what its runs were, and how many claims hold: those made, and those that follow from them."""
     counts = []
     for follows in (False, True):
@@ -254,7 +250,7 @@ def summary(ledger: StepLedger) -> str:
     return f"\n{_runs(ledger)}It is: {description(ledger.findings)}.\n{claims}."
 
 
-def _runs(ledger: StepLedger) -> str:
+def _runs(ledger: Ledger) -> str:
     """The steps and the lengths of the runs, and the steps that fail, in steps a nutation; empty of a trajectory."""
     traces, words = ledger.traces, []
     if "steps_run" in traces and (steps := float(traces["steps_run"])):

@@ -36,12 +36,12 @@ import xarray as xr
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, whole
 from symtop.core.numbers import EPSILON
-from symtop.judging.adapters.adapter import heartbeat
-from symtop.judging.battery import Stage, measure, stages, unmeasured
-from symtop.judging.claims import bodies
+from symtop.judging.adapters.adapter import heartbeat, integrator
+from symtop.judging.adapters.python_step import CONJUGATE
+from symtop.judging.battery import measure, stages, unmeasured
 from symtop.judging.claims.constants import KEPT, Constant
-from symtop.judging.claims.subject import Subject, open_target, timed
-from symtop.judging.findings import NOTHING, About, Finding, Ledger, Measured, StepLedger, error_units, undecided
+from symtop.judging.claims.subject import Subject, open_target, seconds_a_step
+from symtop.judging.findings import About, Finding, Ledger, Measured, error_units, undecided
 from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
 from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import checked, completed, errors, refuse_other_scene, sampled
@@ -77,7 +77,7 @@ def judge(
     explicit: bool | None = None, conserves: Collection[str] | None = None, energy: str | None = None,
     adaptive: bool = False, autonomous: bool = False, quick: bool = False, seed: int | None = None,
     tell: Callable[[About | Finding], object] | None = None,
-) -> StepLedger:  # fmt: skip
+) -> Ledger:  # fmt: skip
     """Judge anything that steps: its order, structure, invariants and drift on the top, beside what is claimed of it.
 
     `target` is one of (`form` says which where it does not show)
@@ -103,7 +103,7 @@ def judge(
     again. `autonomous` says that it was written for y' = f(y), whatever f is called with.
     `tell` is handed what is judged and then each finding, as they are made.
 
-    Returns a `StepLedger`: ``ledger["order"]`` is a finding, ``print(ledger)`` shows all of them,
+    Returns a `Ledger`: ``ledger["order"]`` is a finding, ``print(ledger)`` shows all of them,
     ``ledger.dataset()`` is the same as a Dataset, ``ledger.refuted`` names the claims that are false. Raises
     SymtopError for a target that cannot be loaded and claims that make no sense.
     """
@@ -123,31 +123,33 @@ def judge(
     if states:
         if set(structure.values()) != {None}:
             raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
-        shown_by = of_trajectory(target, chosen, kept, energy)
-        about = About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory", "", "", 0.0)
+        findings = of_trajectory(target, chosen, kept, energy)
+        about = About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory")
         listen(about)
-        for finding in shown_by:
+        for finding in findings:
             listen(finding)
-        return StepLedger(about.name, chosen.name, tuple(shown_by), {}, about)
+        return Ledger(about.name, chosen.name, tuple(findings), {}, about)
     implied = {"time": not autonomous, "energy": energy is None and "energy" not in kept, "order": order is None}
     heartbeat.reset(quick=quick)
-    began, findings = time.monotonic(), list[Finding]()
+    began, findings = time.monotonic(), []
     load = functools.partial(open_target, target, form, chart, adaptive=adaptive)
     with Process(lambda: table_of(load)) as process:
         process.allow(OPENING)
         try:
             stepper = Remote(process)
-            subject = timed(stepper, chosen, claims, quick=quick, seed=drawn, autonomous=autonomous)
+            method = integrator(stepper, **claims)
+            seconds = seconds_a_step(stepper, chosen) if method.fixed_step else 0.0
         except SymtopError as error:
             raise SymtopError(f"it cannot be judged: {error}") if process.lost else error from None
+        subject = Subject(method, chosen, quick, stepper, seconds, drawn, autonomous)
         facts = stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step
         about = About(*facts, drawn, chosen.time_scale())
         listen(about)
-        for finding in _measured("step", subject, process, began, QUICK_VERDICT if quick else VERDICT):
+        for finding in _measured(subject, process, began, QUICK_VERDICT if quick else VERDICT):
             listen(finding)
             findings.append(finding)
     follow = frozenset(name for name, follows in implied.items() if follows)
-    return StepLedger(about.name, chosen.name, tuple(findings), subject.traces, about, follow)
+    return Ledger(about.name, chosen.name, tuple(findings), subject.traces, about, follow)
 
 
 def _no_solver(*_: Any) -> Any:
@@ -170,14 +172,11 @@ def read(target: Any) -> dict[str, Any]:
         raise SymtopError(
             f"{path.name} must begin with a line of names, time and of {', '.join(known[1:])}, not {head[:60]!r}"
         )
-    rows = [line.split() for line in lines if line.strip()]
-    for k, row in enumerate(rows):
-        if len(row) != len(names):
-            raise SymtopError(f"{path.name} must have {len(names)} numbers a line, and row {k + 1} has {len(row)}")
     try:
-        columns = dict(zip(names, np.array(rows, dtype=float).reshape(-1, len(names)).T, strict=True))
+        columns = dict(zip(names, np.loadtxt(lines or [""] * 2, ndmin=2, unpack=True), strict=True))
     except ValueError as error:
-        raise SymtopError(f"{path.name} must hold numbers: {error}") from None
+        why = str(error).partition(";")[0]
+        raise SymtopError(f"{path.name} must have {len(names)} numbers in each line: {why}") from None
     for name, parts in VECTORS.items():
         if set(parts) <= set(columns):
             columns[name] = np.stack([columns[part] for part in parts], axis=-1)
@@ -225,7 +224,7 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
 def _of_rates(scene: Scene, time: np.ndarray, rates: np.ndarray) -> dict[str, np.ndarray]:
     """The error of the rates (n, 3) of a body, rad per unit time, and its bound."""
     truth, moments = reference(scene, time), np.array(scene.top.moments)
-    inside = rotated(truth["quaternion"].values * [1.0, -1.0, -1.0, -1.0], truth["momentum"].values)
+    inside = rotated(truth["quaternion"].values * CONJUGATE, truth["momentum"].values)
     bound = scene.momentum_scale / moments.min() * (truth["attitude_error_bound"].values + 4.0 * EPSILON)
     return {"rates": np.linalg.norm(rates - inside / moments, axis=1), "rates_bound": bound}
 
@@ -236,7 +235,7 @@ def _from_states(scene: Scene, states: Trajectory) -> dict[str, np.ndarray]:
     if L is None or axis is None or (scene.of_body and q is None):
         return {}
     if scene.of_body:
-        inside = rotated(q * [1.0, -1.0, -1.0, -1.0], L)
+        inside = rotated(q * CONJUGATE, L)
         return {"energy": body_energy(scene.top, np.concatenate([q, inside], axis=1)), "p_phi": L[:, 2]}
     p_psi = np.sum(L * axis, axis=1)
     return {"energy": space_energy(scene.top, axis, L, p_psi), "p_phi": L[:, 2], "p_psi": p_psi}
@@ -265,20 +264,18 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     if time.size < FEWEST:
         changed = changed._replace(exponent=math.nan)
     constant = Constant(changed, math.nan, KEPT * grain, grain)
-    kind, verdict, off = constant.kind, constant.verdict(declared), abs(values[0] - true) / scale
-    why = constant.words(f"in {time.size} samples; it begins {off:.1e} from the scene's")
-    if verdict == "undecided":
-        why += "; no law of growth to judge it by" if kind == "unknown" else ", which leaves open whether it grows"
-    measured = NOTHING if kind == "unknown" else Measured(kind, changed.largest)
-    return Finding(name, declared, measured, verdict, why, changed.largest, constant.floor)
+    off = abs(values[0] - true) / scale
+    return constant.finding(
+        name, declared, constant.words(f"in {time.size} samples; it begins {off:.1e} from the scene's")
+    )
 
 
 def _measured(
-    kind: str, subject: Subject, process: Process, began: float, limits: tuple[float, float, float]
+    subject: Subject, process: Process, began: float, limits: tuple[float, float, float]
 ) -> Iterator[Finding]:
     """The findings on each claim, undecided where the process was lost: all of a step that makes no call."""
     most, together, least = limits
-    todo: list[Stage] = stages(kind)
+    todo = stages(subject.kind)
     for stage in todo:
         tried = subject
         for _ in range(2):
@@ -291,11 +288,11 @@ def _measured(
             if not (process.late and subject.seconds_a_step):
                 break
             tried = replace(subject, seconds_a_step=SHORTER * max(subject.seconds_a_step, process.late))
-        first = stage[0].name == "calls"
+        first = "calls" in stage.claims
         process.lost += SLOW[subject.quick] if process.late else ""
         if process.lost:
-            left = [claim for one in (todo if first else [stage]) for claim in one]
-            findings = unmeasured(tuple(left), subject.method, process.lost)
+            left = tuple(claim for one in (todo if first else [stage]) for claim in one.claims)
+            findings = unmeasured(left, subject.method, process.lost)
         yield from findings
         if process.lost and first:
             return
@@ -306,8 +303,6 @@ def apart(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
     heartbeat.reset(quick=quick)
     limits = PLUGIN, math.inf, PLUGIN
     with Process(lambda: solvers_of(method)) as process:
-        if scene.of_body:
-            return bodies.judge(separated(method, process), scene, quick=quick)
         subject = Subject(separated(method, process), scene, quick, seed=secrets.randbelow(SEEDS))
-        findings = tuple(_measured("integrator", subject, process, time.monotonic(), limits))
+        findings = tuple(_measured(subject, process, time.monotonic(), limits))
     return Ledger(method.name, scene.name, findings, subject.traces)

@@ -88,11 +88,11 @@ class Process:
         except SymtopError as failure:
             back = heartbeat.inside and heartbeat.step < 0.0 and not heartbeat.forward_only
             self.end()
-            if back:
-                heartbeat.forward_only = True
-                return self.call(name, *args)
-            self.lost = str(failure)
-            raise SymtopError(self.lost) from None
+            if not back:
+                self.lost = str(failure)
+                raise
+            heartbeat.forward_only = True
+            return self.call(name, *args)
         if kind == "error":
             raise SymtopError(answer)
         return answer
@@ -247,8 +247,8 @@ def separated(method: Integrator, process: Process) -> Integrator:
 
 def solvers_of(method: Integrator) -> Table:
     """A method's solvers by their charts, whose runs are checked before they are sent."""
+    return {chart: functools.partial(_solved, method, chart) for chart in method.solvers}
 
-    def asked(chart: str) -> Callable[..., Any]:
-        return lambda top, start, plan: solve(method, chart, top, start, plan)._asdict()
 
-    return {chart: asked(chart) for chart in method.solvers}
+def _solved(*args: Any) -> dict[str, Any]:
+    return solve(*args)._asdict()

@@ -30,7 +30,7 @@ from symtop.model import charts
 from symtop.model.body import Attitude, RigidBody
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.model.top import Angles, SymmetricTop
-from symtop.run.ensemble.inputs import read_members
+from symtop.run.ensemble.inputs import read_members, refuse_others
 from symtop.run.reference.truth import PRECISIONS, reference
 from symtop.run.trajectory import Trajectory, dataset
 
@@ -120,13 +120,7 @@ def errors(
 def _of_members(runs: xr.Dataset, members: Any, precision: str) -> xr.Dataset:
     """The errors of every member, as alone; a warning that several have comes once, with their number."""
     given, n = read_members(members), runs.sizes["member"]
-    if len(given.numbers) != n:
-        raise SymtopError(f"members must be the {n} of the ensemble, not {len(given.numbers)}")
-    labels = [
-        [*map(str, data.indexes["member"])] for data in (members, runs) if "member" in getattr(data, "indexes", {})
-    ]
-    if len(labels) == 2 and labels[0] != labels[1]:
-        raise SymtopError("members must be those of the ensemble in their order, and their labels are others")
+    refuse_others(given, runs)
     tables = []
     with warnings.catch_warnings(record=True) as doubtful:
         warnings.simplefilter("always")

@@ -66,7 +66,7 @@ def order_table(
     table = table if more is None else xr.concat([table, more], "setting")
     if math.isfinite(order_fit(scene, method, table, quantity, horizon).slope):
         return table
-    extended = extended_errors(scene, method)
+    extended = None if scene.of_body else extended_errors(scene, method)
     return table if extended is None else table.merge(extended)
 
 

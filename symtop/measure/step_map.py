@@ -23,7 +23,7 @@ Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1, VI.2, VII
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -106,6 +106,11 @@ class StepMap:
             return self.point(start)
         return self.scaled(charts.space_state(self.chart, self.top, start), 0.0, 0.0)
 
+    def motion(self, start: Angles) -> Callable[[float], Array]:
+        """Y of the true motion from a start after any time; of q the sign that is nearer to the start's."""
+        exact, before = closed_form(Scene("start", self.top, start, 1.0)), self.at(start)
+        return lambda time: aligned(self.chart, self.at(Angles(*map(float, exact(time)))), before)
+
     def point(self, start: Angles) -> Array:
         """z of a start."""
         momenta = self.top.momenta(start)
@@ -154,8 +159,7 @@ def generic_start(scene: Scene) -> Angles:
     if not math.isfinite(scene.nutation_period):
         start: Angles = scene.start
         return start
-    motion = closed_form(scene)(np.array([0.3711 * scene.nutation_period]))
-    return Angles(*(float(value[0]) for value in motion))
+    return Angles(*map(float, closed_form(scene)(0.3711 * scene.nutation_period)))
 
 
 def drawn(scene: Scene, count: int, seed: int, *, same_top: bool) -> Iterator[Scene]:

@@ -24,7 +24,6 @@ from numpy.polynomial import chebyshev
 from symtop.core.errors import SymtopError
 from symtop.measure.step_map import StepMap, aligned
 from symtop.model.charts import Array
-from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles
 
 NODES = 40  # an even number: no step of length zero
@@ -94,17 +93,12 @@ def step_series(step: StepMap, start: Angles, period: float) -> Series:
 
     Raises SymtopError if no step succeeds.
     """
-    exact, z, before = closed_form(Scene("start", step.top, start, 1.0)), step.point(start), step.at(start)
+    z, before = step.point(start), step.at(start)
 
-    def motion(h: float) -> Array:
-        return step.at(Angles(*(float(value[0]) for value in exact(np.array([h])))))
+    def image(h: float) -> Array:
+        return aligned(step.chart, step.image(z, h), before)
 
-    return compared(
-        lambda h: aligned(step.chart, step.image(z, h), before),
-        lambda h: aligned(step.chart, motion(h), before),
-        period,
-        step.chart,
-    )
+    return compared(image, step.motion(start), period, step.chart)
 
 
 def compared(

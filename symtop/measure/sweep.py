@@ -14,13 +14,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from tqdm import tqdm
 
 from symtop.core import code_hash, netcdf
 from symtop.core.errors import SymtopError, boolean, file_path, foreign_code, positive, row, whole
 from symtop.core.jit import code
 from symtop.core.parallel import MOST_THREADS, cores, in_threads
-from symtop.core.progress import beating
+from symtop.core.progress import progress_bar
 from symtop.measure import columns
 from symtop.measure.accuracy import as_table, blank_row, enough_samples, error_row
 from symtop.measure.timing import bare_run, timings
@@ -122,9 +121,7 @@ def sweep(
         return netcdf.describe(columns.described(data, units), "errors and work of a sweep", units=units, **words)
 
     written = time.monotonic()
-    with beating(
-        tqdm(total=len(cells), initial=len(cells) - len(rest), desc="sweep", disable=silent or None, leave=False)
-    ) as bar:
+    with progress_bar("sweep", quiet=silent, total=len(cells), initial=len(cells) - len(rest)) as bar:
         try:
             for cell, table in zip(rest, in_threads(_table, rest, workers), strict=True):
                 done[cell.made_of] = table

@@ -175,10 +175,13 @@ class RigidBody:
         """What the products in `momentum` are rounded by."""
         return tuple(two_product(moment, rate)[1] for moment, rate in zip(self.moments, at.omega_body, strict=True))
 
+    def kinetic(self, at: Attitude) -> float:
+        """Kinetic energy of a start."""
+        return 0.5 * math.fsum(m * w for m, w in zip(self.momentum(at), at.omega_body, strict=True))
+
     def energy(self, at: Attitude) -> float:
         """Total energy of a start."""
-        kinetic = 0.5 * math.fsum(m * w for m, w in zip(self.momentum(at), at.omega_body, strict=True))
-        return kinetic + math.fsum(c * g for c, g in zip(self.torque, vertical(*at.quaternion), strict=True))
+        return self.kinetic(at) + math.fsum(c * g for c, g in zip(self.torque, vertical(*at.quaternion), strict=True))
 
     def momenta(self, at: Attitude) -> Placed:
         """p_phi, conserved, and M3, which is p_psi of a symmetric body."""
@@ -193,8 +196,7 @@ class RigidBody:
 
     def energy_scale(self, at: Attitude) -> float:
         """What energy errors are divided by: the kinetic energy of the start, and |mgl|."""
-        kinetic = 0.5 * math.fsum(m * w for m, w in zip(self.momentum(at), at.omega_body, strict=True))
-        return kinetic + abs(self.mgl)
+        return self.kinetic(at) + abs(self.mgl)
 
     def flat(self, at: Attitude) -> tuple[float, ...]:
         """The body and a start as 14 plain numbers: moments, mgl, centre, quaternion, omega."""

@@ -35,7 +35,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.errors import SymtopError, finite, not_negative, positive, row
+from symtop.core.errors import SymtopError, finite, positive, row
 from symtop.core.jit_functions import inlined, shared
 
 UNIT = 1e-6  # a quaternion or an axis may differ from unit length by this
@@ -250,7 +250,7 @@ class SymmetricTop:
         mass = positive("mass", mass)
         polar = positive("polar_radius", polar_radius)
         equatorial = positive("equatorial_radius", equatorial_radius)
-        gravity = not_negative("gravity", gravity)
+        gravity = finite("gravity", gravity, 0.0)
         across = mass * (polar * polar + equatorial * equatorial) / 5.0
         along = 2.0 * mass * equatorial * equatorial / 5.0
         if pivot_distance is None:
@@ -271,7 +271,7 @@ class SymmetricTop:
         across, axial = positive("at_centre", at_centre), positive("axial", axial)
         if axial > 2.0 * across:
             raise SymtopError(f"axial must be at most 2 at_centre (no rigid body exceeds it), not {axial!r}")
-        return cls(across + mass * arm * arm, axial, mass * not_negative("gravity", gravity) * arm)
+        return cls(across + mass * arm * arm, axial, mass * finite("gravity", gravity, 0.0) * arm)
 
     def spheroid_radii(self, mass: float) -> tuple[float, float]:
         """Polar and equatorial radius of the solid spheroid of `from_spheroid` without a pivot distance.

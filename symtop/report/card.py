@@ -17,7 +17,7 @@ import numpy as np
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home
-from symtop.judging.findings import Finding, StepLedger, claim_name, description
+from symtop.judging.findings import Finding, Ledger, claim_name, description
 from symtop.report.figures import SMALLEST
 from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels, slope_guide
 
@@ -26,7 +26,7 @@ LONGEST = 72  # letters of what a badge says
 SIGNS = {"confirmed": "✓", "refuted": "✗", "measured": "=", "undecided": "?", "inapplicable": "–"}
 
 
-def figures(ledger: StepLedger) -> tuple[Any, Any]:
+def figures(ledger: Ledger) -> tuple[Any, Any]:
     """Two figures: errors over the step size, and the change of the energy over the long run."""
     (first, order), (second, energy) = (panels(1, 1, width=4.8, height=3.1) for _ in range(2))
     _order(order[0, 0], ledger)
@@ -42,7 +42,7 @@ def _as_svg(figure: Any) -> str:
     return drawn.getvalue().partition("<svg")[2]
 
 
-def _order(axis: Any, ledger: StepLedger) -> None:
+def _order(axis: Any, ledger: Ledger) -> None:
     traces, finding = ledger.traces, ledger["order"]
     axis.set(title=f"order: {finding.measured or 'not measured'}", xlabel="step size", ylabel="error at the end (rad)")
     steps, errors = (np.asarray(traces.get(name, [])) for name in ("step_size", "error"))
@@ -64,7 +64,7 @@ def _order(axis: Any, ledger: StepLedger) -> None:
     axis.legend(frameon=False)
 
 
-def _energy(axis: Any, ledger: StepLedger) -> None:
+def _energy(axis: Any, ledger: Ledger) -> None:
     traces, finding = ledger.traces, ledger["energy"]
     axis.set(
         title=f"energy: {finding.measured or 'not measured'}", xlabel="time (nutations)",
@@ -91,7 +91,7 @@ def _nothing(axis: Any, finding: Finding) -> None:
     axis.set(xticks=[], yticks=[])
 
 
-def card(ledger: StepLedger, path: str | Path) -> Path:
+def card(ledger: Ledger, path: str | Path) -> Path:
     """Write the card, an HTML page; SymtopError for a trajectory and a place that cannot be written to."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -116,7 +116,7 @@ def card(ledger: StepLedger, path: str | Path) -> Path:
     return _written(text, path)
 
 
-def badge(ledger: StepLedger) -> str:
+def badge(ledger: Ledger) -> str:
     """The badge: what the method is, in green without a claim that is refuted, in vermillion with one."""
     refuted = [claim_name(one.claim) for one in ledger.findings if one.verdict == "refuted"]
     words = f"refuted: {', '.join(refuted)}" if refuted else description(ledger.findings).partition(";")[0]
@@ -139,7 +139,7 @@ def badge(ledger: StepLedger) -> str:
     return "\n".join(parts) + "\n"
 
 
-def write_badge(ledger: StepLedger, path: str | Path) -> Path:
+def write_badge(ledger: Ledger, path: str | Path) -> Path:
     """Write the badge as an SVG file; SymtopError if the folder cannot be written to."""
     return _written(badge(ledger), path)
 

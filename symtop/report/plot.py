@@ -45,7 +45,7 @@ LINES = ("-", "--", "-.", ":")  # of a sweep's scenes
 AXES = {"seconds": "time of a run, one core (s)", "force_evaluations": "force evaluations of a run"}
 COLORS = {"axis": BLACK, "attitude": GREY, "theta": SKY, "energy": VERMILLION, "p_phi": GREEN, "p_psi": PURPLE}
 BANDS = ((0, 4, 0.18), (1, 3, 0.38))  # of `spread.LEVELS`, 1 to 99 % and 10 to 90 %, and how opaque
-MOST = {"axis": np.pi, "energy": 1e3}  # what is larger, and members that failed, are drawn here
+MOST = {"axis": np.pi, "attitude": np.pi, "energy": 1e3}  # what is larger, and members that failed, are drawn here
 
 
 def plot(
@@ -61,8 +61,8 @@ def plot(
                       for each variant, dashed for further scenes; crosses are runs that failed, the grey band is what
                       the reference cannot judge
         a comparison  the same for one scene, of the quantity that is compared, with the time of the exact motion
-        an ensemble   quantiles over members of the error of `quantity` ("axis" or "energy") over time; `members` are
-                      the tops that were run (the dataset does not hold them)
+        an ensemble   quantiles over members of the error of `quantity` ("axis", of bodies "attitude", or "energy") over
+                      time; `members` are those that were run (the dataset does not hold them)
 
     `quantity` is one of axis, attitude, theta, energy, p_phi, p_psi. Raises SymtopError for anything else.
     """
@@ -163,8 +163,9 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
 def _ensemble(ax: "Axes", data: xr.Dataset, quantity: str, members: Any) -> None:
     if not isinstance(members, xr.Dataset):
         raise SymtopError("plot needs members, the tops of the ensemble, to compare it with the exact motion")
-    _bands(ax, members, data, one_of("quantity", quantity, spread.QUANTITIES))
-    ax.set_title(f"{data.attrs['integrator']} on {data.sizes['member']} tops")
+    kind = spread.kind_of(data)
+    _bands(ax, members, data, one_of("quantity", quantity, spread.QUANTITIES[kind]))
+    ax.set_title(f"{data.attrs['integrator']} on {data.sizes['member']} {kind}")
 
 
 def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Dataset, path: str | Path) -> None:
@@ -196,14 +197,15 @@ def _line(axis: Any, times: Any, values: Any, color: str, label: str) -> None:
 
 def draw_ensemble(members: xr.Dataset, data: xr.Dataset, path: str | Path) -> None:
     """Two panels in a file: quantiles over members of the axis error and of the energy error against time."""
-    shown = [name for name in spread.QUANTITIES if name in data]
+    kind = spread.kind_of(data)
+    shown = [name for name in spread.QUANTITIES[kind] if spread.SHOWN_BY[name] in data]
     figure, axes = panels(len(shown), 1, height=2.1, sharex=True)
     for axis, name in zip(axes[:, 0], shown, strict=True):
         _bands(axis, members, data, name)
         axis.label_outer()
     ended = (data["outcome"] == "ok").mean().item()
     sentence = (
-        f"{data.attrs['integrator']} on {data.sizes['member']} tops: errors against the closed form; "
+        f"{data.attrs['integrator']} on {data.sizes['member']} {kind}: errors against the true motion; "
         f"{100.0 * ended:.4g} % of the runs ended ok"
     )
     if ended < 1.0:
@@ -227,7 +229,7 @@ def _bands(axis: Any, members: xr.Dataset, data: xr.Dataset, quantity: str) -> N
     quantiles = spread.spread(own)
     known = np.isfinite(places) & ~np.isnan(quantiles).any(axis=0) & (places > 0.0)
     if not known.any():
-        raise SymtopError("there is nothing to draw: the closed form of no member is known")
+        raise SymtopError("there is nothing to draw: the true motion of no member is known")
     times, errors = (places * (horizons[0] if shared else 1.0))[known], quantiles[:, known]
     most, color = MOST[quantity], look(data.attrs["integrator"]).color
     quantiles = np.clip(errors, SMALLEST, most)
@@ -241,7 +243,8 @@ def _bands(axis: Any, members: xr.Dataset, data: xr.Dataset, quantity: str) -> N
     ends = {f"{name}: failed" if np.isinf(error) else name: (float(times[-1]), float(shown), color)
             for name, error, shown in zip(names, errors[:, -1], quantiles[:, -1], strict=True)}  # fmt: skip
     label = "time" if shared else "time, as a fraction of each member's horizon"
-    axis.set(xlim=(0.0, times[-1]), yscale="log", ylabel=spread.QUANTITIES[quantity], xlabel=label)
+    words = spread.QUANTITIES[spread.kind_of(data)][quantity]
+    axis.set(xlim=(0.0, times[-1]), yscale="log", ylabel=words, xlabel=label)
     name_ends(axis, ends)
 
 

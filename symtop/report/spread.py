@@ -1,46 +1,58 @@
 """Errors of the members of an ensemble, and how they spread: quantiles over members at each sample.
 
-    axis      angle between the member's axis and that of its closed form, rad
-    energy    abs(E - E0) / (E0 - min V), the unit of `errors`
+    axis        angle between the member's axis and that of its closed form, rad
+    attitude    of bodies without symmetry, in its place: angle between the attitude and that of the true motion, rad
+    energy      abs(E - E0) / (E0 - min V), or of bodies / (T0 + |mgl|), the units of `errors`
 
-A member that has failed has an infinite error from there on, so that it counts among the worst and is not left out.
-Quantiles are those of the sample, without interpolation: an infinite one says that so many have failed.
+A member that has failed has an infinite error from there on, so that it counts among the worst and is not left out; an
+error is NaN where the true motion is not known, as of a heavy body in chaos. Quantiles are those of the sample, without
+interpolation: an infinite one says that so many have failed.
 """
 
 import functools
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError, one_of
+from symtop.measure.errors import OF_BODY, QUANTITIES as OF_TOP
+from symtop.methods.framework.lanes import members_of, of_bodies
 from symtop.model import charts, scenes
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import NUMBERS
-from symtop.run.ensemble.inputs import read_members
+from symtop.run.ensemble.inputs import read_members, refuse_others
+from symtop.run.reference.truth import body_samples
 
 Array = NDArray[np.float64]
 
-QUANTITIES = {"axis": "angle between axes (rad)", "energy": "energy error / (E0 - min V)"}
+QUANTITIES = {
+    "tops": {name: OF_TOP[name] for name in ("axis", "energy")},
+    "bodies": {name: (OF_TOP | OF_BODY)[name] for name in ("attitude", "energy")},
+}
+SHOWN_BY = {"axis": "axis", "attitude": "quaternion", "energy": "energy"}  # variables of an ensemble
 LEVELS = (0.01, 0.1, 0.5, 0.9, 0.99)
 SAME_SHARE = 1e-9  # of a horizon: a sample that is later than a place by less than this is there
 BLOCK = 1 << 20  # samples that are compared at a time
 
 
+def kind_of(data: xr.Dataset) -> str:
+    """Is this an ensemble of "tops" or of "bodies"?"""
+    return "bodies" if data.attrs["chart"] == charts.BODY else "tops"
+
+
 def member_errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array:
     """Errors (n, samples) of an ensemble of these members; NaN beyond the samples of a run of few steps."""
-    one_of("quantity", quantity, QUANTITIES)
+    one_of("quantity", quantity, QUANTITIES[kind_of(data)])
+    given = read_members(members)
+    refuse_others(given, data)
+    if (variable := SHOWN_BY[quantity]) not in data:
+        raise SymtopError(f"the ensemble was asked for without the variable {variable}")
     n, samples = data.sizes["member"], data.sizes["time"]
-    if members.sizes.get("member") != n:
-        raise SymtopError(f"members must be the {n} of the ensemble, not {members.sizes.get('member')}")
-    labels = [given.indexes["member"] for given in (members, data) if "member" in given.indexes]
-    if len(labels) == 2 and [*map(str, labels[0])] != [*map(str, labels[1])]:
-        raise SymtopError("members must be those of the ensemble in their order, and their labels are others")
-    if quantity not in data:
-        raise SymtopError(f"the ensemble was asked for without the variable {quantity}")
     stride = max(1, BLOCK // samples)
     parts = [slice(begin, begin + stride) for begin in range(0, n, stride)]
-    return np.concatenate([_errors(members.isel(member=one), data.isel(member=one), quantity) for one in parts])
+    return np.concatenate([_errors(given.numbers[one], data.isel(member=one), quantity) for one in parts])
 
 
 @functools.lru_cache(maxsize=1)
@@ -49,19 +61,30 @@ def _forms(plain: bytes) -> ClosedForms:
     return ClosedForms(np.frombuffer(plain).reshape(-1, len(NUMBERS)))
 
 
-def _errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array:
-    numbers, values = read_members(members).numbers, data[quantity].values
+def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
+    values = data[SHOWN_BY[quantity]].values
+    known: Any = True
     times = np.broadcast_to(data["time"].values, values.shape[:2])
     finite = np.isfinite(times)
+    filled = np.where(finite, times, 0.0)
     with np.errstate(all="ignore"):  # what a run blew up to is no error of this comparison
-        if quantity == "axis":
-            truth = _forms(numbers.tobytes()).axis(np.where(finite, times, 0.0))
-            errors = charts.axis_distance(values, truth)
+        if quantity == "energy":
+            errors = np.abs(values - values[:, :1]) / _energy_scales(numbers)[:, None]
+        elif quantity == "axis":
+            truth = _forms(numbers.tobytes()).axis(filled)
+            errors, known = charts.axis_distance(values, truth), np.isfinite(truth).all(axis=2)
         else:
-            unit = scenes.energy_scales(numbers, _forms(numbers.tobytes()).theta_range)
-            errors = np.abs(values - values[:, :1]) / unit[:, None]
-    known = np.isfinite(truth).all(axis=2) if quantity == "axis" else True
+            each = zip(members_of(numbers), filled, strict=True)
+            motions = [body_samples(*one, row.tobytes(), precise=False) for one, row in each]
+            truth, low, _, bound = (np.array(part) for part in zip(*motions, strict=True))
+            errors, known = charts.attitude_distance(values, truth, low), np.isfinite(bound)
     return np.where(finite & known, np.where(np.isfinite(errors), errors, np.inf), np.nan)
+
+
+def _energy_scales(numbers: Array) -> Any:
+    if of_bodies(numbers):
+        return np.array([body.energy_scale(start) for body, start in members_of(numbers)])
+    return scenes.energy_scales(numbers, _forms(numbers.tobytes()).theta_range)
 
 
 def at_places(data: xr.Dataset, errors: Array) -> tuple[Array, Array]:

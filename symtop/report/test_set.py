@@ -90,13 +90,8 @@ def write(folder: str | Path, chosen: Sequence[Scene] | None = None) -> Path:
     return path
 
 
-def _given(scene: Scene) -> list[float]:
-    body, start = scene.top, scene.start
-    return [*body.moments, body.mgl, *body.centre, *start.quaternion, *start.omega_body]
-
-
 def _problems_csv(scenes: Sequence[Scene]) -> str:
-    rows = [",".join([scene.name, *map(repr, _given(scene))]) for scene in scenes]
+    rows = [",".join([scene.name, *map(repr, scene.top.flat(scene.start))]) for scene in scenes]
     return "\n".join([",".join(["name", *GIVEN]), *rows, ""])
 
 
@@ -123,7 +118,7 @@ def states(scenes: Sequence[Scene], motions: Sequence[Digits]) -> xr.Dataset:
         dims, low = ("problem", "sample", dimension), (exact - high).astype(float)
         variables[name] = dims, high, {"long_name": words, "units": units}
         variables[f"{name}_lo"] = dims, low, {"long_name": f"what {name} lacks, to be added", "units": units}
-    numbers = np.array([_given(scene) for scene in scenes])
+    numbers = np.array([scene.top.flat(scene.start) for scene in scenes])
     for k, name in enumerate(GIVEN):
         about = {"long_name": f"{name} of the problem, as in problems.csv", "units": "1"}
         variables[f"given_{name}"] = "problem", numbers[:, k], about

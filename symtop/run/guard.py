@@ -36,7 +36,7 @@ import numpy as np
 
 from symtop.core.numbers import EPSILON, GOLDEN
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan, Run, sentence
+from symtop.methods.framework.plan import Plan, sentence
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
@@ -51,6 +51,7 @@ MOST_PROBED = 20_000  # steps
 ROUNDED = 1e-13  # rad; a probe that is closer than this shows rounding, which grows as n^1.5
 PARTIAL = 10.0  # distrust of a probe shorter than a nutation: it may have missed where errors are made, or stretched
 AFFORDED = {"compiled": 12_000, "python": 1200}  # evaluations of a longer probe of an adaptive method
+THROUGH = 20.0  # times as many where the axis passes a pole closer than the tolerance: each passage may end the run
 MOST_WORK = {"compiled": 5e6, "python": 5e5}  # evaluations of any probe: 20 nutations take a hundredth; beside a pole
 # the steps of a solver may shrink to nothing, and the probe would take as long as the run
 LOOSE = 1e-4  # tolerance from which a method in Python is probed for a whole nutation: a few of its steps
@@ -85,9 +86,6 @@ class Probe(NamedTuple):
     evaluations: int  # of the force, at the step of the run
 
 
-Ran = tuple[Array, Run, float]  # a probe that is not yet compared: its times, its run and the time since when
-
-
 class Forecast(NamedTuple):
     """The forecast of one run."""
 
@@ -117,32 +115,23 @@ def _marks(steps: int, points: int) -> Any:
     return np.unique(np.maximum(np.rint(_places(points) * (steps / points)).astype(np.int64), 1))
 
 
-def _ran(
+def _probe(
     motion: Integrated, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
-) -> Ran:
+) -> Probe:
     """Run `method` from the time `since` of the true motion for `duration`, with `step` or the plan's tolerance."""
     if method.fixed_step:
         piece = Plan.steps(step, _marks(max(1, round(duration / step)), motion.points))
     else:
         most = min(plan.most(math.inf), MOST_WORK[method.implementation])
         piece = Plan.until(duration * (_places(motion.points) / motion.points), plan.tolerance, most)
-    return piece.times, solve(method, chart, motion.scene.top, motion.start(since), piece), since
-
-
-def _compared(motion: Integrated, chart: str, plan: Plan, times: Array, run: Run, since: float) -> Probe:
-    """The short run beside the true motion."""
+    run = solve(method, chart, motion.scene.top, motion.start(since), piece)
     with np.errstate(all="ignore"):
-        error = motion.error(times, chart, run.states, since, plan.horizon)
+        error = motion.error(piece.times, chart, run.states, since, plan.horizon)
     outcome = run.outcome
     if not math.isfinite(error.sum()):  # no angle is more than pi
         error[~np.isfinite(error)] = math.inf
         outcome = "not_finite" if outcome == "ok" else outcome
-    return Probe(times, error, outcome, since + run.reached, run.force_evaluations)
-
-
-def _probe(motion: Integrated, method: Integrator, chart: str, plan: Plan, *piece: float) -> Probe:
-    """Both, of a duration, a step and the time since when."""
-    return _compared(motion, chart, plan, *_ran(motion, method, chart, plan, *piece))
+    return Probe(piece.times, error, outcome, since + run.reached, run.force_evaluations)
 
 
 def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
@@ -209,20 +198,21 @@ def _adaptive_forecast(
     cheap = method if method.same_steps_as is None else integrator(method.same_steps_as)  # a hundredth of the time
     least = twice if cheap.implementation == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
 
-    def ran(piece: float) -> tuple[bool, Ran]:
+    def probed(piece: float) -> tuple[float, Probe]:
         partial = piece < min(period, 0.5 * plan.horizon)
         since = max(0.0, motion.closest() - 0.5 * piece) if partial else 0.0
-        return partial, _ran(motion, cheap, chart, plan, piece, math.nan, since)
+        probe = _probe(motion, cheap, chart, plan, piece, math.nan, since)
+        expected = max(grown(probe, plan.horizon, straight=False), _amplified(motion, probe, plan.horizon))
+        return expected * (PARTIAL if partial else 1.0), probe
 
     piece = max(share, least)
-    partial, short = ran(piece)
+    expected, probe = probed(piece)
     afforded = AFFORDED[cheap.implementation] * min(cheap.speed, 1.0)
-    longer = min(plan.horizon, piece * afforded / max(short[1].force_evaluations, 1))
+    if chart == "angles" and motion.marks.gap < plan.tolerance and cheap.implementation == "compiled":
+        afforded *= THROUGH
+    longer = min(plan.horizon, piece * afforded / max(probe.evaluations, 1))
     if longer > 1.5 * piece:
-        partial, short = ran(longer)
-    probe = _compared(motion, chart, plan, *short)
-    expected = max(grown(probe, plan.horizon, straight=False), _amplified(motion, probe, plan.horizon))
-    expected *= PARTIAL if partial else 1.0
+        expected, probe = probed(longer)
     return expected if probe.times[-1] >= plan.horizon else max(expected, plan.tolerance), probe
 
 
@@ -395,7 +385,7 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
             "the motion passes so close to a separatrix that rounding alone decides when it falls; no method and no "
             f"step help, shorten the horizon to less than one nutation of {marks.period:.4g}"
         )
-    if not expected.axis_error > EXPECTED:
+    if not expected.axis_error > EXPECTED and expected.outcome == "ok":
         return None
     second, period = motion.scene.second, motion.scene.period_word
     reached = min(expected.axis_error, math.pi)

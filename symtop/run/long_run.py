@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from tqdm import tqdm
 
 from symtop.core import netcdf
 from symtop.core.code_hash import by_file, digest, hashed
@@ -27,7 +26,7 @@ from symtop.core.errors import SymtopError, SymtopWarning, check_replaceable, fi
 from symtop.core.files import cache_root, make_private
 from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
-from symtop.core.progress import beating
+from symtop.core.progress import progress_bar
 from symtop.core.signals import ending_on_sigterm
 from symtop.methods.framework.loop import FixedStep, Loop, Position, inside
 from symtop.methods.framework.plan import OK, OUTCOMES, sentence
@@ -175,9 +174,8 @@ def long_run(
     ends, outcome, reached, title = windows(count), OK, at.k, f"{method.name} on {chosen.name}"
     quantities = OF_BODY if chosen.of_body else QUANTITIES
     gauge = watch(chosen, method, h) if len(rows) < len(ends) else None
-    bar = tqdm(total=count, initial=at.k, desc=title, unit="step", unit_scale=True, disable=quiet or None, leave=False)
     with checkpoints.saved_on_failure():
-        with beating(bar):
+        with progress_bar(title, quiet=quiet, total=count, initial=at.k, unit="step", unit_scale=True) as bar:
             while gauge is not None and len(rows) < len(ends) and outcome == OK:
                 stretch, after = loop.advance(par, rule, at, h, scattered(at.k, ends[len(rows)]))
                 outcome, reached = stretch.outcome, after.k

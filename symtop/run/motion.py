@@ -1,14 +1,13 @@
 """The true motion beside a probe of the guard: by the closed form, or integrated where there is none.
 
 `Exact` knows a top's motion for ever. `Integrated` needs the equations alone, and so takes bodies too: a Taylor series
-at rounding, of order 19, whose own error is its distance from one of order 16: over a tenth of the way, and all the way
-where the motion multiplies errors. What it makes of one is
+at rounding, of order 19, whose own error is its distance from one of order 16, at the beginning or, where the motion
+multiplies errors, all the way. What the motion makes of an error is
 
     A(t) = max over s <= t of |y~(s) - y(s)|/delta,      |y~(0) - y(0)| = delta,
 
 of two integrations over the whole run: shear makes A grow with t, chaos and unstable motions by exponentials. A piece
-of the run does not show it, because a chaotic motion looks regular on many a piece. Both integrations are compiled
-solvers of this package and called as they are: the checks of `symtop.methods.framework.calling` take as long.
+of the run does not show it, because a chaotic motion looks regular on many a piece.
 """
 
 import functools
@@ -27,9 +26,8 @@ from symtop.model.top import Angles, SymmetricTop
 from symtop.run.reference.sensitivity import displacement
 
 SERIES, PAIR = {BODY: "series-general-adaptive", "axis": "series-adaptive"}, "dop853-compiled-fixed"
-FINE, CHECK = 1e-15, 1e-13  # tolerances: of the true motion, and of its check at one of so many times, the last first,
-CHECKED = 10  # or at as many of the first ones, until the motion
-MULTIPLIES = 1e5  # errors by so much: less leaves those of the check far below any error that is asked for
+FINE, CHECK = 1e-15, 1e-13  # tolerances: of the true motion, and of its check at one of so many times, the last first
+CHECKED, MULTIPLIED = 10, 1e5  # or at the first ones where A is less, which makes little of what they differ by
 PAIR_STEPS = 6  # of two motions side by side, in a period of the fastest turn: with longer ones chaos is damped away
 MOVED = 1e-10  # of the natural frequency: small enough to show how much a motion beside a separatrix shears
 SATURATED = 0.01  # rad; two motions that are farther apart no longer show how fast they part
@@ -116,8 +114,8 @@ class Integrated:
 
     def states(self, times: Array, tolerance: float) -> Array:
         """States (n, dimension) at `times` (n,), NaN from where the work is too much."""
-        solver, plan = integrator(SERIES[self.chart]).solvers[self.chart], Plan.until(times, tolerance, MOST_WORK)
-        return solver(self.scene.top, self.scene.start, plan).states
+        solver = integrator(SERIES[self.chart]).solvers[self.chart]  # called as it is: checks take as long as a short run
+        return solver(self.scene.top, self.scene.start, Plan.until(times, tolerance, MOST_WORK)).states
 
     def apart(self, first: tuple[str, Array], second: tuple[str, Array]) -> Array:
         """Rad (n,) between states (n, dimension) of two charts."""
@@ -127,7 +125,7 @@ class Integrated:
 
     def error(self, times: Array, chart: str, states: Array, _: float, horizon: float, /) -> Array:
         """Rad (n,) by which states (n, dimension) are off at `times` (n,) of a run, with what two orders differ by."""
-        steady = self.amplification(float(times[-1]), horizon) < MULTIPLIES
+        steady = self.amplification(float(times[-1]), horizon) < MULTIPLIED
         some = slice(max(times.size // CHECKED, 1)) if steady else slice((times.size - 1) % CHECKED, None, CHECKED)
         true = self.states(times, FINE)
         gap = np.abs(self.states(times[some], CHECK) - true[some])[:, : 4 if self.chart == BODY else 3].max(initial=0.0)
@@ -162,13 +160,12 @@ class Integrated:
             plan = Plan.steps(until / steps, np.arange(1, POINTS + 1) * steps // POINTS)
             solver, top = integrator(PAIR).solvers[self.chart], self.scene.top
             near, far = (solver(top, start, plan).states for start in (self.scene.start, self.moved()))
-            place, weights = near.shape[1] - 3, np.zeros((near.shape[1], 2))  # of the attitude and of the momentum
-            weights[:place, 0] = ((2.0 if self.chart == BODY else 1.0) / MOVED) ** 2
-            weights[place:, 1] = (MOVED * self.inertia * self.marks.frequency) ** -2
+            weights = np.zeros((near.shape[1], 2))  # of the attitude and of the momentum
+            weights[:-3, 0] = ((2.0 if self.chart == BODY else 1.0) / MOVED) ** 2
+            weights[-3:, 1] = (MOVED * self.inertia * self.marks.frequency) ** -2
             with np.errstate(all="ignore"):  # of what has failed
                 apart = np.sqrt(((far - near) ** 2 @ weights).max(axis=1))
-                if self.chart == BODY:
-                    apart[off_length(BODY, near) | off_length(BODY, far)] = math.nan
+                apart[off_length(self.chart, near) | off_length(self.chart, far)] = math.nan
             self.known[until] = Growth.of(plan.times, apart, SATURATED / MOVED)
         return self.known[until]
 

@@ -1,16 +1,48 @@
-"""Plug-ins: a user's Python file that registers integrators and scenes of its own.
+"""Python files of a user: those that a command runs, and plug-ins, which register integrators and scenes.
 
-What it registers counts in a fingerprint by its values and by the code that it reaches, wherever that stands.
+What a plug-in registers counts in a fingerprint by its values and by the code that it reaches, wherever that stands.
 """
 
+import contextlib
+import importlib.util
+import sys
 from pathlib import Path
+from types import ModuleType
 
-from symtop.core.errors import SymtopError, foreign_code
-from symtop.core.files import execute, python_file
+from symtop.core.errors import SymtopError, at_home, foreign_code
 from symtop.methods.framework.registry import integrators, is_built_in, split_name
 from symtop.model.scenes import added_scenes, body_scenes, scenes
 
 _loaded: dict[Path, list[str]] = {}  # files of plug-ins in use, and the names that each has registered
+
+
+def python_file(path: str | Path, name: str, wanted: str) -> Path:
+    """A file by its path; SymtopError that argument `name` must be what is `wanted` if it is not there."""
+    with contextlib.suppress(OSError, ValueError):  # a name that is too long, or holds a null character
+        if (file := at_home(path).resolve()).is_file():
+            return file
+    raise SymtopError(f"{name} must be {wanted}, not {str(path)!r}", name)
+
+
+def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
+    """A module of that name from a file, or a package if its `places` are given."""
+    for stale in [known for known in sys.modules if known.startswith(f"{name}.")]:
+        del sys.modules[stale]  # of another folder with the same name
+    if file.suffix != ".py":
+        raise SymtopError(f"{str(file)!r} cannot be loaded: its name must end in .py")
+    spec = importlib.util.spec_from_file_location(name, file, submodule_search_locations=places)
+    assert spec is not None and spec.loader is not None  # noqa: PT018, S101  (its suffix has one)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # also because kernels are cached under the name of their module
+    usual, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # no ``__pycache__`` in the user's folder
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        sys.modules.pop(name)
+        raise
+    finally:
+        sys.dont_write_bytecode = usual
+    return module
 
 
 def load(path: str | Path) -> list[str]:

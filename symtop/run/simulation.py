@@ -77,24 +77,19 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
 
 
 def chart_of(method: Integrator, watched: str, observe: str | None = None) -> str:
-    """The chart of a run: the smallest that shows what is asked.
+    """The chart of a run: the smallest that shows what is asked; of a body without symmetry there is one.
 
     Where nothing is asked, it is what the scenes are `watched` for, or the axis if the method does not show that.
     """
     if watched == BODY:
-        return _body_chart(method, observe)
+        one_of("observe", observe or "attitude", ("axis", "attitude"))
+        if BODY not in method.solvers:
+            able = ", ".join(name for name, entry in methods().items() if BODY in entry.solvers)
+            raise SymtopError(f"integrator must have a chart for bodies without symmetry, not {method.name}: {able}")
+        return BODY
     if observe is not None:
         return method.chart_for(one_of("observe", observe, OBSERVABLES))
     return method.chart_for(watched if watched != "attitude" or {"angles", "attitude"} & {*method.charts()} else "axis")
-
-
-def _body_chart(method: Integrator, observe: str | None) -> str:
-    """The chart of a body without symmetry, if the method has it."""
-    one_of("observe", observe or "attitude", ("axis", "attitude"))
-    if BODY not in method.solvers:
-        able = ", ".join(name for name, entry in methods().items() if BODY in entry.solvers)
-        raise SymtopError(f"integrator must have a chart for bodies without symmetry, not {method.name}: {able}")
-    return BODY
 
 
 def likely_step(scene: Scene, method: Integrator, horizon: float, accuracy: float) -> float:

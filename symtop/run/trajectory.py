@@ -51,38 +51,24 @@ class Trajectory(NamedTuple):
         """
         with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up, and that is a result
             view = View(chart, scene.top, run.states, run.p_phi, run.p_psi)
-            if chart == BODY:
-                return cls._of_body(view, plan, run)
-            phi, psi = view.phi, view.psi
-            if chart != "angles":
-                angles = [phi] if psi is None else [phi, psi]
-                guides = closed_form(scene).turns(plan.times)[: len(angles)]
-                phi, psi = (*continuous(np.array(angles), guides), None)[:2]
-            axis, energy, p_theta = readings(view)
-            quaternion = view.quaternion if chart == "attitude" else None
+            phi = psi = p_theta = momentum = None
+            if chart == BODY:  # no angles but theta, and the momentum in space
+                axis, energy, momentum = view.axis, view.energy, view.momentum
+            else:
+                phi, psi = view.phi, view.psi
+                if chart != "angles":
+                    angles = [phi] if psi is None else [phi, psi]
+                    guides = closed_form(scene).turns(plan.times)[: len(angles)]
+                    phi, psi = (*continuous(np.array(angles), guides), None)[:2]
+                axis, energy, p_theta = readings(view)
             outcome, reached = run.outcome, run.reached
             if outcome == "ok" and not (whole := np.isfinite(energy + run.p_phi)).all():  # its squares overflow
                 outcome, reached = "not_finite", plan.last_of(whole)
             return cls(
-                plan.times, view.theta, phi, psi, axis, quaternion, energy, p_theta, run.p_phi, run.p_psi, None, chart,
-                plan.step_size, plan.tolerance, *run[3:6], outcome, reached,
+                plan.times, view.theta, phi, psi, axis, view.quaternion if chart in ("attitude", BODY) else None,
+                energy, p_theta, run.p_phi, None if chart == BODY else run.p_psi, momentum, chart, plan.step_size,
+                plan.tolerance, *run[3:6], outcome, reached,
             )  # fmt: skip
-
-    @classmethod
-    def _of_body(cls, view: View, plan: Plan, run: Run) -> Self:
-        """What the chart `body` shows: no angles but theta, and the momentum in space."""
-        outcome, reached = run.outcome, run.reached
-        if outcome == "ok" and not (whole := np.isfinite(view.energy)).all():
-            outcome, reached = "not_finite", plan.last_of(whole)
-        facts: dict[str, Any] = {
-            "chart": BODY, "step_size": plan.step_size, "tolerance": plan.tolerance, "steps": run.steps,
-            "force_evaluations": run.force_evaluations, "newton_iterations": run.newton_iterations, "outcome": outcome,
-            "reached_time": reached,
-        }  # fmt: skip
-        return cls(
-            plan.times, view.theta, axis=view.axis, quaternion=view.quaternion, energy=view.energy, p_phi=run.p_phi,
-            momentum=view.momentum, **facts,
-        )  # fmt: skip
 
     @classmethod
     def of_data(cls, data: xr.Dataset | Mapping[str, Any]) -> Self:

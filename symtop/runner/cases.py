@@ -20,7 +20,7 @@ from typing import Any, Self
 import xarray as xr
 
 from symtop.core import code_hash, netcdf
-from symtop.core.progress import beating, post, progress_bar
+from symtop.core.progress import post, progress_bar
 from symtop.measure.datasets import Combined, combine, differences
 from symtop.run import plugins
 from symtop.runner import fingerprint, store
@@ -89,7 +89,7 @@ class StudyCases:
         script = str(file_of(self.study.name))
         tasks = [Task(script, case, path, plugins.loaded(), limit, fresh) for path, case in missing.items()]
         before = self.computed + len(self.failures)
-        with beating(progress_bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case")) as bar:
+        with progress_bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case") as bar:
 
             def on_result(task: Task, result: Result) -> None:
                 if self.study.follow_up is not None:  # read while others are computed

@@ -12,7 +12,7 @@ from symtop.core import code_hash
 from symtop.core.code_hash import Reasons
 from symtop.core.jit import code
 from symtop.methods.framework.registry import integrators, split_name
-from symtop.model.scenes import scenes
+from symtop.model.scenes import all_scenes, scenes
 from symtop.runner.study import REFERENCE, Case, Study, failing
 
 EVERY = "*"  # in place of an integrator's or a scene's name: all of them
@@ -44,8 +44,8 @@ def settings_key(study: Study, case: Case) -> str:
 
 def reasons(study: Study, case: Case) -> Reasons:
     """Everything that a case's numbers depend on: settings, scene, integrators, code, versions."""
-    methods, catalogue = integrators(), scenes()
-    places = sorted(catalogue) if case.scene == EVERY else {case.scene} & catalogue.keys()
+    methods, catalogue = integrators(), all_scenes()
+    places = sorted(scenes()) if case.scene == EVERY else {case.scene} & catalogue.keys()
     parts = [made_of("measure", study.measure), code_hash.packages(), {"settings": settings_key(study, case)}]
     parts += [made_of(f"scene {name}", catalogue[name]) for name in places]
     parts += [made_of(f"integrator {name}", methods[name]) for name in used(study, case)]

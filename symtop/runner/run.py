@@ -18,10 +18,10 @@ from pebble import ProcessExpired
 
 from symtop.core import code_hash, files, netcdf
 from symtop.core.errors import label, positive, shown
-from symtop.core.progress import beating, progress_bar
+from symtop.core.progress import progress_bar
 from symtop.measure import columns
 from symtop.measure.datasets import Combined, combine
-from symtop.model.scenes import scenes
+from symtop.model.scenes import all_scenes
 from symtop.run import plugins
 from symtop.runner import fingerprint, manifest, store
 from symtop.runner.cases import StudyCases
@@ -92,7 +92,7 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
 
     def result() -> Findings:
         begin = time.monotonic()
-        with beating(progress_bar(f"{study.name}: combining and drawing", quiet=quiet)):
+        with progress_bar(f"{study.name}: combining and drawing", quiet=quiet):
             findings = None
             with contextlib.suppress(BrokenExecutor, CancelledError, ProcessExpired):  # its process was ended
                 findings = None if future is None else future.result()
@@ -128,7 +128,7 @@ def drawing_digest(study: Study, save: Save | None) -> str:
 
 def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> Findings:
     """Combine, draw, judge and write; `made_of` is noted in the manifest."""
-    study, results, catalogue = cases.study, cases.results, scenes()
+    study, results, catalogue = cases.study, cases.results, all_scenes()
     dataset, words = results / f"{study.name}.nc", results / f"{study.name}.json"
     with files.locked(dataset, wait=True):
         for file in (dataset, words):

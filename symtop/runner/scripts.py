@@ -12,7 +12,7 @@ from types import ModuleType
 
 from symtop.core import code_hash
 from symtop.core.errors import SymtopError, foreign_code, one_of
-from symtop.core.files import execute, python_file
+from symtop.run.plugins import execute, python_file
 from symtop.runner.study import Study
 
 STUDIES = "symtop_studies"  # the package that every shipped study belongs to

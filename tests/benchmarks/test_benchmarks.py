@@ -18,6 +18,7 @@ from symtop.report import page
 
 KEYS = kernels.keys()
 STEPS = 500
+FEW = [("stormer-verlet", "angles"), ("takahashi-imada", "attitude"), ("rk4", "axis")]  # of the fast tests
 needs_gcc = pytest.mark.skipif(twin.compiler() is None, reason="the twins are built with gcc")
 
 
@@ -31,14 +32,7 @@ def test_every_compiled_fixed_step_kernel_has_a_twin():
 
 
 @needs_gcc
-@pytest.mark.parametrize("key", [("stormer-verlet", "angles"), ("takahashi-imada", "attitude"), ("rk4", "axis")])
-def test_a_twin_returns_the_same_bits(key):
-    assert twin.difference(kernels.kernel(key), STEPS) == 0.0
-
-
-@needs_gcc
-@pytest.mark.slow
-@pytest.mark.parametrize("key", KEYS, ids="-".join)
+@pytest.mark.parametrize("key", [key if key in FEW else pytest.param(key, marks=pytest.mark.slow) for key in KEYS])
 def test_every_twin_returns_the_same_bits(key):
     assert twin.difference(kernels.kernel(key), STEPS) == 0.0
 

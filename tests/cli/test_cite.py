@@ -3,18 +3,15 @@
 import re
 
 import pytest
-from click.testing import CliRunner
 
 import symtop
-from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.methods.framework.registry import bibliography, citation_keys
+from tests.commands import call
 
 
 def cited(*arguments):
-    done = CliRunner().invoke(main, ["cite", *map(str, arguments)])
-    assert done.exit_code == 0, done.output
-    return done
+    return call("cite", *arguments)
 
 
 def test_without_a_file_the_package_is_cited_with_its_version():
@@ -50,6 +47,5 @@ def test_a_method_without_a_known_source_is_said(tmp_path):
 def test_a_file_that_is_no_dataset_is_refused(tmp_path):
     path = tmp_path / "notes.txt"
     path.write_text("no netCDF")
-    done = CliRunner().invoke(main, ["cite", str(path)])
-    assert done.exit_code == 2
+    done = call("cite", path, code=2)
     assert "cannot read" in done.output

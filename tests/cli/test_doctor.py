@@ -6,13 +6,12 @@ import shutil
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 import symtop
 from symtop.cli import doctor
-from symtop.cli.main import main
 from symtop.core.files import cache_root
 from symtop.measure import published
+from tests.commands import call
 
 
 def faults(findings):
@@ -20,8 +19,7 @@ def faults(findings):
 
 
 def test_all_is_well_here_and_it_says_what_it_saw(tmp_path):
-    done = CliRunner().invoke(main, ["doctor", "--results", str(tmp_path), "--json"])
-    assert done.exit_code == 0, done.output
+    done = call("doctor", "--results", tmp_path, "--json")
     topics = {entry["topic"]: entry["result"] for entry in json.loads(done.output)}
     assert {"python", "numba", "cache", "kernels cache", "reference cache", "studies", "published values"} <= set(
         topics
@@ -98,8 +96,7 @@ def test_a_check_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path
 
     monkeypatch.setitem(doctor.CHECKS, "machine", trouble)
     monkeypatch.setitem(doctor.CHECKS, "self-check", lambda _: [])
-    done = CliRunner().invoke(main, ["doctor", "--results", str(tmp_path)])
-    assert done.exit_code == 1
+    done = call("doctor", "--results", tmp_path, code=1)
     assert "BAD  machine" in done.output
     assert "OSError: the tools are gone" in done.output
 
@@ -135,9 +132,8 @@ def test_all_of_them_are_compiled_once(monkeypatch, tmp_path):
     for folder in sorted((tmp_path / "kernels").iterdir())[::8]:
         shutil.rmtree(folder)
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
-    done = CliRunner().invoke(main, ["doctor", "--warm", "--results", str(tmp_path / "r")])
-    assert done.exit_code == 0, done.output
+    done = call("doctor", "--warm", "--results", tmp_path / "r")
     assert doctor.kernels() > 100
     assert "not run" not in done.output
-    again = CliRunner().invoke(main, ["doctor", "--warm", "--results", str(tmp_path / "r")])
+    again = call("doctor", "--warm", "--results", tmp_path / "r")
     assert "kernels compiled: 0;" in again.output

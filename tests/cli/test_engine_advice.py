@@ -3,12 +3,11 @@
 import json
 
 import pytest
-from click.testing import CliRunner
 
 import symtop
 from symtop.advise import SETTINGS, i_use
-from symtop.cli.main import main
 from symtop.methods.framework.registry import engines
+from tests.commands import call
 
 
 def test_every_setting_has_a_map_and_every_map_of_the_engines_a_setting():
@@ -53,19 +52,17 @@ def test_bad_input_is_refused_in_a_sentence(engine, step, message):
 
 
 def test_the_command_says_what_an_engine_does():
-    done = CliRunner().invoke(main, ["recommend", "goldstein", "--i-use", "havok", "--horizon", "10", "--json"])
-    assert done.exit_code == 0, done.output
+    done = call("recommend", "goldstein", "--i-use", "havok", "--horizon", "10", "--json")
     assert json.loads(done.output)["errors"]["default"] > 1.5
 
 
 def test_an_accuracy_beside_an_engine_is_advised_at_its_step_below_its_errors():
     words = ["recommend", "spheroid", "--i-use", "mujoco-euler", "--accuracy", "1e-3", "--per-nutation", "500"]
-    done = CliRunner().invoke(main, words)
-    assert done.exit_code == 0, done.output
+    done = call(*words)
     engine, advice = done.output.split(" rad  mujoco-euler (mujoco-euler)\n")
     step = symtop.scene("spheroid").nutation_period / 500.0
     assert f"step {step:g}" in engine
     assert f"step_size={step!r}" in advice
     assert "meets axis error 0.001" in advice
-    assert CliRunner().invoke(main, [*words, "--step-size", "0.01"]).exit_code == 2
-    assert CliRunner().invoke(main, ["recommend", "spheroid", "--per-nutation", "0"]).exit_code == 2
+    call(*words, "--step-size", "0.01", code=2)
+    call("recommend", "spheroid", "--per-nutation", "0", code=2)

@@ -5,17 +5,16 @@ import math
 import re
 
 import pytest
-from click.testing import CliRunner
 
 import symtop
 from symtop.cli.common import table
 from symtop.cli.main import main
 from symtop.methods.framework.registry import engines, methods
+from tests.commands import call
 
 
 def printed(*words, columns=80):
-    done = CliRunner().invoke(main, list(words), env={"COLUMNS": str(columns)})
-    assert done.exit_code == 0, done.output
+    done = call(*words, COLUMNS=str(columns))
     return done.output
 
 
@@ -95,7 +94,7 @@ def test_every_scene_can_be_shown(name):
 
 
 def test_the_help_describes_every_command_in_one_whole_line():
-    done = CliRunner().invoke(main, ["--help"], env={"COLUMNS": "80"})
+    done = call("--help", COLUMNS="80")
     lines = done.output.partition("Commands:\n")[2].splitlines()
     assert [line.split()[0] for line in lines] == sorted(main.commands)
     assert all(line.endswith(".") and not line.endswith("..") for line in lines)

@@ -6,20 +6,19 @@ import sys
 import time
 
 import pytest
-from click.testing import CliRunner
 
 import symtop
 from symtop.cli import runs
-from symtop.cli.main import main
 from symtop.run.ensemble import population
+from tests.commands import call
 
 SLOW = """\
 import sys, time
-from symtop.core import progress
-progress.FIRST, progress.EVERY = 0.2, 0.3
-with progress.telling("judge"):
+from symtop.cli import clock
+clock.FIRST, clock.EVERY = 0.2, 0.3
+with clock.telling("judge"):
     time.sleep(float(sys.argv[1]))
-    with progress.ticking("trying methods"):
+    with clock.ticking("trying methods"):
         time.sleep(float(sys.argv[1]))
 """
 
@@ -42,7 +41,7 @@ def test_a_command_that_is_quick_says_nothing():
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_the_lines_end_with_a_command_that_is_killed():
-    code = SLOW.replace("with progress", "print('on', flush=True)\nwith progress", 1)
+    code = SLOW.replace("with clock", "print('on', flush=True)\nwith clock", 1)
     process = subprocess.Popen([sys.executable, "-c", code, "60"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     process.stdout.readline()
     time.sleep(0.5)
@@ -77,8 +76,5 @@ def test_members_that_do_not_fit_into_memory_are_refused_before_they_are_drawn(m
     assert population.population(1000).sizes["member"] == 1000
     with pytest.raises(symtop.SymtopError, match=r"n must be at most 1e\+03 in the .* GiB of this machine.*, not 1001"):
         population.population(1001)
-    result = CliRunner().invoke(
-        main, ["ensemble", "strang", "--members", "1001", "--per-nutation", "20", "--nutations", "1"]
-    )
-    assert result.exit_code == 2
+    result = call("ensemble", "strang", "--members", "1001", "--per-nutation", "20", "--nutations", "1", code=2)
     assert "--members must be at most" in result.stderr

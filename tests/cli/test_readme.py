@@ -6,10 +6,8 @@ What blocks of code do is in `tests.docs.test_blocks`.
 import importlib
 import re
 
-from click.testing import CliRunner
-
-from symtop.cli.main import main
 from symtop.report.formats import columns, table
+from tests.commands import call
 from tests.pages import ROOT, pages
 
 registry = importlib.import_module("symtop.methods.framework.registry")
@@ -40,7 +38,7 @@ def test_every_study_is_explained():
 
 def test_the_first_run_prints_what_the_readme_shows():
     shown = re.search(r"```text\n(rk4\[angles\] on spheroid.*?)```", PAGES["README.md"], re.DOTALL)
-    done = CliRunner().invoke(main, ["run", "spheroid", "rk4", "--step-size", "0.01"])
+    done = call("run", "spheroid", "rk4", "--step-size", "0.01")
     assert shown is not None
     assert done.stdout.startswith(shown.group(1))
     assert done.stderr == ""

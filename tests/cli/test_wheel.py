@@ -1,5 +1,6 @@
 """An installed wheel, without a checkout: it carries the studies and runs nothing of the working directory."""
 
+import functools
 import os
 import re
 import subprocess
@@ -12,6 +13,22 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 TRAP = "raise SystemExit('a study of the working directory was run')\n"
+MINE = """
+import symtop
+
+symtop.register(symtop.runge_kutta("my-heun", ((), (1.0,)), (0.5, 0.5), order=2))
+top, start = symtop.SymmetricTop(1.5, 1.0, 3.0), symtop.Angles(theta=1.0, psi_dot=4.0)
+symtop.register_scene(symtop.Scene("my-top", top, start, horizon=6.0))
+"""
+
+
+def run(*command, **settings):
+    """What a command prints."""
+    done = subprocess.run(
+        list(map(str, command)), capture_output=True, text=True, timeout=1200, check=False, **settings
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
 
 
 @pytest.mark.slow
@@ -22,15 +39,8 @@ def test_a_wheel_in_an_empty_folder(tmp_path):
         (home / "studies" / name).write_text(TRAP)
     environment = {**os.environ, "SYMTOP_CACHE": str(tmp_path / "cache"), "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
     environment.pop("PYTHONPATH", None)
-
-    def run(*command):
-        done = subprocess.run(
-            list(map(str, command)), cwd=home, env=environment, capture_output=True, text=True, timeout=600, check=False
-        )
-        assert done.returncode == 0, done.stdout + done.stderr
-        return done.stdout
-
-    run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", tmp_path, ROOT)
+    here = functools.partial(run, cwd=home, env=environment)
+    here(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", tmp_path, ROOT)
     (wheel,) = tmp_path.glob("symtop-*.whl")
     names = set(zipfile.ZipFile(wheel).namelist())
     ours = {
@@ -43,17 +53,25 @@ def test_a_wheel_in_an_empty_folder(tmp_path):
     assert ours >= {"symtop/report/templates/report.html", "symtop/explore/static/page.html", "symtop/py.typed"}
     assert "symtop_studies/convergence/study.py" in ours
 
-    run(sys.executable, "-m", "venv", tmp_path / "venv")
+    here(sys.executable, "-m", "venv", tmp_path / "venv")
     python, symtop = (tmp_path / "venv" / "bin" / name for name in ("python", "symtop"))
-    run(python, "-m", "pip", "install", "--quiet", "--constraint", ROOT / "constraints.txt", wheel)
-    assert str(tmp_path / "venv") in run(python, "-c", "import symtop; print(symtop.__file__)")
-    assert "cases computed" in run(symtop, "study", "reduction", "--quick")
-    assert "report.html" in run(symtop, "report")
+    here(python, "-m", "pip", "install", "--quiet", "--constraint", ROOT / "constraints.txt", wheel)
+    assert str(tmp_path / "venv") in here(python, "-c", "import symtop; print(symtop.__file__)")
+    assert "cases computed" in here(symtop, "study", "reduction", "--quick")
+    assert "report.html" in here(symtop, "report")
     assert "Reduction" in (home / "results" / "quick" / "report.html").read_text(encoding="utf-8")
-    assert "midpoint" in run(symtop, "claims", "midpoint")
-    assert "@article" in run(symtop, "integrators", "midpoint")
-    assert "BAD" not in run(symtop, "doctor")
+    assert "midpoint" in here(symtop, "claims", "midpoint")
+    assert "@article" in here(symtop, "integrators", "midpoint")
+    assert "BAD" not in here(symtop, "doctor")
     assert {path.name for path in home.iterdir()} == {"studies", "results"}
+    mine = ("--plugin", tmp_path / "mine.py")  # somebody new adds a scene and a method, and finds both in a report
+    mine[1].write_text(MINE, encoding="utf-8")
+    assert "reached t = 6" in here(symtop, "run", "my-top", "my-heun", "--step-size", "0.01", *mine)
+    here(symtop, "study", "convergence", "--quick", "--only", "my-heun,midpoint", *mine)
+    here(symtop, "report", "--results", "results/quick/only", *mine)
+    page = (home / "results" / "quick" / "only" / "report.html").read_text(encoding="utf-8")
+    assert "my-heun" in page
+    assert "my-top" in page
 
 
 RUN = """
@@ -67,25 +85,20 @@ print(hashlib.sha256(data["theta"].values.tobytes() + data["energy"].values.toby
 @pytest.mark.slow
 def test_a_wheel_brings_the_kernels_of_first_runs(tmp_path):
     """The commands of the README compile nothing with an empty cache; bits are those of kernels compiled here."""
-    home, made, site = tmp_path / "home", tmp_path / "made", tmp_path / "site"
-    home.mkdir()
+    made, site = tmp_path / "made", tmp_path / "site"
     environment = {**os.environ, "SYMTOP_COMPILE_WITH": sys.executable, "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
 
-    def run(*command, **more):
-        done = subprocess.run(
-            list(map(str, command)), cwd=home, env={**environment, **more}, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, done.stdout + done.stderr
-        return done.stdout
+    def here(*command, **more):
+        return run(*command, cwd=tmp_path, env={**environment, **more})
 
-    run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", made, ROOT)
+    here(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", made, ROOT)
     (wheel,) = made.glob("symtop-*.whl")
     zipfile.ZipFile(wheel).extractall(site)
     kernels = list((site / "symtop" / "kernels").rglob("*.bitcode"))
     assert len(kernels) >= 25
     assert sum(path.stat().st_size for path in kernels) < 2e6
     environment["PYTHONPATH"] = str(site)
-    assert str(site) in run(sys.executable, "-c", "import symtop; print(symtop.__file__)")
+    assert str(site) in here(sys.executable, "-c", "import symtop; print(symtop.__file__)")
 
     lines = re.findall(
         r"^(?:\$ )?symtop ((?:run|compare|recommend|ensemble|long) .*?)(?: +#.*)?$", README, re.MULTILINE
@@ -94,17 +107,17 @@ def test_a_wheel_brings_the_kernels_of_first_runs(tmp_path):
     cache = tmp_path / "cache"
     for line in lines:
         words = line.replace("--steps 1e9", "--steps 1e6").replace('"', "").split()
-        run(sys.executable, "-m", "symtop", *words, SYMTOP_CACHE=str(cache))
+        here(sys.executable, "-m", "symtop", *words, SYMTOP_CACHE=str(cache))
     assert list(cache.rglob("*.code"))
     assert not list(cache.rglob("*.bitcode"))  # nothing was compiled
 
     plain = {"SYMTOP_CACHE": str(tmp_path / "x86-64"), "NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": ""}
     for name in ("strang[axis]", "series[axis]", "rk4[angles]", "vern9-fixed[axis]"):  # fused products, and vectors
         words = (sys.executable, "-c", RUN, name, "0.01")
-        compiled = run(*words, PYTHONPATH=str(ROOT), SYMTOP_CACHE=str(tmp_path / "own"))
-        assert run(*words, SYMTOP_CACHE=str(cache)) == compiled
-        assert run(*words, **plain) == compiled  # for a processor without the instructions of this one
+        compiled = here(*words, PYTHONPATH=str(ROOT), SYMTOP_CACHE=str(tmp_path / "own"))
+        assert here(*words, SYMTOP_CACHE=str(cache)) == compiled
+        assert here(*words, **plain) == compiled  # for a processor without the instructions of this one
     assert not list((tmp_path / "x86-64").rglob("*.bitcode"))
 
-    run(sys.executable, "-c", RUN, "yoshida-4[attitude]", "0.01", SYMTOP_CACHE=str(cache))
+    here(sys.executable, "-c", RUN, "yoshida-4[attitude]", "0.01", SYMTOP_CACHE=str(cache))
     assert list(cache.rglob("*.bitcode"))  # the control: a kernel that the wheel has not

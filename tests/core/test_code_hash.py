@@ -7,7 +7,6 @@ import importlib.util
 import inspect
 import os
 import shutil
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -19,6 +18,7 @@ import symtop
 from symtop.core import code_hash, files, jit
 from symtop.core.code_hash import Code, by_file, changes, digest, merged
 from symtop.runner import fingerprint
+from tests.commands import printed_by
 
 
 def loaded(path: Path, name: str):
@@ -85,19 +85,17 @@ def test_words_do_not_count_and_numbers_do():
     assert made(dataclasses.replace(method, order=4)) != made(method)
 
 
-def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again():
+def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again(clean_registry):
     from symtop.runner.scripts import load
     from tests.commands import PROBE
 
     study, plain = load(str(PROBE)), symtop.integrator("midpoint")
     case = next(case for case in study.cases(True) if case.integrator == "midpoint")
     digests = []
-    try:
-        for order in range(2, 12):
-            symtop.register(dataclasses.replace(plain, order=order), replace=True)
-            digests.append(fingerprint.digest(study, case))
-    finally:
-        symtop.register(plain, replace=True)
+    for order in range(2, 12):
+        symtop.register(dataclasses.replace(plain, order=order), replace=True)
+        digests.append(fingerprint.digest(study, case))
+    symtop.register(plain, replace=True)
     assert len(set(digests)) == 10
     assert digests[0] == fingerprint.digest(study, case)
 
@@ -155,12 +153,9 @@ def kernels_of(root: Path, store: Path) -> dict[str, int]:
         "print(float(symtop.simulate(w, m, step_size=0.02, guard=False)['theta'][-1]).hex(), "
         "L._identity(w, m, 0.01, 100, True))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=240, check=True, cwd=root,
-        env={**os.environ, "PYTHONPATH": str(root), "SYMTOP_CACHE": str(store)},
-    )  # fmt: skip
+    said = printed_by(code, cwd=root, PYTHONPATH=root, SYMTOP_CACHE=store).split()
     files = {str(path.relative_to(store)): path.stat().st_mtime_ns for path in (store / "kernels").rglob("*.code")}
-    return {"said": done.stdout.split(), "files": files}
+    return {"said": said, "files": files}
 
 
 @pytest.mark.slow

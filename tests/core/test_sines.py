@@ -45,16 +45,9 @@ def quarter(n, seed=1):
     return np.concatenate([draw.uniform(0.0, 0.5 * math.pi, 2 * n), near, 0.5 * math.pi - near, last])
 
 
-def test_errors_between_the_poles_are_those_of_the_docstring():
-    x = quarter(3000)
-    sine, cosine = errors(x, compiled(x))
-    assert sine < 0.56
-    assert cosine < 0.63
-
-
-@pytest.mark.slow
-def test_errors_between_the_poles_hold_for_many():
-    x = quarter(100_000, seed=2)
+@pytest.mark.parametrize(("n", "seed"), [(3000, 1), pytest.param(100_000, 2, marks=pytest.mark.slow)])
+def test_errors_between_the_poles_are_those_of_the_docstring(n, seed):
+    x = quarter(n, seed)
     sine, cosine = errors(x, compiled(x))
     assert sine < 0.56
     assert cosine < 0.63

@@ -11,15 +11,12 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
-from click.testing import CliRunner
 
 from symtop.cli.main import main
-from tests.commands import ended, symtop
+from tests.commands import call, ended, symtop
 from tests.pages import LANGUAGES, ROOT, Block, blocks, pages
 
-registry = importlib.import_module("symtop.methods.framework.registry")
-scenes = importlib.import_module("symtop.model.scenes")
-
+pytestmark = pytest.mark.usefixtures("clean_registry")  # what a page adds goes with its test
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
 PAGES = {path.relative_to(ROOT).as_posix(): blocks(path.read_text(encoding="utf-8")) for path in pages()}
 SLOW = [page for page, found in PAGES.items() if any(block.slow for block in found)]
@@ -79,8 +76,7 @@ class Page:
             code, out, err = ended(symtop(*rest), seconds=900.0)
             assert code == 0, (line, out, err)
             return out
-        done = CliRunner().invoke(main, rest)
-        assert done.exit_code == 0, (line, done.output)
+        done = call(*rest)
         return done.output
 
 
@@ -88,8 +84,6 @@ def follow(page, slow, folder, monkeypatch):
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend(folder)
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    monkeypatch.setattr(registry, "_registry", registry.integrators())  # what a page adds goes with the test
-    monkeypatch.setattr(scenes, "_added", {})
     reader = Page(page, slow=slow)
     for block in PAGES[page]:
         reader.follow(block)

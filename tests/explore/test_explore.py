@@ -15,10 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import symtop
-from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning
 from symtop.explore import answers, cost
@@ -29,6 +27,7 @@ from symtop.model import charts
 from symtop.model.scenes import closed_form
 from symtop.run.simulation import integrate
 from tests.browser import Browser
+from tests.commands import call
 
 
 def fields(name="spheroid", integrator="midpoint", **changes):
@@ -318,8 +317,7 @@ def test_nothing_on_the_page_comes_from_elsewhere():
 
 def test_a_bad_port_is_refused(site):
     for port in (site.server_address[1], 70_000):
-        done = CliRunner().invoke(main, ["explore", "--no-browser", "--port", str(port)])
-        assert done.exit_code == 2
+        done = call("explore", "--no-browser", "--port", port, code=2)
         assert "port must be" in done.output
 
 

@@ -6,15 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import symtop
-from symtop.cli.main import main
 from symtop.core.signals import InterruptedByUser, told_apart
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.run import plugins
-from tests.commands import ended, symtop as command
+from tests.commands import call, ended, symtop as command
 
 PLUGIN = Path(__file__).with_name("plugin.py")
 RUN = ["--step-size", "0.01", "--horizon", "2"]
@@ -30,7 +28,7 @@ def misbehaving():
 def said_of(words):
     """Exit code and the lines of a command that must not end in a traceback, and must leave the scene as it was."""
     with warnings.catch_warnings():
-        done = CliRunner().invoke(main, words)
+        done = call(*words, code=None)
     assert done.exception is None or isinstance(done.exception, SystemExit), words
     assert "Traceback" not in done.output
     assert repr(symtop.scene("spheroid")) == BEFORE

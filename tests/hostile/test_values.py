@@ -1,7 +1,7 @@
 """Every argument of every public function, every kind of bad value: `SymtopError` in one sentence, or a result.
 
-Values that cannot be meant must be refused; of the others (`ANY`) it is only asked that nothing but a SymtopError comes
-of them. The first half is the lists of `tests/cli/test_bad_input.py`, each value once and not some of them.
+Values that cannot be meant must be refused; of the others (`ANY`, and what hypothesis draws) it is only asked that
+nothing but a SymtopError comes of them, and at once. The command line is tried in `tests.hostile.test_command_lines`.
 """
 
 import decimal
@@ -14,21 +14,9 @@ import hypothesis.strategies as st
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 
 import symtop
-from tests.cli.test_bad_input import (
-    ANYTHING,
-    CALLS,
-    CALM,
-    NOT_FINITE,
-    NOT_POSITIVE,
-    NOT_ROW,
-    NOT_WHOLE,
-    START,
-    TOP,
-    UNKNOWN,
-)
 
 SECONDS = 20.0  # of processor time for one call
 
@@ -45,6 +33,18 @@ class Unprintable:
     __hash__ = None
 
 
+ODD = [None, "x", "", b"1", [], [1.0], {}, (), object(), 1j, True, np.array([1.0, 2.0]), "1e", lambda: 1.0, 10**400]
+NOT_FINITE = [*ODD, math.nan, math.inf, -math.inf]
+NOT_POSITIVE = [*NOT_FINITE, 0.0, -0.0, -1.0, -1e300, -5e-324, np.float64(-2.0)]
+NOT_WHOLE = [*NOT_POSITIVE, 1.5, 2.0000001]
+UNKNOWN = [None, 3, "", "no-such", b"spheroid", [], object(), "Spheroid ", "\0", "x" * 5000]
+NOT_LABEL = [None, 3, "", " x", "a b", "ä", "-x", "x" * 65, "a/b", "a\nb", b"x", []]
+NOT_ROW = [None, "01", {}, 3.0, [math.nan], ["x"], [[0.5]], [None], object(), [1j]]
+NOT_TIMES = [None, "x", [], [math.nan], [math.inf], [-1.0], [[1.0]], ["x"], object(), np.zeros((2, 2)), [None]]
+
+TOP, START = symtop.SymmetricTop(2.0, 1.0, 1.0), symtop.Angles(theta=0.5, psi_dot=5.0)
+SOLVERS = {"angles": lambda top, start, plan: None}
+STEP = {"step_size": 0.01, "horizon": 1.0, "samples": 11, "observe": "axis"}
 ANY = [
     None, True, False, 0, -1, 1, 2, 10**400, -(10**400), 0.0, -0.0, 0.5, 5e-324, 1e308, -1e308, math.nan, math.inf, 1j,
     "", "x", "nan", "1", "é", "\0", "a" * 5000, b"1", [], [1.0], [[1.0]], (), (1, 2), {}, {"a": 1}, set(), {1.0},
@@ -63,7 +63,107 @@ NAMED = [value for value in UNKNOWN if value is not None]  # where None asks for
 NO_NUMBER = [value for value in NOT_POSITIVE if not isinstance(value, np.ndarray | list)]
 SMALL = symtop.population(3, seed=1)
 
-MORE = {
+CALLS = {
+    "SymmetricTop": (
+        symtop.SymmetricTop,
+        {"I1": 2.0, "I3": 1.0, "mgl": 1.0},
+        {"I1": NOT_POSITIVE, "I3": [*NOT_POSITIVE, 4.1, 1e300], "mgl": NOT_FINITE},
+    ),
+    "from_spheroid": (
+        symtop.SymmetricTop.from_spheroid,
+        {"mass": 1.0, "polar_radius": 2.0, "equatorial_radius": 1.0},
+        {
+            "mass": NOT_POSITIVE,
+            "polar_radius": NOT_POSITIVE,
+            "equatorial_radius": NOT_POSITIVE,
+            "gravity": NOT_FINITE,
+            "pivot_distance": [value for value in NOT_FINITE if value is not None],
+        },
+    ),
+    "Angles": (
+        symtop.Angles,
+        {"theta": 0.5},
+        dict.fromkeys(("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot"), NOT_FINITE),
+    ),
+    "Scene": (
+        symtop.Scene,
+        {"name": "mine", "top": TOP, "start": START, "horizon": 1.0},
+        {"name": NOT_LABEL, "top": NOT_FINITE, "start": NOT_FINITE, "horizon": NOT_POSITIVE, "observes": UNKNOWN},
+    ),
+    "simulate midpoint": (
+        symtop.simulate,
+        {"scene": "spheroid", "integrator": "midpoint", **STEP},
+        {
+            "scene": UNKNOWN,
+            "integrator": UNKNOWN,
+            "step_size": [*NOT_POSITIVE, 1.1, 1e300, 1e-300],
+            "tolerance": [value for value in NOT_POSITIVE if value is not None] + [1e-6],
+            "horizon": [value for value in NOT_POSITIVE if value is not None] + [1e300, 0.001],
+            "samples": [*NOT_WHOLE, 1, 10**9],
+            "observe": [value for value in UNKNOWN if value is not None],
+        },
+    ),
+    "simulate rk45": (
+        symtop.simulate,
+        {"scene": "spheroid", "integrator": "rk45", "tolerance": 1e-6, "horizon": 0.5, "samples": 11},
+        {"tolerance": [*NOT_POSITIVE, 1e-15, 1.0, 1e300], "step_size": [0.01, "x", math.nan], "observe": ["psi"]},
+    ),
+    "reference": (
+        symtop.reference,
+        {"scene": "spheroid", "times": [0.5], "precision": "double"},
+        {"scene": UNKNOWN, "times": NOT_TIMES, "precision": UNKNOWN},
+    ),
+    "register": (symtop.register, {"entry": None}, {"entry": [*NOT_FINITE, symtop.integrator("midpoint")]}),
+    "register_scene": (symtop.register_scene, {"entry": None}, {"entry": [*NOT_FINITE, symtop.scene("spheroid")]}),
+    "scene": (symtop.scene, {"name": "spheroid"}, {"name": UNKNOWN}),
+    "integrator": (symtop.integrator, {"name": "midpoint"}, {"name": UNKNOWN}),
+    "citation": (symtop.citation, {"name": "midpoint"}, {"name": UNKNOWN}),
+    "discrete_lagrangian": (
+        symtop.discrete_lagrangian,
+        {"name": "mine", "nodes": (0.5,), "weights": (1.0,)},
+        {
+            "name": NOT_LABEL,
+            "nodes": [*NOT_ROW, (1.5,), (), (0.2, 0.8)],
+            "weights": [*NOT_ROW, (0.9,), (), (0.5, 0.5)],
+            "order": [value for value in NOT_WHOLE if value is not None],
+        },
+    ),
+    "composition": (
+        symtop.composition,
+        {"name": "mine", "drift": (1.0,), "kick": (0.5, 0.5)},
+        {
+            "name": NOT_LABEL,
+            "drift": [*NOT_ROW, (0.9,), (), (0.5, 0.5)],
+            "kick": [*NOT_ROW, (0.5, 0.4), (1.0,)],
+            "gradient": [value for value in NOT_ROW if value is not None] + [(1.0,), (1.0, 1.0)],
+            "chart": UNKNOWN,
+            "rotation": [*UNKNOWN, "cayley"],
+            "processor": [*NOT_FINITE, 1.0],
+        },
+    ),
+    "runge_kutta": (
+        symtop.runge_kutta,
+        {"name": "mine", "a": ((), (1.0,)), "b": (0.5, 0.5)},
+        {
+            "name": NOT_LABEL,
+            "a": [None, 3, "x", (), ((),), ((), (math.nan,)), ((), ("x",)), ((), (1.0, 1.0, 1.0)), [[0, 1], [1, 0]]],
+            "b": [*NOT_ROW, (0.5, 0.4), (1.0,)],
+            "c": [value for value in NOT_ROW if value is not None] + [(0.0, 0.5), (0.0,)],
+        },
+    ),
+    "series": (symtop.series, {"name": "mine", "order": 12}, {"name": NOT_LABEL, "order": [*NOT_WHOLE, 9, 24]}),
+    "Integrator": (
+        symtop.Integrator,
+        {"name": "mine", "family": "other", "summary": "", "solvers": SOLVERS},
+        {
+            "name": NOT_LABEL,
+            "family": UNKNOWN,
+            "solvers": [None, {}, [], {"angles": 3}, {"elsewhere": print}, "x"],
+            "control": [3, "", "steps", []],
+            "implementation": UNKNOWN,
+            "order": [value for value in NOT_WHOLE if value is not None],
+        },
+    ),
     "from_quaternion": (
         symtop.Angles.from_quaternion,
         {"quaternion": [1.0, 0.0, 0.0, 0.0], "omega_body": [0.0, 0.0, 1.0]},
@@ -141,13 +241,13 @@ MORE = {
 }  # fmt: skip
 BAD = [
     pytest.param(function, good, argument, values, id=f"{name} {argument}")
-    for name, (function, good, bad) in {**CALLS, **MORE}.items()
+    for name, (function, good, bad) in CALLS.items()
     for argument, values in bad.items()
 ]
 COST = {"judge", "recommend", "compare"}  # seconds for every value that is taken: their bad ones only
 WHATEVER = [
     pytest.param(function, good, argument, ANY, id=f"{name} {argument} any")
-    for name, (function, good, bad) in {**CALLS, **MORE}.items()
+    for name, (function, good, bad) in CALLS.items()
     if name not in COST
     for argument in {**good, **bad}
     if (name, argument) != ("register", "entry")
@@ -189,7 +289,18 @@ def test_anything_is_used_or_refused(function, good, argument, values):
     assert not faults
 
 
-PLACES = [(name, key) for name, call in MORE.items() if name not in COST for key in sorted({*call[1], *call[2]})]
+def test_the_same_calls_with_good_input_are_fine():
+    for name, (function, good, _) in CALLS.items():
+        if name not in ("register", "register_scene", "judge of nothing"):
+            assert came(function, good) == "", name
+
+
+PLACES = [(name, key) for name, call in CALLS.items() if name not in COST for key in sorted({*call[1], *call[2]})]
+ANYTHING = st.one_of(
+    st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=8), st.binary(max_size=4),
+    st.lists(st.floats() | st.text(max_size=2), max_size=3), st.dictionaries(st.text(max_size=2), st.none()),
+    st.complex_numbers(), st.just(object()), st.floats(width=16).map(np.float16), st.decimals(), st.fractions(),
+)  # fmt: skip
 
 
 def _cheap(value):
@@ -201,10 +312,11 @@ def _cheap(value):
     return not (1e-13 < size < 1e-3 or 1e4 < size < 1e13)
 
 
-@CALM
+@settings(
+    max_examples=400, deadline=None, derandomize=True, database=None, suppress_health_check=[HealthCheck.too_slow]
+)
 @given(place=st.sampled_from(PLACES), value=ANYTHING.filter(_cheap))
 def test_anything_at_all_is_used_or_refused(place, value):
-    """The same for the functions of `tests.cli.test_bad_input` stands there."""
     name, argument = place
-    function, good, _ = MORE[name]
+    function, good, _ = CALLS[name]
     came(function, {**good, argument: value})

@@ -22,10 +22,10 @@ from symtop.cli.judge import FORMS as OFFERED
 from symtop.cli.main import main
 from symtop.judging import judge_step
 from symtop.judging.adapters.adapter import heartbeat, integrator, label_of
-from symtop.judging.adapters.python_step import PythonStep, RotationStep, SeparableStep, to_body, to_space
-from symtop.judging.battery import TABLE
+from symtop.judging.adapters.python_step import PythonStep, RotationStep, SeparableStep
+from symtop.judging.battery import stages
 from symtop.judging.claims.subject import FORMS, open_target
-from symtop.judging.findings import VERDICTS, About, Finding, Measured, StepLedger, line, undecided
+from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Measured, line, undecided
 from symtop.judging.remote import clock
 from tests.judging.blind.right import midpoint, product, turn, verlet
 
@@ -66,9 +66,6 @@ def test_a_scipy_class_makes_the_steps_that_it_is_told_to():
 
 
 def test_a_rotation_is_that_of_the_top():
-    start, body = np.array([0.9, 0.3, -0.2, 0.25]), np.array([0.3, -0.7, 1.1])
-    q = start / np.linalg.norm(start)
-    np.testing.assert_allclose(to_body(q, to_space(3.0 * q, body)), body, atol=1e-15)
     stepper = RotationStep(lambda q, w, h, inertia, torque: (q, w))
     par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
     shown = stepper.form.present(par, np.zeros(1), np.array([state]))[0]
@@ -323,7 +320,7 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset():
     ledger = symtop.judge(changes_its_input, quick=True, tell=told.append)
     assert told[0].name == "changes_its_input"
     assert told[1:] == list(ledger.findings)
-    assert [one.claim for one in ledger.findings] == [claim.name for claim in TABLE if "step" in claim.applies]
+    assert [one.claim for one in ledger.findings] == [claim for stage in stages("step") for claim in stage.claims]
     assert {one.verdict for one in ledger.findings} <= set(VERDICTS) - {"refuted", "confirmed"}
     assert "writes to its input" in ledger["calls"].why
     data = ledger.dataset()
@@ -355,7 +352,7 @@ def test_a_line_says_what_was_measured_and_of_a_claim_that_fails_why():
     assert line(undecided("energy", "", "it stopped")).splitlines()[0] == "energy         undecided"
     assert line(Finding("calls", "", Measured("a function"), "measured", "", 0.0, 1e-13)) == ""
     failed = {"step_size": np.array([0.01, 0.1, np.nan]), "error": np.array([1e-6, np.nan, np.nan])}
-    ledger = StepLedger("mine", "spheroid", (wrong,), failed, About("mine", "axis", "python", 2e-5, 3, 1.0))
+    ledger = Ledger("mine", "spheroid", (wrong,), failed, About("mine", "axis", "python", 2e-5, 3, 1.0))
     assert "Its runs: 10 to 100 steps a nutation for the order, of which 10 and fewer fail.\n" in str(ledger)
     assert str(ledger).startswith("mine in the axis chart on spheroid, 20 us a step, seed 3\n")
 

@@ -26,6 +26,7 @@ from symtop.model import charts
 from symtop.run import plugins
 from symtop.run.simulation import integrate
 from tests.conftest import random_scenes
+from tests.judging.blind.right import euler, implicit_euler
 
 registry = importlib.import_module("symtop.methods.framework.registry")
 SPHEROID = symtop.scene("spheroid")
@@ -150,10 +151,25 @@ def test_a_bias_of_a_unit_of_rounding_a_step_is_rounding_where_sums_are_plain(a_
     assert long.change_of(TIME, residual, rounding, steps, plain=plain).kind == kind
 
 
-def test_what_changes_at_once_is_said_unless_the_run_has_blown_up():
+def test_what_changes_at_once_is_said():
     jump = np.where(TIME > 4000.0, 1e-6, 0.0) + 1e-12 * np.sin(TIME)
     assert long.change_of(TIME, jump, WAVE[:9] * 1e-10, 1000).sudden.startswith("after t = 4000 it changes ")
-    assert long.change_of(TIME, jump, WAVE[:9] * 1e-10, 1000, energy=np.where(TIME > 3000.0, 1e5, 0.0)).sudden == ""
+    assert long.change_of(TIME, WAVE, WAVE[:9] * 1e-10, 1000).sudden == ""
+
+
+def test_an_energy_that_leaves_its_scale_is_said_to_blow_up_and_the_rest_judged_until_then(only):
+    """Euler's method gains energy, and keeps p_phi; the implicit one loses all that it can, which is no blow-up."""
+    only("energy", "p_phi")
+    for claims in {}, {"energy": "bounded"}:
+        ledger = symtop.judge(euler, quick=True, **claims)
+        assert (ledger["energy"].measured.kind, ledger["p_phi"].measured.kind) == ("blows up", "kept")
+        assert ledger.refuted == [*claims]
+        assert re.search(r"^energy +blows up at t = \d\S+, after \d+ steps, \d+ a nutation", str(ledger), re.MULTILINE)
+        assert "more than that of the nutation and 2 |mgl|" in ledger["energy"].why
+        assert "keeps p_phi; not the energy" in str(ledger)
+    rise = 1.0 + 2.0 * SPHEROID.top.mgl / SPHEROID.energy_scale
+    assert rise < ledger["energy"].value < 2.0 * rise
+    assert symtop.judge(implicit_euler, quick=True)["energy"].measured.kind in ("drift", "growing", "bounded")
 
 
 @pytest.mark.parametrize(("largest", "verdict"), [(0.9, "confirmed"), (3.2, "refuted")])

@@ -127,8 +127,8 @@ def test_the_command_takes_a_file(table, tmp_path):
     [
         ("time,x\n0,1\n", "must begin with a line of names"),
         ("ex,ey,ez\n0,0,1\n", "must begin with a line of names"),
-        ("time,theta\n0,0.4\n1\n", "2 numbers a line, and row 2 has 1"),
-        ("time,theta\n0,high\n", "must hold numbers"),
+        ("time,theta\n0,0.4\n1\n", "2 numbers in each line: the number of columns changed from 2 to 1"),
+        ("time,theta\n0,high\n", "numbers in each line: could not convert string 'high' to float64"),
         ("time,energy\n0,1\n", "one of axis, quaternion, theta"),
         ("", "it is no text, or empty"),
     ],

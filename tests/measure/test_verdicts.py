@@ -4,13 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import symtop
-from symtop.cli.main import main
 from symtop.measure.verdicts import judgement
 from symtop.model import charts
 from symtop.model.scenes import closed_form, grazing
+from tests.commands import call
 
 
 def judged(scene, name, **controls):
@@ -48,7 +47,7 @@ def test_a_pole_passed_on_the_wrong_side_is_a_wrong_regime():
 
 
 def test_the_command_line_judges_a_run():
-    few = CliRunner().invoke(main, ["run", "goldstein", "strang", "--step-size", "0.3", "--samples", "2", "--json"])
+    few = call("run", "goldstein", "strang", "--step-size", "0.3", "--samples", "2", "--json")
     assert json.loads(few.stdout)["judgement"]["verdict"] == "bounded_but_wrong"
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from symtop.core import jit
 from symtop.core.jit import compile_kernel
+from tests.commands import printed_by
 
 EVERY = "midpoint galerkin-simpson midpoint-unreduced stormer-verlet strang gauss-4 rk4"
 SCRIPT = """
@@ -38,13 +39,7 @@ print(len(used), sum(sum(one.stats.cache_misses.values()) for one in used),
 @pytest.mark.slow  # tests/core/test_cold.py has a short run of one method
 @pytest.mark.parametrize(("names", "lanes"), [(EVERY, ["strang[axis]", "srkn-14-6[attitude]"])], ids=["every"])
 def test_a_second_process_finds_the_kernels_of_every_family_on_disk(names, lanes, tmp_path):
-    environment = {**os.environ, "SYMTOP_CACHE": str(tmp_path)}
-    counts = []
-    for _ in range(2):
-        done = subprocess.run(
-            [sys.executable, "-c", SCRIPT, names, *lanes], env=environment, capture_output=True, text=True, check=True
-        )
-        counts.append([int(word) for word in done.stdout.split()])
+    counts = [[*map(int, printed_by(SCRIPT, names, *lanes, SYMTOP_CACHE=tmp_path).split())] for _ in range(2)]
     (_, compiled, _), (loaded, missed, without_cache) = counts
     assert compiled >= len(names.split())  # the first process starts with an empty folder
     assert loaded >= len(names.split())
@@ -83,12 +78,7 @@ def test_kernels_return_the_same_bits_whichever_way_they_were_made(count, tmp_pa
         made = {file: file.read_bytes() for file in tmp_path.rglob("*.code")}
         for file in made:
             file.unlink()
-        done = subprocess.run(
-            [sys.executable, "-c", BITS, way.partition(",")[0], str(count)],
-            env={**os.environ, "SYMTOP_CACHE": str(tmp_path), **processor}, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert done.returncode == 0, (way, done.stderr)
-        said[way] = done.stdout.splitlines()
+        said[way] = printed_by(BITS, way.partition(",")[0], count, SYMTOP_CACHE=tmp_path, **processor).splitlines()
         assert len(said[way]) == count + -(-count // 3)
         assert said[way] == said["numba alone"], way
         if way == "bitcode":  # mostly the same machine code, and so as fast

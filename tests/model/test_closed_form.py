@@ -2,9 +2,6 @@
 
 import itertools
 import math
-import subprocess
-import sys
-from pathlib import Path
 
 import mpmath as mp
 import numpy as np
@@ -20,6 +17,7 @@ from symtop.model.exact.digits import PreciseForm, precise_constants
 from symtop.model.scenes import grazing, scene, sleeping
 from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.run.reference.truth import ROUNDING
+from tests.commands import ROOT, printed_by
 
 EPS = float(np.finfo(float).eps)
 SEPARATRIX = SymmetricTop(1.0, 0.5, -1.0), Angles(0.0, theta_dot=2.0)
@@ -187,9 +185,7 @@ def test_a_few_forms_import_no_slow_library():
         "for scene in symtop.scenes().values(): symtop.ClosedForm(scene.top, scene.start).axis([0.0, 1.0])\n"
         "print(*({'numba', 'mpmath', 'scipy', 'heyoka'} & set(sys.modules)))"
     )
-    root = Path(__file__).parents[2]
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root)
-    assert done.stdout.strip() == ""
+    assert printed_by(code, cwd=ROOT).strip() == ""
 
 
 def test_many_samples_are_worth_compiling(monkeypatch):

@@ -105,24 +105,15 @@ def _excess(top, start, precise, times):
     return worst
 
 
-def _check_regime(kind, count, seed):
+@pytest.mark.parametrize(("count", "seed"), [(2, 1), pytest.param(40, 2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", REGIMES)
+def test_double_precision_agrees_with_fifty_digits(kind, count, seed):
     random = np.random.default_rng([seed, REGIMES.index(kind)])
     for _ in range(count):
         top, start = random_top(kind, random)
         precise = PreciseForm(top, start, digits=50)
         excess = _excess(top, start, precise, _times(precise, random))
         assert (excess <= 1.0).all(), (top, start, excess)
-
-
-@pytest.mark.parametrize("kind", REGIMES)
-def test_double_precision_agrees_with_fifty_digits(kind):
-    _check_regime(kind, 2, seed=1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", REGIMES)
-def test_double_precision_agrees_with_fifty_digits_on_many_tops(kind):
-    _check_regime(kind, 40, seed=2)
 
 
 @pytest.mark.parametrize("field", ["I1", "I3", "mgl"])

@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 import pytest
 
 import symtop
-from symtop.judging.findings import About, Finding, Measured, StepLedger
+from symtop.judging.findings import About, Finding, Ledger, Measured
 from symtop.report.card import badge, card, figures, write_badge
 
 
@@ -20,7 +20,7 @@ def ledger():
 
 
 def handmade(*findings, name="mine"):
-    return StepLedger(name, "spheroid", findings, {}, About(name, "axis", "python", 0.0))
+    return Ledger(name, "spheroid", findings, {}, About(name, "axis", "python", 0.0))
 
 
 def test_the_card_is_one_page_with_two_figures_and_every_verdict(ledger, tmp_path):

@@ -5,18 +5,12 @@ import dataclasses
 import pytest
 
 import symtop
-from symtop.methods.framework import registry
 from symtop.report import style
 
 
 def test_no_two_integrators_look_alike():
     looks = [(style.look(name).color, style.look(name).marker) for name in symtop.integrators()]
     assert len(set(looks)) == len(looks)
-
-
-@pytest.fixture
-def clean_registry(monkeypatch):
-    monkeypatch.setattr(registry, "_registry", registry.integrators())  # a copy: what a test adds goes with it
 
 
 @pytest.mark.parametrize("model", ["rk4", "strang", "midpoint", "rk45", "taylor", "exact"])

@@ -257,6 +257,27 @@ def test_what_passages_of_a_pole_add_is_seen_over_many_of_them():
         assert bool(said(scene, name, step_size=step)) is lost
 
 
+def test_an_end_at_a_pole_after_many_passages_is_announced(monkeypatch):
+    """The axis passes the pole at 2e-16 rad, and Adams' method ends there after 17 nutations, vern9 at none of 96."""
+    top = symtop.SymmetricTop(0.34197641538075246, 0.3742372339233947, 0.037042027632846225)
+    rates = {"theta_dot": 0.0, "phi_dot": 0.458319572783573, "psi_dot": 0.40513789028252667}
+    start = symtop.Angles(1.2174251215796315, 2.418827152562061, 0.7304406217729724, **rates)
+    scene = symtop.Scene("through-upright", top, start, 1365.0500094145345)
+    controls = {"tolerance": 4.772194832341897e-08, "observe": "attitude"}
+    assert "stopped at t = 250.083" in said(scene, "adams", **controls)
+    assert said(scene, "vern9", **controls) == ""
+    monkeypatch.setattr(guard, "THROUGH", 1.0)
+    assert said(scene, "adams", **controls) == ""  # the control: of the first nutations it sees nothing
+    top = symtop.SymmetricTop(0.21139120105289147, 0.17433412715295638, -0.10207649271382181)
+    rates = -1.3442613475029312, 2.15157297712127, 2.483867050263369
+    start = symtop.Angles(1.8477525261144405, -2.366700800344101, -0.25147517216375936, *rates)
+    for horizon, ends in ((2.8551485700365795, True), (1.3, False)):  # there it is right to 0.0095 rad and ends
+        scene = symtop.Scene("aimed", top, start, horizon)
+        run = symtop.simulate(scene, "extrapolation[angles]", tolerance=0.0012096342552818213, guard=False)
+        assert (run.attrs["outcome"] == "left_chart") is ends
+        assert bool(said(scene, "extrapolation[angles]", tolerance=0.0012096342552818213)) is ends
+
+
 def test_the_end_of_a_run_at_the_limit_of_its_work_is_announced():
     """Steps that shrink towards a pole: 2e8 of them end at t = 2361.6; half the horizon is within the limit."""
     top = symtop.SymmetricTop(0.8710803565723452, 0.49843955501086307, 0.13722107388085694)

@@ -12,17 +12,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numba import njit
 from symtop_studies.drift.runs import members, rounding
 
 import symtop
-from symtop.cli.main import main
 from symtop.core.errors import SymtopError
-from symtop.core.jit import fused
+from symtop.core.jit_functions import fused
 from symtop.methods.framework import loop as drive
 from symtop.run import long_run as longrun
 from symtop.run.long_run import chart_of, leaves, long_run, regrown, scattered, windows
+from tests.commands import call, printed_by
 
 WHERE = symtop.scene("spheroid")
 H = WHERE.nutation_period / 400.37
@@ -294,12 +293,10 @@ def test_a_fused_sum_is_rounded_once_and_a_plain_one_twice():
 def test_the_command_runs_and_says_what_changed(tmp_path):
     output = tmp_path / "long.nc"
     files = ["--checkpoint", str(tmp_path / "c.nc"), "--output", str(output)]
-    done = CliRunner().invoke(main, ["long", "spheroid", "cayley", "--steps", "2e4", *files])
-    assert done.exit_code == 0, done.output
+    done = call("long", "spheroid", "cayley", "--steps", "2e4", *files)
     assert "modified_energy" in done.output
     assert output.is_file()
-    bad = CliRunner().invoke(main, ["long", "spheroid", "rk45", "--steps", "10", "--step-size", "0.1"])
-    assert bad.exit_code == 2
+    call("long", "spheroid", "rk45", "--steps", "10", "--step-size", "0.1", code=2)
 
 
 @pytest.mark.parametrize("name", ["strang", "gauss-4"])  # one that shows what it steps, and one that turns it back
@@ -324,8 +321,7 @@ def test_a_body_is_watched_as_simulate_shows_it(name):
 def test_what_a_free_body_keeps_grows_as_rounding_and_what_it_does_not_keep_as_the_time(tmp_path):
     command = ["long", "tennis-racket", "--steps", "1e5", "--per-nutation", "60.37", "--checkpoint"]
     file = str(tmp_path / "c.nc")
-    kept, lost = (CliRunner().invoke(main, [*command, file, name]) for name in ("strang", "rk4"))
-    assert (kept.exit_code, lost.exit_code) == (0, 0), kept.output + lost.output
+    kept, lost = (call(*command, file, name) for name in ("strang", "rk4"))
     sizes = {}
     for name, done in (("strang", kept), ("rk4", lost)):
         row = next(line.split() for line in done.output.splitlines() if line.startswith("|L|"))
@@ -350,8 +346,6 @@ for name in ("galerkin-simpson", "gauss-4", "stormer-verlet"):  # each builds an
     long_run.chart_of(symtop.integrator(name))[1].loop.plain.__wrapped__()
 print(identity())
 """
-    environment = {**os.environ, "PYTHONPATH": _root()}
-    command = [sys.executable, "-c", script]
-    told = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
+    told = printed_by(script, PYTHONPATH=_root()).split()
     here = longrun._identity(WHERE, symtop.integrator("midpoint"), 0.01, 1000, True)
     assert told == [str(here)] * 2

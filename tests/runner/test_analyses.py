@@ -7,17 +7,15 @@ from dataclasses import replace
 
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 
 import symtop
-from symtop.cli.main import main
 from symtop.core import files
 from symtop.runner import manifest, run as runner, store
 from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool
 from symtop.runner.run import analyse_stored, drawing_digest
 from symtop.runner.study import Case
-from tests.commands import leftovers, same
+from tests.commands import call, leftovers, same
 
 SCRIPT = """
 import os, signal
@@ -59,7 +57,7 @@ def script(tmp_path, monkeypatch):
 
 def studied(results, *files):
     """Exit code and output of one command for several studies."""
-    done = CliRunner().invoke(main, ["study", *files, "--results", str(results), "--jobs", "2"])
+    done = call("study", *files, "--results", results, "--jobs", "2", code=None)
     return done.exit_code, done.output
 
 

@@ -3,15 +3,13 @@
 import sys
 
 import pytest
-from click.testing import CliRunner
 
-from symtop.cli.main import main
 from symtop.core.errors import SymtopError
 from symtop.run.ensemble import chunks
 from symtop.run.ensemble.ensemble import ensemble
 from symtop.run.ensemble.population import population
 from symtop.runner.pool import Pool
-from tests.commands import PROBE, ended, leftovers, same, symtop
+from tests.commands import PROBE, call, ended, leftovers, same, symtop
 
 distributed = pytest.importorskip("distributed")
 pytestmark = [
@@ -68,8 +66,7 @@ def test_an_ensemble_computed_there_is_the_one_computed_here(cluster, tmp_path, 
 @pytest.mark.parametrize("address", ["nowhere", "tcp://127.0.0.1:1", "ftp://x", "tcp://[::1:0"])
 def test_a_scheduler_that_is_none_is_one_sentence(address, tmp_path, monkeypatch):
     monkeypatch.setattr("symtop.run.cluster.PATIENCE", 0.5)
-    done = CliRunner().invoke(main, ["study", str(PROBE), "--results", str(tmp_path), "--scheduler", address])
-    assert done.exit_code == 2, done.output
+    done = call("study", PROBE, "--results", tmp_path, "--scheduler", address, code=2)
     assert "scheduler must be the address of a dask scheduler that answers and has workers" in done.output
     assert "Traceback" not in done.output
 

@@ -14,20 +14,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 
-from symtop.cli.main import main
 from symtop.core import files, netcdf
 from symtop.core.errors import SymtopError
 from symtop.core.signals import at_most
 from symtop.runner import pool as work, run as runner, store
-from tests.commands import PROBE, contents, ended, leftovers, same, stop, symtop
+from tests.commands import PROBE, call, contents, ended, leftovers, same, stop, symtop
 from tests.kills import survive
 
 
 def probe(results, *words):
     """The quick probe in this process: exit code and what it said."""
-    done = CliRunner().invoke(main, ["study", str(PROBE), "--quick", "--results", str(results), *map(str, words)])
+    done = call("study", PROBE, "--quick", "--results", results, *words, code=None)
     assert "Traceback" not in done.output
     assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
     return done.exit_code, done.output

@@ -13,7 +13,7 @@ from symtop.runner.run import load
 BUILT_IN = {
     "convergence": ["spheroid", "goldstein", "loop", "hairer-lubich-wanner"],
     "drift": ["spheroid", "goldstein"],
-    "claims": ["spheroid"],
+    "claims": ["check-case-2", "spheroid"],
 }
 
 

@@ -1,15 +1,11 @@
 """Plug-ins: what one registers counts by the code that it reaches, and is in the studies beside symtop's own."""
 
-import subprocess
-import sys
-
 import pytest
-from click.testing import CliRunner
 
-from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.core.code_hash import changes
 from symtop.methods.framework.registry import split_name
+from tests.commands import call, printed_by
 
 CODE = """\
 import sys
@@ -37,8 +33,7 @@ symtop.register(symtop.Integrator(name="a-users", family="other", summary="", so
 
 def made_of(plugin):
     """What a new process says that the method of a plug-in is made of."""
-    done = subprocess.run([sys.executable, "-c", CODE, plugin], capture_output=True, text=True, timeout=100, check=True)
-    return dict(line.split("\t") for line in done.stdout.splitlines())
+    return dict(line.split("\t") for line in printed_by(CODE, plugin).splitlines())
 
 
 def write(folder, **files):
@@ -64,10 +59,8 @@ def test_functions_count_wherever_they_stand_and_however_they_were_imported(tmp_
 def test_a_mistake_in_a_plugin_is_told_with_its_name_and_as_no_option_of_the_command(tmp_path):
     text = "import symtop\nsymtop.Integrator(name='m', family='other', summary='', solvers={'angles': print}, {})\n"
     plugin = write(tmp_path, plug=text.replace("{})", "symplectic='yes')"))
-    done = CliRunner().invoke(main, ["integrators", "--plugin", str(plugin)])
-    assert (done.exit_code, done.output) == (
-        2, "symtop: plugin plug.py: symplectic must be True, False or None, not 'yes'\n"
-    )  # fmt: skip
+    done = call("integrators", "--plugin", plugin, code=2)
+    assert done.output == "symtop: plugin plug.py: symplectic must be True, False or None, not 'yes'\n"
 
 
 FOUR_LINES = """\
@@ -90,8 +83,7 @@ def plugin(tmp_path_factory):
 @pytest.mark.parametrize("studies", [("convergence",), pytest.param(("drift", "stability"), marks=pytest.mark.slow)])
 def test_a_plugins_method_and_scene_are_in_every_study(studies, plugin, tmp_path):
     words = ["--quick", "--only", "simpson-of-a-user,strang", "--results", str(tmp_path), "--plugin", str(plugin)]
-    done = CliRunner().invoke(main, ["study", *studies, *words])
-    assert done.exit_code == 0, done.output
+    call("study", *studies, *words)
     for study in studies:
         data = netcdf.groups(netcdf.read_any(tmp_path / "quick" / "only" / f"{study}.nc")).values()
         groups = [group for group in data if group.variables]

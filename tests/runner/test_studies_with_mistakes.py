@@ -5,12 +5,11 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 
-from symtop.cli.main import main
 from symtop.core.errors import SymtopError
 from symtop.runner import run as runner
 from symtop.runner.study import Case, StudyError, each
+from tests.commands import call
 
 SCRIPT = """\
 import numpy as np
@@ -50,7 +49,7 @@ def ran(folder, change, *words):
     script.write_text(SCRIPT.format(change=change))
     sys.modules.pop("symtop_study_mine", None)  # of an earlier text
     command = ["study", str(script), "--jobs", "1", "--results", str(folder / "results"), *words]
-    done = CliRunner().invoke(main, command)
+    done = call(*command, code=None)
     assert done.exception is None or isinstance(done.exception, SystemExit), repr(done.exception)
     return done.exit_code, done.output
 

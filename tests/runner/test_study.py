@@ -10,16 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 
 import symtop
-from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.measure.datasets import differences
-from symtop.methods.framework import registry
 from symtop.methods.framework.registry import Integrator
 from symtop.runner import run as runner, store
-from tests.commands import PROBE, contents
+from tests.commands import PROBE, call, contents
 
 
 def measured(path: Path) -> list[xr.Dataset]:
@@ -58,7 +55,7 @@ def test_every_fact_and_table_of_the_report_follows_from_a_stored_dataset(quick_
 
 
 def probe(results, *words):
-    return CliRunner().invoke(main, ["study", str(PROBE), "--quick", "--results", str(results), *words])
+    return call("study", PROBE, "--quick", "--results", results, *words, code=None)
 
 
 def test_status_says_what_is_missing_done_and_stale(tmp_path):
@@ -151,10 +148,7 @@ def test_the_full_grid_and_the_ordinary_one_keep_each_others_cases(tmp_path):
     (tmp_path / "grids.py").write_text(GRIDS)
 
     def computed(*words):
-        done = CliRunner().invoke(
-            main, ["study", str(tmp_path / "grids.py"), "--results", str(tmp_path / "r"), "--json", *words]
-        )
-        assert done.exit_code == 0, done.output
+        done = call("study", tmp_path / "grids.py", "--results", tmp_path / "r", "--json", *words)
         return json.loads(done.output)
 
     for words, count in (([], 2), (["--full"], 2), ([], 0), (["--full"], 0)):
@@ -168,7 +162,7 @@ def test_the_full_grid_and_the_ordinary_one_keep_each_others_cases(tmp_path):
 # ---- failures --------------------------------------------------------------------------------------------------------
 
 
-def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path):
+def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path, clean_registry):
     def solve(top, start, plan):
         raise RuntimeError("no luck")
 
@@ -178,10 +172,7 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path):
     cases.append(dataclasses.replace(cases[0], integrator="unlucky[angles]"))
     small = dataclasses.replace(whole, cases=lambda quick: cases)
     symtop.register(unlucky)
-    try:
-        found = runner.run(small, tmp_path, quick=True, quiet=True)
-    finally:
-        registry._registry.pop("unlucky")
+    found = runner.run(small, tmp_path, quick=True, quiet=True)
     assert found["failures"] == [
         "unlucky[angles] on goldstein failed: integrator unlucky[angles] failed: RuntimeError: no luck"
     ]

@@ -16,7 +16,7 @@ LIAR = "planted-hidden-kick"
 def data():
     """An honest method and a liar, as the study stores them."""
     (liar,) = (case for case in planted.cases(quick=True) if case.integrator == LIAR)
-    cases = [Case(SCENE, "strang", {"quick": True}), liar]
+    cases = [Case(name, "strang", {"quick": True}) for name in (facts.FREE, SCENE)] + [liar]
     return combine([(case, study.measure(case)) for case in cases])
 
 
@@ -31,8 +31,18 @@ def test_a_liar_is_judged_beside_the_honest_and_registered_nowhere(data):
     assert "1 of 1" in shown
 
 
+def test_claims_on_a_free_body_are_counted_by_themselves(data):
+    said, table = facts.facts(data), facts.tables(data)["body"]
+    assert (said["free_methods"], said["free_declared"], said["free_confirmed"]) == (1, 3, 3)
+    assert [*table["claim"]] == ["order", "energy", "momentum"]
+    assert {*facts.tables(data)["ledger"]["scene"]} == {SCENE}
+    wrong = (data["scene"] == facts.FREE) & (data["claim"] == "momentum")
+    refuted = facts.facts(data.assign(verdict=xr.where(wrong & (data["verdict"] != ""), "refuted", data["verdict"])))
+    assert (refuted["free_refuted"], refuted["refuted"]) == (1, said["refuted"])
+
+
 def test_one_that_escapes_is_named_and_one_refuted_for_another_claim_is_not_caught(data):
-    liar = data["variant"] == LIAR
+    liar = (data["variant"] == LIAR) & (data["scene"] == SCENE)
     verdict = xr.where(liar & (data["claim"] == "symmetric"), "confirmed", data["verdict"])
     fooled = data.assign(verdict=xr.where(liar & (data["claim"] == "order"), "refuted", verdict))
     said = facts.facts(fooled)
@@ -49,7 +59,7 @@ def test_a_part_of_the_study_without_them_says_nothing_of_them(data):
 
 
 def test_a_refuted_claim_is_counted_and_comes_first(data):
-    wrong = (data["variant"] == "strang") & (data["claim"] == "symmetric")
+    wrong = (data["variant"] == "strang") & (data["claim"] == "symmetric") & (data["scene"] == SCENE)
     refuted = data.assign(verdict=xr.where(wrong, "refuted", data["verdict"]))
     said, row = facts.facts(refuted), facts.tables(refuted)["ledger"].iloc[0]
     assert (said["refuted"], said["declared"]) == (1, said["held"] + 1)

@@ -43,11 +43,13 @@ from symtop.methods.framework.equations import FORMULATIONS, Formulation
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.space import on_attitude
 from symtop.methods.library.scipy_ivp import solver as solver_of
+from symtop.model.body import rotated, vertical
 from symtop.model.charts import space_momenta
 from symtop.model.top import Angles, SymmetricTop, effective_force
 
 Field = Callable[[float, Array], Array]
 PROBE = 1e-3  # step of the call that shows whether a rotation is a matrix
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 ANY = 1e300  # a tolerance that every step meets; infinity times a component of zero would be no number
 LOOSE = 1e8  # one that every step meets, and beside which an update of Newton's iteration can be seen
 SOLVED, MOST_NEWTON, NEWTON = 1e-14, 50, "NEWTON_MAXITER"  # of a stage, absolute; rounds, and what modules call them
@@ -175,35 +177,18 @@ class Body(NamedTuple):
     mgl: float
 
 
-def to_space(q: Any, vector: Any) -> Any:
-    """R(q) vector for q of any length, shapes (..., 4) and (..., 3)."""
-    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
-    turned = np.cross(q[..., 1:], vector)
-    return vector + 2.0 * (q[..., :1] * turned + np.cross(q[..., 1:], turned))
-
-
-def to_body(q: Any, vector: Any) -> Any:
-    """R(q)^T vector."""
-    return to_space(q * np.array([1.0, -1.0, -1.0, -1.0]), vector)
-
-
-def _up_in_body(w: float, x: float, y: float, z: float) -> tuple[float, float]:
-    """The first two components of R(q)^T e_z for q of any length."""
-    size = w * w + x * x + y * y + z * z or math.nan
-    return 2.0 * (x * z - w * y) / size, 2.0 * (y * z + w * x) / size
-
-
 def _body_of(top: SymmetricTop, at: Angles) -> tuple[Body, tuple[float, ...]]:
     """The body and the state (q, w) of a start."""
-    state = np.array(on_attitude(top, at)[1])
+    q, momentum = np.split(np.array(on_attitude(top, at)[1]), [4])
     inertia = np.array([top.I1, top.I1, top.I3])
-    return Body(inertia, top.mgl), (*state[:4].tolist(), *(to_body(state[:4], state[4:]) / inertia).tolist())
+    return Body(inertia, top.mgl), (*q.tolist(), *(rotated(q * CONJUGATE, momentum) / inertia).tolist())
 
 
 def _body_shown(body: Body, _times: Array, states: Array) -> Array:
     """States (q, L) of states (q, w)."""
     with np.errstate(all="ignore"):
-        return np.concatenate([states[:, :4], to_space(states[:, :4], body.inertia * states[:, 4:])], axis=1)
+        turn = states[:, :4] / np.linalg.norm(states[:, :4], axis=1, keepdims=True)
+        return np.concatenate([states[:, :4], rotated(turn, body.inertia * states[:, 4:])], axis=1)
 
 
 def _body_momenta(body: Body, states: Array) -> tuple[Array, Array]:
@@ -217,7 +202,7 @@ ROTATION = FORMULATIONS["attitude"]._replace(prepare=_body_of, present=_body_sho
 def _matrix_of(top: SymmetricTop, at: Angles) -> tuple[Body, tuple[float, ...]]:
     """The body and the state (R, w) of a start, R row by row."""
     body, state = _body_of(top, at)
-    return body, (*to_space(np.array(state[:4]), np.eye(3)).T.ravel().tolist(), *state[4:])
+    return body, (*rotated(state[:4], np.eye(3)).T.ravel().tolist(), *state[4:])
 
 
 def _with_quaternions(states: Array) -> Array:
@@ -264,8 +249,8 @@ class RotationStep(FunctionStep):
             nonlocal calls
             calls += 1
             at = np.asarray(q, dtype=float)
-            up = at[2] if shape == (3, 3) else _up_in_body(*at.tolist())
-            return np.array([par.mgl * up[1], -par.mgl * up[0], 0.0])
+            x, y, _ = at[2] if shape == (3, 3) else np.array(vertical(*at.tolist())) / (float(at @ at) or math.nan)
+            return np.array([par.mgl * y, -par.mgl * x, 0.0])
 
         def once(_: float, y: Array) -> Array:
             q = y[:-3].reshape(shape)

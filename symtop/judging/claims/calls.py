@@ -3,15 +3,15 @@
 A one-step method is a function of its arguments. A call is repeated, then repeated after a step somewhere else: one
 that differs keeps something, such as the last force, and its runs depend on the runs before. Where the loop over steps
 is somebody else's, a run of n + m steps is compared with a run of n and one of m: a loop that sums its time and stops
-too late or too soon is a step away, a method of several steps less. The same is done after many steps, n and m drawn at
-random, the m steps from a state whose last bit is changed, once in a new process: what a step remembers of a state, or
-of the steps that it has made, is not there. Then the first call is repeated.
+too late or too soon is a step away, a method of several steps less. So are runs of many steps, n and m drawn at random,
+whosever the loop is, once in a new process. The m steps begin at a state whose last bit is changed: what a step
+remembers of a state, or of the steps that it has made, is not there. Then the first call is repeated.
 """
 
 import contextlib
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -30,7 +30,7 @@ AGAIN, NOISY = 16, 0.1  # calls that tell noise from what is kept, by how much o
 REPEATS, SECONDS = 250, 0.3  # calls with the same arguments, or as many as there is time for
 NOTHING, STANDS = 1e-8, 1e-6  # a step of so little moves a state by less than this, relative
 FAR = 200.0  # times the step: one that most methods do not survive
-PARTS = ((20, 20), (64, 64), (100, 157), (311, 500), (1000, 1000))  # runs that are cut in two
+PARTS = [(20, 20), (64, 64), (100, 157), (311, 500), (1000, 1000)]  # steps of runs that are cut in two
 REMEMBERED = 1e-9  # of a step: a last slope that is kept, and not computed anew, makes 1e-10 in 2000 steps
 MISSED = 0.2  # of a step: a method of several steps starts anew with less
 LATE = {False: (100_000, 3.0), True: (20_000, 0.5)}  # quick: steps before a late one, or as many as there are seconds
@@ -74,13 +74,14 @@ def _calls(subject: Subject) -> Finding:
     traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # in two words, and in a clause
     single = {"single precision": "its numbers are those of single precision"}
     traits |= single if (first == first.astype(np.float32)).all() else {}
-    missed, why = _steps_missed(stepper, scene, h / 10.0) if stepper.own_loop else (0.0, "")
+    missed, why = _cut(stepper, scene, h / 10.0, PARTS) if stepper.own_loop else (0.0, "")
     if missed > MISSED:
         return _refuted("miscounts steps", why, missed, MISSED)
     traits |= {"remembers": why} if missed > REMEMBERED else {}
-    missed, why = _late(subject, h / 1.6)
+    missed, why = _cut(stepper, scene, h / 1.6, _late(subject))
     if missed > (most := MISSED if stepper.own_loop else RECALLED):
-        return _refuted("keeps state", f"it keeps something between calls: {why}", missed, most)
+        why = f"it keeps something between calls: {why} (seed {subject.seed})"
+        return _refuted("keeps state", why, missed, most)
     if (gap := relative_gap(first, once(start, h))) > SAME:
         why = f"it keeps something between calls: the first one, repeated, differs by {gap:.1e}"
         return _refuted("keeps state", why, gap)
@@ -113,47 +114,31 @@ def _repeated(
     return _refuted("keeps state", f"it keeps something between calls: {how} differs by {gap:.1e}", gap)
 
 
-def _steps_missed(stepper: Stepper, scene: Scene, h: float) -> tuple[float, str]:
-    """How far a run is from two runs of as many steps, in steps, and a clause; the largest of `PARTS`."""
+def _cut(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, int]]) -> tuple[float, str]:
+    """How far the last m steps of a run of n + m are from those asked again, in steps, and a clause; the largest."""
     start, run = stepper.from_start(scene.top, generic_start(scene), h)
-    a_step = _gap(run(start, 1)[0], start)
-    if a_step == 0.0:  # it stands still, which is not to count wrongly
-        return 0.0, ""
-    gaps = {(n, m): _gap(run(start, n + m)[0], run(run(start, n)[0], m)[0]) / a_step for n, m in PARTS}
-    n, m = max(PARTS, key=lambda parts: gaps[parts])
-    return gaps[n, m], f"a run of {n + m} steps is {gaps[n, m]:.2g} steps from one of {n} and one of {m}"
-
-
-def _late(subject: Subject, h: float) -> tuple[float, str]:
-    """How far the last steps of a run are from the same steps asked again, in steps, and a clause; the largest of some.
-
-    Runs end with the longest, so that a call after them comes after many steps of one process.
-    """
-    stepper, scene, draw = subject.stepper, subject.scene, np.random.default_rng(subject.seed)
-    start, run = stepper.from_start(scene.top, generic_start(scene), h)
-    most, seconds = LATE[subject.quick]
-    longest = max(min(most, seconds / max(subject.seconds_a_step, 1e-9)), AFTER)
-    a_step = _gap(run(start, 1)[0], start) or 1.0
-    worst, words = 0.0, "after few steps"
-    for k, share in enumerate((*np.sort(draw.uniform(0.2, 1.0, LATER - 1)).tolist(), 1.0)):
-        n, m = round(longest**share * draw.uniform(1.0, 1.1)), int(draw.integers(1, AFTER))
+    a_step, worst, words = _gap(run(start, 1)[0], start) or 1.0, 0.0, "after few steps"
+    for k, (n, m) in enumerate(parts):
         middle, end = run(start, n, n + m)
         if stepper.own_loop:
             end = run(start, n + m)[0]
         elif k == 0:
             stepper.renew()
-        if not _largest(middle) <= BLOWN_UP * _largest(start):  # NaN too, which a class of SciPy's does not take
+        if not np.abs(middle).max() <= BLOWN_UP * np.abs(start).max():  # NaN too, which SciPy's classes refuse
             continue  # there the last bit alone moves a step further than any memory
         gap = _gap(end, run(np.nextafter(middle, np.inf), m)[0]) / a_step
         words = words if np.isfinite(gap) else "after a run that fails"
         if gap > worst:
-            worst = gap
-            words = f"after {n} steps (seed {subject.seed}) the next {m} are {gap:.1e} of a step from those asked again"
+            worst, words = gap, f"after {n} steps the next {m} are {gap:.1e} of a step from those asked again"
     return worst, words
 
 
-def _largest(state: Any) -> float:
-    return float(np.max(np.abs(state)))
+def _late(subject: Subject) -> list[tuple[int, int]]:
+    """Lengths of such runs, drawn; the last is the longest, so that a call after it comes after many steps."""
+    draw, (most, seconds) = np.random.default_rng(subject.seed), LATE[subject.quick]
+    longest = max(min(most, seconds / max(subject.seconds_a_step, 1e-9)), AFTER)
+    shares = *np.sort(draw.uniform(0.2, 1.0, LATER - 1)).tolist(), 1.0
+    return [(round(longest**one * draw.uniform(1.0, 1.1)), int(draw.integers(1, AFTER))) for one in shares]
 
 
 def _gap(first: Any, second: Any) -> float:

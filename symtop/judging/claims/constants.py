@@ -11,6 +11,9 @@ the size of rounding only the size is judged. While it has changed little, no co
 next by `SUDDEN` times what as many of the largest steps at the beginning add up to: else the step is another one
 somewhere, whatever is claimed of it.
 
+A run blows up when its energy has risen by more than that of the nutation and all that the weight can give, 2 |mgl|: no
+friction does that, and nothing after it is of the top. The constants are judged over the run until then, made again.
+
 A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 tau, whatever its tau: c is fitted, and it
 is the rest of the fit that must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
 
@@ -34,10 +37,10 @@ from symtop.measure.step_map import one_step
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Array, Plan, Run, sentence
 from symtop.methods.framework.registry import Integrator
-from symtop.model.charts import space_momenta
+from symtop.model.charts import BODY, space_momenta
 from symtop.model.scenes import Scene
 from symtop.model.top import SymmetricTop
-from symtop.run.simulation import make_plan
+from symtop.run.simulation import chart_of, make_plan
 from symtop.run.trajectory import Trajectory
 
 STEPS, QUICK_STEPS = 1_000_000, 50_000
@@ -54,9 +57,10 @@ ROUNDING_OF_A_STEP = 2e-13  # a change in one step that may be rounding, where |
 BOUNDED = 0.25  # an exponent that exceeds it with its whole interval is growth
 SURE = 8.0
 VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
-SUDDEN, LITTLE, BLOWN_UP, FROM = 100.0, 1e-2, 1e4, "changes as it begins"
-OF_A_RUN = (*CONSTANTS, "reported", "invariant", "explicit", "work")
-KINDS = ("kept", "bounded", "random walk", "growing", "drift")  # from best to worst
+SUDDEN, LITTLE, FROM = 100.0, 1e-2, "changes as it begins"
+OF_A_RUN = (*CONSTANTS, "reported", "invariant", "explicit", "work")  # reported: momenta beside those of the states
+OF_MOTION = (*CONSTANTS, "momentum")  # the last of a body: L in space, of a heavy one L_z
+KINDS = ("kept", "bounded", "random walk", "growing", "drift", "blows up")  # from best to worst
 OWN = "its states'"  # what every run says of the momenta that it reports
 BADNESS = ("inapplicable", "measured", "confirmed", "undecided", "refuted")
 CUTS, SAME_RUN, OF_RUN = 8, 1e-9, "state"  # runs that are compared with parts of longer ones, and within what
@@ -109,6 +113,15 @@ class Constant(NamedTuple):
         true = {"kept": within, "bounded": not self.grows}.get(claimed)
         return "measured" if true is None else "confirmed" if true else "refuted"
 
+    def finding(self, claim: str, claimed: str, why: str) -> Finding:
+        """The finding on the claim."""
+        verdict, measured = self.verdict(claimed), Measured(self.kind, self.changed.largest)
+        if self.kind == "unknown":
+            why, measured = f"{why}; no law of growth to judge it by", NOTHING
+        elif verdict == "undecided":
+            why += ", which leaves open whether it grows"
+        return Finding(claim, claimed, measured, verdict, why, self.changed.largest, self.floor)
+
 
 class LongRun(NamedTuple):
     """One long run: its constants by name, and its cost."""
@@ -124,6 +137,7 @@ class LongRun(NamedTuple):
     steady_cost: bool  # every run of the same number of steps cost the same, at two step sizes
     reported: Difference | None  # of the momenta from those of the states; None where the states show none
     energy: Array  # times, in nutations, and the largest relative change around each, shape (2, WINDOWS)
+    blown_up: float = math.nan  # the time at which it blew up; the run is that until then
 
     @property
     def span(self) -> str:
@@ -147,7 +161,7 @@ def _run(
         control = {"tolerance": TOLERANCE}
     plan, _ = make_plan(scene, method, **control, horizon=horizon, samples=samples)
     own = run = solve(method, chart, scene.top, scene.start, plan, f" on {scene.name}")
-    if chart != "angles":
+    if chart in ("axis", "attitude"):
         with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up
             p_phi, p_psi = space_momenta(chart, run.states)
         own = run._replace(p_phi=p_phi, p_psi=p_psi)
@@ -177,25 +191,27 @@ def long_run(
     steady = len({one.force_evaluations / max(one.steps, 1) for one in (first, other)}) == 1
     reported = None
     plain = isinstance(method.solvers[inside], AdapterSolver)
-    if not plain:  # else its momenta are those of its states
+    if not (plain or scene.of_body):  # else its momenta are those of its states
         reported = _reported(method, scene, chart, shown, (run, plan))
         if method.fixed_step:
             reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
-    changes, every_step = constants(scene, shown), constants(scene, pilot)
+    changes, every_step, blown_up = constants(scene, shown), constants(scene, pilot), math.nan
+    risen = np.flatnonzero(changes["energy"] > 1.0 + 2.0 * abs(scene.top.mgl) / scene.energy_scale)
+    if risen.size:
+        blown_up = float(plan.times[risen[0]])
+        shown, run, plan = _run(method, scene, inside, blown_up / step, step, SAMPLES)
+        changes = constants(scene, shown)
     made, grains = max(run.steps, 1), {"energy": scene.energy_grain}
     kept = {
-        name: change_of(
-            plan.times, changes[name], every_step[name], made, grains.get(name, 1.0), changes["energy"], plain=plain
-        )
+        name: change_of(plan.times, changes[name], every_step[name], made, grains.get(name, 1.0), plain=plain)
         for name in (changes if chart != PLANE else ("energy",))
     }
     message, nutations = sentence(run.outcome, run.reached, float(plan.times[-1])), run.reached / unit
     costs = run.force_evaluations / made, run.newton_iterations / made, steady
-    energy, times = np.full((2, WINDOWS), math.nan), plan.times / unit
-    shown_by = tops(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS)  # fewer, where no sample is
-    for row, values in zip(energy, shown_by, strict=True):
-        row[: len(values)] = values
-    return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *costs, reported, energy)
+    times = plan.times / unit
+    rows = tops(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS)  # fewer, where no sample is
+    energy = np.array([np.pad(row, (0, WINDOWS - len(row)), constant_values=math.nan) for row in rows])
+    return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *costs, reported, energy, blown_up)
 
 
 def _contradiction(
@@ -222,21 +238,21 @@ def _reported(
     run, plan = long
     if chart == "angles":
         return from_increments(method, scene, plan) if method.fixed_step else None
-    apart = {}
-    for name in ("p_phi", "p_psi"):
-        gap = np.abs(getattr(run, name) - getattr(shown, name)) / scene.momentum_scale
-        apart[name] = float(np.max(gap[np.isfinite(gap)], initial=0.0))
-    name = max(apart, key=lambda one: apart[one])
-    return Difference(name, apart[name], REPORTED, f"of the larger momentum in {run.steps} steps")
+    gaps = {name: np.abs(getattr(run, name) - getattr(shown, name)) for name in ("p_phi", "p_psi")}
+    size, name = max((float(np.max(gap[np.isfinite(gap)], initial=0.0)), name) for name, gap in gaps.items())
+    return Difference(name, size / scene.momentum_scale, REPORTED, f"of the larger momentum in {run.steps} steps")
 
 
 def constants(scene: Scene, run: Trajectory) -> Rows:
     """Relative change of every constant that the run's chart has, at its samples."""
     changes = residuals(scene, run)
+    if scene.of_body:
+        moved = (run.momentum - run.momentum[0]) / scene.momentum_scale
+        return changes | {"momentum": np.linalg.norm(moved, axis=1) if scene.top.free else moved[:, 2]}
     if run.chart != "angles":
         changes["axis_length"] = np.linalg.norm(run.axis, axis=1) - 1.0
-    if run.chart != "angles" and math.isfinite(run.step_size):
-        changes["cayley_energy"] = _cayley_residual(scene.top, run)
+        if math.isfinite(run.step_size):
+            changes["cayley_energy"] = _cayley_residual(scene.top, run)
     return changes
 
 
@@ -257,13 +273,12 @@ def _cayley_residual(top: SymmetricTop, run: Trajectory) -> Array:
 
 
 def change_of(
-    time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0, energy: Any = 0.0, *,
-    plain: bool = False,
-) -> Constant:  # fmt: skip
+    time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0, *, plain: bool = False
+) -> Constant:
     """Size, growth and trend of a residual over so many steps; `every_step` holds it at consecutive ones.
 
-    Where the change of the `energy` is beyond `BLOWN_UP`, rounding is larger, and nothing is sudden. Of `plain` sums
-    half of what rounding makes in one step may be a bias, and add up, but no more than a unit of rounding a step.
+    Of `plain` sums half of what rounding makes in one step may be a bias, and add up, but no more than a unit of
+    rounding a step.
     """
     jumps = np.abs(np.diff(every_step))
     a_step = float(np.max(jumps[np.isfinite(jumps)])) if np.isfinite(jumps).any() else math.nan
@@ -272,8 +287,8 @@ def change_of(
     floor = max(KEPT * grain, rounding)
     with np.errstate(all="ignore"):  # a run may blow up
         ratio = np.abs(np.diff(values)) / max(a_step * steps / (time.size - 1), floor)
-        calm = (np.abs(values) < LITTLE) & (np.abs(energy) < BLOWN_UP)
-        jump = np.flatnonzero((ratio[1:] > SUDDEN) & (ratio[:-1] < SUDDEN / 10.0) & calm[1:-1])
+        calm = np.abs(values[1:-1]) < LITTLE
+        jump = np.flatnonzero((ratio[1:] > SUDDEN) & (ratio[:-1] < SUDDEN / 10.0) & calm)
     words = "after t = {:.4g} it changes {:.0e} times as much as by its first steps"
     sudden = words.format(time[jump[0] + 1], ratio[jump[0] + 1]) if jump.size else ""
     return Constant(constant_of(time, values), a_step, floor, grain, sudden)
@@ -281,14 +296,16 @@ def change_of(
 
 def measure(subject: Subject) -> list[Finding]:
     """Everything that one long run in each chart shows; the worst chart decides, and the finding names it."""
-    method, runs, by_chart = subject.method, [], []
+    method, scene, runs, by_chart = subject.method, subject.scene, [], []
+    charts = (chart_of(method, BODY),) if scene.of_body else (PLANE,) if subject.in_plane else method.charts()
     options: dict[str, Any] = {"quick": subject.quick, "most": subject.long_steps, "seed": subject.seed}
-    for chart in (PLANE,) if subject.in_plane else method.charts():
+    for chart in charts:
         try:
-            runs.append(long_run(method, subject.scene, chart, **options))
+            runs.append(long_run(method, scene, chart, **options))
             findings = of_run(method, runs[-1])
         except SymtopError as error:
-            findings = [undecided(claim, declared(method, claim), str(error)) for claim in OF_A_RUN]
+            every = (*OF_A_RUN, "momentum")
+            findings = [undecided(claim, declared(method, claim), str(error)) for claim in every]
         by_chart.append([_named(one, chart) for one in findings])
     if runs:
         subject.traces.update(min(runs, key=lambda run: run.steps).traces())
@@ -297,7 +314,7 @@ def measure(subject: Subject) -> list[Finding]:
 
 def of_run(method: Integrator, run: LongRun) -> list[Finding]:
     """What one long run shows of each claim of `OF_A_RUN`."""
-    motion = [_constant(method, one, declared(method, one), run, run.constants.get(one)) for one in CONSTANTS]
+    motion = [_constant(method, one, declared(method, one), run, run.constants.get(one)) for one in OF_MOTION]
     return [*motion, _of_states(run), _invariant(method, run), *_costs(method, run)]
 
 
@@ -316,25 +333,29 @@ def _badness(one: Finding) -> tuple[int, int, float]:
 def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, constant: Constant | None) -> Finding:
     if constant is None:
         return inapplicable(claim, f"the {run.chart} chart has no such constant", claimed)
-    kind, changed, verdict = constant.kind, constant.changed, "undecided"
-    measured = Measured(kind, changed.largest) if kind != "unknown" and run.steps else NOTHING
+    kind, changed, ended = constant.kind, constant.changed, run.outcome != "ok"
     why = constant.words(f"in {run.span}, {constant.a_step:.0e} in one step at most")
     why += f", drifting by {changed.rise / max(run.steps, 1):.1e} a step" if kind == "drift" else ""
+    finding = constant.finding(claim, claimed, why)
+    finding = finding if run.steps else finding._replace(measured=NOTHING)
     # an error that returns with the nutation cannot exceed the largest change of a step, all one way
     most = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
-    steady = kind in ("kept", "bounded")
-    if run.outcome not in ("ok", "not_finite", "not_normalised") or (steady and run.outcome != "ok"):
-        why += f"; but the run {run.message}"
-    elif method.fixed_step and constant.sudden:
-        verdict, claimed, why = "refuted", claimed or FROM, f"{constant.sudden}; {why}"
-    elif kind == "unknown":
-        why = f"the run {run.message}" if run.outcome != "ok" else f"{why}: no exponent to judge it by"
-    elif claimed == "bounded" and kind != "kept" and changed.largest > max(most, constant.floor):
-        verdict, why = "refuted", f"{why}, more than the steps of a nutation can add up to: it does not come back"
-    else:
-        verdict = constant.verdict(claimed)
-        why += ", which leaves open whether it grows" if verdict == "undecided" else ""
-    return Finding(claim, claimed, measured, verdict, why, changed.largest, constant.floor)
+    if claim == "energy" and run.blown_up > 0.0:
+        when, pace = f"t = {run.blown_up:.3g}", run.steps / run.nutations
+        text = f"blows up at {when}, after {run.steps} steps, {pace:.0f} a nutation"
+        why = f"by {when} it rises by more than that of the nutation and 2 |mgl|: {why}"
+        measured, verdict = Measured("blows up", changed.largest, text), "refuted" if claimed else "measured"
+        return finding._replace(measured=measured, verdict=verdict, why=why)
+    if run.outcome not in ("ok", "not_finite", "not_normalised") or (ended and kind in ("kept", "bounded")):
+        return finding._replace(verdict="undecided", why=f"{why}; but the run {run.message}")
+    if method.fixed_step and constant.sudden:
+        return finding._replace(verdict="refuted", declared=claimed or FROM, why=f"{constant.sudden}; {why}")
+    if kind == "unknown" and ended:
+        return finding._replace(why=f"the run {run.message}")
+    if claimed == "bounded" and kind not in ("kept", "unknown") and changed.largest > max(most, constant.floor):
+        why += ", more than the steps of a nutation can add up to: it does not come back"
+        return finding._replace(verdict="refuted", why=why)
+    return finding
 
 
 def _of_states(run: LongRun) -> Finding:
@@ -383,6 +404,5 @@ def _costs(method: Integrator, run: LongRun) -> list[Finding]:
     why = f"it reports no iterations and {run.evaluations:.2f} forces a step, always"
     why += "; so does a method that solves linear equations" * (answer is None)
     why = f"it reports {run.iterations:.2f} iterations a step" if iterates else why
-    measured = NOTHING if answer is None else Measured(yes_no(answer))
-    verdict = agreement(declared=method.explicit, measured=answer)
-    return [Finding("explicit", claimed, measured, verdict, why, run.iterations, 0.0), work]
+    finding = agreement("explicit", method.explicit, answer, why, run.iterations, 0.0)
+    return [finding._replace(measured=Measured(yes_no(answer))), work]

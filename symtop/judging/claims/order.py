@@ -22,12 +22,12 @@ A map of (theta, p_theta) is judged by its error of theta. A step that chooses i
 order, is to come as near to the motion as its tolerance asks: its error is rounding at the least tolerance, or falls.
 
 *Time.* The top's equations are autonomous: a method whose f is called at wrong times, the nodes c of its tableau, is
-right on them. In a frame that turns about a horizontal axis at a rate w, z = R(t)^T y moves by
+right on them. By a clock g that runs fast and slow the motion z(t) = y(g(t)) solves
 
-    z' = R^T f(R z) - w x z          for e and L alike, gravity being R^T k,
+    z' = g'(t) f(z),        g = t + a (sin(w (t - t0) + 1) - sin 1)/w,
 
-which depends on t. The series of one step from t0 is set beside that of R(t)^T y(t). An order that is lower than in a
-frame at rest, w = 0, is one of wrong times. A step that asks f at t0 alone was written for f(y), which refutes nothing.
+which depends on t. The series of one step from t0 is set beside that of y(g(t)). An order that is lower than with an
+even clock, a = 0, is one of wrong times. A step that asks f at t0 alone was written for f(y), which refutes nothing.
 """
 
 import contextlib
@@ -44,7 +44,7 @@ from symtop.judging.claims.structure import ONE_MAP, map_of
 from symtop.judging.claims.subject import FINEST, Subject
 from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, undecided, yes_no
 from symtop.measure.accuracy import error_table
-from symtop.measure.order import BESIDE, LARGEST_ERROR, Fit, order_verdict
+from symtop.measure.order import BESIDE, CLEARLY, LARGEST_ERROR, Fit, order_verdict
 from symtop.measure.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
@@ -52,16 +52,14 @@ from symtop.measure.step_map import StepMap, aligned, generic_start, one_step, r
 from symtop.measure.step_series import Series, compared, step_series
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.loop import FixedStep
-from symtop.methods.framework.plan import Array, sentence
+from symtop.methods.framework.plan import Array
 from symtop.methods.framework.preparation import Scaled
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import Tableau
 from symtop.methods.splitting.loop import Composition
 from symtop.methods.splitting.rotor import EXACT
-from symtop.model import charts
-from symtop.model.scenes import Scene, closed_form, scene as find_scene
+from symtop.model.scenes import Scene, scene as find_scene
 from symtop.model.top import Angles
-from symtop.run.simulation import integrate
 
 NUTATIONS = 1.37  # length of the runs that the slope is fitted to
 FALLBACK, LONGER = "goldstein", (8.37, 40.0)
@@ -75,7 +73,7 @@ DRAWS, DRAWING = (96, 32), (10.0, 3.0)  # starts at which the order of one step 
 HALVINGS, SHORT = 10, 80.0  # steps that are tried from each, and how many of a short one make a nutation
 LOWER, JUMP = 0.6, 3.0  # an order is lower by so much, or jumps by so much
 LARGE, SEEN = 1e-3, 1e-11  # a miss beyond the first is of no power, below the second rounding
-TURNS = 0.7  # of the frame in a nutation
+UNEVEN, WAVES = 0.6, 0.7  # a, and waves of the clock in a nutation
 BEGIN = 0.23  # of a nutation: t0
 CLEAR = 1e-9  # noise of the h^1 term: a step that is rounded to single precision leaves 1e-8
 CONVERGES, ROUNDED, FALLS = "converges", 1e-10, (1e4, 10.0)  # an error that falls to a tenth over four decades
@@ -118,22 +116,19 @@ def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
                 step = one_step(subject.method, chart, scene, float(sizes[0]))
                 if restart_gap(step, scene.start) > ONE_MAP:
                     continue
-                order, h = _lower(sizes, _misses(step, scene, sizes), power, scale / SHORT)
+                order, h = _lower(sizes, _misses(step, scene.start, sizes), power, scale / SHORT)
                 if order < power:
                     return order, f"a step of h = {h:.2g} from {name} has order {order:.1f}, in the {chart} chart"
     return None
 
 
-def _misses(step: StepMap, scene: Scene, sizes: Array) -> Array:
+def _misses(step: StepMap, start: Angles, sizes: Array) -> Array:
     """How far steps of these sizes end from the motion; NaN where a step fails."""
-    exact, z, before, misses = closed_form(scene)(sizes), step.point(scene.start), step.at(scene.start), []
-    for h, *angles in zip(sizes.tolist(), *(values.tolist() for values in exact), strict=True):
-        true = aligned(step.chart, step.at(Angles(*angles)), before)
-        try:
-            misses.append(step.gap(aligned(step.chart, step.image(z, h), before), true))
-        except SymtopError:
-            misses.append(math.nan)
-    return np.array(misses)
+    motion, z, misses = step.motion(start), step.point(start), np.full(sizes.size, math.nan)
+    for k, h in enumerate(sizes.tolist()):
+        with contextlib.suppress(SymtopError):
+            misses[k] = step.gap(step.image(z, h), motion(h))
+    return misses
 
 
 def _lower(sizes: Array, misses: Array, power: int, short: float) -> tuple[float, float]:
@@ -146,6 +141,21 @@ def _lower(sizes: Array, misses: Array, power: int, short: float) -> tuple[float
         return float(orders[fine].max()), float(sizes[fine[0]])
     jumps = np.flatnonzero(clear[1:] & clear[:-1] & (orders[1:] > power + JUMP) & (orders[:-1] < power - LOWER))
     return (float(orders[jumps[0]]), float(sizes[jumps[0]])) if jumps.size else (math.inf, math.nan)
+
+
+def on_body(subject: Subject) -> list[Finding]:
+    """The finding on a body without symmetry: the slope of attitude errors alone.
+
+    A method may be of higher order on one body than on others, as Fasso's is: that refutes nothing.
+    """
+    claim, scene = subject.method.order, subject.scene
+    fitted = measured_order(subject.method, scene, quick=subject.quick, main="attitude")
+    fit, verdict, why = fitted.main, order_verdict(claim, fitted.main), f"attitude {fitted.main} on {scene.name}"
+    if not fitted.measured:
+        return [undecided("order", yes_no(claim), fit.reason)]
+    if verdict == "refuted" and fit.slope - fit.interval > (claim or 0) + CLEARLY:
+        verdict, why = "measured", f"{why}: here the error falls with a higher power"
+    return [Finding("order", yes_no(claim), fitted.measured, verdict, why, fit.slope, fit.interval)]
 
 
 def _terms(series: Series) -> Measured:
@@ -197,12 +207,11 @@ def measured_order(
     method: Integrator, scene: Scene, *, quick: bool = False, finest: float | None = None, main: str = ""
 ) -> Order:
     """Slopes of the errors of attitude (or axis, or `main`), theta and energy; `finest`: most steps of a run."""
-    if method.control is None:
-        raise SymtopError(f"{method.name} has neither a step nor a tolerance")
     runs, shown = [(scene, NUTATIONS)], observable(method)
     if finest is not None and method.fixed_step:
         runs.append((scene, SHARE))  # the same number of steps, and smaller errors
-    if not (quick or not method.fixed_step or method.order is None or method.implementation == "python"):
+    known = method.fixed_step and method.order is not None and not scene.of_body
+    if known and not quick and method.implementation == "compiled":
         runs += [(find_scene(FALLBACK), nutations) for nutations in LONGER]
     count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # steps that are chosen scatter
     most = FINEST[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
@@ -328,24 +337,19 @@ def limit(method: Integrator, scene: Scene, power: int, finest: float | None = N
     """How far from the true motion runs of a method of order `power`, of `finest` steps at most, end as h -> 0."""
     fewest = STEPS.get(power, 200) // (1 if method.implementation == "compiled" else 20)
     fewest = fewest if finest is None else min(fewest, int(finest) // 4)
-    first, second, third = (_signed_error(method, scene, SHARE * scene.time_scale(), fewest * 2**k) for k in range(3))
+    step = one_step(method, method.chart_for(observable(method)), scene, SHARE * scene.time_scale() / fewest)
+    true = step.motion(scene.start)(step.h * fewest)
+
+    def signed_error(steps: int) -> Array:
+        end = step.shown(step.run(scene.start, step.h * fewest / steps, steps))
+        return aligned(step.chart, end, true) - true
+
+    first, second, third = (signed_error(fewest * 2**k) for k in range(3))
     # errors at h and h/2 without their term in h^power, then without that in h^(power + 1)
     coarse, fine = (b + (b - a) / (2.0**power - 1.0) for a, b in ((first, second), (second, third)))
     last = fine + (fine - coarse) / (2.0 ** (power + 1) - 1.0)
     size = [float(np.max(np.abs(value))) for value in (third, fine, last)]
     return Limit(min(size[0], size[2]), abs(size[2] - size[1]))
-
-
-def _signed_error(method: Integrator, scene: Scene, horizon: float, steps: int) -> Array:
-    run = integrate(scene, method, step_size=horizon / steps, horizon=horizon, samples=2, observe=observable(method))
-    if run.outcome != "ok":
-        end = sentence(run.outcome, run.reached_time, horizon)
-        raise SymtopError(f"a run of {steps} steps over {horizon:.3g} {end}")
-    true = closed_form(scene)(np.array([horizon]))
-    axis = charts.axis_from_angles(true.theta[0], true.phi[0])
-    slip = (float(run.p_theta[-1]) - scene.top.I1 * float(true.theta_dot[0])) / scene.momentum_scale
-    turn = [] if run.psi is None else [float(run.psi[-1]) - float(true.psi[0])]
-    return np.array([*(run.axis[-1] - axis), slip, *turn])
 
 
 def _exactness(subject: Subject) -> Finding:
@@ -375,73 +379,65 @@ def table_of(method: Integrator) -> Conditions | None:
 
 
 def time_order(subject: Subject) -> list[Finding]:
-    """The finding on the order in a frame that turns."""
+    """The finding on the order where f depends on the time."""
     if subject.autonomous or not (subject.method.fixed_step and subject.stepper.takes_field):
         why = "it was written for f(y)" if subject.autonomous else "it takes no right-hand side"
         return [inapplicable("time", why)]
-    order, rate = subject.method.order, 2.0 * math.pi * TURNS / subject.scene.time_scale()
-    turning, calls = series_in_frame(subject, rate)
+    order = subject.method.order
+    series, calls = series_by_clock(subject, UNEVEN)
     if not calls:
         return [inapplicable("time", "it asks for no right-hand side")]
-    if turning.order < 0:
+    if series.order < 0:
         return [inapplicable("time", "a step of no length moves a state that is not of its chart")]
-    power = turning.order if order is None else order
-    shown = min(turning.order, power)
+    power = series.order if order is None else order
+    shown = min(series.order, power)
     declared, measured, verdict = yes_no(order), Measured("order", shown, text=str(shown)), "measured"
-    if turning.order >= min(power, turning.resolved):
-        if turning.order < power:  # no higher term is resolved
+    if series.order >= min(power, series.resolved):
+        if series.order < power:  # no higher term is resolved
             measured, verdict = Measured("order", shown, text=f"{shown} or more"), "undecided"
         elif order is not None:
             verdict = "confirmed"
-        why = f"where f depends on t, {turning.words(power)}"
+        why = f"where f depends on t, {series.words(power)}"
     elif subject.knows_top:
         return [inapplicable("time", "it knows equations of the top beside f, which depend on no time")]
     elif calls == {BEGIN * subject.scene.time_scale()}:  # a step for f(y): no fault on a top
         declared, measured = "", Measured("f(y) only", shown, text=f"f(y) only, {shown}")
         why = "f is asked at the start of a step alone, which is right for f(y); where f depends on t, "
-        why += turning.wrong_term()
-    elif series_in_frame(subject, 0.0)[0].order <= turning.order:  # the order is wrong, and not the times
-        declared, why = "", f"{turning.wrong_term()}, as for f(y)"
+        why += series.wrong_term()
+    elif series_by_clock(subject, 0.0)[0].order <= series.order:  # the order is wrong, and not the times
+        declared, why = "", f"{series.wrong_term()}, as for f(y)"
     else:
-        verdict, why = "refuted", f"where f depends on t, {turning.wrong_term()}: f is asked at wrong times"
-    term = min(power, turning.order + 1)
-    return [Finding("time", declared, measured, verdict, why, turning.worst(term), turning.least(term))]
+        verdict, why = "refuted", f"where f depends on t, {series.wrong_term()}: f is asked at wrong times"
+    term = min(power, series.order + 1)
+    return [Finding("time", declared, measured, verdict, why, series.worst(term), series.least(term))]
 
 
-class TurningField:
-    """y' = f(t, y) on the axis in a frame that turns about x at a rate; it keeps the times it sees."""
+class Hastened:
+    """y' = g'(t) f(y) on the axis, by a clock with a and w; it keeps the times it sees."""
 
-    def __init__(self, par: Any, rate: float) -> None:
-        self.par, self.rate, self.times = par, rate, set[float]()
+    def __init__(self, par: Any, uneven: float, rate: float, begin: float) -> None:
+        self.par, self.uneven, self.rate, self.begin = par, uneven, rate, begin
+        self.times = set[float]()
 
-    def turned(self, t: float, y: Any, sign: float = 1.0) -> Array:
-        """R(t) y for sign 1, R(t)^T y for -1."""
-        c, s = math.cos(self.rate * t), sign * math.sin(self.rate * t)
-        turn = np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
-        return np.asarray((np.reshape(y, (2, 3)) @ turn).ravel())
-
-    def __call__(self, t: float, z: Any) -> Array:
-        """z'."""
+    def __call__(self, t: float, y: Any) -> Array:
+        """y'."""
         self.times.add(t)
-        rates = FORMULATIONS["axis"].field(self.par, self.turned(t, z).tolist())
-        swept = np.cross([self.rate, 0.0, 0.0], np.reshape(z, (2, 3))).ravel()
-        return np.asarray(self.turned(t, rates, -1.0) - swept)
+        pace = 1.0 + self.uneven * math.cos(self.rate * (t - self.begin) + 1.0)
+        rates = np.array(FORMULATIONS["axis"].field(self.par, np.asarray(y).tolist()))
+        return np.asarray(pace * rates)
 
 
-def series_in_frame(subject: Subject, rate: float) -> tuple[Series, set[float]]:
-    """The series of a step in a frame that turns at a rate, and the times at which it asks for f."""
-    scene, start = subject.scene, generic_start(subject.scene)
-    begin, unit = BEGIN * scene.time_scale(), np.repeat([1.0, scene.momentum_scale], 3)
-    form, exact = FORMULATIONS["axis"], closed_form(Scene("start", scene.top, start, 1.0))
-    f = TurningField(form.prepare(scene.top, start)[0], rate)
+def series_by_clock(subject: Subject, uneven: float) -> tuple[Series, set[float]]:
+    """The series of a step by a clock that is so `uneven`, and the times at which it asks for f."""
+    scene, start, scale = subject.scene, generic_start(subject.scene), subject.scene.time_scale()
+    begin, rate, unit = BEGIN * scale, 2.0 * math.pi * WAVES / scale, np.repeat([1.0, scene.momentum_scale], 3)
+    par, state = FORMULATIONS["axis"].prepare(scene.top, start)
+    true, f = one_step(subject.method, "axis", scene, scale).motion(start), Hastened(par, uneven, rate, begin)
 
-    def motion(h: float) -> Any:
-        at = Angles(*(float(value[0]) for value in exact(np.array([h]))))
-        return f.turned(begin + h, charts.space_state("axis", scene.top, at), -1.0) / unit
+    def motion(h: float) -> Array:
+        return true(h + uneven * (math.sin(rate * h + 1.0) - math.sin(1.0)) / rate)
 
     def image(h: float) -> Any:
-        return subject.stepper.along(f, begin, first.copy(), h, np.array([1]))[0] / unit
+        return subject.stepper.along(f, begin, np.array(state), h, np.array([1]))[0] / unit
 
-    first = motion(0.0) * unit
-
-    return compared(image, motion, scene.time_scale(), "turning"), f.times
+    return compared(image, motion, scale, "axis"), f.times

@@ -22,7 +22,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError
 from symtop.judging.claims.subject import Subject, declared
-from symtop.judging.findings import NOTHING, Finding, Measured, agreement, undecided, yes_no
+from symtop.judging.findings import Finding, Measured, agreement, undecided
 from symtop.measure import step_map as maps
 from symtop.measure.errors import errors
 from symtop.methods.framework.plan import Array
@@ -102,9 +102,7 @@ def map_of(subject: Subject, chart: str) -> tuple[maps.StepMap, Angles]:
 
 def _in_chart(chart: str, method: Integrator, claim: str, answer: Answer) -> Finding:
     yes, value, resolution, why = answer
-    claimed, measured = getattr(method, claim), NOTHING if yes is None else Measured(yes_no(yes), value)
-    verdict = agreement(declared=claimed, measured=yes)
-    return Finding(claim, yes_no(claimed), measured, verdict, f"{why}, in the {chart} chart", value, resolution)
+    return agreement(claim, getattr(method, claim), yes, f"{why}, in the {chart} chart", value, resolution)
 
 
 def _badness(one: Finding) -> tuple[int, float]:
@@ -172,40 +170,38 @@ class Passage(NamedTuple):
         """Did it come out on the other side, with an error that falls with the step?"""
         return self.outcome == "ok" and (self.finer < 0.7 * self.error or self.finer < POLE_RIGHT)
 
+    @property
+    def word(self) -> str:
+        """The same in a word."""
+        return "passes" if self.passes else "wrong" if self.outcome == "ok" else "ends there"
+
+    def __str__(self) -> str:
+        how = f", off by {self.error:.0e} and {self.finer:.0e} with finer steps"
+        return f"{self.chart}: {self.word}{how if self.outcome == 'ok' else f' ({self.outcome})'}"
+
 
 def passages(method: Integrator) -> list[Passage]:
     """What happens at a pole, in every chart of the method."""
     rows = []
     for chart in method.charts():
-        only, ends, largest = method.variant(chart), [], []
-        for finer in (1.0, 2.0):
-            step, tolerance = POLE.horizon / (POLE_STEPS * finer), max(10.0 ** (-5.0 - finer), method.least_tolerance)
-            control = method.setting(step if method.fixed_step else tolerance).kwargs()
-            observe = "attitude" if chart == "attitude" else "axis"
-            run = simulate(POLE, only, samples=201, observe=observe, guard=False, **control)
-            ends.append(str(run.attrs["outcome"]))
-            miss = errors(run)["axis"].values
-            largest.append(float(np.nanmax(miss)) if np.isfinite(miss).any() else math.nan)
-        rows.append(Passage(chart, next((end for end in ends if end != "ok"), "ok"), *largest))
+        settings = [max(tolerance, method.least_tolerance) for tolerance in (1e-6, 1e-7)]
+        if method.fixed_step:
+            settings = [POLE.horizon / (POLE_STEPS * finer) for finer in (1.0, 2.0)]
+        options: dict[str, Any] = {"samples": 201, "observe": "attitude" if chart == "attitude" else "axis"}
+        controls = [options | method.setting(setting).kwargs() for setting in settings]
+        runs = [simulate(POLE, method.variant(chart), guard=False, **control) for control in controls]
+        ends = {str(run.attrs["outcome"]) for run in runs} - {"ok"}
+        rows.append(Passage(chart, max(ends, default="ok"), *(float(errors(run)["axis"].max()) for run in runs)))
     return rows
 
 
 def pole(subject: Subject) -> list[Finding]:
     """The finding on the pole; of a bare step it is measured alone, for its chart may be the simplest and no claim."""
     claim, passed = "" if subject.stepper else declared(subject.method, "pole"), passages(subject.method)
-    sentence = "; ".join(
-        f"{one.chart}: passes, off by {one.error:.0e} and {one.finer:.0e} with finer steps" if one.passes
-        else f"{one.chart}: ends there ({one.outcome})" if one.outcome != "ok"
-        else f"{one.chart}: comes out wrong by {one.error:.0e}, {one.finer:.0e} with finer steps"
-        for one in passed
-    )  # fmt: skip
     judged = [one for one in passed if one.chart != "angles"] or passed
-    words = ["passes" if one.passes else "wrong" if one.outcome == "ok" else "ends there" for one in judged]
-    if not claim:
-        verdict = "measured"
-    elif any(one.outcome not in ("ok", "left_chart", "not_finite", "not_normalised") for one in judged):
+    verdict = "measured" if not claim else "confirmed" if all(one.passes for one in judged) else "refuted"
+    if claim and any(one.outcome not in ("ok", "left_chart", "not_finite", "not_normalised") for one in judged):
         verdict = "undecided"
-    else:
-        verdict = "confirmed" if all(one.passes for one in judged) else "refuted"
-    measured = Measured(", ".join(dict.fromkeys(words)))
-    return [Finding("pole", claim, measured, verdict, sentence, max(one.finer for one in judged), POLE_RIGHT)]
+    measured = Measured(", ".join(dict.fromkeys(one.word for one in judged)))
+    value = max(one.finer for one in judged)
+    return [Finding("pole", claim, measured, verdict, "; ".join(map(str, passed)), value, POLE_RIGHT)]

@@ -19,21 +19,22 @@ from typing import Any
 import numpy as np
 
 from symtop.core.errors import SymtopError, foreign_code, one_of
-from symtop.core.files import execute, python_file
-from symtop.judging.adapters.adapter import Stepper, integrator
+from symtop.judging.adapters.adapter import Stepper
 from symtop.judging.adapters.external import BatchStep, DiffraxSolver, Program, SharedObject, is_solver
 from symtop.judging.adapters.python_step import REDUCED, PythonStep, RotationStep, ScipySolver, SeparableStep
 from symtop.judging.findings import yes_no
 from symtop.measure.conservation import CONSTANTS as MOTION
 from symtop.measure.step_map import drawn, generic_start
-from symtop.methods.framework.registry import Integrator
+from symtop.methods.framework.registry import ENGINE, Integrator
 from symtop.model.charts import CHARTS
 from symtop.model.scenes import Scene
+from symtop.run.plugins import execute, python_file
 
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
 ARGUMENTS = {"ode": "(f, t, y, h)", "separable": "(state, h, dT, dV)", "rotation": "(q, w, h, inertia, torque)"}
 LIBRARIES = (".so", ".dylib", ".dll")
 CONSTANTS = (*MOTION, "axis_length")
+KEEPING = ("splitting", "discrete-lagrangian", "lie-group")  # families that keep the momentum of a body
 PLANE = "nutation"  # the chart of a map of (theta, p_theta)
 LONG, SLOPES = (10.0, 2.5), (6.0, 1.5)  # seconds of a long run and of the runs of the order; the second with --quick
 STEPS = 1_000_000  # most steps of a long run
@@ -43,7 +44,7 @@ FEWEST = 300  # steps of the longest run of the order, however slow
 LADDER = 2.5  # times the steps of the longest run: what all of them take
 ENOUGH_STEPS, AT_REST = 50.0, 1e-9  # steps a nutation with a right-hand side of zero, and how far they may go
 STEPS_A_NUTATION = 118.02  # of a long run, and of the steps that are timed: an implicit one costs more if it is long
-ENOUGH = 0.03  # seconds after which the time of a step is known
+ENOUGH, LEAST = 0.03, 1e-9  # seconds after which the time of a step is known, and the least that it is
 
 
 def rest(_: float, y: Any) -> Any:
@@ -63,6 +64,11 @@ class Subject:
     seed: int = 0  # of the starts, times and steps that are drawn
     autonomous: bool = False  # was a step written for f(y)?
     traces: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """A bare "step", or a registered "integrator", or one on a "body" without symmetry."""
+        return "step" if self.stepper else "body" if self.scene.of_body else "integrator"
 
     @property
     def in_plane(self) -> bool:
@@ -120,15 +126,8 @@ class Subject:
         return max(steps, FEWEST)
 
 
-def timed(stepper: Stepper, scene: Scene, claims: dict[str, Any], **options: Any) -> Subject:
-    """A bare step and what it claims, after its steps have been timed; SymtopError if it makes none."""
-    method = integrator(stepper, **claims)
-    seconds = seconds_a_step(stepper, scene) if method.fixed_step else 0.0
-    return Subject(method, scene, stepper=stepper, seconds_a_step=seconds, **options)
-
-
 def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
-    """Seconds a step, from runs of more and more steps; what a run costs at its start is left out.
+    """Seconds a step, from runs of more and more steps without what a run costs at its start; SymtopError without one.
 
     A run that blows up is no longer than its last finite state: then the longest run before it is timed, start and all.
     """
@@ -145,7 +144,8 @@ def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
         steps *= 4 if finite else 1
         if not finite or taken - first > max(ENOUGH, first) or steps > 1e7:  # a start's cost scatters as much as it is
             taken = min(seconds(steps)[0] for _ in range(3))  # others may have been at work
-            return max(taken - first * finite, 0.5 * taken) / steps  # the start alone may have been disturbed
+            # the start alone may have been disturbed; a process that waited before is told of its waiting later
+            return max(taken - first * finite, 0.5 * taken, LEAST * steps) / steps
 
 
 def declared(method: Integrator, claim: str) -> str:
@@ -153,12 +153,19 @@ def declared(method: Integrator, claim: str) -> str:
 
     Nothing claimed of the energy means what the other claims imply: kept if it is among the conserved quantities,
     bounded if the method is symplectic and its step fixed (Benettin, Giorgilli, J. Stat. Phys. 74 (1994) 1117).
+
+    On a body L_z, and all of L without a weight, is kept by methods that turn q and M by the same rotation and kick by
+    the torque: splittings, variational and Lie-group methods, and maps of engines that carry L in space. M.Gamma is a
+    cubic of the state, so that p_phi, which a Runge-Kutta method keeps on the axis of a top, is no claim of it there.
     """
     conserves = method.conserves or frozenset()
     if claim == "energy" and method.energy_error is not None:
         return method.energy_error
     if claim == "energy" and "energy" not in conserves:
         return "bounded" if method.symplectic and method.fixed_step else ""
+    if claim == "momentum":
+        keeps = method.family in KEEPING or (method.family == ENGINE and "p_phi" in conserves)
+        return "kept" if keeps else ""
     if claim in CONSTANTS:
         return "kept" if claim in conserves else ""
     if claim == "invariant":
@@ -168,28 +175,21 @@ def declared(method: Integrator, claim: str) -> str:
     return yes_no(getattr(method, "order" if claim == "time" else claim, None))
 
 
-def form_of(target: Any) -> str:
-    """The form of what is given, where it shows: a class, a function, FILE.py:NAME or a library."""
-    if isinstance(target, type):
-        return "scipy"
-    if callable(target) or is_solver(target):
-        return "diffrax" if is_solver(target) else "ode"
-    path = str(target).partition(":")[0]
-    if path.endswith(".py") or path.endswith(LIBRARIES):
-        return "ode" if path.endswith(".py") else "shared"
-    raise SymtopError(f"a step must be FILE.py:NAME or FILE.so, or a command with form program, not {str(target)!r}")
-
-
 def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = False) -> Stepper:
     """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else."""
-    kind = one_of("form", form_of(target) if form is None else form, FORMS)
     one_of("chart", chart, CHARTS)
+    path, _, symbol = str(target).partition(":")
+    shared = isinstance(target, (str, Path)) and path.endswith(LIBRARIES)
+    kind = one_of("form", ("shared" if shared else "ode") if form is None else form, FORMS)
     if kind == "program":
         return Program(str(target), chart)
     if kind == "shared":
-        path, _, symbol = str(target).partition(":")
         return SharedObject(path, chart, symbol or "step")
-    thing, name = _from_file(target) if isinstance(target, (str, Path)) else (target, "")
+    return _python_step(*_thing(target), chart, kind, adaptive=adaptive)
+
+
+def _python_step(thing: Any, name: str, chart: str, kind: str, *, adaptive: bool) -> Stepper:
+    """The stepper of something in Python."""
     if kind == "diffrax" or is_solver(thing):
         return DiffraxSolver(thing, chart, name)
     if isinstance(thing, type):
@@ -199,14 +199,12 @@ def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = F
     arguments = ARGUMENTS.get(kind, ARGUMENTS["ode"])
     try:
         inspect.signature(thing).bind(*arguments.split(","))
+    except TypeError:
+        hint = "; a rotation, q = (w, x, y, z), takes (q, w, h, inertia, torque): form rotation" * (kind == "ode")
+        given = f"{inspect.signature(thing)}{hint}"
+        raise SymtopError(f"a step of the form {kind} must take {arguments}, not {given}") from None
     except ValueError:  # built in, without a signature
         pass
-    except TypeError:
-        signature = inspect.signature(thing)
-        hint = (
-            "; a rotation, q = (w, x, y, z), takes (q, w, h, inertia, torque): form rotation" if kind == "ode" else ""
-        )
-        raise SymtopError(f"a step of the form {kind} must take {arguments}, not {signature}{hint}") from None
     if kind in ("torch", "jax"):
         return BatchStep(thing, chart, kind, name)
     if kind == "ode":
@@ -214,9 +212,14 @@ def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = F
     return RotationStep(thing, name) if kind == "rotation" else SeparableStep(thing, name)
 
 
-def _from_file(target: str | Path) -> tuple[Any, str]:
-    """What FILE.py:NAME names, and its name; without a name the function ``step``."""
+def _thing(target: Any) -> tuple[Any, str]:
+    """What is given, or FILE.py:NAME names, and its name; without a name the function ``step``."""
+    if callable(target) or is_solver(target):
+        return target, ""
     path, _, name = str(target).partition(":")
+    if not path.endswith(".py"):
+        words = "a step must be FILE.py:NAME or FILE.so, or a command with form program"
+        raise SymtopError(f"{words}, not {str(target)!r}")
     file = python_file(path, "a step", "FILE.py:NAME with a file that is there (a command needs form program)")
     with foreign_code(f"the file {file.name}"):
         sys.path.insert(0, str(file.parent))  # what stands beside it, as Python has it for a script

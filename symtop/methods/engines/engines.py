@@ -74,7 +74,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.jit import by_length, register_jitable
+from symtop.core.jit import by_length, register_jitable, set_item
 from symtop.methods.framework.body import prepared
 from symtop.methods.framework.loop import FixedStep, Loop, as_stepped, kernel_loop, no_carry
 from symtop.methods.framework.preparation import Body, Preparation
@@ -640,32 +640,24 @@ def adams_bashforth(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> 
     return p, rotated(par, p, w), rotated(par, p, now)
 
 
-@register_jitable
-def _first_turn(par: Any, q: Any, L: Any, h: float) -> Any:
-    """About the body's first axis, with L in body axes."""
-    x = 0.5 * h * L[0] / par.I1
-    c, s = np.cos(x), np.sin(x)
-    C, S = c * c - s * s, 2.0 * s * c
-    q = q[0] * c - q[1] * s, q[1] * c + q[0] * s, q[2] * c + q[3] * s, q[3] * c - q[2] * s
-    return q, (L[0], C * L[1] + S * L[2], C * L[2] - S * L[1])
+def _turn(k: int) -> Callable[..., Any]:
+    """The turn about axis k of the body, with L in body axes."""
+    a, b, c = 1 + k, 1 + (k + 1) % 3, 1 + (k + 2) % 3
+
+    @register_jitable
+    def turned(par, q, L, h):  # type: ignore[no-untyped-def]
+        x = 0.5 * h * L[k] / (par.I3 if k == 2 else par.I1)
+        cos, sin = np.cos(x), np.sin(x)
+        C, S = cos * cos - sin * sin, 2.0 * sin * cos
+        about = set_item(set_item(q, 0, q[0] * cos - q[a] * sin), a, q[a] * cos + q[0] * sin)
+        across = set_item(set_item(about, b, q[b] * cos + q[c] * sin), c, q[c] * cos - q[b] * sin)
+        i, j = b - 1, c - 1
+        return across, set_item(set_item(L, i, C * L[i] + S * L[j]), j, C * L[j] - S * L[i])
+
+    return turned
 
 
-@register_jitable
-def _second_turn(par: Any, q: Any, L: Any, h: float) -> Any:
-    y = 0.5 * h * L[1] / par.I1
-    c, s = np.cos(y), np.sin(y)
-    C, S = c * c - s * s, 2.0 * s * c
-    q = q[0] * c - q[2] * s, q[1] * c - q[3] * s, q[2] * c + q[0] * s, q[3] * c + q[1] * s
-    return q, (C * L[0] - S * L[2], L[1], C * L[2] + S * L[0])
-
-
-@register_jitable
-def _third_turn(par: Any, q: Any, L: Any, h: float) -> Any:
-    z = 0.5 * h * L[2] / par.I3
-    c, s = np.cos(z), np.sin(z)
-    C, S = c * c - s * s, 2.0 * s * c
-    q = q[0] * c - q[3] * s, q[1] * c + q[2] * s, q[2] * c - q[1] * s, q[3] * c + q[0] * s
-    return q, (C * L[0] + S * L[1], C * L[1] - S * L[0], L[2])
+_first_turn, _second_turn, _third_turn = map(_turn, range(3))
 
 
 def _increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:

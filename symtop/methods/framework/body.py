@@ -68,14 +68,6 @@ def _on_body(body: Any, at: Any) -> Any:
     return body, (at.w, at.x, at.y, at.z, at.M1, at.M2, at.M3)
 
 
-class _OfBody(Preparation):
-    """A preparation that takes a `RigidBody` and an `Attitude`."""
-
-    def __call__(self, top: Any, at: Any) -> tuple[Any, Any]:
-        """Kernel parameters and state of a start."""
-        return self.numbers(*self.opened(top.flat(at)))
-
-
 def _turned(body: Any, at: Any) -> Any:
     return body, (at.w, -at.x, -at.y, -at.z, at.M1, at.M2, at.M3)
 
@@ -101,7 +93,7 @@ of_top, in_space = Preparation(_of_top, 7), Shown(_in_space, 7)  # a top as (q, 
 
 def prepared(numbers: Any) -> Preparation:
     """What a kernel of seven numbers steps, by ``numbers(body, start)`` of a `General` and a `Pose`."""
-    return _OfBody(numbers, 7, opened=opened, momenta=_momenta, given=14)
+    return Preparation(numbers, 7, opened=opened, momenta=_momenta, given=14)
 
 
 on_body, turned, turned_back = prepared(_on_body), prepared(_turned), Shown(_turned_back, 7)

@@ -82,7 +82,7 @@ class Preparation:
         """Kernel parameters and state of a start."""
         if self.check is not None:
             self.check(at)
-        return self.numbers(top, at)
+        return self.numbers(*self.opened(flat(top, at)))
 
 
 @functools.cache

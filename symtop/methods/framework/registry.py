@@ -160,7 +160,7 @@ class Integrator:
         for name, (kind, words) in KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 raise SymtopError(f"{name} must be {words}, not {shown(getattr(self, name))}")
-        least, usual = errors.not_negative("least_tolerance", self.least_tolerance), self.default_tolerance
+        least, usual = errors.finite("least_tolerance", self.least_tolerance, 0.0), self.default_tolerance
         if usual is not None and not max(least, 5e-324) <= errors.finite("default_tolerance", usual) < 1.0:
             raise SymtopError(f"default_tolerance must be above zero, at least {least:g} and below 1, not {usual!r}")
 

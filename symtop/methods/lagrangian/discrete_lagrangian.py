@@ -34,7 +34,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError, row
-from symtop.core.jit import fused, register_jitable
+from symtop.core.jit import register_jitable
+from symtop.core.jit_functions import fused
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome, on_angles
 from symtop.methods.framework.lanes import Lanes

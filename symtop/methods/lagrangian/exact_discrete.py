@@ -60,8 +60,8 @@ from typing import Any
 
 import numpy as np
 
-from symtop.core.jit import fused, register_jitable, set_item
-from symtop.core.jit_functions import two_product
+from symtop.core.jit import register_jitable, set_item
+from symtop.core.jit_functions import fused, two_product
 from symtop.methods.framework.lanes import one_loop
 from symtop.methods.framework.loop import FixedStep, kernel_loop
 from symtop.methods.framework.preparation import Shown

@@ -26,7 +26,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.jit import fused, register_jitable, set_item
+from symtop.core.jit import register_jitable, set_item
+from symtop.core.jit_functions import fused
 from symtop.core.numbers import EPSILON
 from symtop.methods.framework.body import torque
 from symtop.methods.framework.equations import FORMS

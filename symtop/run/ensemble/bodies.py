@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, finite, one_of, whole
+from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
 from symtop.model.body import PARTS, Attitude, RigidBody
@@ -92,15 +93,13 @@ def scenes_of(members: xr.Dataset) -> list[Scene]:
     rows = np.column_stack([members[name].values for name in PARTS])
     seen: dict[str, int] = {}
     scenes = list[Scene]()
-    for row, kind in zip(rows, members["stratum"].values.tolist(), strict=True):
+    for one, kind in zip(members_of(rows), members["stratum"].values.tolist(), strict=True):
         seen[kind] = seen.get(kind, -1) + 1
-        scenes.append(_scene(row, f"{kind}-{seen[kind]}", f"a random body, {kind}"))
+        scenes.append(_scene(*one, f"{kind}-{seen[kind]}", f"a random body, {kind}"))
     return scenes
 
 
-def _scene(row: Array, name: str = "drawn", purpose: str = "") -> Scene:
-    I1, I2, I3, mgl, c1, c2, c3, w, x, y, z, *rates = row.tolist()
-    body, start = RigidBody(I1, I2, I3, mgl, (c1, c2, c3)), Attitude((w, x, y, z), (rates[0], rates[1], rates[2]))
+def _scene(body: RigidBody, start: Attitude, name: str = "drawn", purpose: str = "") -> Scene:
     return Scene(name, body, start, PERIODS * body.nutation_period(start), purpose)
 
 
@@ -113,7 +112,7 @@ def _members(kind: str, seed: int, count: int, epsilon: float | None) -> Array:
         uniform = np.ascontiguousarray((integers * 2.0**-53).reshape(-1, DRAWS).T)
         drawn = _free(kind, uniform) if kind in FREE else _heavy(uniform, 0.0 if kind == "lagrange" else epsilon)
         if kind in ("regular", "chaotic"):
-            chaotic = np.array([growth(_scene(row)) > CHAOS for row in drawn])
+            chaotic = np.array([growth(_scene(*one)) > CHAOS for one in members_of(drawn)])
             drawn = drawn[chaotic == (kind == "chaotic")]
         found.append(drawn)
         left -= len(drawn)

@@ -297,11 +297,8 @@ class Job:
         """The same by one call of a solver for each member; one fails alone whatever its solver raises."""
         n = len(plan.counts)
         states = np.full((n, self.samples, charts.DIMENSIONS[self.chart]), np.nan)
-        momenta, (steps, evaluations, iterations, outcome) = (
-            np.full((n, self.samples, 2), np.nan),
-            np.zeros((4, n), int),
-        )
-        runs = _Runs(states, momenta, steps, evaluations, iterations, outcome, np.zeros(n))
+        momenta, (steps, work, iterations, outcome) = np.full((n, self.samples, 2), np.nan), np.zeros((4, n), int)
+        runs = _Runs(states, momenta, steps, work, iterations, outcome, np.zeros(n))
         for i, (top, start) in enumerate(members_of(self.numbers)):
             heed()
             if self.chart == "angles" and not 0.0 < start.theta < np.pi:
@@ -429,8 +426,7 @@ def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
     """A run whose states or energy are not finite, and that reports nothing of it, ends there, as in `simulate`."""
     if all(values.min() > -HARMLESS and values.max() < HARMLESS for values in runs[:2]):  # a tenth of the time
         return runs
-    readings = view.energy if view.chart == BODY else view.energy + view.p_phi
-    finite = np.isfinite(runs.states).all(axis=2) & np.isfinite(readings) | np.isnan(plan.times)
+    finite = np.isfinite(runs.states).all(axis=2) & np.isfinite(view.energy + view.p_phi) | np.isnan(plan.times)
     bad = np.flatnonzero((runs.outcome == OK) & ~finite.all(axis=1))
     if not bad.size:
         return runs

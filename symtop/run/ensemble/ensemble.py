@@ -16,7 +16,6 @@ import netCDF4
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from tqdm import tqdm
 
 from symtop.core import netcdf
 from symtop.core.code_hash import digest, hashed, packages
@@ -24,7 +23,7 @@ from symtop.core.errors import SymtopError, SymtopWarning, boolean, check_replac
 from symtop.core.files import locked
 from symtop.core.jit import code
 from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
-from symtop.core.progress import beating
+from symtop.core.progress import progress_bar
 from symtop.core.signals import ending_on_sigterm
 from symtop.methods.framework.lanes import of_bodies
 from symtop.methods.framework.plan import OUTCOMES
@@ -109,8 +108,8 @@ def ensemble(
     def compute(rest: list[slice], keep: Callable[[slice, dict[str, Any]], object]) -> tuple[int, str]:
         """On how many members a solver raised an exception, and the first one's message."""
         raised, first, left = 0, "", sum(chunk.stop - chunk.start for chunk in rest)
-        bar = tqdm(total=n, initial=n - left, desc=words["title"], unit="run", disable=silent or None, leave=False)
-        with beating(bar), contextlib.closing(_computed(job, rest, workers, scheduler)) as parts:
+        drawn = progress_bar(words["title"], quiet=silent, total=n, initial=n - left, unit="run")
+        with drawn as bar, contextlib.closing(_computed(job, rest, workers, scheduler)) as parts:
             for chunk, part in zip(rest, parts, strict=True):
                 if message := part.pop(RAISED, ""):
                     raised, first = raised + int((part["outcome"] == RAISED).sum()), first or message

@@ -128,6 +128,15 @@ def _check_names(data: xr.Dataset, parts: dict[str, int]) -> None:
             raise SymtopError(f"members have no variable {name!r}; did you mean {near[0]}?")
 
 
+def refuse_others(given: Members, runs: xr.Dataset) -> None:
+    """Refuse members that are not those of an ensemble, by their number or their labels."""
+    if len(given.numbers) != (n := runs.sizes["member"]):
+        raise SymtopError(f"members must be the {n} of the ensemble, not {len(given.numbers)}")
+    labels = [[*map(str, row)] for row in (given.names, runs.indexes.get("member")) if row is not None]
+    if len(labels) == 2 and labels[0] != labels[1]:
+        raise SymtopError("members must be those of the ensemble in their order, and their labels are others")
+
+
 def _plain(index: Any) -> NDArray[Any]:
     """Labels that a netCDF file can hold: numbers as they are, anything else as text."""
     values = index.to_numpy()

@@ -161,8 +161,8 @@ def _motion(body: RigidBody, start: Attitude) -> "FreeBody | HeavyBody":
 
 
 @functools.lru_cache(maxsize=16)
-def _samples(body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> "BodyMotion":
-    """A motion at times, kept for a while: methods on one scene ask for the same ones."""
+def body_samples(body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> "BodyMotion":
+    """A motion at times, kept for a while: methods on one scene ask for the same ones; NaN from where it is lost."""
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
     return motion.samples(times) if body.free else motion.samples(times, precise=precise)  # type: ignore[call-arg]
 
@@ -174,7 +174,7 @@ def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) ->
     one_of(f"precision on {scene.name}", precision, known)
     if certify is not None:
         raise SymtopError(f"certify must be None on {scene.name}, a body without symmetry, not {certify!r}")
-    shown = _samples(body, start, times.tobytes(), precision == "quad")
+    shown = body_samples(body, start, times.tobytes(), precision == "quad")
     if (lost := shown.lost(times)) is not None:
         words = "its motion is not known to 1e-9 rad from there on"
         raise SymtopError(f"times must be below {lost:.6g} on {scene.name}, not {times.max():.6g}: {words}", "times")
