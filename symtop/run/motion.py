@@ -114,7 +114,7 @@ class Integrated:
 
     def states(self, times: Array, tolerance: float) -> Array:
         """States (n, dimension) at `times` (n,), NaN from where the work is too much."""
-        solver = integrator(SERIES[self.chart]).solvers[self.chart]  # called as it is: checks take as long as a short run
+        solver = integrator(SERIES[self.chart]).solvers[self.chart]  # called as it is: checks take as long as it does
         return solver(self.scene.top, self.scene.start, Plan.until(times, tolerance, MOST_WORK)).states
 
     def apart(self, first: tuple[str, Array], second: tuple[str, Array]) -> Array:
