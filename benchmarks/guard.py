@@ -308,7 +308,8 @@ def page(results: Path) -> None:
         "was chosen on 2,600 bodies and 2,100 hostile ones of another seed. As the guard then was, 2 of 1,969 wrong "
         "runs of the first 5,000 bodies were silent (the worst off by 0.058 rad) and 6 of 1,912 of the hostile ones, "
         "two of them beyond ten limits (0.34 and 0.51 rad). The steps of its watch damped the chaos of a needle, and "
-        "two motions beside an unstable rotation stay 0.01 rad apart until they pass it again. Both were mended.", [table],
+        "two motions beside an unstable rotation stay 0.01 rad apart until they pass it again. Both were mended.",
+        [table],
         captions={"curves": (f"{title[0].upper()}{title[1:]}. {caption}", alt)}, cases=sum(map(len, known.values())),
         measured=measured.sentence(facts, "python -m benchmarks.guard"),
         provenance={key: facts[key] for key in facts if key not in ("measured", "cores", "load_before")},
