@@ -7,11 +7,12 @@ A row of the table is a greedy cover of the random tops of the study: the varian
 least on most of them, then the one that does so on most of those that are left, and so on. One whose cost is next to
 the least on a few hard tops comes before a second one that is good where the first is.
 
-A check draws scenes that the table was not made from, with accuracies and lengths of its own. The cost of a method is
-the force evaluations of the run that its search over the whole horizon ends with (`symtop.measure.settings`), moved to
-the very accuracy along the method's order, times the seconds of one, and the seconds of a call. Those of the best
-method in the table and of the advised one are compared with the least. The advice compares single runs, whose errors
-lie between 0.3 times the accuracy and it, and whose times vary: it may take the second best of two that are close.
+A check draws scenes that the table was not made from, with accuracies and lengths of its own. What a method costs is
+foreseen by the run that its search over the whole horizon ends with (`symtop.measure.settings`): its force evaluations,
+moved to the very accuracy along the method's order, times the seconds of one, and the seconds of a call. The settings
+of those that are foreseen to be within `NEXT` of the least, and of the table's, are then corrected as the advice
+corrects its own, and their runs are timed against each other and against the very run that is advised, `ROUNDS` times
+in turn. That one, and the best of the table's, are compared with the least.
 """
 
 import functools
@@ -28,17 +29,20 @@ import symtop
 from symtop import advise
 from symtop.core import netcdf
 from symtop.measure import ranking, settings
-from symtop.measure.ranking import MENU, PRICED_AT
+from symtop.measure.ranking import MENU
 from symtop.methods.framework.registry import NEEDS, integrator
 from symtop.run.simulation import likely_step
 
+PRICED_AT = 1e-8  # tolerance at which the study takes the price of an evaluation
 TIE = 1.1  # costs of a ratio below this are level
 SHARE = 0.95  # of the scenes, on which a method of the table costs at most `TIE` times the least
 CLASSES = {ranking.ANY: advise.OF_ANY, **{need: (need,) for need in NEEDS if need != "solution"}}
 SEED = 2027  # of the scenes of a check; the study draws with another
 SPANS, ACCURACIES = (3.0, 300.0), (1e-10, 1e-3)  # nutations and errors that are drawn, evenly in the logarithm
 QUANTITIES = ("axis", "axis", "axis", "attitude", "energy")
-PRICED = 1e-6  # accuracy of the runs that are timed
+PRICED = 1e-6  # accuracy of the runs that prices are made of
+NEXT, ROUNDS = 1.5, 25  # foreseen cost, over the least, of what is timed; how often
+ADVISED = "advised"  # the run that is
 PATIENCE = 8.0  # times the least cost so far that a run may be foreseen to take
 MOST = 1e6  # evaluations of it
 LONGEST = 1e7  # evaluations of a run of the advice: a minute or more of vain trials elsewhere
@@ -116,21 +120,26 @@ def prices(quantity: str) -> dict[str, tuple[float, float]]:
     return {one.name: pair for one, *pair in zip(each, price.tolist(), call.tolist(), strict=True)}  # type: ignore[misc]
 
 
-def costs(scene: symtop.Scene, quantity: str, accuracy: float, advised: str | None) -> dict[str, float]:
-    """Seconds of the candidates that meet the accuracy and may be the cheapest, and of the advised one."""
-    each, spent, first = prices(quantity), dict[str, float](), ranking.cheapest((), quantity, accuracy, 100.0)
+def costs(question: advise._Question, advised: symtop.Advice, menu: list[str]) -> dict[str, float]:
+    """Seconds of the candidates that meet the accuracy and may be the cheapest, of the table's, and of `ADVISED`."""
+    scene, accuracy, quantity = question.scene, advise.MARGIN * question.accuracy, question.quantity
+    each, first = prices(quantity), ranking.cheapest((), quantity, accuracy, 100.0)
+    mets, spent = dict[str, settings.Met](), dict[str, float]()
     for name in sorted(each, key=lambda name: (name not in first, -(integrator(name).order or 0))):
         price, call = each[name]
-        most = math.inf if name == advised else min(PATIENCE * min(spent.values(), default=math.inf) / price, MOST)
+        most = math.inf if name in menu else min(PATIENCE * min(spent.values(), default=math.inf) / price, MOST)
         met = settings.search(scene, integrator(name), accuracy, quantity, scene.horizon, patience=most)
         if isinstance(met, settings.Met):
-            spent[name] = work(met, accuracy) * price + call
-    return spent
-
-
-def work(met: settings.Met, accuracy: float) -> float:
-    """Evaluations at the very accuracy: those of a method of order p grow as error^(-1/p)."""
-    return met.evaluations * (met.error / accuracy) ** (1.0 / (met.integrator.order or math.inf))
+            mets[name] = met
+            part = settings.at_accuracy(met.integrator, met.error / accuracy)
+            spent[name] = met.evaluations * price * part + call
+    least = min(spent.values(), default=math.inf)
+    near = {name: met for name, met in mets.items() if spent[name] <= NEXT * least or name in menu}
+    near = {name: advise._coarser(question, met) for name, met in near.items()}
+    if advised.integrator is not None:
+        setting = float(advised.step_size or advised.tolerance or math.nan)
+        near[ADVISED] = settings.attempt(scene, integrator(advised.integrator), setting, scene.horizon, quantity)
+    return dict(zip(near, settings.seconds(scene, [*near.values()], quantity, scene.horizon, ROUNDS), strict=True))
 
 
 class Row(NamedTuple):
@@ -147,15 +156,15 @@ def excess(count: int) -> list[Row]:
     """The rows of drawn scenes on which something meets the accuracy."""
     rows = []
     for scene, quantity, accuracy in scenes(count):
-        advised = str(symtop.recommend(scene, accuracy=accuracy, quantity=quantity).integrator)
-        each = costs(scene, quantity, accuracy, advised)
-        menu = advise._menu(advise._Question(scene, accuracy, quantity, scene.horizon, ()))
+        advised = symtop.recommend(scene, accuracy=accuracy, quantity=quantity)
+        question = advise._Question(scene, accuracy, quantity, scene.horizon, ())
+        each = costs(question, advised, menu := advise._menu(question))
         if each:
             words = f"{scene.name} {quantity} {accuracy:.1e} over {scene.horizon / scene.nutation_period:.3g} nutations"
             best = min(each, key=each.__getitem__)
             over = {name: cost / each[best] for name, cost in each.items()}
             named = min((over[name] for name in menu if name in over), default=math.inf)
-            rows.append(Row(words, advised, best, over.get(advised, math.inf), named))
+            rows.append(Row(words, str(advised.integrator), best, over.get(ADVISED, math.inf), named))
     return rows
 
 

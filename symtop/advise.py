@@ -1,13 +1,13 @@
 """`recommend`: the cheapest integrator, with its step or tolerance, that meets an accuracy on a scene.
 
-    1. Candidates. A stored study of cost counts on how many of the random tops nearest to this one a method was the
-       cheapest or nearly so (`symtop.measure.ranking`). Without a stored study a table that was made from one names
-       five. One more is tried if the trials disagree with it: three of the five fail, or its fourth or fifth is the
-       fastest. Where it does not answer, or nothing of it gets there, every compiled method is a candidate.
+    1. Candidates. A table that was made from the study of cost names five (`symtop.measure.ranking`). One more is tried
+       if the trials disagree with it: three of the five fail, its fourth or fifth is the fastest, or two are level.
+       Where it does not answer, or nothing of it gets there, every compiled method is a candidate.
     2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
        (`symtop.measure.settings`), against the closed form and a target lowered by the law of growth; one run is timed.
-    3. Confirmation. The three fastest candidates are run to the whole horizon, if a budget of force evaluations allows
-       it, and their settings are corrected.
+       Settings are found to a factor: times are compared as they would be at the very accuracy.
+    3. Confirmation. The three fastest candidates, and others as fast, are run to the whole horizon, if a budget of
+       force evaluations allows it, and their settings are corrected, to some 5 % of a step.
 
 The confidence of the advice is one of:
 
@@ -30,7 +30,6 @@ import re
 import shlex
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from symtop.core import files
@@ -40,7 +39,7 @@ from symtop.judging.claims.subject import declared
 from symtop.measure import settings
 from symtop.measure.errors import QUANTITIES, errors
 from symtop.measure.phase import FREQUENCIES
-from symtop.measure.ranking import STORED, Near, cheapest, nearest
+from symtop.measure.ranking import cheapest
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import (
     NEEDS,
@@ -66,11 +65,11 @@ OF_ANY = tuple(need for need in NEEDS if need not in THIS_TOP)  # of what is the
 COMMA = re.compile(r",\s*(?![^(]*\))")  # between words of `NEEDS`, one of which is f(t, y)
 KEPT = {"energy": ("energy",), "momenta": ("p_phi", "p_psi")}  # claims, by what a user wants kept
 KERNELS = 0.65  # of a method: some have one in common
-CANDIDATES = 8  # methods of the stored study that are tried
 FEW = 5  # methods of the table that are tried
-AGREED = 3  # of them meet the accuracy at least, and the fastest is one of so many first
-FINALISTS = 3  # methods that are run to the whole horizon
+AGREED, TIED = 3, 1.1  # of them meet the accuracy at least, the fastest is one of so many first, and none as fast
+FINALISTS, LEVEL = 3, 1.3  # methods that are run to the whole horizon, and those that cost so little more than the best
 TOO_DEAR = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
+CHEAP = 1e5  # evaluations that no search ends at: it may have begun with a step that is far too fine
 CONFIDENCE = {
     "checked": "measured to the end",
     "at the reference's limit": "measured to the end, as far as the reference can tell",
@@ -98,6 +97,8 @@ SETTINGS = {  # the maps of an engine by its settings, the default first
 MISSES_AT_STEP, FAILS_AT_STEP = "Not accurate enough at this step", "No run ends well at this step"
 STEP = 1.0 / 240.0  # s
 WORST = 0.5  # rad: an axis that is further off needs no method to match it
+CLOSE = 0.95  # of the longest step that serves: so near is that of a finalist
+ROUNDS = 15  # in which finalists are timed
 MARGIN = 0.8  # fraction of the accuracy that a run must meet at its samples; between them its error may be larger
 
 
@@ -124,14 +125,13 @@ class Advice:
     runner_up: str = ""
     beside: str = ""
     closed_form: str = ""
-    nearest: str = ""
     fails: tuple[str, ...] = ()
     command: str = ""
     python: str = ""
 
     def __str__(self) -> str:
         lines = [
-            self.reason, self.runner_up and f"Runner-up: {self.runner_up}", self.beside, self.nearest, self.closed_form,
+            self.reason, self.runner_up and f"Runner-up: {self.runner_up}", self.beside, self.closed_form,
             *self.fails, self.command and f"Run it: {self.command}", self.python and f"In Python: {self.python}",
         ]  # fmt: skip
         return "\n".join(filter(None, lines))
@@ -176,13 +176,18 @@ class _Trial(NamedTuple):
         """Seconds of a step; infinite for a method that has none."""
         return self.seconds * self.met.setting / self.horizon if self.met.integrator.fixed_step else math.inf
 
+    def cost(self, question: _Question) -> float:
+        """Seconds at the very accuracy; those of the run itself where the step is the user's."""
+        ratio = 1.0 if question.step is not None else self.error / question.accuracy
+        return self.seconds * settings.at_accuracy(self.met.integrator, ratio)
+
     def words(self) -> str:
         return f"{self.met.integrator.name} with {self.met.integrator.setting(self.met.setting).label}"
 
 
 def recommend(
     scene: "str | Scene", *, accuracy: float, quantity: str | None = None, horizon: float | None = None,
-    results: str | Path | None = None, needs: Collection[str] = (), step_size: float | None = None,
+    needs: Collection[str] = (), step_size: float | None = None,
     max_step: float | None = None, general: bool = False, keeps: str | None = None, time_a_step: float | None = None,
 ) -> Advice:  # fmt: skip
     """The cheapest integrator, with its step or tolerance, that keeps the error of `quantity` below `accuracy`.
@@ -190,11 +195,10 @@ def recommend(
     `accuracy` is the largest error of `quantity`, by default of the axis, over the run: radians for ``axis``,
     ``attitude`` and ``theta``, and relative for others, energy and momenta by the scales of `symtop.errors`. `horizon`
     is the scene's own by default. Of a body without symmetry the `quantity` is the attitude by default, the candidates
-    are the methods of the chart ``body``, and `keeps` may be "energy" alone.
-    `results` is a folder with a stored ``cost.nc``; without it a table made from one says what is tried. `needs` leaves
-    out methods that need something else (`Integrator.needs`), for example ``("derivative", "kicks")``, or by what you
-    can supply, ``"f(t, y), torque, free motion"``; without them, what is made for this very top is not the answer but
-    named beside it (`Advice.beside`).
+    are the methods of the chart ``body``, and `keeps` may be "energy" alone. `needs` leaves out methods that need
+    something else (`Integrator.needs`), for example ``("derivative", "kicks")``, or by what you can supply, ``"f(t, y),
+    torque, free motion"``; without them, what is made for this very top is not the answer but named beside it
+    (`Advice.beside`).
 
     `step_size` is the step that you have: every method of fixed step runs with it, and the fastest that is good enough
     is the answer. `max_step` is the longest step, `time_a_step` the most seconds of one on this machine. `general`
@@ -212,9 +216,6 @@ def recommend(
     if quantity in settings.ANGLES and accuracy >= math.pi:
         raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}", "accuracy")
     horizon = scene.horizon if horizon is None else horizon_of(horizon)
-    comparable = allowed or OF_ANY
-    results = None if scene.of_body else results  # the study is of tops
-    near = None if results is None else nearest(Path(results) / STORED, scene, quantity, accuracy, horizon, comparable)
     limit = settings.judgeable(scene, quantity, horizon)
     step = None if step_size is None else positive("step_size", step_size)
     if step is not None and not horizon / MOST_STEPS <= step < horizon:
@@ -230,16 +231,15 @@ def recommend(
         return _advice(question, [], (), source)
     if {*allowed} == {"solution"} and not scene.of_body and question.allows(integrator("exact")):
         return _the_motion(question, limit)
-    guesses, source = _candidates(question, near)
-    source += f" ({Path(results) / STORED})" if results is not None else ""
-    search = _Search(question, guesses, [] if near is not None else _menu(question))
+    names, source = _candidates(question)
+    search = _Search(question, names, _menu(question))
     ranked, beside, fails = search.answers(), search.beside(), search.fails
     # Times of the user's own methods in plain Python say nothing beside those of compiled ones.
     own = [one.name for one in integrators().values() if one.implementation == "python" and not is_built_in(one.name)]
     if own:
         fails["Not tried, as only compiled methods are timed"] = own
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
-    return _advice(question, ranked, sentences, source, near, beside)
+    return _advice(question, ranked, sentences, source, beside)
 
 
 def _needs(given: Collection[str]) -> tuple[str, ...]:
@@ -255,16 +255,17 @@ def _needs(given: Collection[str]) -> tuple[str, ...]:
 
 
 class _Search:
-    """Trials of candidates by their guesses, and of others if the `menu`, which they are from, does not serve."""
+    """Trials of candidates, and of others if the `menu`, which they are from, does not serve."""
 
-    def __init__(self, question: _Question, guesses: dict[str, float | None], menu: list[str]) -> None:
-        self.question, self.guesses, self.menu = question, guesses, menu
+    def __init__(self, question: _Question, names: Collection[str], menu: list[str]) -> None:
+        self.question, self.names, self.menu = question, names, menu
         self.trials: list[_Trial] = []  # the fastest first
         self.fails: dict[str, list[str]] = {}  # names of methods by why they are no answer
-        of_top = [] if question.needs else [name for name in guesses if integrator(name).needs in THIS_TOP]
-        self._try(guesses)
-        answers = [name for name in self._names() if name in menu]
-        if menu and (len(answers) < AGREED or menu.index(answers[0]) >= AGREED):
+        of_top = [] if question.needs else [name for name in names if integrator(name).needs in THIS_TOP]
+        self._try(names)
+        costs = {name: one.cost(question) for one in self.trials if (name := one.met.integrator.name) in menu}
+        first, second, *_ = [*costs.values(), math.inf, math.inf]
+        if menu and (len(costs) < AGREED or menu.index(next(iter(costs))) >= AGREED or second < TIED * first):
             self._try(menu[FEW : FEW + 1])
         self._of_top = [name for name in self._names() if name in of_top][:1]
         self._general = [name for name in self._names() if name not in of_top]
@@ -274,10 +275,10 @@ class _Search:
         ranked = self._confirmed(self._general, FINALISTS)
         if not ranked and self.menu:
             everyone = _everyone(self.question._replace(needs=self.question.needs or OF_ANY))
-            rest = {*everyone} - {*self.guesses, *self.menu}
+            rest = {*everyone} - {*self.names, *self.menu}
             self._try(rest)
             ranked = self._confirmed([name for name in self._names() if name in rest], FINALISTS)
-        return _timed(self.question, ranked, self.fails)
+        return _timed(self.question, ranked, self.fails, ROUNDS)
 
     def beside(self) -> list[_Trial]:
         """The fastest that is made for this very top, run to the end."""
@@ -292,15 +293,18 @@ class _Search:
         for number, method in enumerate(sorted(map(integrator, names), key=lambda method: -(method.order or 0)), 1):
             post(f"trying method {number} of {len(names)}")
             rivals = (one.met.evaluations for one in self.trials if one.met.integrator.needs not in THIS_TOP)
-            patience = TOO_DEAR * min(rivals, default=math.inf)
-            self._sort_in(_try(self.question, method, self.guesses.get(method.name), patience), self.trials, method)
-        self.trials = _timed(self.question, self.trials, self.fails)
+            patience = max(TOO_DEAR * min(rivals, default=math.inf), CHEAP)
+            self._sort_in(_try(self.question, method, patience), self.trials, method)
+        timed = _timed(self.question, self.trials, self.fails)
+        self.trials = sorted(timed, key=lambda one: one.cost(self.question))
 
     def _confirmed(self, names: Sequence[str], most: int) -> list[_Trial]:
         """Of the trials with these names, so many of the first, or as many as it takes to have one, run to the end."""
         ranked: list[_Trial] = []
-        for number, tried in enumerate([one for one in self.trials if one.met.integrator.name in names]):
-            if number < most or not ranked:
+        trials = [one for one in self.trials if one.met.integrator.name in names]
+        costs = [one.cost(self.question) for one in trials]
+        for number, tried in enumerate(trials):
+            if number < most or not ranked or costs[number] <= LEVEL * costs[0]:
                 self._sort_in(_confirm(self.question, tried), ranked, tried.met.integrator)
         return ranked
 
@@ -349,33 +353,23 @@ def _menu(question: _Question) -> list[str]:
     return list(dict.fromkeys(name for row in rows if (name := _same(row, usable))))
 
 
-def _candidates(question: _Question, near: Near | None) -> tuple[dict[str, float | None], str]:
-    """Names of methods to try, each with a first guess of its setting, and a phrase on their origin."""
-    scene, usable = question.scene, _everyone(question)
-    everyone: dict[str, float | None] = dict.fromkeys(usable)
+def _candidates(question: _Question) -> tuple[list[str], str]:
+    """Names of methods to try, and a phrase on their origin."""
+    everyone = _everyone(question)
     if not everyone:
         return everyone, "no compiled method is within these limits"
     if question.step is not None:
         return everyone, f"tried all {len(everyone)} compiled methods of fixed step that you can use"
     of_top = [] if question.needs else _menu(question._replace(needs=THIS_TOP[:1]))[:1]  # named beside the answer
-    if near is None:
-        menu = _menu(question)[:FEW]
-        few = dict.fromkeys([*menu, *(name for name in usable if menu and not is_built_in(name)), *of_top])
-        said = f"tried the {len(menu)} methods that a study of random tops found the cheapest for such questions"
-        return (few, said) if menu else (everyone, f"tried all {len(everyone)} compiled methods")
-    chosen: dict[str, float | None] = {}
-    for variant, count in near.served.items():
-        name = _same(variant, usable)
-        if name is not None and name not in chosen and count and len(chosen) < CANDIDATES:
-            setting = near.settings[variant]
-            chosen[name] = scene.nutation_period / setting if integrator(name).fixed_step else setting
-    if not chosen:
-        return everyone, f"tried all {len(everyone)} compiled methods (none served the nearest random tops)"
-    served = f"tried the {len(chosen)} methods that served the {near.tops} nearest random tops most often"
-    return dict.fromkeys(of_top) | chosen, served
+    menu = _menu(question)[:FEW]
+    if not menu:
+        return everyone, f"tried all {len(everyone)} compiled methods"
+    own = [name for name in everyone if not is_built_in(name)]
+    words = f"tried the {len(menu)} methods that a study of random tops found the cheapest for such questions"
+    return list(dict.fromkeys([*menu, *own, *of_top])), words
 
 
-def _try(question: _Question, method: Integrator, guess: float | None, patience: float) -> "_Trial | str":
+def _try(question: _Question, method: Integrator, patience: float) -> "_Trial | str":
     """A candidate's setting and cost from short runs, or the reason why it has none."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
@@ -384,7 +378,7 @@ def _try(question: _Question, method: Integrator, guess: float | None, patience:
     short = min(horizon, settings.SHORT * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** settings.growth(method, quantity)
     met = settings.search(
-        scene, method, accuracy * law, quantity, short, guess, patience, longest=question.max_step
+        scene, method, accuracy * law, quantity, short, patience=patience, longest=question.max_step
     )  # fmt: skip
     if isinstance(met, str):
         dear = met == settings.BUDGET and patience < settings.MOST_EVALUATIONS[method.implementation]
@@ -407,9 +401,10 @@ def _at_step(question: _Question, method: Integrator, step: float) -> "_Trial | 
     return _Trial(met, met.error, math.nan, confidence, horizon)
 
 
-def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]]) -> list[_Trial]:
+def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]], rounds: int = 5) -> list[_Trial]:
     """The trials by their times, measured against each other; steps that take too long fail."""
-    times = settings.seconds(question.scene, [one.met for one in trials], question.quantity, question.horizon)
+    mets = [one.met for one in trials]
+    times = settings.seconds(question.scene, mets, question.quantity, question.horizon, rounds)
     pairs = zip(trials, times, strict=True)
     timed = sorted((one._replace(seconds=time) for one, time in pairs), key=lambda one: one.seconds)
     slow = [one.met.integrator.name for one in timed if one.a_step > question.pace]
@@ -432,13 +427,31 @@ def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
     )
     if isinstance(best, str):
         return f"Good enough over a short run but not to the end ({best[0].lower()}{best[1:]})"
-    met = settings.rounded(scene, best, MARGIN * accuracy, quantity)
+    met = settings.rounded(scene, _coarser(question, best), MARGIN * accuracy, quantity)
     confidence = "checked" if met.error + met.bound <= accuracy else "at the reference's limit"
     return _Trial(met, met.error, math.nan, confidence, horizon)
 
 
+def _coarser(question: _Question, met: settings.Met) -> settings.Met:
+    """The coarsest setting that meets the margin, as far as three runs find it along the order of the method."""
+    scene, accuracy, quantity, horizon = question[:4]
+    method, goal = met.integrator, MARGIN * accuracy
+    highest = min(settings.limits(scene, method, horizon, quantity)[1], question.max_step)
+    for _ in range(3):
+        room = CLOSE * goal / max(met.error, 1e-3 * goal)
+        longer = min(met.setting * room ** (1.0 / (method.order or 2) if method.fixed_step else 1.0), highest)
+        if longer < met.setting / CLOSE:
+            break
+        again = settings.attempt(scene, method, longer, horizon, quantity)
+        if again.error <= goal:
+            met = again
+        else:
+            highest = math.sqrt(met.setting * longer)
+    return met
+
+
 def _advice(
-    question: _Question, ranked: Sequence[_Trial], fails: tuple[str, ...], source: str, near: Near | None = None,
+    question: _Question, ranked: Sequence[_Trial], fails: tuple[str, ...], source: str,
     beside: Sequence[_Trial] = (),
 ) -> Advice:  # fmt: skip
     scene, accuracy, quantity, horizon = question[:4]
@@ -456,14 +469,13 @@ def _advice(
         count = scene.time_scale(horizon) / best.met.setting
         worth += f"; steps are {count:.3g} a {scene.period_word}, {1e6 * best.a_step:.2g} us each"
     runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
-    served = _same(name, list(near.served)) if near is not None else None  # None: the study has no chart of it
     setting = {str(best.met.integrator.control): best.met.setting}
     return question.advice(
         integrator=name, expected_error=best.error, seconds=best.seconds, confidence=best.confidence, fails=fails,
         reason=f"{best.words()} meets {goal}: {worth}; {source}.{_carries(question, best.met.integrator)}",
         runner_up="".join(runners), beside=_beside(beside, best.seconds),
-        closed_form=_without_steps(question, best.seconds), nearest=near.words(served) if near and served else "",
-        **setting, **_lines(question, best.met.integrator, best.met.setting),
+        closed_form=_without_steps(question, best.seconds), **setting,
+        **_lines(question, best.met.integrator, best.met.setting),
     )  # fmt: skip
 
 
@@ -516,11 +528,10 @@ def _lines(question: _Question, method: Integrator, setting: float | None) -> di
 
 
 def _exact_seconds(question: _Question) -> float:
-    """Seconds of the exact motion at the horizon, interpreted where it is not compiled yet, which takes 20 s."""
+    """Seconds of the exact motion at the horizon, once it is compiled."""
     scene, _, quantity, horizon = question[:4]
     exact = integrator("exact")
     call = bare_run(scene, exact, exact.chart_for(settings.observed(quantity)), math.nan, horizon)
-    closed_form.load()
     return timings([call], batches=5, batch=0.002, exact=False)[0].best
 
 
@@ -529,14 +540,16 @@ def _without_steps(question: _Question, best: float) -> str:
     scene, _, quantity, horizon = question[:4]
     if scene.of_body:
         return "A free body needs no integrator: symtop.reference evaluates its exact motion." if scene.top.free else ""
-    taken, way = _exact_seconds(question), "" if closed_form.load() else ", interpreted"
     limit = settings.judgeable(scene, quantity, horizon)
     error = f", with an error below {limit:.1g}" if math.isfinite(limit) else ""
+    if not closed_form.load():  # to compile it takes 10 s, and its time interpreted says nothing
+        return f"The closed form, integrator exact, takes no step{error}."
+    taken = _exact_seconds(question)
     if not best > taken:
         more = f", {taken / best:.2g} times that" if math.isfinite(best) else ""
-        return f"The closed form, integrator exact, takes {taken * 1e6:.2g} us{way}{more}{error}, and no step."
+        return f"The closed form, integrator exact, takes {taken * 1e6:.2g} us{more}{error}, and no step."
     return (
-        f"The fastest way is no integrator: the closed form (exact) takes {taken * 1e6:.2g} us{way}, {best / taken:.2g}"
+        f"The fastest way is no integrator: the closed form (exact) takes {taken * 1e6:.2g} us, {best / taken:.2g}"
         f" times less{error}. The integrators are compared for what they do where there is no closed form."
     )
 

@@ -130,7 +130,11 @@ class Tops:
 
     @cached_property
     def regime(self) -> Array:
-        """Four numbers without units that fix the motion of the axis, (n, 4); see `symtop.measure.ranking`."""
+        """Four numbers without units that fix the motion of the axis, (n, 4).
+
+        cos(theta) at both turning points, and asinh of p_psi and p_phi over sqrt(I1 |mgl|). A top with mgl < 0 moves as
+        one with -mgl whose axis is named the other way round: cos(theta) and p_psi change sign, p_phi does not.
+        """
         I1, _, mgl = (self.numbers[:, k] for k in range(3))
         unit = np.sqrt(I1 * np.maximum(np.abs(mgl), TINY))
         high, low = np.cos(self.forms.theta_range.T)

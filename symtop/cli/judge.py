@@ -2,7 +2,6 @@
 
 import dataclasses
 import sys
-from pathlib import Path
 from typing import Any
 
 import click
@@ -181,13 +180,10 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
 @click.option("--keeps", help="Only what does not let it drift: energy or momenta.")
 @click.option("--quantity", help="Of what: axis, which is the default, attitude (that of a body), theta, energy, ...")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
-@click.option("--results", type=File(file_okay=False), help="Folder of a stored study; results by default.")
 @common.body_options
 @plugin_option
 @json_option
-def recommend(
-    scene: Any, accuracy: float | None, engine: str | None, results: str | None, as_json: bool, **options: Any
-) -> None:
+def recommend(scene: Any, accuracy: float | None, engine: str | None, as_json: bool, **options: Any) -> None:
     """Find the cheapest integrator and step that meet an accuracy on a SCENE.
 
     The answer is no method that is made for this very top; the best of those is named beside it. The exit code is 1 if
@@ -204,19 +200,16 @@ def recommend(
     """
     with ticking("loading"):
         from symtop import advise
-        from symtop.measure.ranking import STORED
     if accuracy is None and engine is None:
         raise SymtopError("recommend needs --accuracy, for example 1e-6, or --i-use")
     options |= {"step_size": common.step_of(scene, options), "needs": options["needs"] or ()}
-    if engine is None and results is None and (Path("results") / STORED).is_file():
-        results = "results"
     with ticking("trying methods"):
         answer: Any
         if engine is not None:
-            answer = advise.i_use(engine, scene, accuracy=accuracy, results=results, **options)
+            answer = advise.i_use(engine, scene, accuracy=accuracy, **options)
             advice = answer.advice if accuracy is not None else None
         else:
-            answer = advice = advise.recommend(scene, accuracy=accuracy or 0.0, results=results, **options)
+            answer = advice = advise.recommend(scene, accuracy=accuracy or 0.0, **options)
     click.echo(as_text(dataclasses.asdict(answer))) if as_json else say(str(answer))
     if advice is not None and advice.integrator is None:
         sys.exit(1)

@@ -229,6 +229,14 @@ def search(
     return setting if isinstance(setting, str) else tried[setting]
 
 
+def at_accuracy(method: Integrator, ratio: float) -> float:
+    """What part of the work of a run is left at the very accuracy, of which its error is the part `ratio`.
+
+    That of a method of order p grows as error^(-1/p). An error below `LEAST` is of a setting that has no coarser one.
+    """
+    return float(min(max(ratio, LEAST), 1.0) ** (1.0 / (method.order or math.inf)))
+
+
 def rounded(scene: Scene, met: Met, accuracy: float, quantity: str) -> Met:
     """The same with a finer setting of five digits if a run with that meets the accuracy too, and else as it was."""
     setting = float(Context(prec=5, rounding=ROUND_DOWN).create_decimal(repr(float(met.setting))))
@@ -236,11 +244,11 @@ def rounded(scene: Scene, met: Met, accuracy: float, quantity: str) -> Met:
     return again if again.error <= accuracy else met
 
 
-def seconds(scene: Scene, mets: Sequence[Met], quantity: str, horizon: float) -> list[float]:
+def seconds(scene: Scene, mets: Sequence[Met], quantity: str, horizon: float, batches: int = 5) -> list[float]:
     """Wall times of bare runs to a horizon with settings, timed against each other; scaled from the runs that met."""
     runs = []
     for met in mets:
         chart = chart_of(met.integrator, scene.observes, observed(quantity))
         runs.append(bare_run(scene, met.integrator, chart, met.setting, met.horizon))
-    taken = timings(runs, batches=5, batch=0.002, patience=0.1, exact=False)
+    taken = timings(runs, batches, batch=0.002, patience=0.06 * batches, exact=False)
     return [timing.best * horizon / met.horizon for timing, met in zip(taken, mets, strict=True)]

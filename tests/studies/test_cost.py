@@ -15,7 +15,6 @@ import symtop
 from symtop.core import netcdf
 from symtop.measure import datasets
 from symtop.measure.accuracy import error_row
-from symtop.measure.ranking import nearest, regime
 from symtop.measure.settings import TARGETS
 from symtop.measure.verdicts import barriers
 from symtop.methods.framework.registry import integrator
@@ -236,6 +235,14 @@ def tops():
     return tops_of(60, 20, 3, 10.0)
 
 
+def regime(scene):
+    """Cosines of the turning points and asinh of the scaled momenta, of the top whose gravity pulls down."""
+    top, momenta = scene.top, scene.top.momenta(scene.start)
+    low, high = sorted(top.turning_cosines(scene.start))
+    psi, phi = np.arcsinh(np.array([momenta.p_psi, momenta.p_phi]) / math.sqrt(top.I1 * abs(top.mgl)))
+    return [low, high, psi, phi] if top.mgl > 0.0 else [-high, -low, -psi, phi]
+
+
 def test_scales_of_many_tops_are_those_of_scenes(tops):
     scenes = [scene_of(tops, k) for k in range(80)]
     assert tops.energy_scale[:80] == pytest.approx([one.energy_scale for one in scenes], rel=1e-6)
@@ -445,20 +452,6 @@ def test_called_winners_survive_prices_that_are_measured_again(data):
     dearer = np.where(np.array(taken.names) == contest.first.name, 3.0, 1.0)[:, np.newaxis]
     worse = hindsight(taken.names, taken.values * dearer, taken.errors)
     assert worse.first.name != contest.first.name  # the control: three times as dear, it wins nowhere
-
-
-@pytest.mark.parametrize("quantity", ["axis", "attitude", "energy"])
-def test_advice_counts_the_nearest_tops_of_the_quick_results(quick_results, quantity):
-    scene = symtop.scene("goldstein")
-    near = nearest(quick_results / "cost.nc", scene, quantity, 1e-6, scene.horizon)
-    assert near.tops == 50
-    assert (near.quantity, near.target) == (quantity, 1e-6)
-    counts = list(near.served.values())
-    assert counts == sorted(counts, reverse=True)
-    assert counts[0] >= 20  # some variant is near the cheapest on most of them
-    advice = symtop.recommend(scene, accuracy=1e-6, quantity=quantity, horizon=20.0, results=quick_results)
-    assert "of the 50 nearest random tops" in advice.nearest
-    assert advice.nearest in str(advice)
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,6 @@ import numpy as np
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
-from symtop.methods.framework.plan import OK
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 
@@ -104,7 +103,7 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
     opened_at = carry_at + carry
     x_at = opened_at + opened
     end_at = x_at + unknowns
-    size_at, live_at = end_at + len(ends), end_at + len(ends) + 1
+    size_at, live_at, steps_at = (end_at + len(ends) + i for i in range(3))
     most = rule.iterations // 2
 
     @register_jitable
@@ -117,7 +116,7 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
         put(block, opened_at, j, start(top(*column(table, 0, j, numbers)), rule, block[j]))
         put(block, x_at, j, predict(problem(block, table, j), column(block, carry_at, j, carries)))
         block[size_at * W + j] = np.inf
-        block[live_at * W + j] = 1.0 - block[flag * W + j]
+        block[live_at * W + j] = 1.0 if block[flag * W + j] == 0.0 else 0.0
 
     @register_jitable
     def attempt(block, table, j):  # type: ignore[no-untyped-def]
@@ -141,8 +140,10 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
         put(block, dimension, j, low)
         put(block, 2 * dimension, j, step)
         put(block, carry_at, j, newest + before)
-        healthy = outcome == OK and block[live_at * W + j] == 0.0
-        block[flag * W + j] = block[flag * W + j] if healthy else 1.0
+        ended = -float(outcome) if block[live_at * W + j] == 0.0 else 1.0
+        ended = ended if block[flag * W + j] == 0.0 else block[flag * W + j]
+        block[flag * W + j] = ended
+        block[steps_at * W + j] += 1.0 if ended == 0.0 else 0.0
 
     def step(block, table):  # type: ignore[no-untyped-def]
         wide_vectors()
@@ -164,5 +165,5 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
     def read(numbers):  # type: ignore[no-untyped-def]
         return rule
 
-    room = live_at + 1 - opened_at
+    room = steps_at + 1 - opened_at
     return Lanes(step, lay, read, lambda _: steady, top, dimension, carry, room=lambda _: room)

@@ -29,7 +29,7 @@ from symtop.core.numbers import GOLDEN
 from symtop.core.parallel import cores, heed, in_threads
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.lanes import Many, W, column, members_of, of_bodies, put
+from symtop.methods.framework.lanes import Many, W, column, divided, members_of, of_bodies, put, turns
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, off_length
 from symtop.methods.framework.preparation import opened
@@ -250,17 +250,28 @@ class Job:
         most = min(CHUNK_STEPS, max(LEAST_STEPS, ends[-1] // SHARES))
         while begin < n:
             done = ends[begin - 1] if begin else 0
-            length = min(int(np.searchsorted(ends, done + most)) - begin, size)
+            length = min(int(np.searchsorted(ends, done + most, "right")) - begin, size)
             length = length // W * W if length > 4 * W else max(length, 1)
             end = min(begin + length, n)
             yield slice(begin, end)
             begin = end
 
-    def part(self, members: slice) -> "Job":
+    def of(self, members: Any) -> "Job":
         """The same for some members."""
         arrays = ("numbers", "horizon", "steps", "tolerance", "period", "names")
         cut = {name: values[members] for name in arrays if (values := getattr(self, name)) is not None}
-        return replace(self, first=self.first + members.start, **cut)
+        return replace(self, **cut)
+
+    def part(self, members: slice) -> "Job":
+        """The same for a stretch of members, which know their numbers."""
+        return replace(self.of(members), first=self.first + members.start)
+
+    def order(self) -> Any:
+        """Members in lanes by the work of a step, as neighbours end together, the most first; others as they are."""
+        members = np.arange(len(self.numbers))
+        if self.execution != IN_LANES:
+            return members
+        return np.concatenate(divided(members, self.steps, turns(self.numbers, self.horizon / self.steps)))[::-1]
 
     def columns(self) -> dict[str, Any]:
         """The runs: ``time``, what they show, `PER_MEMBER`, and the first exception's message where one was raised."""

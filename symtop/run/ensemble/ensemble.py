@@ -99,7 +99,9 @@ def ensemble(
     job = _job(read, method, chart, settings, tolerance, count, limit, shown)
     if scheduler is not None:
         cluster.check_sent(scheduler, job.part(slice(0, 1)), method.name)
-    chunks = list(job.chunks())
+    order = job.order() if path is None else np.arange(n)
+    ordered = replace(job.of(order), continuous=False) if path is None else job
+    chunks = list(ordered.chunks())
     words = {
         "title": f"{method.name} on {n} {'bodies' if chart == BODY else 'tops'}", "units": read.units, "chart": chart,
         "integrator": method.name, "implementation": method.implementation, "execution": job.execution,
@@ -109,7 +111,7 @@ def ensemble(
         """On how many members a solver raised an exception, and the first one's message."""
         raised, first, left = 0, "", sum(chunk.stop - chunk.start for chunk in rest)
         drawn = progress_bar(words["title"], quiet=silent, total=n, initial=n - left, unit="run")
-        with drawn as bar, contextlib.closing(_computed(job, rest, workers, scheduler)) as parts:
+        with drawn as bar, contextlib.closing(_computed(ordered, rest, workers, scheduler)) as parts:
             for chunk, part in zip(rest, parts, strict=True):
                 if message := part.pop(RAISED, ""):
                     raised, first = raised + int((part["outcome"] == RAISED).sum()), first or message
@@ -118,8 +120,8 @@ def ensemble(
         return raised, first
 
     if path is None:
-        job, columns = replace(job, continuous=False), dict[str, Any]()
-        raised, first = compute(chunks, lambda chunk, part: _fill(columns, part, chunk, n))
+        columns = dict[str, Any]()
+        raised, first = compute(chunks, lambda chunk, part: _fill(columns, part, order[chunk], n))
         if raised == n:
             raise SymtopError(first)
         data = as_dataset(columns, read.labels, of=job)
@@ -147,8 +149,8 @@ def _computed(job: Job, chunks: list[slice], threads: int, scheduler: str | None
             yield from in_order(client.get_executor(pure=False), Job.columns, parts, cluster.width(client))
 
 
-def _fill(columns: dict[str, Any], part: dict[str, Any], chunk: slice, n: int) -> None:
-    """Put a chunk into columns of n members, which the first one makes."""
+def _fill(columns: dict[str, Any], part: dict[str, Any], chunk: Any, n: int) -> None:
+    """Put the members of a chunk into columns of n members, which the first one makes."""
     for name, values in part.items():
         if name not in columns:
             kind = f"U{max(map(len, OUTCOMES))}" if name == "outcome" else values.dtype
