@@ -39,7 +39,7 @@ from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import heartbeat, integrator
 from symtop.judging.adapters.python_step import CONJUGATE
 from symtop.judging.battery import measure, stages, unmeasured
-from symtop.judging.claims.constants import KEPT, Constant
+from symtop.judging.claims.constants import KEPT, Constant, blows_up, said_to_blow_up
 from symtop.judging.claims.subject import Subject, open_target, seconds_a_step
 from symtop.judging.findings import About, Finding, Ledger, Measured, error_units, undecided
 from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
@@ -263,7 +263,9 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
         changed = changed._replace(exponent=math.nan)
     constant = Constant(changed, math.nan, KEPT * grain, grain)
     where = f"in {time.size} samples; it begins {abs(values[0] - true) / scale:.1e} from the scene's"
-    return constant.finding(name, declared, constant.words(where))
+    finding = constant.finding(name, declared, constant.words(where))
+    risen = blows_up(scene, (values - values[0]) / scale) if name == "energy" else np.empty(0)
+    return said_to_blow_up(finding, time[risen[0]]) if risen.size else finding
 
 
 def _measured(
