@@ -41,7 +41,9 @@ from symtop.run.ensemble.population import STRATA, population
 from symtop.run.motion import Exact, Integrated
 from symtop.run.simulation import make_plan
 
-SEED, CHUNK = 29, 100
+CHUNK = 100
+SEEDS = {"tops": 29, "bodies": 1124, "hostile": 1124}  # of bodies another one than those that `LATER` was chosen on
+MENDED = 5000  # bodies of each sampler on which the guard's watch was mended; later ones are new to it
 NUTATIONS = (10.0, 100.0, 1000.0)  # of tops
 SAMPLES = {"tops": 501, "bodies": 201, "hostile": 201}
 MOST_TURNS = 1e3  # of a hostile body about any axis
@@ -73,29 +75,29 @@ def tops(k: int) -> tuple[Scene, random.Random]:
     member = drawn.isel(member=k // len(names) % CHUNK)
     numbers = {name: float(member[name]) for name in member.data_vars if name != "stratum"}
     top = SymmetricTop(*(numbers.pop(name) for name in ("I1", "I3", "mgl")))
-    return Scene(f"{names[k % len(names)]}.{k}", top, Angles(**numbers), 1.0), random.Random(f"{SEED}/{k}")
+    return Scene(f"{names[k % len(names)]}.{k}", top, Angles(**numbers), 1.0), random.Random(f"{SEEDS['tops']}/{k}")
 
 
 @functools.lru_cache(maxsize=16)
 def _population(stratum: str, block: int) -> Any:
-    return population(CHUNK, seed=SEED + block, kind=stratum)
+    return population(CHUNK, seed=SEEDS["tops"] + block, kind=stratum)
 
 
 @functools.lru_cache(maxsize=2)
 def _bodies(block: int) -> list[Scene]:
-    return scenes_of(body_population(CHUNK, seed=SEED + block))
+    return scenes_of(body_population(CHUNK, seed=SEEDS["bodies"] + block))
 
 
 def bodies(k: int) -> tuple[Scene, random.Random]:
     """Body k of the sampler of symtop."""
     scene = _bodies(k // CHUNK)[k % CHUNK]
     named = f"{scene.name.rpartition('-')[0]}.{k}"
-    return Scene(named, scene.top, scene.start, 1.0), random.Random(f"{SEED}/{k}")
+    return Scene(named, scene.top, scene.start, 1.0), random.Random(f"{SEEDS['bodies']}/{k}")
 
 
 def hostile(k: int) -> tuple[Scene, random.Random]:
     """Body k of this sampler."""
-    draw = random.Random(f"hostile/{SEED}/{k}")
+    draw = random.Random(f"hostile/{SEEDS['hostile']}/{k}")
     shape = draw.choice(["thin", "flat", "sphere", "any"])
     small = 10.0 ** draw.uniform(-6.0, -1.0)
     least = draw.uniform(0.1, 0.9)
@@ -196,12 +198,12 @@ def kept(name: str) -> list[Run]:
         ]  # fmt: skip
 
 
-def make(name: str, count: int) -> None:
+def make(name: str, count: int, workers: int) -> None:
     """Make the runs that are missing."""
     TABLES.mkdir(parents=True, exist_ok=True)
     done = {run.k // CHUNK for run in kept(name)}
     missing = [place for place in range(math.ceil(count / CHUNK)) if place not in done]
-    with ProcessPoolExecutor(2) as pool, (TABLES / f"guard-{name}.csv").open("a") as file:
+    with ProcessPoolExecutor(workers) as pool, (TABLES / f"guard-{name}.csv").open("a") as file:
         for runs in pool.map(functools.partial(chunk, name), [place * CHUNK for place in missing]):
             csv.writer(file).writerows(runs)
             file.flush()
@@ -281,14 +283,17 @@ def page(results: Path) -> None:
             rows += [[f"{name}: {part}", guarded, *counts(runs, guarded)] for part, runs in parts.items()]
     table = Table("Runs that the guard warned of, of all, by the error that they had", header, rows)
     print("\n".join(" | ".join(row) for row in [header, *rows]))
-    sentences = []
-    for name, runs in known.items():
+    sentences, shown = [], {"tops": known["tops"]}
+    for name, words in (("bodies", "bodies"), ("hostile", "hostile bodies")):
+        shown |= {words: [run for run in known[name] if run.k < MENDED]}
+        shown |= {f"{words} more": [run for run in known[name] if run.k >= MENDED]}
+    for name, runs in shown.items():
         for guarded in ("exact", "series") if name == "tops" else ("series",):
             wrong = [run for run in runs if run.outcome == "ok" and run.error > guard.EXPECTED]
             right = [run for run in runs if run.outcome == "ok" and run.error <= guard.EXPECTED]
             silent = [run for run in wrong if not getattr(run, guarded) > guard.EXPECTED]
             false = sum(getattr(run, guarded) > guard.EXPECTED for run in right)
-            words = {"tops": f"tops, guard {guarded!r}", "bodies": "bodies", "hostile": "hostile bodies"}[name]
+            words = f"tops, guard {guarded!r}" if name == "tops" else name.replace(" more", ", new to the guard")
             sentences.append(
                 f"{len(runs)} runs of {words}: of {len(wrong)} wrong ones {len(silent)} were silent, the worst off by "
                 f"{max((run.error for run in silent), default=0.0):.2g} rad; of {len(right)} right ones {false} were "
@@ -300,7 +305,11 @@ def page(results: Path) -> None:
     words = pages.findings(
         "guard", "The guard without the truth", "Does the guard need to know the solution?", sentences,
         f"Wrong: off by more than {guard.EXPECTED} rad at some sample. The margin of the guard in unstable motions "
-        "was chosen on the first 2,600 bodies and 2,100 hostile ones.", [table],
+        "was chosen on 2,600 bodies and 2,100 hostile ones of another seed. As the guard then was, 2 of 1,969 wrong "
+        "runs of the first 5,000 bodies were silent (the worst off by 0.058 rad) and 6 of 1,912 of the hostile ones, "
+        "two of them beyond ten limits (0.34 and 0.51 rad). The steps of its watch damped the chaos of a needle, and "
+        "two motions beside an unstable rotation stay 0.01 rad apart until they pass it again. Both were mended.",
+        [table],
         captions={"curves": (f"{title[0].upper()}{title[1:]}. {caption}", alt)}, cases=sum(map(len, known.values())),
         measured=measured.sentence(facts, "python -m benchmarks.guard"),
         provenance={key: facts[key] for key in facts if key not in ("measured", "cores", "load_before")},
@@ -315,11 +324,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("name", choices=[*SAMPLERS, "page"])
     parser.add_argument("count", type=int, nargs="?", default=CHUNK)
+    parser.add_argument("--workers", type=int, default=2)
     asked = parser.parse_args()
     if asked.name == "page":
         page(Path("results"))
         return
-    make(asked.name, asked.count)
+    make(asked.name, asked.count, asked.workers)
     for run in kept(asked.name):
         if run.outcome == "ok" and run.error > 10.0 * guard.EXPECTED and not run.series > guard.EXPECTED:
             print("silent and grossly wrong:", run)

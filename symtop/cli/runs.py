@@ -130,6 +130,7 @@ def estimate(steps: float, run: Callable[[int], object]) -> None:
             few *= 4
             spent = first_call(partial(run, few)) - fixed  # what a run takes whatever its steps does not count
     took = spent * steps / (few - FEWEST)
+    post("running")  # no longer compiling
     if took > 10.0:
         warn(f"{steps:.3g} steps take about {f'{took:.2g} s' if took < 100.0 else f'{took / 60.0:.2g} min'}")
 

@@ -39,7 +39,7 @@ from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import heartbeat, integrator
 from symtop.judging.adapters.python_step import CONJUGATE
 from symtop.judging.battery import measure, stages, unmeasured
-from symtop.judging.claims.constants import KEPT, Constant
+from symtop.judging.claims.constants import KEPT, Constant, blows_up, said_to_blow_up
 from symtop.judging.claims.subject import Subject, open_target, seconds_a_step
 from symtop.judging.findings import About, Finding, Ledger, Measured, error_units, undecided
 from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
@@ -65,9 +65,7 @@ OPENING = 60.0  # seconds for loading a file and its imports
 # seconds for the claims of one stage: at most, for all stages together, and at least however many were spent
 PLUGIN = 600.0  # of a registered integrator
 VERDICT, QUICK_VERDICT = (45.0, 120.0, 15.0), (12.0, 40.0, 6.0)
-SHORTER = (
-    4.0  # times: the runs of a stage that took too long are shortened by so much beyond their pace, and made again
-)
+SHORTER = 4.0  # times, beyond their pace: the runs of a stage that took too long, made again
 SLOW = "; make a step faster", "; judge it without --quick, or make a step faster"  # the second with --quick
 
 
@@ -264,10 +262,10 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     if time.size < FEWEST:
         changed = changed._replace(exponent=math.nan)
     constant = Constant(changed, math.nan, KEPT * grain, grain)
-    off = abs(values[0] - true) / scale
-    return constant.finding(
-        name, declared, constant.words(f"in {time.size} samples; it begins {off:.1e} from the scene's")
-    )
+    where = f"in {time.size} samples; it begins {abs(values[0] - true) / scale:.1e} from the scene's"
+    finding = constant.finding(name, declared, constant.words(where))
+    risen = blows_up(scene, (values - values[0]) / scale) if name == "energy" else np.empty(0)
+    return said_to_blow_up(finding, time[risen[0]]) if risen.size else finding
 
 
 def _measured(

@@ -126,7 +126,7 @@ def _probe(
         piece = Plan.until(duration * (_places(motion.points) / motion.points), plan.tolerance, most)
     run = solve(method, chart, motion.scene.top, motion.start(since), piece)
     with np.errstate(all="ignore"):
-        error = motion.error(piece.times, chart, run.states, since)
+        error = motion.error(piece.times, chart, run.states, since, plan.horizon)
     outcome = run.outcome
     if not math.isfinite(error.sum()):  # no angle is more than pi
         error[~np.isfinite(error)] = math.inf

@@ -1,7 +1,8 @@
 """The true motion beside a probe of the guard: by the closed form, or integrated where there is none.
 
 `Exact` knows a top's motion for ever. `Integrated` needs the equations alone, and so takes bodies too: a Taylor series
-at rounding, of order 19, whose own error is its distance from one of order 16. What the motion makes of an error is
+at rounding, of order 19, whose own error is its distance from one of order 16, at the beginning or, where the motion
+multiplies errors, all the way. What the motion makes of an error is
 
     A(t) = max over s <= t of |y~(s) - y(s)|/delta,      |y~(0) - y(0)| = delta,
 
@@ -17,8 +18,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from symtop.core.numbers import EPSILON
-from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.plan import Plan, off_length
 from symtop.methods.framework.registry import integrator
 from symtop.model.charts import BODY, Array, attitude_distance, axes, axis_distance
 from symtop.model.scenes import Scene, closed_form
@@ -26,13 +26,13 @@ from symtop.model.top import Angles, SymmetricTop
 from symtop.run.reference.sensitivity import displacement
 
 SERIES, PAIR = {BODY: "series-general-adaptive", "axis": "series-adaptive"}, "dop853-compiled-fixed"
-FINE, CHECK = 1e-15, 1e-13  # tolerances: of the true motion, and of its check at one of so many times, the last first:
-CHECKED = 10
-PAIR_STEPS = 5  # of two motions side by side, in a period of the fastest turn
+FINE, CHECK = 1e-15, 1e-13  # tolerances: of the true motion, and of its check at one of so many times, the last first
+CHECKED, MULTIPLIED = 10, 1e5  # or at the first ones where A is less, which makes little of what they differ by
+PAIR_STEPS = 6  # of two motions side by side, in a period of the fastest turn: with longer ones chaos is damped away
 MOVED = 1e-10  # of the natural frequency: small enough to show how much a motion beside a separatrix shears
-SATURATED = 0.1  # rad; two motions that are farther apart no longer show how fast they part
+SATURATED = 0.01  # rad; two motions that are farther apart no longer show how fast they part
 WATCHED = {BODY: 200.0, "axis": 20.0}  # natural periods of a run: the motion of a top is integrable
-MOST_WATCHED = 5000  # steps
+MOST_WATCHED = 6000  # steps
 POINTS = 100  # of A
 MOST_POWER = 20.0  # of the time by which A grows beyond what is watched
 UNSTABLE = 50.0  # times that a stable motion may amplify a change of its start more than the time goes on
@@ -85,7 +85,7 @@ class Growth(NamedTuple):
     @classmethod
     def of(cls, times: Array, apart: Array, most: float) -> Self:
         """From a distance in units of the first one; beyond `most`, which shows no A, it grows on exponentially."""
-        size = np.maximum.accumulate(np.maximum(np.nan_to_num(apart, nan=math.inf), 1.0))
+        size = np.maximum.accumulate(np.maximum(np.where(np.isnan(apart), math.inf, apart), 1.0))
         last = int(np.searchsorted(size, most))
         if last < size.size:
             size[last:] = np.exp(np.minimum(math.log(most) * times[last:] / times[last], MOST_FOLDS))
@@ -114,8 +114,8 @@ class Integrated:
 
     def states(self, times: Array, tolerance: float) -> Array:
         """States (n, dimension) at `times` (n,), NaN from where the work is too much."""
-        plan = Plan.until(times, tolerance, MOST_WORK)
-        return solve(integrator(SERIES[self.chart]), self.chart, self.scene.top, self.scene.start, plan).states
+        solver = integrator(SERIES[self.chart]).solvers[self.chart]  # called as it is: checks take as long as it does
+        return solver(self.scene.top, self.scene.start, Plan.until(times, tolerance, MOST_WORK)).states
 
     def apart(self, first: tuple[str, Array], second: tuple[str, Array]) -> Array:
         """Rad (n,) between states (n, dimension) of two charts."""
@@ -123,10 +123,12 @@ class Integrated:
             return attitude_distance(first[1][:, :4], second[1][:, :4])
         return axis_distance(axes(*first), axes(*second))
 
-    def error(self, times: Array, chart: str, states: Array, _: float, /) -> Array:
-        """Rad (n,) by which states (n, dimension) of a run are off at `times` (n,), with what two orders differ by."""
-        true, check = self.states(times, FINE), self.states(times[::-CHECKED][::-1], CHECK)
-        gap = np.abs(check - true[::-CHECKED][::-1])[:, : 4 if self.chart == BODY else 3].max(initial=0.0)
+    def error(self, times: Array, chart: str, states: Array, _: float, horizon: float, /) -> Array:
+        """Rad (n,) by which states (n, dimension) are off at `times` (n,) of a run, with what two orders differ by."""
+        steady = self.amplification(float(times[-1]), horizon) < MULTIPLIED
+        some = slice(max(times.size // CHECKED, 1)) if steady else slice((times.size - 1) % CHECKED, None, CHECKED)
+        true = self.states(times, FINE)
+        gap = np.abs(self.states(times[some], CHECK) - true[some])[:, : 4 if self.chart == BODY else 3].max(initial=0.0)
         error: Array = self.apart((chart, states), (self.chart, true)) + gap
         return error
 
@@ -156,14 +158,15 @@ class Integrated:
         if until not in self.known:
             steps = max(math.ceil(until / step), POINTS)
             plan = Plan.steps(until / steps, np.arange(1, POINTS + 1) * steps // POINTS)
-            near, far = (
-                solve(integrator(PAIR), self.chart, self.scene.top, start, plan).states
-                for start in (self.scene.start, self.moved())
-            )
-            gap, place = far - near, 4 if self.chart == BODY else 3
-            turned = (2.0 if self.chart == BODY else 1.0) * np.linalg.norm(gap[:, :place], axis=1)
-            apart = np.fmax(turned, np.linalg.norm(gap[:, place:], axis=1) / (self.inertia * self.marks.frequency))
-            self.known[until] = Growth.of(plan.times, apart / MOVED, SATURATED / MOVED)
+            solver, top = integrator(PAIR).solvers[self.chart], self.scene.top
+            near, far = (solver(top, start, plan).states for start in (self.scene.start, self.moved()))
+            weights = np.zeros((near.shape[1], 2))  # of the attitude and of the momentum
+            weights[:-3, 0] = ((2.0 if self.chart == BODY else 1.0) / MOVED) ** 2
+            weights[-3:, 1] = (MOVED * self.inertia * self.marks.frequency) ** -2
+            with np.errstate(all="ignore"):  # of what has failed
+                apart = np.sqrt(((far - near) ** 2 @ weights).max(axis=1))
+                apart[off_length(self.chart, near) | off_length(self.chart, far)] = math.nan
+            self.known[until] = Growth.of(plan.times, apart, SATURATED / MOVED)
         return self.known[until]
 
     def amplification(self, until: float, horizon: float) -> float:
@@ -213,7 +216,7 @@ class Exact(Integrated):
     def __init__(self, scene: Scene) -> None:
         self.scene, self.marks, self.form = scene, landmarks(scene), closed_form(scene)
 
-    def error(self, times: Array, chart: str, states: Array, since: float, /) -> Array:
+    def error(self, times: Array, chart: str, states: Array, since: float, _: float, /) -> Array:
         """See `Integrated`; of the axis."""
         return self.form.axis_distance(since + times if since else times, axes(chart, states))
 

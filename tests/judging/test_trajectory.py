@@ -13,7 +13,7 @@ from symtop.core import netcdf
 from symtop.judging.claims.subject import open_target
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.model.body import product, rotated
-from tests.judging.blind.right import midpoint
+from tests.judging.blind.right import euler, midpoint
 
 SPHEROID = symtop.scene("spheroid")
 H, STRIDE, SAMPLES = 0.01, 10, 1001
@@ -46,6 +46,20 @@ def test_a_csv_file_has_the_errors_and_the_drift_of_its_states(table, tmp_path):
     assert ledger["energy"].measured.kind == "drift"
     assert (ledger["p_phi"].verdict, ledger["energy"].verdict) == ("confirmed", "refuted")
     assert str(ledger).startswith("run on spheroid\n")
+
+
+def test_an_energy_that_blows_up_is_said_to(table):
+    """Euler's method gains energy; that of `table` drifts, and friction that takes all of it is no blow-up."""
+    stepper, given = open_target(euler, None, "axis"), {"time": table[:101, 0], "axis": table[:101, 1:4]}
+    par, state = FORMULATIONS["axis"].prepare(SPHEROID.top, SPHEROID.start)
+    states = stepper.march(SPHEROID.top, par, np.array(state), H, STRIDE * np.arange(101)).states
+    states[:, :3] /= np.linalg.norm(states[:, :3], axis=1)[:, None]
+    ledger = symtop.judge({"time": given["time"], "axis": states[:, :3], "momentum": states[:, 3:]}, energy="bounded")
+    assert ledger["energy"].measured.kind == "blows up"
+    assert ledger.refuted == ["energy"]
+    assert "energy         blows up at t = " in str(ledger)
+    lost = symtop.judge(given | {"momentum": np.exp(-given["time"])[:, None] * table[:101, 4:]}, energy="bounded")
+    assert lost["energy"].measured.kind != "blows up"
 
 
 def test_a_netcdf_file_a_mapping_and_blanks_are_the_same(table, tmp_path):
@@ -188,7 +202,7 @@ def test_a_conjugate_attitude_of_a_body_is_refused_although_it_starts_right(tmp_
     axis, late = text(wrong[:, [0, 5, 6, 7]], "time,wx,wy,wz"), np.copy(wrong[:, :5])
     for content, words in [
         (axis, "one of axis, quaternion, theta"),
-        (text(late[::-1], OF_BODY[:16]), "increase from sample to sample"),
+        (text(late[::-1], OF_BODY[:16]), "at least 0 and increase, but sample 1 is at"),
         (text(late * [1.0, 2.0, 2.0, 2.0, 2.0], OF_BODY[:16]), "quaternion must be of length 1 within 0.001"),
         (text(wrong[:, [0, 3, 5, 6, 7]], "time,theta,wx,wy,wz").replace(",-0.", ",0."), "rows of 3 beside an attitude"),
     ]:

@@ -275,23 +275,16 @@ def _no_field(*_: Any) -> Any:
 
 
 def _plane_of(top: SymmetricTop, at: Angles) -> tuple[Any, tuple[float, ...]]:
-    """The top with its momenta, and (theta, p_theta) of a start."""
+    """The top with its momenta, which are parameters of the reduced motion, and (theta, p_theta) of a start."""
     par, state = on_angles(top, at)
     return par, state[:2]
 
 
-def _plane_shown(_par: Any, _times: Array, states: Array) -> Array:
-    """States in angles, whose phi and psi, which the reduced motion has not, stand still."""
-    return np.pad(states, ((0, 0), (0, 2)))
-
-
-def _plane_momenta(par: Any, states: Array) -> tuple[Array, Array]:
-    """p_phi and p_psi, which are parameters of the reduced motion."""
-    p_phi = 0.5 * (par.north + par.south)
-    return np.full(len(states), p_phi), np.full(len(states), par.p_psi)
-
-
-REDUCED = Formulation(_no_field, lambda y: chart_outcome(y[0]), _no_field, _plane_of, _plane_shown, _plane_momenta)
+REDUCED = Formulation(
+    _no_field, lambda y: chart_outcome(y[0]), _no_field, _plane_of,
+    lambda _, __, states: np.pad(states, ((0, 0), (0, 2))),  # in angles, whose phi and psi stand still
+    lambda par, states: (np.full(len(states), 0.5 * (par.north + par.south)), np.full(len(states), par.p_psi)),
+)  # fmt: skip
 
 
 class SeparableStep(FunctionStep):

@@ -124,7 +124,7 @@ def _cut(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, in
             end = run(start, n + m)[0]
         elif k == 0:
             stepper.renew()
-        if np.abs(middle).max() > BLOWN_UP * np.abs(start).max():
+        if not np.abs(middle).max() <= BLOWN_UP * np.abs(start).max():  # NaN too, which SciPy's classes refuse
             continue  # there the last bit alone moves a step further than any memory
         gap = _gap(end, run(np.nextafter(middle, np.inf), m)[0]) / a_step
         words = words if np.isfinite(gap) else "after a run that fails"

@@ -26,6 +26,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError
 from symtop.core.numbers import EPSILON
@@ -144,12 +145,6 @@ class LongRun(NamedTuple):
         """Its length in words."""
         return f"{f'{self.steps} steps' if self.steps else 'a formula'} over {self.nutations:.3g} nutations"
 
-    def traces(self) -> dict[str, Array]:
-        """What a figure shows of it."""
-        times, change = self.energy
-        length = {"steps_run": np.array(self.steps), "nutations_run": np.array(self.nutations)}
-        return length | {"long_nutations": times, "energy_change": change}
-
 
 def _run(
     method: Integrator, scene: Scene, chart: str, steps: float, step: float, samples: int
@@ -196,8 +191,7 @@ def long_run(
         if method.fixed_step:
             reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
     changes, every_step, blown_up = constants(scene, shown), constants(scene, pilot), math.nan
-    risen = np.flatnonzero(changes["energy"] > 1.0 + 2.0 * abs(scene.top.mgl) / scene.energy_scale)
-    if risen.size:
+    if (risen := blows_up(scene, changes["energy"])).size:
         blown_up = float(plan.times[risen[0]])
         shown, run, plan = _run(method, scene, inside, blown_up / step, step, SAMPLES)
         changes = constants(scene, shown)
@@ -212,6 +206,18 @@ def long_run(
     rows = tops(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS)  # fewer, where no sample is
     energy = np.array([np.pad(row, (0, WINDOWS - len(row)), constant_values=math.nan) for row in rows])
     return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *costs, reported, energy, blown_up)
+
+
+def blows_up(scene: Scene, change: Array) -> NDArray[np.int64]:
+    """The samples at which the energy has risen by more than that of the nutation and all that the weight can give."""
+    return np.flatnonzero(change > 1.0 + 2.0 * abs(scene.top.mgl) / scene.energy_scale)
+
+
+def said_to_blow_up(finding: Finding, time: float, steps: str = "") -> Finding:
+    """The finding on such an energy."""
+    measured, when = Measured("blows up", finding.value, f"blows up at t = {time:.3g}{steps}"), f"by t = {time:.3g}"
+    why = f"{when} it rises by more than that of the nutation and 2 |mgl|: {finding.why}"
+    return finding._replace(measured=measured, verdict="refuted" if finding.declared else "measured", why=why)
 
 
 def _contradiction(
@@ -308,7 +314,9 @@ def measure(subject: Subject) -> list[Finding]:
             findings = [undecided(claim, declared(method, claim), str(error)) for claim in every]
         by_chart.append([_named(one, chart) for one in findings])
     if runs:
-        subject.traces.update(min(runs, key=lambda run: run.steps).traces())
+        run = min(runs, key=lambda run: run.steps)
+        length = {"steps_run": np.array(run.steps), "nutations_run": np.array(run.nutations)}
+        subject.traces.update(length, long_nutations=run.energy[0], energy_change=run.energy[1])
     return [max(findings, key=_badness) for findings in zip(*by_chart, strict=True)]
 
 
@@ -341,11 +349,8 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
     # an error that returns with the nutation cannot exceed the largest change of a step, all one way
     most = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
     if claim == "energy" and run.blown_up > 0.0:
-        when, pace = f"t = {run.blown_up:.3g}", run.steps / run.nutations
-        text = f"blows up at {when}, after {run.steps} steps, {pace:.0f} a nutation"
-        why = f"by {when} it rises by more than that of the nutation and 2 |mgl|: {why}"
-        measured, verdict = Measured("blows up", changed.largest, text), "refuted" if claimed else "measured"
-        return finding._replace(measured=measured, verdict=verdict, why=why)
+        steps = f", after {run.steps} steps, {run.steps / run.nutations:.0f} a nutation"
+        return said_to_blow_up(finding, run.blown_up, steps)
     if run.outcome not in ("ok", "not_finite", "not_normalised") or (ended and kind in ("kept", "bounded")):
         return finding._replace(verdict="undecided", why=f"{why}; but the run {run.message}")
     if method.fixed_step and constant.sudden:

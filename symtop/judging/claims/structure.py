@@ -62,8 +62,12 @@ def measure(subject: Subject) -> list[Finding]:
                 answers = _elsewhere(subject, step, answers)
         except SymtopError as error:
             answers += [(None, math.nan, math.nan, undecided("", "", str(error)).why)] * (2 - len(answers))
-        names = ("symplectic", "symmetric")
-        by_chart.append([_in_chart(chart, subject.method, *each) for each in zip(names, answers, strict=True)])
+        by_chart.append(
+            [
+                agreement(claim, getattr(subject.method, claim), yes, f"{why}, in the {chart} chart", value, least)
+                for claim, (yes, value, least, why) in zip(("symplectic", "symmetric"), answers, strict=True)
+            ]
+        )
     return [max(findings, key=_badness) for findings in zip(*by_chart, strict=True)]
 
 
@@ -98,11 +102,6 @@ def map_of(subject: Subject, chart: str) -> tuple[maps.StepMap, Angles]:
     scene, start = subject.scene, maps.generic_start(subject.scene)
     h, momenta = maps.SHARE * scene.time_scale(), scene.top.momenta(start)
     return maps.coarsest(Plane(subject.method, "angles", scene.top, scene.momentum_scale, h, momenta), start), start
-
-
-def _in_chart(chart: str, method: Integrator, claim: str, answer: Answer) -> Finding:
-    yes, value, resolution, why = answer
-    return agreement(claim, getattr(method, claim), yes, f"{why}, in the {chart} chart", value, resolution)
 
 
 def _badness(one: Finding) -> tuple[int, float]:

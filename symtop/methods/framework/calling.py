@@ -12,7 +12,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, foreign_code
 from symtop.core.signals import at_most
-from symtop.methods.framework.plan import OUTCOMES, Array, Plan, Run, off_length
+from symtop.methods.framework.plan import OUTCOMES, QUATERNIONS, Array, Plan, Run, off_length
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import DIMENSIONS
 
@@ -40,7 +40,7 @@ def solve(method: Integrator, chart: str, top: Any, start: Any, plan: Plan, cont
         if not own:
             _restore(method, fields)
         checked = _checked(method, (plan.times.size, DIMENSIONS[chart]), plan, run, copy=not own)
-        return _of_length_one(plan, checked, chart)
+        return _of_length_one(plan, checked, chart) if chart in QUATERNIONS else checked
 
 
 def _restore(method: Integrator, fields: list[tuple[Any, str, Any]]) -> None:

@@ -85,6 +85,7 @@ _CAUSES = {
 
 
 LENGTH = 1e-3  # how far from one the length of a quaternion may be
+QUATERNIONS = ("attitude", "body")  # charts that begin with one
 
 
 def off_length(chart: str, states: Array) -> NDArray[np.bool_]:
@@ -92,7 +93,7 @@ def off_length(chart: str, states: Array) -> NDArray[np.bool_]:
 
     A state that is not finite says nothing.
     """
-    if chart not in ("attitude", "body"):
+    if chart not in QUATERNIONS:
         return np.zeros(states.shape[:-1], dtype=bool)
     length = np.sqrt((states[..., :4] ** 2).sum(axis=-1))
     return np.logical_or.accumulate(np.isfinite(length) & (np.abs(length - 1.0) > LENGTH), axis=-1)
