@@ -3,7 +3,7 @@
     1. Candidates. A table that was made from the study of cost names five (`symtop.measure.ranking`). One more is tried
        if the trials disagree with it: three of the five fail, its fourth or fifth is the fastest, or two are level.
        Where it does not answer, or nothing of it gets there, every compiled method is a candidate.
-    2. Trials. The step or tolerance of each candidate is searched for on a dozen nutations of the scene itself
+    2. Trials. The step or tolerance of each candidate is searched for on 120 nutations of the scene at most
        (`symtop.measure.settings`), against the closed form and a target lowered by the law of growth; one run is timed.
        Settings are found to a factor: times are compared as they would be at the very accuracy.
     3. Confirmation. The three fastest candidates, and others as fast, are run to the whole horizon, if a budget of
