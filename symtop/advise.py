@@ -159,7 +159,7 @@ class _Question(NamedTuple):
         """Is a method what the user can use, before its error is known?"""
         kept = all(declared(method, claim) in ("kept", "bounded") for claim in KEPT.get(self.keeps or "", ()))
         fixed = self.step is None and self.max_step == self.pace == math.inf
-        return kept and (fixed or method.fixed_step) and (method.general is True or not self.general)
+        return kept and (fixed or method.fixed_step) and (not self.general or BODY in _solvers(method))
 
 
 class _Trial(NamedTuple):
@@ -202,7 +202,7 @@ def recommend(
 
     `step_size` is the step that you have: every method of fixed step runs with it, and the fastest that is good enough
     is the answer. `max_step` is the longest step, `time_a_step` the most seconds of one on this machine. `general`
-    leaves out what does not exist for a body without symmetry, `keeps` ("energy", "momenta") what lets them drift.
+    leaves out what does not run on bodies without symmetry, `keeps` ("energy", "momenta") what lets them drift.
 
     Raises SymtopError for arguments that are out of range, and for a `horizon` to which the motion of a body is not
     known. It runs what it recommends, which takes from 0.1 s to half
@@ -501,8 +501,14 @@ def _carries(question: _Question, method: Integrator) -> str:
         return ""
     if method.general is not True:
         return " It does not carry over to a body without symmetry."
-    here = ", in the chart body" if BODY in integrator(method.method).solvers else ", which symtop does not run it on"
-    return f" It carries over to a body without symmetry{here}."
+    if BODY not in _solvers(method):
+        return " It carries over to a body without symmetry, which symtop does not run it on."
+    return " It carries over to a body without symmetry, in chart body; its step does not: ask again with that body."
+
+
+def _solvers(method: Integrator) -> Collection[str]:
+    """The charts of a method, whatever the one of a variant."""
+    return integrator(method.method).solvers
 
 
 def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
@@ -582,15 +588,17 @@ class EngineAdvice:
         near = self.errors[self.best] <= WORST
         if self.best != default and near:
             times = self.errors[default] / self.errors[self.best]
-            lines.append(f"Its best setting is {self.best}, {times:.3g} times nearer than {default}.")
+            nearer = f", {times:.3g} times nearer than {default}" if self.errors[default] < math.pi else ""
+            lines.append(f"Its best setting is {self.best}{nearer}.")
         if not near:
             lines.append(
                 f"No setting is within {WORST:g} rad: none is better than another, and there is nothing to match."
             )
         if self.advice is None:
             return "\n".join(lines)
-        if self.advice.accuracy != self.errors[self.best]:
-            return "\n".join([*lines, str(self.advice)])
+        if (wanted := self.advice.accuracy) != self.errors[self.best]:
+            serving = ", ".join(name for name, value in self.errors.items() if value <= wanted) or "none"
+            return "\n".join([*lines, f"Settings within {wanted:g} rad at this step: {serving}.", str(self.advice)])
         much = f"{self.gain:.3g} times fewer" if self.gain >= 1.0 else f"{1.0 / self.gain:.3g} times more"
         lines.append(f"As near as {self.best} with {much} force evaluations: {self.advice.reason}")
         return "\n".join(lines)

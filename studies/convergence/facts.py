@@ -76,11 +76,13 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     ends, rows = fits(data, MAIN, at_end=True), []
     for pair, (word, slopes) in judged(data).items():
         measured = [part for name in (MAIN, *OTHERS) for part in _order(slopes.get(name))]
-        rows.append([*pair, declared_order(pair[1]), word, *measured, ends[pair].constant])
+        off = "higher" if MAIN in slopes and slopes[MAIN].slope > declared_order(pair[1]) else "lower"
+        shown = off if word == "refuted" else word  # a claim is judged by more than this run: see the ledger
+        rows.append([*pair, declared_order(pair[1]), shown, *measured, ends[pair].constant])
     names = [part for name in (MAIN, *OTHERS) for part in (f"order in {name}", f"+- in {name}")]
     orders = pd.DataFrame(rows, columns=["scene", "variant", "declared", "verdict", *names, "C at the end (rad/s^p)"])
-    rank = {"refuted": 0, "undecided": 1}
-    orders = orders.sort_values("verdict", key=lambda column: column.map(lambda word: rank.get(word, 2)), kind="stable")
+    rank = {"lower": 0, "higher": 1, "undecided": 2}
+    orders = orders.sort_values("verdict", key=lambda column: column.map(lambda word: rank.get(word, 3)), kind="stable")
     return {"costs": costs, "orders": orders, "tolerances": tolerances(data)}
 
 

@@ -82,7 +82,8 @@ def compare(
     timed, end, count = options["cost"] == "time", data.attrs["horizon"], data.attrs["nutations"]
     unit, period = " s" if data["reached_time"].attrs["units"] == "s" else "", period_word(data)
     say(f"{data['scene'].item()} to t = {end:.6g}{unit} ({count:.3g} {period}s): the cheapest run by {options['cost']}")
-    say(f"steps a {period} or tolerance{', time' * timed}, force evaluations; error of {data.attrs['quantity']}")
+    cost = "time" if timed else "force evaluations"
+    say(f"steps a {period} or tolerance (tol), {cost}; error of {data.attrs['quantity']}")
     rows = [[titled(cell), *(_cell(one, timed) for one in own)] for cell, own in zip(cells, records, strict=True)]
     click.echo(table(["variant", *map("error {:.0e}".format, TARGETS)], rows))
     for cell in cells:
@@ -114,5 +115,6 @@ def _cell(record: dict[str, Any], timed: bool) -> str:
 
     steps, tolerance = record["steps_per_nutation"], record["tolerance"]
     fixed, formula = not math.isnan(record["step_size"]), math.isnan(tolerance)
-    setting = (f"{steps:.3g}" if steps < 1e3 else f"{steps:.0f}") if fixed else "-" if formula else f"{tolerance:.0e}"
-    return f"{setting:>6} {pace(record['seconds']) if timed else '':>{7 * timed}} {record['force_evaluations']:.1e}"
+    many = f"{steps:.3g}" if steps < 1e3 else f"{steps:.0f}"
+    setting = f"{many} steps" if fixed else "-" if formula else f"tol {tolerance:.0e}"
+    return f"{setting:>10} {pace(record['seconds']) if timed else format(record['force_evaluations'], '.1e'):>7}"

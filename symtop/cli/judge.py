@@ -56,7 +56,9 @@ def judge(
     my.py:MyRK      a class derived from scipy.integrate.OdeSolver
     my.py:solver    an instance of a solver of diffrax
     my.py:step      with --form rotation, step(q, w, h, inertia, torque) -> q, w of a rigid
-                    body: q = (w, x, y, z) from body to space, or a matrix (3, 3)
+                    body: q = (w, x, y, z) from body to space, or a matrix (3, 3); w the
+                    rates in body axes, inertia the three principal moments, torque(q)
+                    a function that returns the torque in body axes
     ./my.so         void step(double *y, double h, const double *par, long n)
     "./engine -x"   with --form program: a line of numbers in, states out
     run.csv         a trajectory without a method: time and states (see symtop.judging.judge_step)
@@ -176,7 +178,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
 @click.option("--max-step", type=float, help="The longest step that you can take.")
 @click.option("--time-a-step", type=float, help="The most seconds that a step may take here, for example 1e-6.")
 @click.option("--needs", callback=common.separated, help="What you can supply: derivative,kicks or torque,inertia.")
-@click.option("--general", is_flag=True, help="Only what exists for a body without symmetry.")
+@click.option("--general", is_flag=True, help="Only what runs on a body without symmetry, too.")
 @click.option("--keeps", help="Only what does not let it drift: energy or momenta.")
 @click.option("--quantity", help="Of what: axis, which is the default, attitude (that of a body), theta, energy, ...")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")

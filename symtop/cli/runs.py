@@ -130,6 +130,7 @@ def estimate(steps: float, run: Callable[[int], object]) -> None:
             few *= 4
             spent = first_call(partial(run, few)) - fixed  # what a run takes whatever its steps does not count
     took = spent * steps / (few - FEWEST)
+    post("running")  # no longer compiling
     if took > 10.0:
         warn(f"{steps:.3g} steps take about {f'{took:.2g} s' if took < 100.0 else f'{took / 60.0:.2g} min'}")
 
@@ -259,11 +260,12 @@ def ensemble(
     few, shown = (part.isel(member=slice(0, most)) for part in (drawn, data))
     outcomes, steps = Counter(data["outcome"].values.tolist()), int(data["steps"].sum())
     with ticking("comparing with the true motion"):
+        wrong = {name: member_errors(few, shown, name) for name in compared}
         if figure is not None:
             from symtop.report.plot import draw_ensemble
 
-            draw_ensemble(few, shown, figure)
-        own = {name: largest(member_errors(few, shown, name)) for name in compared}
+            draw_ensemble(shown, wrong, figure)
+        own = {name: largest(values) for name, values in wrong.items()}
         worst = {name: spread(values[:, None])[:, 0].tolist() for name, values in own.items()}
     data.close()
     if output is not None:

@@ -150,7 +150,7 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     known = list(allowed)
     if isinstance(value, str) and value in known:
         return value
-    near = difflib.get_close_matches(value, known, n=3, cutoff=0.5) if isinstance(value, str) else []
+    near = difflib.get_close_matches(value.lower(), known, n=3, cutoff=0.5) if isinstance(value, str) else []
     names = ", ".join(known[:12]) + " ..." * (len(known) > 12)
     hint = f"did you mean {' or '.join(near)}?" if near else f"known: {names}"
     error = UnknownNameError(f"{name} {shown(value)} is unknown; {hint}", name)

@@ -267,8 +267,11 @@ def _times(data: Mapping[Any, Any]) -> charts.Array:
     time = _numbers("time", data["time"])
     if time.ndim != 1 or time.size == 0:
         raise SymtopError(f"time must be a row of numbers, not of shape {time.shape}")
-    if not np.isfinite(time).all() or time[0] < 0.0 or (np.diff(time) <= 0.0).any():
-        raise SymtopError("time must be finite, at least 0 and increase from sample to sample")
+    bad = ~np.isfinite(time) | (np.diff(time, prepend=-1.0 if time[0] == 0.0 else 0.0) <= 0.0)
+    if bad.any():
+        k = int(np.argmax(bad))
+        after = f" after {time[k - 1]:g}" if k else ""
+        raise SymtopError(f"time must be finite, at least 0 and increase, but sample {k} is at {time[k]:g}{after}")
     return time
 
 

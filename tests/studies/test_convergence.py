@@ -109,9 +109,9 @@ def test_the_ledger_and_the_study_say_the_same_of_an_order():
     """An interval that holds the order confirms it in both; what is neither 5 nor clearly another is open in both."""
     assert "order" in CLAIMS
     radau = measured_order(integrator("radau"), symtop.scene("spheroid"), quick=True)
-    assert order_verdict(5, radau.fits[radau.observed]) != "confirmed"
+    assert order_verdict(5, radau.main) != "confirmed"
     verlet = measured_order(integrator("stormer-verlet"), symtop.scene("spheroid"), quick=True)
-    assert order_verdict(2, verlet.fits[verlet.observed], verlet.fits.values()) == "confirmed"
+    assert order_verdict(2, verlet.main, verlet.fits.values()) == "confirmed"
 
 
 def test_errors_of_adaptive_methods_follow_their_tolerance(data):

@@ -37,7 +37,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from symtop.core.errors import SymtopError
 from symtop.judging.claims.structure import ONE_MAP, map_of
@@ -182,15 +181,12 @@ class Order(NamedTuple):
     """What the errors of a method say about its order."""
 
     scene: str
-    table: xr.Dataset  # of `order_table`
+    tolerance: Array
     step_size: Array  # mean ones of an adaptive method
-    fits: dict[str, Fit]  # attitude (or axis, where the chart has no attitude), theta, energy
-    observed: str  # the first of them, which decides
-
-    @property
-    def main(self) -> Fit:
-        """The fit that decides."""
-        return self.fits[self.observed]
+    error: Array  # of the attitude (or axis, where the chart has no attitude)
+    bound: Array  # of it
+    main: Fit  # of it, which decides
+    fits: dict[str, Fit]  # of it, theta and energy
 
     @property
     def measured(self) -> Measured:
@@ -198,16 +194,13 @@ class Order(NamedTuple):
         fit = self.main
         return Measured("slope", fit.slope, text=str(fit)) if math.isfinite(fit.slope) else NOTHING
 
-    def columns(self, *names: str) -> list[Array]:
-        """Columns of the table; "" and "_bound" are of what decides."""
-        return [self.table[self.observed + name if name in ("", "_bound") else name].values for name in names]
-
 
 def measured_order(
     method: Integrator, scene: Scene, *, quick: bool = False, finest: float | None = None, main: str = ""
 ) -> Order:
     """Slopes of the errors of attitude (or axis, or `main`), theta and energy; `finest`: most steps of a run."""
     runs, shown = [(scene, NUTATIONS)], observable(method)
+    main = main or shown
     if finest is not None and method.fixed_step:
         runs.append((scene, SHARE))  # the same number of steps, and smaller errors
     known = method.fixed_step and method.order is not None and not scene.of_body
@@ -221,8 +214,9 @@ def measured_order(
         settings = ladder(method, chosen, horizon, count, most)
         table = order_table(chosen, method, settings, horizon, shown, dense=finest is None)
         step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
-        fits = {name: order_fit(chosen, method, table, name, horizon) for name in (main or shown, "theta", "energy")}
-        tried.append(Order(chosen.name, table, step, fits, main or shown))
+        fits = {name: order_fit(chosen, method, table, name, horizon) for name in (main, "theta", "energy")}
+        columns = table["tolerance"].values, step, table[main].values, table[f"{main}_bound"].values
+        tried.append(Order(chosen.name, *columns, fits[main], fits))
         if tried[-1].measured:
             return tried[-1]
     return tried[0]
@@ -240,7 +234,7 @@ def _by_steps(subject: Subject) -> Finding:
         method = replace(method, order=max(series.order, 1))
         fitted = measured_order(method, scene, **options)
     main, measured, rank = fitted.main, fitted.measured, np.argsort(fitted.step_size)[:SHOWN]
-    columns = {"step_size": fitted.step_size, "error": fitted.columns("")[0], "fitted": main.used.astype(float)}
+    columns = {"step_size": fitted.step_size, "error": fitted.error, "fitted": main.used.astype(float)}
     padded = np.full(SHOWN - rank.size, math.nan)
     subject.traces.update({name: np.concatenate([values[rank], padded]) for name, values in columns.items()})
     slopes = ", ".join(f"{name} {fit}" for name, fit in fitted.fits.items() if math.isfinite(fit.slope))
@@ -271,7 +265,7 @@ def _by_steps(subject: Subject) -> Finding:
 
 def _converges(fitted: Order, slopes: str) -> Finding:
     """Does the error fall with the tolerance, down to rounding?"""
-    tolerances, errors = fitted.columns("tolerance", "")
+    tolerances, errors = fitted.tolerance, fitted.error
     good, (decades, less) = np.isfinite(errors), FALLS
     if not good.any():
         return undecided("order", CONVERGES, fitted.main.reason)
@@ -314,7 +308,7 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
 
 def _agree(fitted: Order, power: int) -> bool:
     """Do the errors of the finest runs fall about as h^power, as far as they can be judged?"""
-    h, (error, bound) = fitted.step_size, fitted.columns("", "_bound")
+    h, error, bound = fitted.step_size, fitted.error, fitted.bound
     good = np.isfinite(error) & (error > ABOVE * bound) & (error < LARGEST_ERROR)
     finest = np.argsort(h[good])[:FINEST_RUNS]
     scaled = error[good][finest] / h[good][finest] ** power
