@@ -5,7 +5,9 @@
 Each method runs on a free body and on a heavy one from starts that differ by a thousandth, at a step so short that its
 own error of the energy is below rounding. The means of a quantity over windows that are logarithmic in time, its root
 mean square over the starts, and the power of the time with which that grows over the last decades: 1/2 is the walk that
-unbiased rounding makes, 1 a bias. p_phi is L_z under a weight, where |L| is no constant.
+unbiased rounding makes, 1 a bias. p_phi is L_z under a weight, where |L| is no constant. Of eight such walks the fitted
+power is 0.35 to 0.66 in 95 cases of 100, and its own interval, which takes the windows for independent, holds 1/2 in
+half of them: a power needs many starts.
 """
 
 import argparse

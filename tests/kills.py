@@ -20,11 +20,10 @@ from tqdm import tqdm
 
 from symtop.core import netcdf
 from symtop.measure.datasets import differences
-from symtop.runner import store
+from symtop.runner import run as runner, store
 from tests.commands import ended, leftovers, symtop
 
 PATIENCE = 2400.0  # seconds for an undisturbed run
-CHOSEN_BY_TIMES = "cost/natural--check-"  # cells that are run in full follow from measured prices
 
 
 class Survived(NamedTuple):
@@ -44,6 +43,8 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
     those of an undisturbed run, measured times aside. A command that is through early is begun anew.
     """
     draw, results, calm = random.Random(seed), folder / "r", folder / "calm"
+    for script in (str(word) for word in words if str(word).endswith(".py")):
+        runner.load(script)  # from here on it is known by its name
     command = ["study", *words, "--jobs", 2, "--results"]
     _through(command, calm)
     count = lost = most = rounds = 0
@@ -96,21 +97,27 @@ def _begun(results: Path) -> set[Path]:
 
 def assert_same(results: Path, calm: Path) -> None:
     """All cases and datasets of both folders are the same but for measured times, and for what is chosen by them."""
-    kinds = ("*.nc", "cases/*/*.npz")
-    names = [
-        sorted(str(path.relative_to(folder)) for kind in kinds for path in folder.rglob(kind))
-        for folder in (results, calm)
-    ]
-    names = [[name for name in some if CHOSEN_BY_TIMES not in name] for some in names]
-    assert names[0] == names[1]
-    differing = {name: differences(_read(results / name), _read(calm / name)) for name in names[0]}
+    paths = sorted(path.relative_to(results) for path in results.rglob("*.nc"))
+    assert paths == sorted(path.relative_to(calm) for path in calm.rglob("*.nc"))
+    differing = {}
+    for path in paths:
+        study, files = runner.load(path.stem), [folder / path for folder in (results, calm)]
+        cases = study.cases("quick" in path.parts)
+        fixed = [case for case in cases if not case.timed]  # a price is a time, and a second round may follow from it
+        for case in fixed:
+            ours, theirs = (store.load_case(store.case_path(file.parent, study, case)) for file in files)
+            assert ours is not None, case
+            assert theirs is not None, case
+            differing[f"{study.name}: {case.label}"] = differences(ours, theirs)
+        groups = {case.group for case in fixed} - {case.group for case in cases if case.timed}
+        differing[str(path)] = differences(*(_of_groups(file, groups) for file in files))
     assert not any(differing.values()), {name: said for name, said in differing.items() if said}
 
 
-def _read(path: Path) -> xr.Dataset | xr.DataTree:
-    data = netcdf.read_any(path) if path.suffix == ".nc" else store.load_case(path)
-    assert data is not None, path
-    return data.drop_nodes("checks") if isinstance(data, xr.DataTree) and "checks" in data.children else data
+def _of_groups(path: Path, groups: set[str]) -> xr.Dataset | xr.DataTree:
+    """A dataset; of a tree the groups of these names."""
+    data = netcdf.read_any(path)
+    return data if isinstance(data, xr.Dataset) else data.drop_nodes(data.children.keys() - groups)
 
 
 if __name__ == "__main__":

@@ -260,11 +260,12 @@ def ensemble(
     few, shown = (part.isel(member=slice(0, most)) for part in (drawn, data))
     outcomes, steps = Counter(data["outcome"].values.tolist()), int(data["steps"].sum())
     with ticking("comparing with the true motion"):
+        wrong = {name: member_errors(few, shown, name) for name in compared}
         if figure is not None:
             from symtop.report.plot import draw_ensemble
 
-            draw_ensemble(few, shown, figure)
-        own = {name: largest(member_errors(few, shown, name)) for name in compared}
+            draw_ensemble(shown, wrong, figure)
+        own = {name: largest(values) for name, values in wrong.items()}
         worst = {name: spread(values[:, None])[:, 0].tolist() for name, values in own.items()}
     data.close()
     if output is not None:

@@ -163,9 +163,8 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
 def _ensemble(ax: "Axes", data: xr.Dataset, quantity: str, members: Any) -> None:
     if not isinstance(members, xr.Dataset):
         raise SymtopError("plot needs members, the tops of the ensemble, to compare it with the exact motion")
-    kind = spread.kind_of(data)
-    _bands(ax, members, data, one_of("quantity", quantity, spread.QUANTITIES[kind]))
-    ax.set_title(f"{data.attrs['integrator']} on {data.sizes['member']} {kind}")
+    _bands(ax, data, quantity, spread.member_errors(members, data, quantity))
+    ax.set_title(f"{data.attrs['integrator']} on {data.sizes['member']} {spread.kind_of(data)}")
 
 
 def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Dataset, path: str | Path) -> None:
@@ -195,17 +194,15 @@ def _line(axis: Any, times: Any, values: Any, color: str, label: str) -> None:
     axis.plot(times[1:], np.maximum(values[1:], SMALLEST), color=color, lw=1.0, label=label)
 
 
-def draw_ensemble(members: xr.Dataset, data: xr.Dataset, path: str | Path) -> None:
-    """Two panels in a file: quantiles over members of the axis error and of the energy error against time."""
-    kind = spread.kind_of(data)
-    shown = [name for name in spread.QUANTITIES[kind] if spread.SHOWN_BY[name] in data]
-    figure, axes = panels(len(shown), 1, height=2.1, sharex=True)
-    for axis, name in zip(axes[:, 0], shown, strict=True):
-        _bands(axis, members, data, name)
+def draw_ensemble(data: xr.Dataset, errors: dict[str, spread.Array], path: str | Path) -> None:
+    """A panel for each error of an ensemble in a file: quantiles of the `member_errors` (n, samples) against time."""
+    figure, axes = panels(len(errors), 1, height=2.1, sharex=True)
+    for axis, (name, values) in zip(axes[:, 0], errors.items(), strict=True):
+        _bands(axis, data, name, values)
         axis.label_outer()
     ended = (data["outcome"] == "ok").mean().item()
     sentence = (
-        f"{data.attrs['integrator']} on {data.sizes['member']} {kind}: errors against the true motion; "
+        f"{data.attrs['integrator']} on {data.sizes['member']} {spread.kind_of(data)}: errors against the true motion; "
         f"{100.0 * ended:.4g} % of the runs ended ok"
     )
     if ended < 1.0:
@@ -214,7 +211,7 @@ def draw_ensemble(members: xr.Dataset, data: xr.Dataset, path: str | Path) -> No
     save(figure, at_home(path))
 
 
-def _bands(axis: Any, members: xr.Dataset, data: xr.Dataset, quantity: str) -> None:
+def _bands(axis: Any, data: xr.Dataset, quantity: str, own: spread.Array) -> None:
     """Quantiles over members of an error against time, on one Axes, at places of `symtop.report.spread.at_places`.
 
     The median is a line, with two bands about it, named at their right ends.
@@ -225,7 +222,7 @@ def _bands(axis: Any, members: xr.Dataset, data: xr.Dataset, quantity: str) -> N
     """
     horizons = data["horizon"].values
     shared = (horizons == horizons[0]).all()
-    places, own = spread.at_places(data, spread.member_errors(members, data, quantity))
+    places, own = spread.at_places(data, own)
     quantiles = spread.spread(own)
     known = np.isfinite(places) & ~np.isnan(quantiles).any(axis=0) & (places > 0.0)
     if not known.any():

@@ -4,9 +4,8 @@
     attitude    of bodies without symmetry, in its place: angle between the attitude and that of the true motion, rad
     energy      abs(E - E0) / (E0 - min V), or of bodies / (T0 + |mgl|), the units of `errors`
 
-A member that has failed has an infinite error from there on, so that it counts among the worst and is not left out; an
-error is NaN where the true motion is not known, as of a heavy body in chaos. Quantiles are those of the sample, without
-interpolation: an infinite one says that so many have failed.
+A member that has failed has an infinite error from there on, so that it counts among the worst and is not left out.
+Quantiles are those of the sample, without interpolation: an infinite one says that so many have failed.
 """
 
 import functools
@@ -74,10 +73,12 @@ def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
             truth = _forms(numbers.tobytes()).axis(filled)
             errors, known = charts.axis_distance(values, truth), np.isfinite(truth).all(axis=2)
         else:
-            each = zip(members_of(numbers), filled, strict=True)
-            motions = [body_samples(*one, row.tobytes(), precise=False) for one, row in each]
-            truth, low, _, bound = (np.array(part) for part in zip(*motions, strict=True))
-            errors, known = charts.attitude_distance(values, truth, low), np.isfinite(bound)
+            rows = []
+            for (body, start), when, mine in zip(members_of(numbers), filled, values, strict=True):
+                name = "the body with the moments {}, {} and {}".format(*body.moments)
+                true = body_samples(name, body, start, when.tobytes(), precise=False)
+                rows.append(charts.attitude_distance(mine, true.quaternion, true.quaternion_lo))
+            errors = np.array(rows)
     return np.where(finite & known, np.where(np.isfinite(errors), errors, np.inf), np.nan)
 
 

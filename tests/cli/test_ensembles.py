@@ -116,6 +116,8 @@ def test_bodies_are_run_compared_written_and_drawn(tmp_path):
      (["strang", *STEPS, "--bodies", "--members", 2_000_000], "--members must be at most 1e+06"),
      (["midpoint", *STEPS, "--bodies", "--members", 4], "must have a chart for bodies without symmetry"),
      (["strang", *STEPS, "--bodies", "--variables", "axis", "--figure", "a.png"], "needs quaternion or energy among"),
+     (["rk4", "--bodies", "--kind", "chaotic", "--members", 2, "--per-nutation", 60, "--nutations", 99, "--samples", 5],
+      "its motion is not known to 1e-9 rad from there on"),
      (["midpoint[attitude]", *STEPS], "known: angles")],
 )  # fmt: skip
 def test_bad_input_is_one_sentence_and_code_2(words, says):

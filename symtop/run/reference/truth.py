@@ -161,10 +161,17 @@ def _motion(body: RigidBody, start: Attitude) -> "FreeBody | HeavyBody":
 
 
 @functools.lru_cache(maxsize=16)
-def body_samples(body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> "BodyMotion":
-    """A motion at times, kept for a while: methods on one scene ask for the same ones; NaN from where it is lost."""
+def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> "BodyMotion":
+    """The motion of a body of that name at times, kept for a while: methods on one scene ask for the same ones.
+
+    SymtopError for one that is lost before the last time, as in chaos.
+    """
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
-    return motion.samples(times) if body.free else motion.samples(times, precise=precise)  # type: ignore[call-arg]
+    shown = motion.samples(times) if body.free else motion.samples(times, precise=precise)  # type: ignore[call-arg]
+    if (lost := shown.lost(times)) is not None:
+        words = "its motion is not known to 1e-9 rad from there on"
+        raise SymtopError(f"times must be below {lost:.6g} on {name}, not {times.max():.6g}: {words}", "times")
+    return shown
 
 
 def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) -> xr.Dataset:
@@ -174,10 +181,7 @@ def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) ->
     one_of(f"precision on {scene.name}", precision, known)
     if certify is not None:
         raise SymtopError(f"certify must be None on {scene.name}, a body without symmetry, not {certify!r}")
-    shown = body_samples(body, start, times.tobytes(), precision == "quad")
-    if (lost := shown.lost(times)) is not None:
-        words = "its motion is not known to 1e-9 rad from there on"
-        raise SymtopError(f"times must be below {lost:.6g} on {scene.name}, not {times.max():.6g}: {words}", "times")
+    shown = body_samples(scene.name, body, start, times.tobytes(), precision == "quad")
     quaternion = shown.quaternion
     momentum = charts.lifted(np.concatenate([quaternion, shown.momentum], axis=1))
     axis = charts.axis_from_quaternion(quaternion)
@@ -186,11 +190,9 @@ def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) ->
     columns |= dict.fromkeys(("axis_error_bound", "theta_error_bound"), shown.bound + 2.0 * EPSILON)
     constants = {"energy": body.energy(start), "p_phi": body.momenta(start).p_phi}
     data = dataset(times, columns | {name: np.full(times.size, value) for name, value in constants.items()})
-    if body.free:
-        source, words = "closed-form", "from the arithmetic of the exact motion of a free body"
-    else:
-        source = "quad" if precision == "quad" else "longdouble"
-        words = "64 times the distance of two integrations that differ in order, steps and rounding"
+    source = "closed-form" if body.free else "quad" if precision == "quad" else "longdouble"
+    words = "256 times the distance of two integrations that differ in order, steps and rounding"
+    words = "from the arithmetic of the exact motion of a free body" if body.free else words
     said = {"scene": scene.name, "precision": source, "asked_for": precision, "bound": words}
     return netcdf.describe(data, f"reference motion of {scene.name}", scene.units, **said)
 
