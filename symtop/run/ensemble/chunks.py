@@ -267,11 +267,12 @@ class Job:
         return replace(self.of(members), first=self.first + members.start)
 
     def order(self) -> Any:
-        """Members in lanes by the work of a step, as neighbours end together, the most first; others as they are."""
-        members = np.arange(len(self.numbers))
-        if self.execution != IN_LANES:
-            return members
-        return np.concatenate(divided(members, self.steps, turns(self.numbers, self.horizon / self.steps)))[::-1]
+        """Members in lanes by the work of a step, as neighbours end together, the most first; None if it is all one."""
+        solver = self.method.solvers[self.chart]
+        if self.execution != IN_LANES or not (solver.implicit or np.ptp(self.steps)):  # type: ignore[attr-defined]
+            return None
+        each = turns(self.numbers, self.horizon / self.steps)
+        return np.concatenate(divided(np.arange(len(each)), self.steps, each))[::-1]
 
     def columns(self) -> dict[str, Any]:
         """The runs: ``time``, what they show, `PER_MEMBER`, and the first exception's message where one was raised."""

@@ -99,8 +99,8 @@ def ensemble(
     job = _job(read, method, chart, settings, tolerance, count, limit, shown)
     if scheduler is not None:
         cluster.check_sent(scheduler, job.part(slice(0, 1)), method.name)
-    order = job.order() if path is None else np.arange(n)
-    ordered = replace(job.of(order), continuous=False) if path is None else job
+    order = job.order() if path is None else None
+    ordered = replace(job if order is None else job.of(order), continuous=path is not None)
     chunks = list(ordered.chunks())
     words = {
         "title": f"{method.name} on {n} {'bodies' if chart == BODY else 'tops'}", "units": read.units, "chart": chart,
@@ -121,7 +121,9 @@ def ensemble(
 
     if path is None:
         columns = dict[str, Any]()
-        raised, first = compute(chunks, lambda chunk, part: _fill(columns, part, order[chunk], n))
+        raised, first = compute(
+            chunks, lambda chunk, part: _fill(columns, part, chunk if order is None else order[chunk], n)
+        )
         if raised == n:
             raise SymtopError(first)
         data = as_dataset(columns, read.labels, of=job)
