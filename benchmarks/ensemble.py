@@ -26,8 +26,9 @@ import symtop
 from symtop.core.parallel import cores
 from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.loop import FixedStep
+from symtop.model.charts import View
 from symtop.run.ensemble import inputs as reading
-from symtop.run.ensemble.chunks import Job, nutation_periods, schedule
+from symtop.run.ensemble.chunks import Job, nutation_periods, schedule, together
 
 METHOD, CHART, PER_NUTATION, NUTATIONS, SAMPLES = "strang", "axis", 100, 10, 11
 MEMBERS, ALONE, ROUNDS = 10_000, 300, 9
@@ -81,7 +82,14 @@ def measure() -> list[Item]:
     shown, angles = (
         Job(row, CHART, numbers, horizon, steps, None, SAMPLES, None, names) for names in (SHOWN, ("phi",))
     )
-    done = shown._runs(plan)
+    runs = shown._runs(plan)
+    cell = (
+        CHART,
+        together(numbers),
+        runs.states,
+        runs.momenta[..., 0],
+        runs.momenta[..., 1],
+    )  # a view keeps what it gave
     calls: dict[str, tuple[Callable[[], object], int]] = {
         "`simulate`": (one_by_one(guard=True), ALONE),
         "`simulate` without its guard": (one_by_one(guard=False), ALONE),
@@ -94,8 +102,8 @@ def measure() -> list[Item]:
         "of it: the steps": (lambda: solver.many(numbers, plan.step_size, plan.marks), MEMBERS),
         "once the steps": (stepped(1), MEMBERS),
         "twice the steps": (stepped(2), MEMBERS),
-        "of it: axis and energy": (lambda: shown._observables(done, plan.times), MEMBERS),
-        "of it: phi, with its closed form": (lambda: angles._observables(done, plan.times), MEMBERS),
+        "of it: axis and energy": (lambda: shown._observables(View(*cell), plan.times), MEMBERS),
+        "of it: phi, with its closed form": (lambda: angles._observables(View(*cell), plan.times), MEMBERS),
     }
     best = dict.fromkeys(calls, np.inf)
     caller = np.inf
