@@ -54,7 +54,8 @@ BAD = {
     "--variables": NAMES, "--form": NAMES, "--cost": NAMES, "--energy": NAMES, "--only": NAMES, "--conserves": NAMES,
     "--output": WRITTEN, "--figure": WRITTEN, "--card": WRITTEN, "--badge": WRITTEN, "--checkpoint": WRITTEN,
     "--results": FOLDERS, "--plugin": PLUGINS, "--scheduler": ADDRESSES, "--body": [*NUMBERS, "1,2,4", "1,2"],
-    "--epsilon": NUMBERS, "--mgl": NOT_NUMBERS, "--centre": NOT_NUMBERS, "--rates": NOT_NUMBERS, "--attitude": NOT_NUMBERS,
+    "--mgl": NOT_NUMBERS, "--centre": NOT_NUMBERS, "--rates": NOT_NUMBERS, "--attitude": NOT_NUMBERS,
+    "--epsilon": NUMBERS,
 }  # fmt: skip
 FINE = {
     ("doctor", "--results"),  # it says what it finds there
