@@ -21,7 +21,7 @@ from .tops import named, tops_of
 SEED = 1
 SHORT, LONG, TOPS, PRICES, FAR, CHECKS = "short", "long", "tops", "prices", "far", "checks"  # groups of cases
 FULL = {
-    SHORT: {"strata": 900, "natural": 700, "seed": SEED, "nutations": 10.0, "budget": 4e4, "guarded": 120},
+    SHORT: {"strata": 700, "natural": 700, "seed": SEED, "nutations": 10.0, "budget": 4e4, "guarded": 120},
     LONG: {"strata": 250, "natural": 160, "seed": SEED, "nutations": 1000.0, "budget": 5e5, "guarded": 0},
 }
 QUICK = {

@@ -27,7 +27,7 @@ LEAST = 0.7  # of the target: the search ends with an error from here to the tar
 PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
 FINER = 1e-3  # of the target: the tolerance that a second search begins with
 NOISY, TRIES = 0.25, 2  # the distance of the quartiles over the median of a time that is taken again; how often
-ENOUGH = 0.08  # seconds of a function's samples in one process; a longer one has one, the median of five is of five
+ENOUGH = 0.03  # seconds of a function's samples in one process; a longer one has one, the median of five is of five
 WARM = 0.01  # of the horizon: a run that loads and compiles what the timed one calls
 START = (
     "from symtop.runner import scripts; scripts.install(); from symtop_studies.factors import measures; measures.{}()"

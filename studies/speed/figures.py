@@ -8,7 +8,20 @@ import xarray as xr
 
 from symtop.methods.framework.registry import split_name
 from symtop.report.figures import MOST_NAMED, error_band, label_lines
-from symtop.report.style import BLACK, BLUE, GREEN, LEAST_TEXT, ORANGE, PURPLE, SKY, VERMILLION, look, panels
+from symtop.report.style import (
+    BLACK,
+    BLUE,
+    BLUES,
+    GREEN,
+    LEAST_TEXT,
+    ORANGE,
+    PURPLE,
+    PURPLES,
+    SKY,
+    VERMILLION,
+    look,
+    panels,
+)
 from symtop.runner.study import REFERENCE, Chart, Picture, Series
 
 from .facts import shown
@@ -20,7 +33,9 @@ LINES = {  # label, colour and line; what is not here is pale
     "trapezoidal[angles]": ("trapezoidal (discrete Lagrangian)", SKY, "-"),
     "rk4[axis]": ("RK4", ORANGE, "-"),
     "rk45-compiled[axis]": ("RK45, compiled", VERMILLION, "-"),
+    "tsit5-fixed[axis]": ("Tsit5", BLUES[2], "-"),
     "dop853-compiled[axis]": ("DOP853, compiled", "#8C510A", "-"),
+    "vern9-fixed[axis]": ("Vern9", PURPLES[1], "-"),
     "gauss-8[axis]": ("Gauss 8", PURPLE, "-"),
     "strang[axis]": ("Strang splitting", "#66A61E", "-"),
     "takahashi-imada[axis]": ("Takahashi-Imada (symmetric)", "#00573F", "-"),
@@ -29,7 +44,6 @@ LINES = {  # label, colour and line; what is not here is pale
 }
 OTHERS = {  # pale ones
     "series[axis]": ("Taylor for this top", PALE, "-"), "dop853[axis]": ("DOP853 through SciPy", PALE, SCIPY),
-    "tsit5-fixed[axis]": ("Tsit5", PALE, "-"), "vern9-fixed[axis]": ("Vern9", PALE, "-"),
 }  # fmt: skip
 LEAST, MOST = 1e-16, 3.0  # rad, of the panel
 COSTS = {"time of a run, one core (s)": "seconds", "force evaluations": "force_evaluations"}

@@ -62,13 +62,13 @@ def axes(method: Integrator, steps: np.ndarray, values: np.ndarray, quick: bool)
 
 
 def cases(quick: bool) -> list[Case]:
-    """Maps of 200 steps by 120 spins and of 72 steps by 48 gaps for every variant; then the scans of single mechanisms.
+    """Maps of 160 steps by 96 spins and of 72 steps by 48 gaps for every variant; then the scans of single mechanisms.
 
-    Methods in lanes have five times the cells, 447 by 268 and 161 by 107, and take about as long with them. An attitude
+    Methods in lanes have five times the cells, 358 by 215 and 161 by 107, and take about as long with them. An attitude
     chart beside an axis chart is left out: a map is judged by the axis, which both step alike.
     """
-    steps = np.geomspace(0.005, 2.0, 24 if quick else 200)
-    spins = np.geomspace(0.1, 30.0, 16 if quick else 120)
+    steps = np.geomspace(0.005, 2.0, 24 if quick else 160)
+    spins = np.geomspace(0.1, 30.0, 16 if quick else 96)
     passes, gaps = np.geomspace(5e-4, 0.1, 12 if quick else 72), np.geomspace(1e-6, 0.3, 12 if quick else 48)
     phases = np.linspace(0.5, 4.0, 8 if quick else 71).tolist()
     limits = np.geomspace(0.1, 30.0, 4 if quick else 14).tolist()
