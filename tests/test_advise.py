@@ -335,6 +335,10 @@ def test_limits_leave_out_what_a_user_cannot_use():
     body = ask(accuracy=1e-4, needs="kicks", general=True)
     assert symtop.integrator(body.integrator).general is True
     assert "It carries over to a body without symmetry" in body.reason
+    assert "its step does not" in body.reason
+    formula = functools.partial(ask, accuracy=1e-3, step_size=0.002, needs="expression")
+    assert formula().integrator == "kahan[axis]"  # which is nowhere run on a body
+    assert "body" in symtop.integrator(str(formula(general=True).integrator).partition("[")[0]).solvers
     kept = ask(accuracy=1e-3, keeps="energy", step_size=0.002)
     run = symtop.simulate(scene, kept.integrator, step_size=0.002, horizon=800.0, guard=False)
     early, late = (symtop.errors(run)["energy"].values[part].max() for part in (slice(1, 50), slice(-50, None)))

@@ -32,6 +32,7 @@ def test_mujoco_is_told_its_best_setting_and_the_gain_of_another_method():
 def test_an_engine_is_told_of_by_its_settings_and_a_map_by_itself(engine):
     """Bullet and yade are names of maps, too."""
     advice = i_use(engine, "goldstein", step_size=0.025, horizon=5.0, accuracy=1e-16)
+    assert "Settings within 1e-16 rad at this step: none." in str(advice)
     assert [*advice.errors] == [*SETTINGS.get(engine, {engine: engine})]
     assert all(f"{name} (" in str(advice) for name in advice.errors)
 
