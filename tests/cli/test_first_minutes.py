@@ -66,7 +66,8 @@ def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(axis_only, 
     assert f"next: symtop report --results {tmp_path / 'quick' / 'only'}" in lines[-1]
     data = netcdf.read(tmp_path / "quick" / "only" / "convergence.nc")
     assert {split_name(str(row))[0] for row in data["variant"].values} == {"on-the-axis"}
-    assert {"of-a-user", "spheroid"} < {*data["scene"].values.tolist()}
+    assert "of-a-user" in data["scene"]
+    assert data.sizes["scene"] > 1
     assert not (tmp_path / "quick" / "convergence.nc").exists()
     assert {file.suffix for file in (tmp_path / "quick" / "only" / "figures").iterdir()} == {".png"}  # no PDF to print
     state = call(*words, "--status")
@@ -128,8 +129,8 @@ COLD = time.time()  # a constant that no kernel on disk was compiled with
 @pytest.mark.parametrize(
     ("words", "longest"),
     [
-        ("run spheroid midpoint --step-size 0.01", 60.0), ("integrators strang", 2.0), ("scenes", 2.0),
-        ("ensemble strang --members 20 --per-nutation 50 --nutations 2", 60.0), ("integrators --engines", 2.0),
+        ("run spheroid midpoint --step-size 0.01", 60.0), ("integrators", 2.0), ("scenes", 2.0),
+        ("ensemble strang --members 20 --per-nutation 50 --nutations 2", 60.0),
         ("study convergence --quick --status --results no-such-folder", 60.0),
     ],
 )  # fmt: skip
