@@ -121,14 +121,6 @@ def test_explicit_maps_fly_apart(name, time):
     assert run["time"].values[np.argmax(np.abs(energy) > 1e6)] == pytest.approx(time, abs=0.2)
 
 
-@pytest.mark.parametrize(
-    ("name", "order"), [("mujoco3-rk4", 2), ("rkmk4", 4), ("yade", 1), ("fincham", 2), ("spiral", 2)]
-)
-def test_one_line_is_worth_an_order(name, order):
-    errors = [axis_error(f"{name}[axis]", steps) for steps in (3200, 6400)]
-    assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.07)
-
-
 # ---- without the gyroscopic term -------------------------------------------------------------------------------------
 
 

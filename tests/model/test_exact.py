@@ -153,32 +153,6 @@ def test_digits_are_right_in_every_regime(kind):
 # ----------------------------------------------------------------------------------------- the equations of motion
 
 
-@pytest.mark.parametrize("kind", ["generic", "fast", "grazes the top", "near the separatrix", "free", "hanging"])
-def test_motion_satisfies_the_equations_of_motion(kind):
-    """Against five-point differences: step 1e-13, so that their own error is some 1e-52 times the fifth derivative."""
-    top, start = random_top(kind, np.random.default_rng([5, REGIMES.index(kind)]))
-    form, step, now = PreciseForm(top, start, digits=60), mp.mpf("1e-13"), mp.mpf("0.37")
-    with mp.workdps(80):
-        around = [form(now + k * step) for k in (-2, -1, 1, 2)]
-        at = form(now)
-        theta_dot, phi_dot, psi_dot, theta_ddot = (
-            (before2 - 8 * before + 8 * after - after2) / (12 * step)
-            for before2, before, after, after2 in (
-                [getattr(m, name) for m in around] for name in ("theta", "phi", "psi", "theta_dot")
-            )
-        )
-        sine, cosine, phi_rate = mp.sin(at.theta), mp.cos(at.theta), at.phi_dot
-        spin = at.psi_dot + phi_rate * cosine
-        torque = sine * (phi_rate * (top.I1 * phi_rate * cosine - top.I3 * spin) + top.mgl)
-        scale = 1 + abs(phi_rate) + abs(spin) + abs(torque)
-        assert abs(theta_dot - at.theta_dot) < 1e-25 * scale
-        assert abs(phi_dot - phi_rate) < 1e-25 * scale
-        assert abs(psi_dot - at.psi_dot) < 1e-25 * scale
-        assert abs(top.I1 * theta_ddot - torque) < 1e-25 * scale
-        assert abs(top.I1 * theta_ddot + torque) > 1e-6 * abs(torque)
-        assert abs(top.I1 * phi_rate * sine**2 + top.I3 * spin * cosine - form.p_phi) < 1e-50 * scale
-
-
 def _momentum(top, start):
     return space_state("axis", top, start)[3:]
 
@@ -206,7 +180,7 @@ def _integrate(top, start, times):
 @pytest.mark.parametrize(
     "kind",
     ["generic", "turning point", "cusp", "plane pendulum", "grazes the top", "grazes the bottom", "through the top",
-     "through the bottom", "flat body", "free", "hanging", "from the top", "asleep below", "nearly steady"],
+     "through the bottom", "flat body", "free", "hanging", "from the top", "asleep below", "nearly steady", "fast"],
 )  # fmt: skip
 def test_an_integration_of_the_attitude_ends_where_the_closed_form_says(kind):
     top, start = random_top(kind, np.random.default_rng([6, REGIMES.index(kind)]))

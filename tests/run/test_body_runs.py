@@ -196,13 +196,6 @@ def test_a_method_makes_the_steps_of_the_symmetric_top(method: str) -> None:
     assert gap(method, 2.0 + 1e-6, 0.1) > 1e-7
 
 
-@pytest.mark.parametrize("method", [name for name, one in engines().items() if one.precision == "double"])
-def test_a_map_of_an_engine_makes_the_steps_of_the_symmetric_top(method: str) -> None:
-    """Some go from w to L and back in every step, whose rounding is the same each time: it adds up in w."""
-    assert gap(method, 2.0, 0.1) < 1e-11
-    assert gap(method, 2.0 + 1e-6, 0.1) > 1e-7
-
-
 @pytest.mark.parametrize(("method", "order"), TO_ORDER.items())
 def test_another_method_comes_to_the_symmetric_top_by_its_order(method: str, order: int) -> None:
     coarse, fine = gap(method, 2.0, 0.02), gap(method, 2.0, 0.01)
