@@ -38,24 +38,14 @@ def chosen(names: Sequence[str], known: Sequence[str], most: int = MOST_NAMED) -
 
 
 def spread(places: Sequence[float], gap: float) -> list[float]:
-    """Places in [0, 1] that keep their order and a distance; labels that would meet share the mean of their places."""
-    order = sorted(range(len(places)), key=lambda k: places[k])
-    blocks: list[tuple[float, int]] = []  # centre and number of labels
-    for k in order:
-        centre, count = places[k], 1
-        while True:
-            reach = 0.5 * gap * count
-            centre = min(max(centre, reach - 0.5 * gap), 1.0 - reach + 0.5 * gap)
-            if not blocks or blocks[-1][0] + 0.5 * gap * blocks[-1][1] <= centre - reach + 1e-12:
-                break
-            before, others = blocks.pop()
-            centre, count = (before * others + centre * count) / (others + count), others + count
-        blocks.append((centre, count))
-    moved = [centre + gap * (k - 0.5 * (count - 1)) for centre, count in blocks for k in range(count)]
-    placed = [0.0] * len(places)
-    for k, value in zip(order, moved, strict=True):
-        placed[k] = value
-    return placed
+    """Places in [0, 1], as near to the given ones as their order and a gap allow (least squares)."""
+    from scipy.optimize import isotonic_regression
+
+    order, gaps = np.argsort(places, kind="stable"), gap * np.arange(len(places))
+    level = isotonic_regression(np.array(places)[order] - gaps).x
+    placed = np.empty(len(places))
+    placed[order] = np.clip(level, 0.0, 1.0 - gaps[-1]) + gaps
+    return placed.tolist()
 
 
 def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]], size: float = LEAST_TEXT) -> None:
