@@ -131,7 +131,8 @@ def few(monkeypatch, count):
 
 
 def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_with_it():
-    axis, attitude = advise._usable("axis"), advise._usable("attitude")
+    asked = advise._Question(symtop.scene("spheroid"), 1e-3, "axis", 20.0, ())
+    axis, attitude = advise._everyone(asked), advise._everyone(asked._replace(quantity="attitude"))
     assert {"rk4[axis]", "rk4[angles]", "strang[axis]", "stormer-verlet"} <= set(axis)
     assert not {"strang[attitude]", "rk45", "exact", "strang"} & set(axis)
     assert "strang[attitude]" in attitude
@@ -315,10 +316,13 @@ def test_at_the_step_that_a_user_has_it_says_what_is_good_enough():
     assert measured(scene, advice) <= 1e-4
     assert f"steps are {scene.nutation_period / step:.3g} a nutation" in advice.reason
     missed = next(words for words in advice.fails if words.startswith("Not accurate enough at this step"))
-    names = missed.partition(": ")[2].rstrip(".").split(", ")
+    names = dict(words.split() for words in missed.partition(": ")[2].rstrip(".").split(", "))
     assert "midpoint" in names
-    for name in names[:4]:
-        assert settings.attempt(scene, symtop.integrator(name), step, scene.horizon, "axis").error > 1e-4
+    assert [*names.values()] == sorted(names.values(), key=float)
+    for name in [*names][:4]:
+        error = settings.attempt(scene, symtop.integrator(name), step, scene.horizon, "axis").error
+        assert error > 1e-4
+        assert f"{error:.1e}" == names[name]
     nobody = symtop.recommend(scene, accuracy=1e-9, step_size=0.2)
     assert nobody.integrator is None or measured(scene, nobody) <= 1e-9
     with pytest.raises(symtop.SymtopError, match="step_size must be below the horizon"):

@@ -337,6 +337,9 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset():
         "energy": "drifts, by ", "work": "2.0 force evaluations a step", "pole": "a run through the upright axis ",
     }  # fmt: skip
     assert [name for name, words in said.items() if not told_of[name].startswith(words)] == []
+    h, nutation = float(data["structure_step"]), symtop.scene("spheroid").nutation_period
+    assert f"one of h = {h:.3g} ({nutation / h:.1f} a nutation) for the structure of a step" in str(ledger)
+    assert told_of["pole"].endswith(" rad off (good: 1e-7 or falling with h)")
     steps, nutations = float(data["steps_run"]), float(data["nutations_run"])
     assert f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation)" in str(ledger)
 
