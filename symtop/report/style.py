@@ -67,7 +67,7 @@ _MARKERS = "osv^<>DPXph8dH"
 _LOOKS = {  # of the methods that people know, one colour a formula; `look` finds one for every other integrator
     "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "stormer-verlet": Look(GREEN, "^"),
     "strang": Look(LEAF, "<"), "cayley": Look(GREENS[1], ">"), "takahashi-imada": Look(GREENS[2], "P"),
-    "yoshida-4": Look(GREENS[2], "p"), "srkn-14-6": Look(GREENS[2], "H"), "rk4": Look(ORANGE, "o"),
+    "yoshida-4": Look(GREENS[2], "p"), "srkn-14-6": Look(GREENS[1], "H"), "rk4": Look(ORANGE, "o"),
     "rk45-compiled": Look(VERMILLION, "s"), "rk45": Look(VERMILLION, "D"), "tsit5-fixed": Look(NAVY, "P"),
     "tsit5": Look(NAVY, "X"), "vern9-fixed": Look(PLUM, "s"), "vern9": Look(PLUM, "d"),
     "dop853-compiled": Look(BROWN, "v"), "dop853-compiled-fixed": Look(BROWN, "^"), "dop853": Look(BROWN, "o"),

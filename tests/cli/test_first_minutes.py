@@ -256,12 +256,10 @@ def test_a_recording_sees_what_wraps():
     ],
 )
 def test_an_unknown_name_says_how_to_give_one_of_your_own(command, ways):
-    done = call(*command, "--step-size", "0.01")
-    assert done.exit_code == 2
+    done = call(*command, "--step-size", "0.01", code=2)
     assert ways in " ".join(done.stderr.split())
 
 
 def test_a_symmetric_body_is_not_told_to_be_without_symmetry():
-    done = call("recommend", "body", "--body", "2,2,1", "--rates", "0.1,0,3", "--i-use", "mujoco")
-    assert done.exit_code == 2
+    done = call("recommend", "body", "--body", "2,2,1", "--rates", "0.1,0,3", "--i-use", "mujoco", code=2)
     assert "scene must be one of a SymmetricTop here, not body, a RigidBody" in " ".join(done.stderr.split())
