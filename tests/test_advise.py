@@ -130,9 +130,12 @@ def few(monkeypatch, count):
     monkeypatch.setattr(advise, "_menu", lambda _: [])
 
 
+def usable(quantity, needs=()):
+    return advise._everyone(advise._Question(symtop.scene("spheroid"), 1e-3, quantity, 20.0, needs))
+
+
 def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_with_it():
-    asked = advise._Question(symtop.scene("spheroid"), 1e-3, "axis", 20.0, ())
-    axis, attitude = advise._everyone(asked), advise._everyone(asked._replace(quantity="attitude"))
+    axis, attitude = usable("axis"), usable("attitude")
     assert {"rk4[axis]", "rk4[angles]", "strang[axis]", "stormer-verlet"} <= set(axis)
     assert not {"strang[attitude]", "rk45", "exact", "strang"} & set(axis)
     assert "strang[attitude]" in attitude
@@ -202,7 +205,7 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     monkeypatch.setattr(settings, "MOST_EVALUATIONS", {"compiled": 3e4, "python": 3e4})
     advice = symtop.recommend(scene, accuracy=1e-11, horizon=30.0)  # of which none gets there
     assert advice.confidence == "checked"
-    assert {*tried} - {"series[axis]"} == {*advise._usable("axis", advise.OF_ANY)}
+    assert {*tried} - {"series[axis]"} == {*usable("axis", advise.OF_ANY)}
 
 
 def test_the_table_names_methods_for_every_class_and_none_where_a_user_limits_steps():
@@ -274,7 +277,7 @@ def test_thirty_random_tops():
             assert good or advice.confidence != "checked", advice
             met.append(good)
             if number % 12 == 0:
-                rivals = [symtop.integrator(name) for name in advise._usable("axis", advise.OF_ANY)]  # as of the advice
+                rivals = [symtop.integrator(name) for name in usable("axis", advise.OF_ANY)]  # as of the advice
                 tried = [settings.search(scene, one, accuracy, "axis", scene.horizon, patience=2e6) for one in rivals]
                 met_by = [one for one in tried if isinstance(one, settings.Met)]
                 best = min(settings.seconds(scene, met_by, "axis", scene.horizon))
@@ -284,9 +287,9 @@ def test_thirty_random_tops():
 
 
 def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
-    usable = advise._usable("axis", ("derivative", "kicks"))
+    usable = usable("axis", ("derivative", "kicks"))
     assert {symtop.integrator(name).needs for name in usable} == {"derivative", "kicks"}
-    assert set(usable) < set(advise._usable("axis"))
+    assert set(usable) < set(usable("axis"))
     advice = symtop.recommend("spheroid", accuracy=1e-6, horizon=4.0, needs="expression")
     assert symtop.integrator(advice.integrator).needs == "expression"
     assert "it needs f as a formula (expression)" in advice.reason
