@@ -96,7 +96,7 @@ SETTINGS = {  # the maps of an engine by its settings, the default first
 MISSES_AT_STEP = "Not accurate enough at this step, each with its error"
 STEP = 1.0 / 240.0  # s
 WORST = 0.5  # rad: an axis that is further off needs no method to match it
-CLOSE = 0.95  # of the longest step that serves: so near is that of a finalist
+CLOSE = 0.85  # of the margin: the least error of a finalist, if few runs find such a setting
 ROUNDS = 15  # in which finalists are timed
 MARGIN = 0.8  # fraction of the accuracy that a run must meet at its samples; between them its error may be larger
 
@@ -422,31 +422,14 @@ def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
         met = settings.rounded(scene, short, accuracy * short.error / (trial.error or 1.0), quantity)
         return trial._replace(met=met, error=trial.error * met.error / (short.error or 1.0))
     best = settings.search(
-        scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting, longest=question.max_step
-    )
+        scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting, least=CLOSE,
+        longest=question.max_step,
+    )  # fmt: skip
     if isinstance(best, str):
         return f"Good enough over a short run but not to the end ({best[0].lower()}{best[1:]})"
-    met = settings.rounded(scene, _coarser(question, best), MARGIN * accuracy, quantity)
+    met = settings.rounded(scene, best, MARGIN * accuracy, quantity)
     confidence = "checked" if met.error + met.bound <= accuracy else "at the reference's limit"
     return _Trial(met, met.error, math.nan, confidence, horizon)
-
-
-def _coarser(question: _Question, met: settings.Met) -> settings.Met:
-    """The coarsest setting that meets the margin, as far as three runs find it along the order of the method."""
-    scene, accuracy, quantity, horizon = question[:4]
-    method, goal = met.integrator, MARGIN * accuracy
-    highest = min(settings.limits(scene, method, horizon, quantity)[1], question.max_step)
-    for _ in range(3):
-        room = CLOSE * goal / max(met.error, 1e-3 * goal)
-        longer = min(met.setting * room ** (1.0 / (method.order or 2) if method.fixed_step else 1.0), highest)
-        if longer < met.setting / CLOSE:
-            break
-        again = settings.attempt(scene, method, longer, horizon, quantity)
-        if again.error <= goal:
-            met = again
-        else:
-            highest = math.sqrt(met.setting * longer)
-    return met
 
 
 def _advice(

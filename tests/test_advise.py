@@ -287,9 +287,9 @@ def test_thirty_random_tops():
 
 
 def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
-    usable = usable("axis", ("derivative", "kicks"))
-    assert {symtop.integrator(name).needs for name in usable} == {"derivative", "kicks"}
-    assert set(usable) < set(usable("axis"))
+    serving = usable("axis", ("derivative", "kicks"))
+    assert {symtop.integrator(name).needs for name in serving} == {"derivative", "kicks"}
+    assert set(serving) < set(usable("axis"))
     advice = symtop.recommend("spheroid", accuracy=1e-6, horizon=4.0, needs="expression")
     assert symtop.integrator(advice.integrator).needs == "expression"
     assert "it needs f as a formula (expression)" in advice.reason

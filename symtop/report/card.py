@@ -20,7 +20,7 @@ from symtop.core.errors import SymtopError, at_home
 from symtop.judging.findings import Finding, Ledger, claim_name, description
 from symtop.report.figures import SMALLEST
 from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels, slope_guide
-from symtop.report.template import templates
+from symtop.report.template import environment
 
 LETTER = 6.6  # width of a letter of the badge, pixels
 LONGEST = 72  # letters of what a badge says
@@ -97,7 +97,8 @@ def card(ledger: Ledger, path: str | Path) -> Path:
     if not ledger.about.chart:
         raise SymtopError("a card shows a method: there is none of a trajectory")
     folder = Path(__file__).parent / "templates"
-    text = templates(autoescape=True).get_template("card.html").render(
+    page = environment(autoescape=True).get_template("card.html")
+    text = page.render(
         css=(folder / "style.css").read_text(encoding="utf-8"),
         about=ledger.about,
         scene=ledger.scene,
