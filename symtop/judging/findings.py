@@ -8,7 +8,7 @@ import math
 import textwrap
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -111,9 +111,6 @@ class About(NamedTuple):
     nutation: float = math.nan  # period of the scene, in its unit of time
 
 
-NOBODY = About()
-
-
 @dataclass(frozen=True)
 class Ledger:
     """Everything that was found about one integrator; as text the report of the command."""
@@ -122,7 +119,7 @@ class Ledger:
     scene: str
     findings: tuple[Finding, ...]
     traces: dict[str, np.ndarray]  # errors by step, defects by differencing width, length of the long run
-    about: About = NOBODY  # of a step that came through an adapter
+    about: About = field(default_factory=About)  # of a step that came through an adapter
     implied: frozenset[str] = frozenset()  # claims that follow from those that were made
 
     def __str__(self) -> str:
