@@ -253,13 +253,13 @@ def _runs(ledger: Ledger) -> str:
         length = f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation)"
         relative = "changes of the energy are relative to the nutation's, of momenta to the larger one"
         words += [f"{length} for the constants", relative]
-    if "structure_step" in traces:
-        h = float(traces["structure_step"])
-        words.insert(0, f"one of h = {h:.3g} ({ledger.about.nutation / h:.1f} a nutation) for the structure of a step")
     tried = ledger.about.nutation / np.asarray(traces.get("step_size", []))  # NaN where no run was made
     if np.isfinite(tried).any():
         failed = tried[np.isnan(traces["error"]) & np.isfinite(tried)]
-        fails = f", of which {failed.max():.0f} and fewer fail" if failed.size else ""
-        words.insert(0, f"{np.nanmin(tried):.0f} to {np.nanmax(tried):.0f} steps a nutation for the order{fails}")
+        fails = f" ({failed.max():.0f} and fewer fail)" if failed.size else ""
+        one = ledger.about.nutation / traces.get("structure_step", math.nan)
+        structure = f", {one:.1f} for the structure" if math.isfinite(one) else ""
+        tries = f"{np.nanmin(tried):.0f} to {np.nanmax(tried):.0f} steps a nutation for the order{fails}{structure}"
+        words.insert(0, tries)
     joined = ";\n    ".join(words)
     return f"Its runs: {joined}.\n" if words else ""
