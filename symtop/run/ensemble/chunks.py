@@ -5,13 +5,11 @@ A member has the bits of `simulate` alone: the same steps, samples and observabl
 other method runs its members one after another by `calling.solve`, as anybody's solver is called.
 
 Whether samples have to be dithered, `simulation.sample_times` decides for one run by the widest stretch of nutation
-phases that none of them shows; `schedule` decides it for row after row in compiled code, by the same operations on the
-same nutation period.
+phases that none of them shows; `schedule` decides it for all rows by the same operations on the same nutation periods.
 """
 
 import contextlib
 import functools
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from types import SimpleNamespace
@@ -24,23 +22,21 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from symtop.core.errors import SymtopError
-from symtop.core.jit import compile_kernel, register_jitable, to_fixed_tuple
-from symtop.core.numbers import GOLDEN
+from symtop.core.jit import compile_kernel, to_fixed_tuple
 from symtop.core.parallel import cores, heed, in_threads
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.lanes import Many, W, column, divided, members_of, of_bodies, put, turns
+from symtop.methods.framework.lanes import Many, W, divided, members_of, of_bodies, turns
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, off_length
 from symtop.methods.framework.preparation import opened
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
-from symtop.methods.simd import wide_vectors
 from symtop.model import charts, top as model
 from symtop.model.charts import BODY, View
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import NUMBERS, SymmetricTop
-from symtop.run.simulation import STRETCHES, WIDEST_GAP
+from symtop.run.simulation import WIDEST_GAP, places, unseen
 from symtop.run.trajectory import LABELS
 
 Array = NDArray[np.float64]
@@ -80,18 +76,36 @@ class Schedule(NamedTuple):
 
 
 def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -> Schedule:
-    """Times and marks of n runs with so many steps each, or without steps of their own (None)."""
-    n, last = len(horizon), samples - 1
+    """The samples of `simulation.sample_times` for n runs with so many steps each, or without steps of their own."""
+    n = len(horizon)
     h = np.full(n, np.nan) if steps is None else horizon / steps
-    marks, times = np.zeros((n, samples), np.int64), np.full((n, samples), np.nan)
-    laid_out = Schedule(h, marks, times, np.full(n, samples), np.zeros(n, dtype=bool))
-    uniform = np.arange(samples, dtype=float)
-    dithered = uniform.copy()
-    dithered[1:last] += np.mod(GOLDEN * uniform[1:last], 1.0) - 0.5
-    by_steps = np.zeros(0, np.int64) if steps is None else np.ascontiguousarray(steps)
-    places = np.stack([uniform / last, dithered / last])
-    _lay_out()(np.ascontiguousarray(period), np.ascontiguousarray(horizon), by_steps, places, *laid_out)
-    return laid_out
+    marks, times = np.zeros((n, samples), np.int64), np.empty((n, samples))
+    plan = Schedule(h, marks, times, np.full(n, samples), np.zeros(n, dtype=bool))
+
+    def lay_out(rows: Whole, *, dithered: bool) -> None:
+        place = places(samples, dithered=dithered)
+        plan.dithered[rows] = dithered
+        if steps is None:
+            times[rows] = horizon[rows, None] * place
+            return
+        marks[rows], plan.counts[rows] = _distinct(np.rint(steps[rows, None] * place).astype(np.int64))
+        times[rows] = marks[rows] * h[rows, None]
+
+    lay_out(np.arange(n), dithered=False)
+    judged = np.isfinite(period) & (horizon > 2.0 * period)
+    rows = np.flatnonzero(judged if steps is None else judged & (steps >= samples))  # others show every step
+    lay_out(rows[unseen(times[rows], period[rows, None]) >= WIDEST_GAP], dithered=True)
+    times[np.arange(samples) >= plan.counts[:, None]] = np.nan
+    return plan
+
+
+def _distinct(marks: Whole) -> tuple[Whole, Whole]:
+    """Ascending rows of marks, each mark once and the last again in the rest of its row; and how many there are."""
+    new = np.diff(marks, axis=1, prepend=-1) > 0
+    counts = new.sum(axis=1)
+    few = counts < marks.shape[1]
+    marks[few] = np.sort(np.where(new[few], marks[few], marks[few, -1:]), axis=1)
+    return marks, counts
 
 
 def nutation_periods(numbers: Array) -> Array:
@@ -105,92 +119,15 @@ def nutation_periods(numbers: Array) -> Array:
 
 @functools.cache
 def _all_periods() -> Any:
-    """The compiled loop over members, whose bisections run in lanes: a third of the time."""
-    period_between, cubic_of, bisected, none = model.period_between, model.nutation_cubic, model.bisected, (0.0,) * 9
-    width = len(none)
+    """The compiled loop over members."""
+    period_of, width = model.nutation_period, len(NUMBERS)
 
     def all_periods(numbers, periods):  # type: ignore[no-untyped-def]
-        wide_vectors()
-        n, lanes = len(numbers), np.empty(len(none) * W)
-        for first in range(0, n, W):
-            for j in range(W):
-                top, start = opened(to_fixed_tuple(numbers[min(first + j, n - 1)], width))
-                cosine = math.cos(start.theta)
-                put(lanes, 0, j, (*cubic_of(top, start), cosine, -1.0, cosine, 1.0, cosine))
-            for _ in range(model.BISECTIONS):
-                for j in range(W):
-                    at = column(lanes, 0, j, none)
-                    put(lanes, 5, j, bisected(at[:4], at[4], *at[5:]))
-            for j in range(min(W, n - first)):
-                top, start = opened(to_fixed_tuple(numbers[first + j], width))
-                low, below, high, above = column(lanes, 5, j, none[:4])
-                periods[first + j] = period_between(top, start, 0.5 * (low + below), 0.5 * (high + above))
+        for i in range(len(numbers)):
+            top, start = opened(to_fixed_tuple(numbers[i], width))
+            periods[i] = period_of(top, start)
 
     return compile_kernel(all_periods)
-
-
-@register_jitable
-def unseen(times: Any, period: float, phases: Any) -> Any:
-    """`simulation._unseen` of one row; `phases` is room for as many numbers."""
-    seen = 0
-    for k in range(len(times)):
-        turns = times[k] / period
-        phases[k] = turns - np.floor(turns)  # the remainder, exactly, and 50 ns less
-        seen |= 1 << int(STRETCHES * phases[k])
-    every = (1 << STRETCHES) - 1
-    if seen & every == every:
-        return 2.0 / STRETCHES
-    phases.sort()
-    gap = phases[0] + 1.0 - phases[-1]
-    for k in range(1, len(phases)):
-        gap = max(gap, phases[k] - phases[k - 1])
-    return gap
-
-
-@functools.cache
-def _lay_out() -> Any:  # noqa: C901  (one loop, read in one piece)
-    """The compiled loop over rows of a `Schedule`."""
-
-    def lay_out(period, horizon, steps, places, h, marks, times, counts, dithered):  # type: ignore[no-untyped-def]
-        samples = places.shape[1]
-        phases = np.empty(samples)
-        for i in range(len(horizon)):
-            if len(steps) and steps[i] < samples:  # every step is shown
-                counts[i] = steps[i] + 1
-                for k in range(samples):
-                    marks[i, k] = min(k, steps[i])
-                for k in range(counts[i]):
-                    times[i, k] = k * h[i]
-            else:
-                long_enough = np.isfinite(period[i]) and horizon[i] > 2.0 * period[i]
-                for row in range(2):
-                    dithered[i] = row == 1
-                    if len(steps) == 0:
-                        for k in range(samples):
-                            times[i, k] = horizon[i] * places[row, k]
-                    else:
-                        counts[i] = _distinct(steps[i], places[row], marks[i])
-                        for k in range(counts[i]):
-                            times[i, k] = marks[i, k] * h[i]
-                    times[i, counts[i] :] = np.nan
-                    judged = row == 0 and long_enough
-                    if not judged or unseen(times[i, : counts[i]], period[i], phases[: counts[i]]) < WIDEST_GAP:
-                        break
-
-    return compile_kernel(lay_out)
-
-
-@register_jitable
-def _distinct(steps: int, places: Any, marks: Any) -> int:
-    """Whole steps next to places that ascend, each once, and the last again in the rest of the row; how many."""
-    count = 0
-    for k in range(len(places)):
-        mark = np.int64(np.rint(steps * places[k]))
-        if k == 0 or mark > marks[count - 1]:
-            marks[count] = mark
-            count += 1
-    marks[count:] = marks[count - 1]
-    return count
 
 
 class _Runs(NamedTuple):
