@@ -33,7 +33,7 @@ from symtop.methods.framework.preparation import opened
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
 from symtop.model import charts, top as model
-from symtop.model.charts import BODY, View
+from symtop.model.charts import BODY, DIMENSIONS, View
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import NUMBERS, SymmetricTop
 from symtop.run.simulation import WIDEST_GAP, places, unseen
@@ -194,14 +194,10 @@ class Job:
             begin = end
 
     def of(self, members: Any) -> "Job":
-        """The same for some members."""
+        """The same for some members; those of a slice know their numbers."""
         arrays = ("numbers", "horizon", "steps", "tolerance", "period", "names")
         cut = {name: values[members] for name in arrays if (values := getattr(self, name)) is not None}
-        return replace(self, **cut)
-
-    def part(self, members: slice) -> "Job":
-        """The same for a stretch of members, which know their numbers."""
-        return replace(self.of(members), first=self.first + members.start)
+        return replace(self, **cut, first=self.first + (members.start if isinstance(members, slice) else 0))
 
     def order(self) -> Any:
         """Members in lanes by the work of a step, as neighbours end together, the most first; None if it is all one."""
@@ -230,7 +226,7 @@ class Job:
         """The states of the members, by the quickest way there is."""
         solver = self.method.solvers[self.chart]
         if isinstance(solver, FixedStep):
-            done = sampled(solver, self.numbers, plan)
+            done = sampled(solver, self.chart, self.numbers, plan)
             reached = done.steps * plan.step_size
             return _Runs(done.states, done.momenta, done.steps, *solver.counts(*done[2:4]), done.outcome, reached)
         if isinstance(solver, Adaptive) and self.tolerance is not None:
@@ -245,7 +241,7 @@ class Job:
     def _in_turn(self, plan: Schedule) -> _Runs:
         """The same by one call of a solver for each member; one fails alone whatever its solver raises."""
         n = len(plan.counts)
-        states = np.full((n, self.samples, charts.DIMENSIONS[self.chart]), np.nan)
+        states = np.full((n, self.samples, DIMENSIONS[self.chart]), np.nan)
         momenta, (steps, work, iterations, outcome) = np.full((n, self.samples, 2), np.nan), np.zeros((4, n), int)
         runs = _Runs(states, momenta, steps, work, iterations, outcome, np.zeros(n))
         for i, (top, start) in enumerate(members_of(self.numbers)):
@@ -308,7 +304,8 @@ class Turns:
     @functools.cached_property
     def all(self) -> dict[str, Array]:
         """Those of all, on all cores."""
-        parts = list(in_threads(self.of, _slices(len(self.numbers), READ_TOGETHER), cores()))
+        firsts = range(0, len(self.numbers), READ_TOGETHER)
+        parts = list(in_threads(self.of, [slice(first, first + READ_TOGETHER) for first in firsts], cores()))
         return {name: np.concatenate([part[name] for part in parts]) for name in self.angles}
 
 
@@ -335,10 +332,6 @@ class Later(BackendArray):
         return xr.Variable(("member", "time"), data)
 
 
-def _slices(n: int, size: int) -> Iterator[slice]:
-    return (slice(first, first + size) for first in range(0, n, size))
-
-
 def _received(values: dict[str, Any]) -> Job:
     """A job as it was before it was sent."""
     return Job(**values | {"method": find_integrator(values["method"])})
@@ -354,19 +347,16 @@ def together(numbers: Array) -> Any:
     return top
 
 
-def sampled(solver: FixedStep, numbers: Array, plan: Schedule) -> Many:
+def sampled(solver: FixedStep, chart: str, numbers: Array, plan: Schedule) -> Many:
     """The runs of a plan, those with equally many samples in one call."""
     counts = np.unique(plan.counts)
     if counts.tolist() == [plan.marks.shape[1]]:
         return solver.many(numbers, plan.step_size, plan.marks)
-    groups = [np.flatnonzero(plan.counts == count) for count in counts]
-    parts = [
-        solver.many(numbers[rows], plan.step_size[rows], plan.marks[rows, :count])
-        for rows, count in zip(groups, counts, strict=True)
-    ]
-    done = Many.empty(len(numbers), plan.marks.shape[1], parts[0].states.shape[2])
-    for rows, count, part in zip(groups, counts, parts, strict=True):
-        done.states[rows, :count], done.momenta[rows, :count] = part.states, part.momenta
+    done = Many.empty(*plan.marks.shape, DIMENSIONS[chart])
+    for count in counts:
+        rows = np.flatnonzero(plan.counts == count)
+        part = solver.many(numbers[rows], plan.step_size[rows], plan.marks[rows, :count])
+        done.states[rows, :count], done.momenta[rows, :count] = part[:2]
         done.steps[rows], done.work[rows], done.outcome[rows] = part[2:]
     return done
 
