@@ -366,26 +366,23 @@ def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
     if all(values.min() > -HARMLESS and values.max() < HARMLESS for values in runs[:2]):  # a tenth of the time
         return runs
     finite = np.isfinite(runs.states).all(axis=2) & np.isfinite(view.energy + view.p_phi) | np.isnan(plan.times)
-    bad = np.flatnonzero((runs.outcome == OK) & ~finite.all(axis=1))
-    if not bad.size:
-        return runs
-    outcome, reached = runs.outcome.copy(), runs.reached.copy()
-    first = finite[bad].argmin(axis=1)
-    outcome[bad], reached[bad] = NOT_FINITE, np.where(first > 0, plan.times[bad, first - 1], 0.0)
-    return runs._replace(outcome=outcome, reached=reached)
+    return _ended(runs, plan, ~finite & (runs.outcome == OK)[:, None], NOT_FINITE)
 
 
 def _of_length_one(runs: _Runs, plan: Schedule, chart: str) -> _Runs:
     """Runs end where their quaternions have left length one, as in `simulate`."""
     lost = off_length(chart, runs.states)
-    bad = lost.any(axis=1)
-    if not bad.any():
+    if not lost.any():
         return runs
-    reached = plan.times[np.arange(len(runs.steps)), np.maximum(lost.argmax(axis=1) - 1, 0)]
-    return runs._replace(
-        states=np.where(lost[..., None], np.nan, runs.states), momenta=np.where(lost[..., None], np.nan, runs.momenta),
-        outcome=np.where(bad, NOT_NORMALISED, runs.outcome), reached=np.where(bad, reached, runs.reached),
-    )  # fmt: skip
+    shown = (np.where(lost[..., None], np.nan, values) for values in runs[:2])
+    return _ended(_Runs(*shown, *runs[2:]), plan, lost, NOT_NORMALISED)
+
+
+def _ended(runs: _Runs, plan: Schedule, lost: NDArray[np.bool_], outcome: int) -> _Runs:
+    """Runs with that outcome end before their first sample that is `lost`, (n, samples)."""
+    bad = lost.any(axis=1)
+    reached = plan.times[np.arange(len(bad)), np.maximum(lost.argmax(axis=1) - 1, 0)]
+    return runs._replace(outcome=np.where(bad, outcome, runs.outcome), reached=np.where(bad, reached, runs.reached))
 
 
 def same_times(times: Any, row: Any) -> bool:

@@ -147,8 +147,11 @@ def _computed(job: Job, chunks: list[slice], threads: int, scheduler: str | None
     if scheduler is None:
         yield from in_threads(Job.columns, parts, threads)
     else:
-        with cluster.connected(scheduler) as client:
+        client = cluster.connect(scheduler)
+        try:
             yield from in_order(client.get_executor(pure=False), Job.columns, parts, cluster.width(client))
+        finally:
+            cluster.leave(client)
 
 
 def _fill(columns: dict[str, Any], part: dict[str, Any], chunk: Any, n: int) -> None:
