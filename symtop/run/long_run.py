@@ -263,8 +263,7 @@ class _Checkpoint:
             words = "belongs to another run or version; remove it or name another file"
             raise SymtopError(f"checkpoint {self.file} {words}", "checkpoint")
         values = iter([float(value) for value in data["position"].values])
-        state, low = (tuple(next(values) for _ in start.state) for _ in range(2))
-        at = Position(state, low, regrown(start.carry, values), int(data["steps_done"]))
+        at = Position(*regrown(start[:3], values), int(data["steps_done"]))
         return at, [[float(value) for value in row] for row in data["rows"].values]
 
     def _read(self, file: Path) -> xr.Dataset | None:
@@ -293,8 +292,7 @@ class _Checkpoint:
         if self.file is None or self.latest is None:
             return
         at, rows = self.latest
-        numbers = [*at.state, *at.low, *leaves(at.carry)]
-        columns: dict[str, Any] = {"position": ("number", numbers), "rows": (("window", "part"), rows)}
+        columns: dict[str, Any] = {"position": ("number", leaves(at[:3])), "rows": (("window", "part"), rows)}
         data = xr.Dataset({**columns, "steps_done": ((), at.k)})
         data.attrs.update(content=netcdf.content_hash(data), identity=self.identity)
         if self.own:

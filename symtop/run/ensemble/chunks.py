@@ -26,7 +26,7 @@ from symtop.core.jit import compile_kernel, to_fixed_tuple
 from symtop.core.parallel import cores, heed, in_threads
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.lanes import Many, W, divided, members_of, of_bodies, turns
+from symtop.methods.framework.lanes import W, divided, members_of, of_bodies, turns
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, off_length
 from symtop.methods.framework.preparation import opened
@@ -226,7 +226,9 @@ class Job:
         """The states of the members, by the quickest way there is."""
         solver = self.method.solvers[self.chart]
         if isinstance(solver, FixedStep):
-            done = sampled(solver, self.chart, self.numbers, plan)
+            done = solver.many(self.numbers, plan.step_size, plan.marks)
+            padding = np.isnan(plan.times)
+            done.states[padding], done.momenta[padding] = np.nan, np.nan
             reached = done.steps * plan.step_size
             return _Runs(done.states, done.momenta, done.steps, *solver.counts(*done[2:4]), done.outcome, reached)
         if isinstance(solver, Adaptive) and self.tolerance is not None:
@@ -345,20 +347,6 @@ def together(numbers: Array) -> Any:
     top: Any = SimpleNamespace(**{name: numbers[:, k : k + 1] for k, name in enumerate(NUMBERS[:3])})
     top.reduced_energy = functools.partial(SymmetricTop.reduced_energy, top)
     return top
-
-
-def sampled(solver: FixedStep, chart: str, numbers: Array, plan: Schedule) -> Many:
-    """The runs of a plan, those with equally many samples in one call."""
-    counts = np.unique(plan.counts)
-    if counts.tolist() == [plan.marks.shape[1]]:
-        return solver.many(numbers, plan.step_size, plan.marks)
-    done = Many.empty(*plan.marks.shape, DIMENSIONS[chart])
-    for count in counts:
-        rows = np.flatnonzero(plan.counts == count)
-        part = solver.many(numbers[rows], plan.step_size[rows], plan.marks[rows, :count])
-        done.states[rows, :count], done.momenta[rows, :count] = part[:2]
-        done.steps[rows], done.work[rows], done.outcome[rows] = part[2:]
-    return done
 
 
 def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
