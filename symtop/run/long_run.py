@@ -263,7 +263,8 @@ class _Checkpoint:
             words = "belongs to another run or version; remove it or name another file"
             raise SymtopError(f"checkpoint {self.file} {words}", "checkpoint")
         values = iter([float(value) for value in data["position"].values])
-        at = Position(*regrown(start[:3], values), int(data["steps_done"]))
+        state, low, carry = regrown(start[:3], values)
+        at = Position(state, low, carry, int(data["steps_done"]))
         return at, [[float(value) for value in row] for row in data["rows"].values]
 
     def _read(self, file: Path) -> xr.Dataset | None:

@@ -362,14 +362,14 @@ def _of_length_one(runs: _Runs, plan: Schedule, chart: str) -> _Runs:
     lost = off_length(chart, runs.states)
     if not lost.any():
         return runs
-    shown = (np.where(lost[..., None], np.nan, values) for values in runs[:2])
-    return _ended(_Runs(*shown, *runs[2:]), plan, lost, NOT_NORMALISED)
+    states, momenta = (np.where(lost[..., None], np.nan, values) for values in (runs.states, runs.momenta))
+    return _ended(runs._replace(states=states, momenta=momenta), plan, lost, NOT_NORMALISED)
 
 
 def _ended(runs: _Runs, plan: Schedule, lost: NDArray[np.bool_], outcome: int) -> _Runs:
     """Runs with that outcome end before their first sample that is `lost`, (n, samples)."""
     bad = lost.any(axis=1)
-    reached = plan.times[np.arange(len(bad)), np.maximum(lost.argmax(axis=1) - 1, 0)]
+    reached = plan.times[np.arange(len(lost)), np.maximum(lost.argmax(axis=1) - 1, 0)]
     return runs._replace(outcome=np.where(bad, outcome, runs.outcome), reached=np.where(bad, reached, runs.reached))
 
 
