@@ -108,14 +108,14 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     at_start, given = presented(solver.loop(par, rule, state, h, np.array([0])).states), np.array([start[:2]])
     first, momenta = (first[ran], momenta[ran]) if ran.any() else (at_start, given)
     energy_start = float(energies(at_start, given)[0][0])
-    curve = modified.oscillation(*modified.section(chart, first), energies(first, momenta)[1])
+    rest = modified.oscillation(*modified.section(chart, first), energies(first, momenta)[1])
 
     def gauge(states: Array, momenta: Array, *, shown: bool = False) -> dict[str, Array]:
         states = states if shown else presented(states)
         energy, values = energies(states, momenta)
         return {
             "energy": (energy - energy_start) / energy_unit,
-            "modified_energy": curve.rest(*modified.section(chart, states), values) / energy_unit,
+            "modified_energy": rest(*modified.section(chart, states), values) / energy_unit,
             "p_phi": (momenta[:, 0] - start.p_phi) / momentum_unit,
             "p_psi": (momenta[:, 1] - start.p_psi) / momentum_unit,
             "theta": View(chart, scene.top, states).theta,
