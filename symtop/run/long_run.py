@@ -197,7 +197,6 @@ def long_run(
 
 
 def _windowed(rows: list[list[float]], ends: list[int], quantities: tuple[str, ...]) -> xr.Dataset:
-    """The dataset of the windows."""
     columns = np.array(rows).reshape(len(rows), len(quantities), 3)
     variables: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
     for i, name in enumerate(quantities):

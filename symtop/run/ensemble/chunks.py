@@ -119,7 +119,6 @@ def nutation_periods(numbers: Array) -> Array:
 
 @functools.cache
 def _all_periods() -> Any:
-    """The compiled loop over members."""
     period_of, width = model.nutation_period, len(NUMBERS)
 
     def all_periods(numbers, periods):  # type: ignore[no-untyped-def]
