@@ -20,12 +20,13 @@ import numpy as np
 from symtop.core.numbers import EPSILON
 from symtop.methods.framework.plan import Plan, off_length
 from symtop.methods.framework.registry import integrator
-from symtop.model.charts import BODY, Array, attitude_distance, axes, axis_distance
+from symtop.methods.runge_kutta.pairs import EIGHTH, two_runs
+from symtop.model.charts import BODY, DIMENSIONS, Array, attitude_distance, axes, axis_distance
 from symtop.model.scenes import Scene, closed_form
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.run.reference.sensitivity import displacement
 
-SERIES, PAIR = {BODY: "series-general-adaptive", "axis": "series-adaptive"}, "dop853-compiled-fixed"
+SERIES = {BODY: "series-general-adaptive", "axis": "series-adaptive"}
 FINE, CHECK = 1e-15, 1e-13  # tolerances: of the true motion, and of its check at one of so many times, the last first
 CHECKED, MULTIPLIED = 10, 1e5  # or at the first ones where A is less, which makes little of what they differ by
 PAIR_STEPS = 6  # of two motions side by side, in a period of the fastest turn: with longer ones chaos is damped away
@@ -157,16 +158,18 @@ class Integrated:
         until = min(horizon, WATCHED[self.chart] * self.marks.period, MOST_WATCHED * step)
         if until not in self.known:
             steps = max(math.ceil(until / step), POINTS)
-            plan = Plan.steps(until / steps, np.arange(1, POINTS + 1) * steps // POINTS)
-            solver, top = integrator(PAIR).solvers[self.chart], self.scene.top
-            near, far = (solver(top, start, plan).states for start in (self.scene.start, self.moved()))
-            weights = np.zeros((near.shape[1], 2))  # of the attitude and of the momentum
+            h, marks, size = until / steps, np.arange(1, POINTS + 1) * steps // POINTS, DIMENSIONS[self.chart]
+            both = np.empty((POINTS, 2 * size))
+            starts = (flat(self.scene.top, start) for start in (self.scene.start, self.moved()))
+            two_runs(self.chart, EIGHTH)(*starts, h, marks, both)
+            near, far = both[:, :size], both[:, size:]
+            weights = np.zeros((size, 2))  # of the attitude and of the momentum
             weights[:-3, 0] = ((2.0 if self.chart == BODY else 1.0) / MOVED) ** 2
             weights[-3:, 1] = (MOVED * self.inertia * self.marks.frequency) ** -2
             with np.errstate(all="ignore"):  # of what has failed
                 apart = np.sqrt(((far - near) ** 2 @ weights).max(axis=1))
                 apart[off_length(self.chart, near) | off_length(self.chart, far)] = math.nan
-            self.known[until] = Growth.of(plan.times, apart, SATURATED / MOVED)
+            self.known[until] = Growth.of(marks * h, apart, SATURATED / MOVED)
         return self.known[until]
 
     def amplification(self, until: float, horizon: float) -> float:
