@@ -42,7 +42,7 @@ from symtop.run.motion import Exact, Integrated
 from symtop.run.simulation import make_plan
 
 CHUNK = 100
-SEEDS = {"tops": 29, "bodies": 1124, "hostile": 1124}  # of bodies another one than those that `LATER` was chosen on
+SEEDS = {"tops": 29, "bodies": 1125, "hostile": 1125}  # of bodies others than those that the guard was mended on
 MENDED = 5000  # bodies of each sampler on which the guard's watch was mended; later ones are new to it
 NUTATIONS = (10.0, 100.0, 1000.0)  # of tops
 SAMPLES = {"tops": 501, "bodies": 201, "hostile": 201}

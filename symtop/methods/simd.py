@@ -199,14 +199,15 @@ def side_by_side(typing, first, second):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def apart(typing, both):  # type: ignore[no-untyped-def]
-    """The doubles of a tuple of `TWO`: all the first ones, then all the second ones."""
+    """The two tuples of doubles that a tuple of `TWO` is made of."""
+    one = types.UniTuple(types.float64, len(both))
 
     def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         values = [builder.extract_value(arguments[0], m) for m in range(len(both))]
-        lanes = [builder.extract_element(one, ir.Constant(_INDEX, k)) for k in range(2) for one in values]
-        return Vectors(builder).array(lanes)
+        lanes = ([builder.extract_element(value, ir.Constant(_INDEX, k)) for value in values] for k in range(2))
+        return context.make_tuple(builder, signature.return_type, [*map(Vectors(builder).array, lanes)])
 
-    return types.UniTuple(types.float64, 2 * len(both))(both), emit
+    return types.UniTuple(one, 2)(both), emit
 
 
 @intrinsic

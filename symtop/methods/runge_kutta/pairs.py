@@ -353,17 +353,17 @@ def fixed_loop(chart: str, pair: Pair) -> Loop:
 
 
 @functools.cache
-def two_runs(chart: str, pair: Pair) -> Callable[..., None]:
-    """``run(near, far, h, marks, states)``: two starts by the same steps, in the time of one and to the bits of each.
+def two_runs(chart: str, pair: Pair, compare: Callable[..., float]) -> Callable[..., None]:
+    """``run(near, far, h, marks, given, seen)``: two starts by the same steps, in the time of one, each to its own bits.
 
-    `near` and `far` are the plain numbers (`preparation`) of one top or body with each start; a sample (2 d) is the
-    state of `near` and then that of `far`. What overflows goes on without a sign.
+    `near` and `far` are the plain numbers (`preparation`) of one top or body with each start. After each mark `seen`
+    has ``compare(state, other state, given)``. What overflows goes on without a sign.
     """
     form = FORMS[chart]
     field, numbers, opened = form.field, form.prepare.numbers, form.prepare.opened
     stages, total = _stages(field, pair.table.a[: len(pair.table.b) - 1], _forget), summed(pair.table.b)
 
-    def run(near, far, h, marks, states):  # type: ignore[no-untyped-def]
+    def run(near, far, h, marks, given, seen):  # type: ignore[no-untyped-def]
         par, first = numbers(*opened(near))
         nothing, state = zero(first), side_by_side(first, numbers(*opened(far))[1])
         none = low = side_by_side(nothing, nothing)
@@ -372,7 +372,7 @@ def two_runs(chart: str, pair: Pair) -> Callable[..., None]:
             while k < marks[j]:
                 state, low = accumulate(state, low, total(none, stages(par, state, field(par, state), 0.0, h), h))
                 k += 1
-            store(states, j, apart(state))
+            seen[j] = compare(*apart(state), given)
 
     compiled: Callable[..., None] = compile_kernel(run)
     return compiled
