@@ -173,7 +173,7 @@ register_model(_Two)(lambda manager, kind: models.PrimitiveModel(manager, kind, 
 
 def _overload(operation: Any, emitted: Any) -> None:
     def chosen(a: Any, b: Any) -> Any:
-        return (lambda a, b: emitted(a, b)) if TWO in (a, b) else None
+        return (lambda a, b: emitted(a, b)) if TWO in (a, b) else None  # noqa: PLW0108  (numba takes functions of Python)
 
     overload(operation, jit_options=INLINED, strict=False)(chosen)
 

@@ -21,7 +21,7 @@ from symtop.core.jit import register_jitable
 from symtop.core.numbers import EPSILON
 from symtop.methods.framework.plan import LENGTH, Plan
 from symtop.methods.framework.registry import integrator
-from symtop.methods.runge_kutta.pairs import EIGHTH, two_runs
+from symtop.methods.runge_kutta.pairs import DOP8, two_runs
 from symtop.model.charts import BODY, Array, attitude_distance, axes, axis_distance
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop, flat
@@ -29,7 +29,7 @@ from symtop.run.reference.sensitivity import displacement
 
 SERIES = {BODY: "series-general-adaptive", "axis": "series-adaptive"}
 FINE, CHECK = (1e-15, 1e-12), (1e-13, 1e-10)  # tolerances: of the true motion and of its check at one of so many
-CHECKED, MULTIPLIED = 10, 1e5  # times, the last first, or at the first ones where A is less; the looser where it stays so
+CHECKED, MULTIPLIED = 10, 1e5  # times, the last first, or at the first ones where A is less; the looser if it stays so
 PAIR_STEPS = 7  # of two motions side by side, in a period of the fastest turn: with 5.3 chaos is damped away
 SWINGS = 8.0  # of the pull of a weight: twice what one swing adds to 2T
 MOVED = 1e-10  # of the natural frequency: small enough to show how much a motion beside a separatrix shears
@@ -178,8 +178,8 @@ class Integrated:
             h, marks, apart = until / steps, np.arange(1, POINTS + 1) * steps // POINTS, np.empty(POINTS)
             starts = (flat(self.scene.top, start) for start in (self.scene.start, self.moved()))
             units = (2.0 if self.chart == BODY else 1.0) / MOVED, 1.0 / (MOVED * self.inertia * self.marks.frequency)
-            two_runs(self.chart, EIGHTH, _apart)(*starts, h, marks, units, apart)
-            self.known[until] = Growth.of(marks * h, apart, SATURATED / MOVED)
+            two_runs(self.chart, DOP8, _apart)(*starts, h, marks, units, apart)
+            self.known[until] = Growth.of(np.multiply(marks, h, dtype=float), apart, SATURATED / MOVED)
         return self.known[until]
 
     def amplification(self, until: float, horizon: float) -> float:

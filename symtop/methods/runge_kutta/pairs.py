@@ -354,12 +354,12 @@ def fixed_loop(chart: str, pair: Pair) -> Loop:
 
 @functools.cache
 def two_runs(chart: str, pair: Pair, compare: Callable[..., float]) -> Callable[..., None]:
-    """``run(near, far, h, marks, given, seen)``: two starts by the same steps, in the time of one, each to its own bits.
+    """``run(near, far, h, marks, given, seen)``: two starts by the same steps, in the time of one and to the same bits.
 
     `near` and `far` are the plain numbers (`preparation`) of one top or body with each start. After each mark `seen`
     has ``compare(state, other state, given)``. What overflows goes on without a sign.
     """
-    form = FORMS[chart]
+    form: Any = FORMS[chart]
     field, numbers, opened = form.field, form.prepare.numbers, form.prepare.opened
     stages, total = _stages(field, pair.table.a[: len(pair.table.b) - 1], _forget), summed(pair.table.b)
 
@@ -379,10 +379,10 @@ def two_runs(chart: str, pair: Pair, compare: Callable[..., float]) -> Callable[
 
 
 RK45 = Pair("rk45-compiled", DORMAND_PRINCE, 5, 4, "Dormand-Prince", "dormand-prince-1980")
-EIGHTH = Pair("dop853-compiled", DOP853, 8, 7, "Dormand-Prince 8(5,3)", "prince-dormand-1981 hairer-norsett-wanner-1993")
+DOP8 = Pair("dop853-compiled", DOP853, 8, 7, "Dormand-Prince 8(5,3)", "prince-dormand-1981 hairer-norsett-wanner-1993")
 PAIRS = (
     Pair("tsit5", TSIT5, 5, 4, "Tsitouras's pair 5(4)", "tsitouras-2011"),
-    EIGHTH,
+    DOP8,
     Pair("vern9", VERN9, 9, 8, "Verner's most efficient pair 9(8)", "verner-2010"),
 )
 
