@@ -1,8 +1,8 @@
 """The true motion beside a probe of the guard: by the closed form, or integrated where there is none.
 
 `Exact` knows a top's motion for ever. `Integrated` needs the equations alone, and so takes bodies too: a Taylor series
-at rounding, of order 19, whose own error is its distance from one of order 16, at the beginning or, where the motion
-multiplies errors, all the way. What the motion makes of an error is
+of order 19 at rounding, or 15 where errors do not grow much, whose own error is its distance from one of order 16 or
+13, at the beginning or, where the motion multiplies errors, all the way. What the motion makes of an error is
 
     A(t) = max over s <= t of |y~(s) - y(s)|/delta,      |y~(0) - y(0)| = delta,
 
@@ -28,8 +28,9 @@ from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.run.reference.sensitivity import displacement
 
 SERIES = {BODY: "series-general-adaptive", "axis": "series-adaptive"}
-FINE, CHECK = (1e-15, 1e-12), (1e-13, 1e-10)  # tolerances: of the true motion and of its check at one of so many
-CHECKED, MULTIPLIED = 10, 1e5  # times, the last first, or at the first ones where A is less; the looser if it stays so
+FINE, CHECK = 1e-15, 1e-13  # tolerances: of the true motion, and of its check at one of so many times, the last first
+CHECKED, MULTIPLIED = 10, 1e5  # or at the first ones where A is less, which makes little of what they differ by
+CALM = 1e3  # times these tolerances where A and the growth of the guard's law are less up to the horizon
 PAIR_STEPS = 7  # of two motions side by side, in a period of the fastest turn: with 5.3 chaos is damped away
 SWINGS = 8.0  # of the pull of a weight: twice what one swing adds to 2T
 MOVED = 1e-10  # of the natural frequency: small enough to show how much a motion beside a separatrix shears
@@ -143,9 +144,10 @@ class Integrated:
         """Rad (n,) by which states (n, dimension) are off at `times` (n,) of a run, with what two orders differ by."""
         end = float(times[-1])
         steady = self.amplification(end, horizon) < MULTIPLIED
-        calm = steady and max(self.amplification(horizon, horizon), (horizon / end) ** 2) < MULTIPLIED
         some = slice(max(times.size // CHECKED, 1)) if steady else slice((times.size - 1) % CHECKED, None, CHECKED)
-        true, check = self.states(times, FINE[calm]), self.states(times[some], CHECK[calm])
+        calm = max(self.amplification(horizon, horizon), (horizon / end) ** 2) < MULTIPLIED
+        looser = CALM if calm else 1.0
+        true, check = self.states(times, FINE * looser), self.states(times[some], CHECK * looser)
         gap = np.abs(check - true[some])[:, : 4 if self.chart == BODY else 3].max(initial=0.0)
         error: Array = self.apart((chart, states), (self.chart, true)) + gap
         return error
