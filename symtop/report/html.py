@@ -73,7 +73,8 @@ class Writer:
             if kind == "paragraph_open" and _only(block[1], "image"):
                 below = blocks[0] if blocks else block
                 captioned = below[0].type == "paragraph_open" and not _only(below[1], "image")
-                made.append(self._figure(block[1].children[0], blocks.pop(0)[1:2] if captioned else []))  # type: ignore[index]
+                caption = blocks.pop(0)[1:2] if captioned else []
+                made.append(self._figure(block[1].children[0], caption))  # type: ignore[index]
             elif kind == "table_open":
                 made.append(self._table(block, title))
             elif kind == "heading_open":
