@@ -22,22 +22,14 @@ from tests.slopes import assert_order
 ONE = np.array([1])
 
 
-def with_rule(stages, **changes):
-    """The Gauss method of so many stages with other numbers in its table."""
-    rule = gauss_rule(stages)._replace(**changes)
-    entry = integrator(f"gauss-{2 * stages}")
-    return dataclasses.replace(
-        entry, name="wrong", solvers={"axis": FixedStep(march_axis, rule, on_axis, stages, implicit=True)}
-    )
-
-
 def nudged(stages, by, mirrored):
     """mu with one entry moved; `mirrored` keeps mu + mu^T = 1."""
     mu = gauss_rule(stages).mu.copy()
     mu[1, 0] += by
     if mirrored:
         mu[0, 1] -= by
-    return with_rule(stages, mu=mu)
+    solver = FixedStep(march_axis, gauss_rule(stages)._replace(mu=mu), on_axis, stages, implicit=True)
+    return dataclasses.replace(integrator(f"gauss-{2 * stages}"), name="wrong", solvers={"axis": solver})
 
 
 def one_step(stages, state, par, h):

@@ -17,7 +17,6 @@ from symtop.model.scenes import closed_form
 
 TABLES = {name: method.table for name, method in tables.METHODS.items()}
 METHODS = {method.name: method for method in built_in()}
-STRANG = tables.STRANG
 
 
 def run(method, scene, h, marks, chart="attitude"):
