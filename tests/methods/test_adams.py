@@ -1,7 +1,6 @@
 """Adams methods: coefficients on any nodes, against SciPy's Adams codes, orders, steps of one length, samples."""
 
 import itertools
-import math
 
 import numpy as np
 import pytest
@@ -139,12 +138,6 @@ def test_it_starts_with_order_one_and_keeps_the_length_of_steps():
     assert 6 <= np.median(orders) <= 12
     assert np.mean(lengths[1:] == lengths[:-1]) > 0.5
     assert np.median([k for _, k in steps_of(1e-3)]) < np.median(orders)
-
-
-def test_nothing_that_belongs_to_the_map_of_one_step_is_claimed():
-    method = symtop.integrator("adams")
-    assert (method.order, method.symplectic, method.symmetric) == (None, None, None)
-    assert math.isclose(method.least_tolerance, symtop.integrator("dop853-compiled").least_tolerance)
 
 
 def test_a_run_of_ten_trillion_seconds_begins():

@@ -1,4 +1,4 @@
-"""Speed as ratios within one run: a step of each basic kernel, a run of one step, and all that surrounds a run."""
+"""Speed as ratios within one run: a run of one step, and all that surrounds a run."""
 
 import functools
 
