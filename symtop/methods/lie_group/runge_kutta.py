@@ -242,7 +242,7 @@ def _turning(element: Callable[..., Any]) -> Callable[..., Any]:
                 if rule.bent != 0.0:
                     slope, g = bent_back(w, f, slope, g)
                 _store(slopes, i, slope, g)
-        return made[0], made[1], made[3], stages, OK
+        return made[0], made[1], made[3], slopes, stages, OK
 
     return turn
 
