@@ -28,7 +28,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.body import observe_turned, turned, turned_back
+from symtop.methods.framework.body import turned, turned_back
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
@@ -139,13 +139,8 @@ def in_both_charts(loop: Loop, rule: Any, carried: Carried, forces: int, *, impl
     }
 
 
-def body_loop(turn: Callable[..., Any], begin: Callable[..., Any] = no_carry) -> Loop:
-    """The loop on (q*, M) of a body without symmetry around ``turn(par, rule, Gamma, M, carry, h)``."""
-    return lie_loop(turn, begin, observe=observe_turned)
-
-
 def on_body(loop: Loop, rule: Any, forces: int, *, implicit: bool) -> dict[str, FixedStep]:
-    """The solver of a body without symmetry."""
+    """The solver of a body without symmetry around a map of Gamma and M, whose loop has `observe_turned`."""
     return {BODY: FixedStep(loop, rule, turned, forces, implicit=implicit, present=turned_back)}
 
 

@@ -34,12 +34,12 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.body import torque
+from symtop.methods.framework.body import observe_turned, torque
 from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group import loop
-from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, iterated_loop, moved
+from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, iterated_loop, lie_loop, moved
 from symtop.methods.splitting.coefficients import SUZUKI_4
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
@@ -166,7 +166,7 @@ def turn_body(par: Any, rule: Any, g: Any, M: Any, carry: Any, h: float) -> Any:
     return m, v, plus(moved(m, v, kicked), half, kick), carry, work, OK if ended and not lost else NOT_CONVERGED
 
 
-march_body = loop.body_loop(turn_body)
+march_body = lie_loop(turn_body, observe=observe_turned)
 
 
 def lie_variational(name: str, rule: Variational, order: int, summary: str, reference: str) -> Integrator:

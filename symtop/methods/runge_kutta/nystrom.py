@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import LEAST_TOLERANCE, chart_outcome, on_angles
+from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import row_of, store, written_out
 from symtop.methods.runge_kutta.pair_tables import Row
@@ -107,14 +108,10 @@ def _field(par: Any, state: Any) -> Any:
     return state[1] / par.I1, slope, precession, turn
 
 
-class Reduced(NamedTuple):
-    """The reduced angles as `pairs.loop` takes a chart."""
-
-    field: Callable[..., Any] = _field
-    ended: Callable[..., Any] = register_jitable(lambda state: chart_outcome(state[0]))
-    observe: Callable[..., Any] = _observe
-    prepare: Any = on_angles
-    present: None = None
+REDUCED = FORMS["angles"]._replace(
+    field=_field, ended=register_jitable(lambda state: chart_outcome(state[0])), observe=_observe, prepare=on_angles,
+    present=None,
+)  # fmt: skip
 
 
 class Nystrom(NamedTuple):
@@ -173,7 +170,7 @@ def built_in() -> list[Integrator]:
     return [
         Integrator(
             name="dprkn8", family="runge-kutta", control="tolerance", order=8,
-            solvers={"angles": solver(Reduced(), Nystrom(DPRKN8), 3)},
+            solvers={"angles": solver(REDUCED, Nystrom(DPRKN8), 3)},
             summary="Runge-Kutta-Nystrom pair 8(6) of Dormand, El-Mikkawy and Prince on the reduced angles, compiled",
             explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi", "p_psi"}),
             least_tolerance=LEAST_TOLERANCE, reference="dormand-el-mikkawy-prince-1987", needs="kicks", general=False,
