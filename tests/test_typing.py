@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[1]
 
 GOOD = """
@@ -43,28 +45,29 @@ text: str = symtop.simulate("spheroid", "midpoint", step_size=0.01)
 REPORTED = {4: "stepsize", 5: '"str"', 6: "simluate", 7: "Scene", 8: "Dataset"}
 
 
-def lines(tmp_path, text):
-    """What mypy says of a script, line by line."""
-    script = tmp_path / "script.py"
-    script.write_text(text, encoding="utf-8")
+@pytest.fixture(scope="module")
+def checked(tmp_path_factory):
+    """What mypy says of both scripts, by file, line by line."""
+    folder = tmp_path_factory.mktemp("typed")
+    for name, text in (("good", GOOD), ("bad", BAD)):
+        (folder / f"{name}.py").write_text(text, encoding="utf-8")
     options = ["--strict", "--ignore-missing-imports", "--no-error-summary", "--follow-imports=silent"]
-    places = ["--config-file", os.devnull, "--cache-dir", str(ROOT / ".mypy_cache"), str(script)]
+    places = ["--config-file", os.devnull, "--cache-dir", str(ROOT / ".mypy_cache"), "good.py", "bad.py"]
     words = [sys.executable, "-m", "mypy", *options, *places]
     home = {**os.environ, "MYPYPATH": str(ROOT)}
-    done = subprocess.run(words, cwd=tmp_path, env=home, capture_output=True, text=True, timeout=300, check=False)
-    return done.stdout.splitlines(), done.stderr
+    done = subprocess.run(words, cwd=folder, env=home, capture_output=True, text=True, timeout=300, check=False)
+    assert done.stdout, done.stderr
+    return {name: [one for one in done.stdout.splitlines() if one.startswith(name)] for name in ("good", "bad")}
 
 
-def test_a_script_is_typed_throughout(tmp_path):
-    said, noise = lines(tmp_path, GOOD)
-    revealed = [line.split('"')[1] for line in said if "Revealed type" in line]
-    assert not [line for line in said if ": error:" in line], noise
+def test_a_script_is_typed_throughout(checked):
+    revealed = [line.split('"')[1] for line in checked["good"] if "Revealed type" in line]
+    assert not [line for line in checked["good"] if ": error:" in line]
     assert [kind.replace("builtins.", "").replace("Union[int, None]", "int | None") for kind in revealed] == SEEN
 
 
-def test_mistakes_are_reported_where_they_are(tmp_path):
-    said, noise = lines(tmp_path, BAD)
-    errors = {int(line.split(":")[1]): line for line in said if ": error:" in line}
-    assert sorted(errors) == sorted(REPORTED), noise
+def test_mistakes_are_reported_where_they_are(checked):
+    errors = {int(line.split(":")[1]): line for line in checked["bad"] if ": error:" in line}
+    assert sorted(errors) == sorted(REPORTED)
     for number, word in REPORTED.items():
         assert word in errors[number]

@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-import symtop
 from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError
@@ -19,10 +18,13 @@ from tests.commands import call
 
 
 def test_run_prints_the_errors_and_writes_the_dataset(tmp_path):
-    path = tmp_path / "run.nc"
-    done = call("run", "spheroid", "midpoint", "--step-size", 0.01, "--output", path)
-    assert "angle between axes" in done.output
-    assert netcdf.read(path).attrs["integrator"] == "midpoint"
+    words = ("run", "spheroid", "midpoint", "--step-size", 0.01, "--output", tmp_path / "run.nc")
+    assert "angle between axes" in call(*words).output
+    assert netcdf.read(tmp_path / "run.nc").attrs["integrator"] == "midpoint"
+    told = numbers(call(*words, "--json").stdout)
+    assert told["steps"] == 800
+    assert 1e-3 < told["errors"]["axis"]["largest"] < 2e-2
+    assert told["errors"]["p_psi"]["largest"] < 1e-14
 
 
 def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):
@@ -30,17 +32,6 @@ def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):
     done = call("run", "spheroid", "stormer-verlet", "--step-size", 1.0, "--horizon", 50, "--output", path, code=3)
     assert "theta left (0, pi)" in done.output
     assert netcdf.read(path).attrs["outcome"] == "left_chart"
-
-
-def test_recommend_tries_only_methods_that_need_no_more_than_there_is():
-    line = ("recommend", "spheroid", "--accuracy", "1e-4", "--horizon", 2, "--json", "--needs")
-    advice = json.loads(call(*line, "kicks, group").stdout)
-    assert symtop.integrator(advice["integrator"]).needs in ("kicks", "group")
-    assert json.loads(call(*line, "solution").stdout)["integrator"] == "exact"  # for whoever has the motion itself
-
-
-def test_the_table_for_the_documents_is_markdown():
-    assert call("integrators", "--markdown").output.startswith("| name |")
 
 
 @pytest.mark.parametrize(
@@ -66,6 +57,7 @@ def test_the_table_for_the_documents_is_markdown():
         ("run spheroid rk45", ["needs a tolerance", "1e-6"]),
         ("run spheroid rk45 --tolerance 1e-20", ["--tolerance", "at least", "1e-20"]),
         ("run spheroid taylor --observe psi", ["--observe 'psi'", "attitude"]),
+        ("run spheroid strang --step-size 0.01 --guard x", ["--guard "]),
         ("run spheroid taylor --plugin no-such-file.py", ["--plugin", "Python file", "no-such-file.py"]),
         ("run spheroid taylor --figure no-such/x.png", ["--figure", "folder that is there", "no-such/x.png"]),
         ("run spheroid taylor --figure x.jpg", ["--figure", ".png or .svg or .pdf", "x.jpg"]),
@@ -177,19 +169,12 @@ def test_numbers_that_are_not_finite_are_null_in_json(tmp_path):
     assert numbers(call("scenes", "--json", "--plugin", plugin).stdout)
 
 
-def test_a_plugin_that_raises_is_named(tmp_path):
-    plugin = tmp_path / "broken.py"
-    plugin.write_text("1 / 0\n")
-    done = call("integrators", "--plugin", plugin, code=2)
-    assert "plugin broken.py failed: ZeroDivisionError" in done.output
-
-
 def test_help_starts_fast():
     """At most three times what importing click costs, in one run."""
 
     def best(*command):
         times = []
-        for _ in range(5):
+        for _ in range(3):
             start = time.perf_counter()
             subprocess.run(command, check=True, capture_output=True)
             times.append(time.perf_counter() - start)
@@ -197,17 +182,6 @@ def test_help_starts_fast():
 
     bare = best(sys.executable, "-c", "import click")
     assert best(sys.executable, "-m", "symtop.cli", "--help") < 3.0 * bare + 0.05
-
-
-def test_a_run_is_drawn_and_printed_as_json(tmp_path):
-    picture = tmp_path / "run.png"
-    command = ["run", "spheroid", "midpoint", "--step-size", "0.01", "--figure", str(picture), "--json"]
-    result = call(*command)
-    run = json.loads(result.stdout)
-    assert run["steps"] == 800
-    assert 1e-3 < run["errors"]["axis"]["largest"] < 2e-2
-    assert run["errors"]["p_psi"]["largest"] < 1e-14
-    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_path):
@@ -286,14 +260,19 @@ def test_what_cannot_be_printed_is_told_in_a_sentence():
 
 
 @pytest.mark.skipif(not Path("/bin/sh").exists(), reason="a shell of Unix")
-@pytest.mark.parametrize("closed", ["1>&-", "2>&-", "0<&- 1>&- 2>&-"])
-def test_a_stream_that_was_closed_changes_no_exit_code(closed):
+@pytest.mark.parametrize(
+    ("words", "closed", "code"),
+    [
+        ("scenes", "1>&-", 0), ("run nowhere", "2>&-", 2), ("run nowhere", "0<&- 1>&- 2>&-", 2),
+        ("run spheroid strang --step-size 0.1 --horizon 1", "0<&- 1>&- 2>&-", 0),
+    ],
+)  # fmt: skip
+def test_a_stream_that_was_closed_changes_no_exit_code(words, closed, code):
     """Python has None in its place; a refusal (the control) is one all the same."""
-    for words, code in (("scenes", 0), ("run spheroid strang --step-size 0.1 --horizon 1", 0), ("run nowhere", 2)):
-        command = ["/bin/sh", "-c", f"{sys.executable} -m symtop.cli {words} {closed}"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-        assert done.returncode == code, (words, done.stderr)
-        assert "Traceback" not in done.stderr
+    command = ["/bin/sh", "-c", f"{sys.executable} -m symtop.cli {words} {closed}"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_a_command_whose_threads_work_or_whose_code_is_a_text_ends_as_python_does():

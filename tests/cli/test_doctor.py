@@ -116,15 +116,6 @@ def test_a_run_that_fails_is_named(monkeypatch):
 
 
 @pytest.mark.slow
-def test_kernels_are_on_disk_afterwards(monkeypatch, tmp_path):
-    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
-    monkeypatch.setattr(doctor, "variants", lambda: ["strang[axis]"])
-    count, _ = doctor.compile_all(jobs=1)
-    assert count == doctor.kernels() >= 1
-    assert doctor.compile_all(jobs=1)[0] == 0
-
-
-@pytest.mark.slow
 def test_all_of_them_are_compiled_once(monkeypatch, tmp_path):
     """From the kernels that other tests have left, less an eighth: all of them take six minutes."""
     (cache_root() / "kernels").mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,5 @@
 """What somebody new meets in the first minutes: each point was a complaint of a trial, and stays mended."""
 
-import json
-import re
 import sys
 import time
 
@@ -9,7 +7,9 @@ import pytest
 from terminal import recorded
 
 import symtop
+from symtop.core import netcdf
 from symtop.measure.verdicts import ACCURATE
+from symtop.methods.framework.registry import split_name
 from symtop.run.guard import EXPECTED
 from tests.commands import call
 
@@ -23,6 +23,8 @@ symtop.register(
         implementation="python",
     )
 )
+top, start = symtop.SymmetricTop(1.5, 1.0, 3.0), symtop.Angles(theta=1.0, psi_dot=4.0)
+symtop.register_scene(symtop.Scene("of-a-user", top, start, horizon=6.0))
 """
 
 
@@ -55,14 +57,17 @@ def test_a_method_on_the_axis_alone_runs_and_is_judged(axis_only):
     assert runs["outcome"].values.tolist() == ["ok"]
 
 
-def test_one_method_alone_takes_part_in_a_study(axis_only, tmp_path):
+def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(axis_only, tmp_path):
     words = ["study", "convergence", "--quick", "--only", "on-the-axis", "--results", tmp_path, "--plugin", axis_only]
     done = call(*words)
     lines = done.output.splitlines()
     assert lines[0].startswith("convergence: ")
     assert "show the order that the method declares" in lines[1]  # the answer of its page
     assert f"next: symtop report --results {tmp_path / 'quick' / 'only'}" in lines[-1]
-    assert (tmp_path / "quick" / "only" / "convergence.nc").is_file()
+    data = netcdf.read(tmp_path / "quick" / "only" / "convergence.nc")
+    assert {split_name(str(row))[0] for row in data["variant"].values} == {"on-the-axis"}
+    assert "of-a-user" in data["scene"]
+    assert data.sizes["scene"] > 1
     assert not (tmp_path / "quick" / "convergence.nc").exists()
     assert {file.suffix for file in (tmp_path / "quick" / "only" / "figures").iterdir()} == {".png"}  # no PDF to print
     state = call(*words, "--status")
@@ -76,30 +81,6 @@ def test_one_method_alone_takes_part_in_a_study(axis_only, tmp_path):
         assert "study truth has no case of on-the-axis" in several.stderr
         assert several.stderr.rstrip().endswith("it is left out")
         assert several.stdout.startswith("convergence: ")
-
-
-def test_the_status_counts():
-    """A line for what is stale and one for what is missing, however many cases there are."""
-    done = call("study", "convergence", "--status", "--results", "no-such-folder", COLUMNS="80")
-    lines = done.output.splitlines()
-    assert re.fullmatch(r"convergence: \d+ missing", lines[0])
-    assert len(lines) < 8
-    assert max(map(len, lines)) <= 80
-
-
-def test_advice_ends_with_the_lines_to_copy():
-    advice = symtop.recommend("goldstein", accuracy=1e-3, horizon=20.0)
-    *_, command, line = str(advice).splitlines()
-    assert command == f"Run it: {advice.command}"
-    assert line == f"In Python: {advice.python}"
-    run = eval(advice.python, {"symtop": symtop})  # a line that is printed to be run
-    assert float(symtop.errors(run)["axis"].max()) <= 1e-3
-    words = advice.command.replace('"', "").split()[1:]
-    done = call(*words, "--json")
-    assert json.loads(done.stdout)["errors"]["axis"]["largest"] <= 1e-3
-    scene = symtop.scene("goldstein")
-    own = symtop.Scene("goldstein", scene.top, scene.start, horizon=30.0)  # no scene of the catalogue has this name
-    assert symtop.recommend(own, accuracy=1e-3).command == ""
 
 
 def test_advice_says_that_a_method_in_plain_python_was_not_tried(axis_only):
@@ -146,25 +127,19 @@ COLD = time.time()  # a constant that no kernel on disk was compiled with
 
 
 @pytest.mark.parametrize(
-    "words",
+    ("words", "longest"),
     [
-        ["run", "spheroid", "midpoint", "--step-size", "0.01"],
-        ["ensemble", "strang", "--members", "20", "--per-nutation", "50", "--nutations", "2"],
-        ["scenes"],
-        ["integrators", "--engines"],
-        ["study", "convergence", "--quick", "--status", "--results", "no-such-folder"],
+        ("run spheroid midpoint --step-size 0.01", 60.0), ("integrators", 2.0), ("scenes", 2.0),
+        ("ensemble strang --members 20 --per-nutation 50 --nutations 2", 60.0),
+        ("study convergence --quick --status --results no-such-folder", 60.0),
     ],
-)
-def test_nothing_wraps_on_a_terminal(words):
-    recording = recorded(words)
+)  # fmt: skip
+def test_nothing_wraps_on_a_terminal_and_a_list_is_there_within_two_seconds(words, longest):
+    recording = recorded(words.split())
     assert recording.code == 0, recording.text
     assert recording.text
     assert recording.widest <= 80
-
-
-@pytest.mark.parametrize("words", [["scenes"], ["integrators"], ["scenes", "spheroid"], ["integrators", "strang"]])
-def test_a_list_is_there_within_two_seconds(words):
-    assert recorded(words).silence < 2.0
+    assert recording.silence < longest
 
 
 @pytest.mark.slow  # half a minute: lanes of one method are compiled
@@ -207,42 +182,23 @@ def test_the_clock_goes_on_while_somebody_holds_the_lock_of_python(tmp_path):
 def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
     from symtop.core import progress
 
-    monkeypatch.setattr(progress, "BEAT", 0.01)
     drawn = []
-
-    class Bar:
-        def __init__(self, disable, **_):
-            self.disable = disable
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):
-            drawn.append("closed")
-
-        def refresh(self):
-            drawn.append("refreshed")
-
-    monkeypatch.setattr("tqdm.tqdm", Bar)
+    monkeypatch.setattr(progress, "BEAT", 0.01)
     monkeypatch.setattr(progress, "is_terminal", lambda _: True)
+    monkeypatch.setattr("tqdm.tqdm.refresh", lambda *_, **__: drawn.append(1))
     with progress.progress_bar("a bar"):
         time.sleep(0.1)
-    assert drawn.count("refreshed") >= 3
     count = len(drawn)
+    assert count >= 3
     time.sleep(0.05)
-    assert drawn[-1] == "closed"
-    assert len(drawn) == count
     with progress.progress_bar("a bar", quiet=True):
         time.sleep(0.05)
-    assert drawn[count:] == ["closed"]
+    assert len(drawn) == count
 
 
-def test_a_recording_hears_a_silence(tmp_path):
-    """Negative control: a plug-in that sleeps while it is loaded."""
+def test_a_recording_hears_a_silence_and_sees_what_wraps(tmp_path):
+    """Negative control: a plug-in that sleeps while it is loaded, and a table of every column."""
     (tmp_path / "sleeps.py").write_text("import time\ntime.sleep(3.0)\n")
-    assert recorded(["scenes", "--plugin", str(tmp_path / "sleeps.py")]).silence > 2.9
-
-
-def test_a_recording_sees_what_wraps():
-    """Negative control: a table of every column does."""
-    assert recorded(["scenes", "--wide"]).widest > 80
+    recording = recorded(["scenes", "--wide", "--plugin", str(tmp_path / "sleeps.py")])
+    assert recording.silence > 2.9
+    assert recording.widest > 80

@@ -3,14 +3,10 @@
 What blocks of code do is in `tests.docs.test_blocks`.
 """
 
-import importlib
 import re
 
-from symtop.report.formats import columns, table
 from tests.commands import call
 from tests.pages import ROOT, pages
-
-registry = importlib.import_module("symtop.methods.framework.registry")
 
 PAGES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in pages()}
 MOST_LINES, MOST_WORDS = 150, 1200  # of the README
@@ -26,22 +22,13 @@ def test_the_readme_is_read_in_a_few_minutes():
 def test_the_table_of_integrators_is_the_generated_one():
     shown = re.search(r"<!-- integrators -->\n(.*?)\n<!-- /integrators -->", PAGES["docs/integrators.md"], re.DOTALL)
     assert shown is not None
-    records = [method.record() for method in registry.methods().values()]
-    today = table(*columns(records)).splitlines()
+    today = call("integrators", "--markdown").output.splitlines()
     assert set(shown.group(1).splitlines()) <= set(today), "regenerate: symtop integrators --markdown"
 
 
 def test_every_study_is_explained():
     for script in (ROOT / "studies").glob("*/study.py"):
         assert f"| `{script.parent.name}` |" in PAGES["docs/studies.md"]
-
-
-def test_the_first_run_prints_what_the_readme_shows():
-    shown = re.search(r"```text\n(rk4\[angles\] on spheroid.*?)```", PAGES["README.md"], re.DOTALL)
-    done = call("run", "spheroid", "rk4", "--step-size", "0.01")
-    assert shown is not None
-    assert done.stdout.startswith(shown.group(1))
-    assert done.stderr == ""
 
 
 def test_pictures_and_links_are_there():

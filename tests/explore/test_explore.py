@@ -91,18 +91,6 @@ def test_an_answer_on_a_body_is_the_run_beside_its_truth():
         answers.setup(fields("tennis-racket", "midpoint"))
 
 
-def test_the_map_of_an_engine_is_played_beside_the_truth_from_a_group_of_its_own():
-    families = [entry["family"] for entry in answers.catalogue()["integrators"]]
-    assert families.count("engine") == len(engines())
-    chosen = {"name": "goldstein", "horizon": 10.0, "step_size": 0.025}
-    off = {
-        name: answers.answer(answers.setup(fields(integrator=name, **chosen)))["largest"]["axis_error"]
-        for name in ("no-gyro", "strang")
-    }
-    assert off["no-gyro"] > 1.5
-    assert off["strang"] < 1e-3
-
-
 def test_a_failing_run_is_an_answer_with_its_sentence():
     answer = answers.answer(answers.setup(fields(step_size=0.6)))
     assert answer["outcome"] == "left_chart"
@@ -133,7 +121,9 @@ def test_bad_questions_are_refused_in_one_sentence(changes, word):
 
 
 def test_the_page_says_in_which_chart_a_method_runs_and_a_row_runs_in_its_own():
-    offered = {entry["name"]: entry["chart"] for entry in answers.catalogue()["integrators"]}
+    listed = answers.catalogue()["integrators"]
+    assert [entry["family"] for entry in listed].count("engine") == len(engines())
+    offered = {entry["name"]: entry["chart"] for entry in listed}
     assert offered["rk4"] == "angles"
     assert offered["strang"] == "attitude"
     for name in ("rk4", "strang"):
@@ -226,14 +216,6 @@ def test_exports_over_http(site, tmp_path):
     assert body.decode() == answers.script(answers.setup(chosen))
 
 
-def test_an_adaptive_run_that_takes_too_long_ends_and_says_so():
-    chosen = answers.setup(fields(integrator="rk45-compiled", tolerance=1e-12, horizon=1e5))
-    began = time.monotonic()
-    assert "limit on the work" in answers.answer(chosen)["message"]
-    assert time.monotonic() - began < 10.0
-    assert f"budget={chosen.budget!r}" in answers.script(chosen)
-
-
 @pytest.mark.parametrize(
     ("method", "tolerance"),
     [
@@ -253,9 +235,10 @@ def test_a_run_to_its_budget_takes_two_seconds_within_a_factor_of_two(method, to
     assert chosen.budget <= answers.MOST_WORK[chosen.method.implementation]
     learnt = time.thread_time()
     assert learnt - before < 2.0
-    run = answers.dataset(chosen, str)
+    answer = answers.answer(chosen)
     assert time.thread_time() - learnt < 2.0 * answers.MOST_SECONDS
-    assert run.attrs["outcome"] == "out_of_budget"
+    assert answer["outcome"] == "out_of_budget"
+    assert "limit on the work" in answer["message"]
     again = answers.setup(fields(integrator=method, tolerance=tolerance, horizon=1e6))
     assert again.budget == chosen.budget  # a script has the same
     assert f"budget={chosen.budget!r}" in answers.script(again)
@@ -339,11 +322,12 @@ def test_the_command_serves_until_it_is_ended():
 PLOT = "document.querySelector('#plot-{}').toDataURL()"
 
 
-def answered(browser, act):
-    """Do something to the page and wait for its answer."""
+def answered(browser, selector, value):
+    """Set a control of the page and wait for its answer."""
     count = browser.evaluate("+(document.body.dataset.answers || 0)")
-    act()
+    browser.set(selector, value)
     browser.wait_for(f"+document.body.dataset.answers > {count}")
+    browser.wait_for("!document.querySelector('#status').textContent.includes('computing')")
 
 
 def test_a_person_can_use_it(site, tmp_path):
@@ -357,7 +341,7 @@ def test_a_person_can_use_it(site, tmp_path):
         before = {name: browser.evaluate(PLOT.format(name)) for name in names}
         assert len(set(before.values())) == len(names)
 
-        answered(browser, lambda: browser.set("#theta-slider", 0.9))  # a slider moves, the plots change
+        answered(browser, "#theta-slider", 0.9)  # a slider moves, the plots change
         assert browser.evaluate("document.querySelector('#theta').value") == "0.9"
         named = "document.querySelector('#scene').selectedOptions[0].text"
         assert browser.evaluate(named) == "spheroid (edited)"  # and so does the name
@@ -377,7 +361,7 @@ def test_a_person_can_use_it(site, tmp_path):
             browser.click(button)
             browser.wait_for(f"window.saved === {file!r}")
 
-        answered(browser, lambda: browser.set("#step_size", 0.6))  # a failing run shows its sentence
+        answered(browser, "#step_size", 0.6)  # a failing run shows its sentence
         browser.wait_for("document.body.dataset.answer === 'left_chart'")
         assert "theta left (0, pi)" in browser.evaluate(status)
         assert browser.evaluate("document.querySelector('#status').className") == "failed"
@@ -393,8 +377,8 @@ def test_a_person_can_use_it(site, tmp_path):
             "0.4",
         ]
 
-        answered(browser, lambda: browser.set("#scene", "goldstein"))
-        answered(browser, lambda: browser.set("#integrator", "rk45"))
+        answered(browser, "#scene", "goldstein")
+        answered(browser, "#integrator", "rk45")
         browser.wait_for(f"{status}.startsWith('rk45: reached t = 70')")
         assert browser.evaluate("document.querySelector('#step_size').offsetParent") is None
         assert browser.evaluate("document.querySelector('#tolerance').offsetParent !== null")
@@ -553,14 +537,14 @@ def test_the_chart_of_costs_and_the_oscillator_are_on_the_page(site, tmp_path):
         browser.open(address(site))
         data = "document.querySelector('#cost').dataset"
         browser.wait_for(f"{data}.missing === '0' && {data}.points === '1'")
-        answered(browser, lambda: browser.set("#second", "strang"))
+        answered(browser, "#second", "strang")
         browser.wait_for(f"{data}.points === '2'")
         drawn = browser.evaluate("document.querySelector('#cost').toDataURL()")
-        answered(browser, lambda: browser.set("#step_size", 0.05))  # the points move along their lines
+        answered(browser, "#step_size", 0.05)  # the points move along their lines
         browser.wait_for(
             f"{data}.points === '2' && document.querySelector('#cost').toDataURL() !== {json.dumps(drawn)}"
         )
-        answered(browser, lambda: browser.set("#step_size", 0.6))  # midpoint fails, strang does not
+        answered(browser, "#step_size", 0.6)  # midpoint fails, strang does not
         browser.wait_for(f"{data}.points === '1'")
         maps, names = browser.evaluate("document.body.dataset.maps"), ("oscillator", "damped-top")
         counted = "+document.querySelector('#{}-key').dataset.answers".format

@@ -156,10 +156,10 @@ def _steady(draw):
     return top, Angles(theta, *_turns(draw), phi_dot=turn, psi_dot=spin - turn * math.cos(theta))
 
 
-def _units(draw):
-    """Any motion in units of inertia, weight and time from 1e-9 to 1e9."""
+def _scaled(draw, decades):
+    """Any motion in units of inertia and of time, each up to so many decades larger or smaller."""
     top, at = _any_start(draw, _top(draw))
-    mass, clock = 10.0 ** draw.uniform(-9.0, 9.0), 10.0 ** draw.uniform(-9.0, 9.0)
+    mass, clock = 10.0 ** draw.uniform(-decades, decades), 10.0 ** draw.uniform(-decades, decades)
     rates = (rate / clock for rate in (at.theta_dot, at.phi_dot, at.psi_dot))
     other = SymmetricTop(top.I1 * mass, top.I3 * mass, top.mgl * mass / clock**2)
     return other, Angles(at.theta, at.phi, at.psi, *rates)
@@ -172,7 +172,7 @@ KINDS = {
     "needle": lambda draw: _any_start(draw, _top(draw, 10.0 ** draw.uniform(-12.0, -2.0))),
     "weightless": lambda draw: _any_start(draw, _top(draw, weight=10.0 ** draw.uniform(-12.0, -3.0))),
     "heavy": lambda draw: _any_start(draw, _top(draw, weight=10.0 ** draw.uniform(2.0, 6.0))),
-    "units": _units,
+    "units": lambda draw: _scaled(draw, 9.0),
     "fast": lambda draw: _fast(draw, 0.0, 1.7),
     "very-fast": lambda draw: _fast(draw, 2.0, 6.0),
     "upright": _upright,
@@ -192,20 +192,10 @@ def _at_pole(draw):
     return top, Angles(draw.choice([0.0, math.pi]), at.phi, at.psi, rate, at.phi_dot, at.psi_dot)
 
 
-def _scaled(draw):
-    """Any motion in units of inertia and of time from 1e-12 to 1e12."""
-    top, at = _any_start(draw, _top(draw))
-    mass, clock = 10.0 ** draw.uniform(-12.0, 12.0), 10.0 ** draw.uniform(-12.0, 12.0)
-    rates = (rate / clock for rate in (at.theta_dot, at.phi_dot, at.psi_dot))
-    return SymmetricTop(top.I1 * mass, top.I3 * mass, top.mgl * mass / clock**2), Angles(
-        at.theta, at.phi, at.psi, *rates
-    )
-
-
 HOSTILE = {  # drawn from by seeds below zero
     "near-sphere": lambda draw: _any_start(draw, _top(draw, 1.0 + _excess(draw, -1.0))),
     "flat-or-thin": lambda draw: _any_start(draw, _top(draw, draw.choice([10.0 ** draw.uniform(-3.0, 0.0), 1.999]))),
-    "scaled": _scaled,
+    "scaled": lambda draw: _scaled(draw, 12.0),
     "at-pole": _at_pole,
 }
 

@@ -52,12 +52,8 @@ def test_what_is_made_is_the_users_alone(planted):
     assert not [finding for finding in doctor._caches(root) if not finding.healthy]
 
 
-def test_a_program_in_a_cache_of_our_own_is_ours_to_run(planted):
+def test_a_program_in_a_cache_of_our_own_is_ours_to_run_and_so_is_its_machine_code(planted):
     """The control: this is what is refused below."""
-    assert compile_kernel(_doubled)(2.0) == 8.0
-
-
-def test_machine_code_in_a_cache_of_our_own_is_ours_to_run_too(planted):
     assert compile_kernel(_doubled)(2.0) == 8.0
     (code,) = planted[0].rglob("*.code")
     written = code.stat().st_mtime_ns

@@ -141,10 +141,3 @@ def test_every_bad_command_line_is_one_sentence(name, folder, monkeypatch):
     if sorted(path.name for path in folder.parent.iterdir()) != above:
         faults.append("wrote beside the folder")
     assert not faults, "\n".join(repr(fault).replace("a" * 290, "aaa").replace("x" * 4990, "xxx") for fault in faults)
-
-
-@pytest.mark.parametrize("words", [["--guard", "x"], ["--step-size", "-1", "--no-guard"]])
-def test_a_sentence_names_the_option_that_was_given(words):
-    done = outcome(["run", "spheroid", "strang", *(() if "--step-size" in words else ("--step-size", "0.01")), *words])
-    assert done.exit_code == 2
-    assert f"symtop: {words[0]} " in done.output

@@ -27,7 +27,7 @@ from symtop.judging.battery import stages
 from symtop.judging.claims.subject import FORMS, open_target
 from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Measured, line, undecided
 from symtop.judging.remote import clock
-from tests.judging.blind.right import midpoint, product, turn, verlet
+from tests.judging.blind.right import midpoint, product, rates, turn, verlet
 
 SPHEROID = symtop.scene("spheroid")
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no C compiler")
@@ -458,17 +458,17 @@ def test_a_command_whose_reader_leaves_ends():
 
 
 def euler_of_matrices(R, w, h, inertia, torque):
-    w = w + h * (np.cross(inertia * w, w) + torque(R)) / inertia
+    w = w + h * rates(R, w, inertia, torque)
     return R @ Rotation.from_rotvec(h * w).as_matrix(), w
 
 
 def euler_of_quaternions(q, w, h, inertia, torque):
-    w = w + h * (np.cross(inertia * w, w) + torque(q)) / inertia
+    w = w + h * rates(q, w, inertia, torque)
     return product(q, turn(h * w)), w
 
 
 def euler_that_stretches(R, w, h, inertia, torque):
-    return R + h * np.cross(R, w), w + h * (np.cross(inertia * w, w) + torque(R)) / inertia
+    return R + h * np.cross(R, w), w + h * rates(R, w, inertia, torque)
 
 
 def of_rotation(function, step_size, horizon):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import symtop
 from symtop.model import charts, top
@@ -21,12 +22,7 @@ def body_rates(at):
 
 def matrix(q):
     """The rotation from body to space."""
-    w, x, y, z = q
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
+    return Rotation.from_quat(q, scalar_first=True).as_matrix()
 
 
 @pytest.mark.parametrize("scene", random_scenes(20, seed=5))

@@ -30,12 +30,3 @@ def test_a_picture_has_the_pixels_of_savefig(tmp_path, write, dpi):
     write(drawn(), tmp_path / "a.png")
     drawn().savefig(tmp_path / "b.png", dpi=dpi)
     assert np.array_equal(pixels(tmp_path / "a.png", "RGBA"), pixels(tmp_path / "b.png", "RGBA"))
-
-
-@pytest.mark.parametrize(("write", "files"), [(style.sketch, 1), (style.save, 1), (style.publish, 2)])
-def test_a_figure_is_drawn_once_a_file(tmp_path, monkeypatch, write, files):
-    figure, times = drawn(), []
-    draw = Figure.draw
-    monkeypatch.setattr(Figure, "draw", lambda *args: (times.append(1), draw(*args))[1])
-    write(figure, tmp_path / "a.png")
-    assert len(times) == files == len(list(tmp_path.iterdir()))

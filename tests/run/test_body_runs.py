@@ -1,6 +1,7 @@
 """Runs of a body without symmetry: orders, conserved quantities, errors against the truth, and what is refused."""
 
 import dataclasses
+import functools
 import itertools
 import json
 import math
@@ -53,16 +54,19 @@ def error(
 
 def slope(scene: symtop.Scene, method: str, order: int, true: symtop.Scene | None = None) -> float:
     """The power of the step by which the error falls, of the shortest steps whose error is no rounding."""
-    errors = []
-    for count in FEWEST[order] * FINER:
-        run = symtop.simulate(scene, method, step_size=scene.nutation_period / count, samples=41, guard=False)
+
+    @functools.cache
+    def largest(k: int) -> float:
+        step = scene.nutation_period / (FEWEST[order] * FINER[k])
+        run = symtop.simulate(scene, method, step_size=step, samples=41, guard=False)
         truth = symtop.reference(true or scene, run.time.values)["quaternion"].values
         off = float(attitude_distance(run["quaternion"].values, truth).max())
-        errors.append(off if run.outcome == "ok" else math.inf)
-        if errors[-1] < ROUNDING:
-            break
-    last = max(i for i, one in enumerate(errors) if one >= ROUNDING)
-    return math.log2(errors[last - 4] / errors[last])
+        return off if run.outcome == "ok" else math.inf
+
+    last = len(FINER) - 1
+    if largest(last) < 20.0 * ROUNDING:
+        last = next((k for k in range(last + 1) if largest(k) < ROUNDING), last + 1) - 1
+    return math.log2(largest(last - 4) / largest(last))
 
 
 @pytest.mark.parametrize("name", BODIES)

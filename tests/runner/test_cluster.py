@@ -9,7 +9,7 @@ from symtop.run.ensemble import chunks
 from symtop.run.ensemble.ensemble import ensemble
 from symtop.run.ensemble.population import population
 from symtop.runner.pool import Pool
-from tests.commands import PROBE, call, ended, leftovers, same, symtop
+from tests.commands import PROBE, ended, symtop
 
 distributed = pytest.importorskip("distributed")
 pytestmark = [
@@ -25,17 +25,6 @@ def cluster(processes_with_dask):
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
     ) as made:
         yield made
-
-
-def test_the_same_bits_as_without_a_cluster(cluster, tmp_path):
-    code, out, err = ended(
-        symtop("study", PROBE, "--results", tmp_path / "there", "--scheduler", cluster.scheduler_address)
-    )
-    assert code == 0, err
-    assert "12 of 12 cases computed" in out
-    assert ended(symtop("study", PROBE, "--results", tmp_path / "here", "--jobs", 1))[0] == 0
-    same(tmp_path / "here", tmp_path / "there")
-    assert not leftovers(tmp_path / "there")
 
 
 def test_a_case_that_fails_there_is_recorded_here(cluster, tmp_path):
@@ -61,14 +50,6 @@ def test_an_ensemble_computed_there_is_the_one_computed_here(cluster, tmp_path, 
     path = tmp_path / "runs.nc"
     with ensemble(members, name, scheduler=cluster.scheduler_address, path=path, **asked) as data:
         assert data.load().identical(here)
-
-
-@pytest.mark.parametrize("address", ["nowhere", "tcp://127.0.0.1:1", "ftp://x", "tcp://[::1:0"])
-def test_a_scheduler_that_is_none_is_one_sentence(address, tmp_path, monkeypatch):
-    monkeypatch.setattr("symtop.run.cluster.PATIENCE", 0.5)
-    done = call("study", PROBE, "--results", tmp_path, "--scheduler", address, code=2)
-    assert "scheduler must be the address of a dask scheduler that answers and has workers" in done.output
-    assert "Traceback" not in done.output
 
 
 def test_without_the_package_it_says_how_to_get_it(monkeypatch):

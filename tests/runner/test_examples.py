@@ -43,12 +43,6 @@ def test_its_kernel_keeps_the_momenta_it_recomputes(example):
         assert float(abs(run[name] / run[name][0] - 1.0).max()) < 1e-13
 
 
-def test_its_scene_is_known(example):
-    assert symtop.scene("mine").nutation_period == pytest.approx(
-        symtop.ClosedForm(symtop.scene("mine").top, symtop.scene("mine").start).nutation_period, rel=1e-12
-    )
-
-
 class Point:
     """What an installed package's entry point looks like."""
 

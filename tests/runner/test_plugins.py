@@ -1,10 +1,8 @@
-"""Plug-ins: what one registers counts by the code that it reaches, and is in the studies beside symtop's own."""
+"""Plug-ins: what one registers counts by the code that it reaches, and its mistakes are told with its name."""
 
 import pytest
 
-from symtop.core import netcdf
 from symtop.core.code_hash import changes
-from symtop.methods.framework.registry import split_name
 from tests.commands import call, printed_by
 
 CODE = """\
@@ -56,37 +54,15 @@ def test_functions_count_wherever_they_stand_and_however_they_were_imported(tmp_
     assert changes(before, made_of(plugin)) == ["code coeffs.py", "code lazily.py"]
 
 
-def test_a_mistake_in_a_plugin_is_told_with_its_name_and_as_no_option_of_the_command(tmp_path):
-    text = "import symtop\nsymtop.Integrator(name='m', family='other', summary='', solvers={'angles': print}, {})\n"
-    plugin = write(tmp_path, plug=text.replace("{})", "symplectic='yes')"))
-    done = call("integrators", "--plugin", plugin, code=2)
-    assert done.output == "symtop: plugin plug.py: symplectic must be True, False or None, not 'yes'\n"
-
-
-FOUR_LINES = """\
-import symtop
-
-symtop.register(symtop.discrete_lagrangian("simpson-of-a-user", (0, 0.5, 1), (1 / 6, 2 / 3, 1 / 6), order=2))
-top, start = symtop.SymmetricTop(1.5, 1.0, 3.0), symtop.Angles(theta=1.0, psi_dot=4.0)
-symtop.register_scene(symtop.Scene("mine", top, start, horizon=6.0))
-"""
-
-
-@pytest.fixture(scope="module")
-def plugin(tmp_path_factory):
-    """Its file, which is loaded once."""
-    file = tmp_path_factory.mktemp("plugin") / "plugin.py"
-    file.write_text(FOUR_LINES)
-    return file
-
-
-@pytest.mark.parametrize("studies", [("convergence",), pytest.param(("drift", "stability"), marks=pytest.mark.slow)])
-def test_a_plugins_method_and_scene_are_in_every_study(studies, plugin, tmp_path):
-    words = ["--quick", "--only", "simpson-of-a-user,strang", "--results", str(tmp_path), "--plugin", str(plugin)]
-    call("study", *studies, *words)
-    for study in studies:
-        data = netcdf.groups(netcdf.read_any(tmp_path / "quick" / "only" / f"{study}.nc")).values()
-        groups = [group for group in data if group.variables]
-        methods = {split_name(str(row))[0] for group in groups for row in group["variant"].values}
-        assert {"simpson-of-a-user", "strang"} <= methods, study
-        assert any("mine" in group["scene"].values for group in groups), study
+@pytest.mark.parametrize(
+    ("mistake", "told"),
+    [
+        ("symtop.Integrator(name='m', family='other', summary='', solvers={'angles': print}, symplectic='yes')",
+         "plugin plug.py: symplectic must be True, False or None, not 'yes'"),
+        ("1 / 0", "plugin plug.py failed: ZeroDivisionError"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_a_plugin_is_told_with_its_name_and_as_no_option_of_the_command(mistake, told, tmp_path):
+    done = call("integrators", "--plugin", write(tmp_path, plug=f"import symtop\n{mistake}\n"), code=2)
+    assert done.output.startswith(f"symtop: {told}")
+    assert done.output.count("\n") == 1

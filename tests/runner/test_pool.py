@@ -3,7 +3,6 @@
 import itertools
 import math
 import os
-import time
 
 import pytest
 
@@ -15,39 +14,48 @@ from symtop.runner.study import Case
 
 SCRIPT = """
 import os, time
+from pathlib import Path
 import xarray as xr
 from symtop.runner.study import Case, Study
 
 def cases(quick):
-    return [Case("spheroid", name) for name in ("midpoint", "strang", "cayley", "rk4")]
+    return [Case("spheroid", ("midpoint", "strang")[k % 2], {"k": k}, k >= 8, f"case-{k}") for k in range(12)]
 
 def measure(case):
-    begin = time.monotonic()
-    time.sleep(0.2)
-    return xr.Dataset({"begin": begin, "end": time.monotonic(), "process": float(os.getpid())})
+    begin, crew = time.monotonic(), Path(os.environ["CREW"])
+    (crew / str(os.getpid())).touch()
+    while not case.timed and len(list(crew.iterdir())) < 2 and time.monotonic() < begin + 60.0:
+        time.sleep(0.01)  # until the second worker has begun a case, too
+    time.sleep(0.2 if case.timed else 0.05)
+    return xr.Dataset({"begin": begin, "end": time.monotonic(), "process": os.getpid(), "timed": float(case.timed)})
 
-STUDY = Study("slept", "Slept", "When?", cases, measure, timed=True)
+STUDY = Study("slept", "Slept", "When?", cases, measure)
 """
 
 
 @pytest.fixture
-def study(tmp_path):
-    file = tmp_path / "slept.py"
-    file.write_text(SCRIPT)
-    return runner.load(str(file))
+def study(tmp_path, monkeypatch):
+    """Eight ordinary cases and four timed ones, or what `some` of them are."""
+    monkeypatch.setenv("CREW", str(tmp_path / "crew"))
+    (tmp_path / "crew").mkdir()
+
+    def written(some="range(12)"):
+        (tmp_path / "slept.py").write_text(SCRIPT.replace("range(12)", some))
+        return runner.load(str(tmp_path / "slept.py"))
+
+    return written
 
 
 def computed(study, results, pool):
-    """The datasets of its cases, in the order in which they began."""
+    """The datasets of its ordinary and of its timed cases, in the order in which they began."""
     runner.run(study, results, pool=pool, quiet=True)
     cases = [store.load_case(file) for file in (results / "cases" / "slept").glob("*.npz")]
-    return sorted(cases, key=lambda case: float(case["begin"]))
+    cases.sort(key=lambda case: float(case["begin"]))
+    return [[case for case in cases if float(case["timed"]) == kind] for kind in (0.0, 1.0)]
 
 
-def waited():
-    """The process that has slept."""
-    time.sleep(0.2)
-    return os.getpid()
+def crew(cases):
+    return {int(case["process"]) for case in cases}
 
 
 def at_once(cases):
@@ -65,21 +73,24 @@ def test_methods_of_one_family_do_not_begin_side_by_side(tmp_path):
 
 
 @pytest.mark.parametrize("ratio", [pools.DISTURBED, 1.01 * pools.DISTURBED])
-def test_a_trial_decides_whether_timed_cases_run_at_once(study, tmp_path, monkeypatch, ratio):
+def test_a_trial_decides_whether_timed_cases_run_at_once_in_workers_that_are_there(study, tmp_path, monkeypatch, ratio):
+    """After all others; few of them, too: workers have the kernels, this process has not."""
     sizes = []
     monkeypatch.setattr(pools, "slowdown", lambda _, size: sizes.append(size) or ratio)
     side_by_side = ratio <= pools.DISTURBED
     with Pool(2) as pool:
-        pool.open(2)
-        while len({future.result() for future in [pool.submit(waited) for _ in range(2)]}) < 2:
-            pass  # until both have started
-        cases = computed(study, tmp_path / "r", pool)
-        assert (at_once(cases) >= 2) is side_by_side
-        assert (at_once(cases) == 0) is not side_by_side
-        for case in cases:
+        ordinary, timed = computed(study(), tmp_path / "r", pool)
+        assert (len(ordinary), len(timed)) == (8, 4)
+        assert at_once(ordinary) > 0  # the control
+        assert max(float(case["end"]) for case in ordinary) <= float(timed[0]["begin"])
+        assert crew(timed) <= crew(ordinary)
+        assert os.getpid() not in crew(ordinary)
+        assert (at_once(timed) >= 2) is side_by_side
+        assert (at_once(timed) == 0) is not side_by_side
+        for case in timed:
             assert case.attrs["timed_at_once"] == (2 if side_by_side else 1)
             assert case.attrs["timed_slowdown"] == ratio
-        computed(study, tmp_path / "again", pool)
+        computed(study(), tmp_path / "again", pool)
     assert sizes == [2]  # once for all studies of a command
 
 
@@ -93,9 +104,9 @@ def test_where_all_workers_disturb_each_other_half_as_many_may_not(monkeypatch):
 
 def test_few_cases_are_computed_here_and_timed_ones_need_no_trial(study, tmp_path):
     with Pool(1) as pool:
-        cases = computed(study, tmp_path / "r", pool)
+        _, cases = computed(study("range(8, 12)"), tmp_path / "r", pool)
     assert at_once(cases) == 0
-    assert {int(case["process"]) for case in cases} == {os.getpid()}
+    assert crew(cases) == {os.getpid()}
     assert {case.attrs["timed_at_once"] for case in cases} == {1}
     assert all(math.isnan(case.attrs["timed_slowdown"]) for case in cases)
 

@@ -1,6 +1,5 @@
 """Two rounds of cases: what is computed again if the second is incomplete, and timed cases in new workers."""
 
-import dataclasses
 import os
 from pathlib import Path
 
@@ -8,7 +7,6 @@ import numpy as np
 import pytest
 
 from symtop.runner import pool as pools, run as runner, store
-from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool
 
 ROUNDS = """
@@ -61,20 +59,3 @@ def test_timed_cases_that_alone_are_missing_run_in_new_workers(study, tmp_path, 
     again = store.load_case(later)
     assert os.getpid() not in set(np.ravel(again["process"]))
     assert set(np.ravel(again["later"])) == {2.0}
-
-
-@pytest.mark.slow
-def test_methods_are_timed_again_when_nothing_else_is_missing(tmp_path, monkeypatch):
-    """The study that times methods, with two of them, in workers."""
-    whole, names = runner.load("cost"), ["midpoint[angles]", "strang[axis]"]
-    few = [dataclasses.replace(one, settings={**one.settings, "integrators": names})
-           for one in whole.cases(True) if one.group == "prices"]  # fmt: skip
-    quiet = {"pictures": lambda _: [], "tables": lambda _: {}, "charts": lambda _: []}
-    small = dataclasses.replace(whole, cases=lambda _: few, facts=None, follow_up=None, **quiet)
-    assert runner.run(small, tmp_path, quiet=True)["failures"] == []
-    monkeypatch.setattr(pools, "WORTH_WORKERS", 1)
-    for path in StudyCases.stored(small, tmp_path, quick=False, full=False).cases:
-        path.unlink()
-    with Pool(2) as pool:
-        done = runner.run(small, tmp_path, quiet=True, pool=pool)
-    assert (done["computed"], done["failures"]) == (len(few), [])

@@ -10,13 +10,10 @@ import sys
 from types import FunctionType
 
 import pytest
-from symtop_studies.reduction import commutation
 
 import symtop
 from symtop.core import code_hash, jit
 from symtop.core.code_hash import PACKAGE
-from symtop.methods.framework import registry
-from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import is_built_in
 from symtop.report import style
 from symtop.runner import fingerprint, run as runner
@@ -182,34 +179,6 @@ def test_a_function_counts_alike_before_and_after_a_kernel_registers_it():
     jit.register_jitable(part)
     assert jit.code().reasons("part", part) == before
     assert jit.code_of(part)[1].values != jit.code().reached("part", part)[1].values  # the control: kernels see it
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["convergence", "drift", "stability", "reduction", "truth", "oscillators", "notebook"])
-def test_no_case_runs_an_integrator_that_it_is_not_said_to_depend_on(name, monkeypatch):
-    """Every quick case is measured with a registry that notes who is run."""
-    study, ran = runner.load(name), set()
-
-    def noting(method):
-        def solver(chart):
-            def solve(top, start, plan):
-                ran.add(method.name)
-                return method.solvers[chart](top, start, plan)
-
-            solve.solve = inside(method.solvers[chart])  # a long run steps the loop itself
-            return solve
-
-        return dataclasses.replace(method, solvers={chart: solver(chart) for chart in method.solvers})
-
-    cases = study.cases(True)[::7]
-    allowed = {case.label: set(fingerprint.used(study, case)) for case in cases}
-    known = registry.integrators()
-    rules = {n: m for n, m in known.items() if commutation.rule_of(m) is not None}  # told by the type of their solver
-    monkeypatch.setattr(registry, "_registry", {n: m if n in rules else noting(m) for n, m in known.items()})
-    for case in cases:
-        ran.clear()
-        study.measure(case)
-        assert ran <= allowed[case.label], case
 
 
 def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):

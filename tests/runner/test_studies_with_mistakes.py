@@ -169,31 +169,3 @@ def test_a_page_that_is_wrong_is_told_of(tmp_path, page, says):
     assert "0 of 2 cases computed" in output
     assert "  The worst is 0.25.\n" in output
     assert (tmp_path / "results" / "tables" / "mine-one.csv").read_text() == "a\n1.5\n"
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (("--status", "--check"), "--status and --check must not be given together"),
-        (("--status", "--fresh"), "--status and --fresh must not be given together"),
-        (("--all",), "name studies or use --all, not both"),
-    ],
-)
-def test_options_that_would_be_ignored_are_refused(tmp_path, words, says):
-    code, output = ran(tmp_path, "", *words)
-    assert code == 2
-    assert says in output
-    assert not (tmp_path / "results").exists()
-    assert ran(tmp_path, "", "--status")[0] == 0
-
-
-def test_a_study_without_findings_does_not_keep_the_next_from_theirs(tmp_path):
-    """Both are computed; the second has its findings, and the first its sentence, last, and the exit code."""
-    second = tmp_path / "other.py"
-    second.write_text(SCRIPT.format(change="").replace('name="mine"', 'name="other"'))
-    code, output = ran(tmp_path, "facts = lambda data: None", str(second))
-    assert code == 2, output
-    assert "other: 2 of 2 cases computed, 1 figure" in output
-    assert output.splitlines()[-1].startswith("symtop: study mine: facts must return")
-    assert (tmp_path / "results" / "other.json").is_file()
-    assert not (tmp_path / "results" / "mine.json").exists()

@@ -2,13 +2,9 @@
 
 import dataclasses
 import json
-import math
-import os
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import pytest
 import xarray as xr
 
 import symtop
@@ -178,46 +174,3 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path, clean_registr
     ]
     assert list(netcdf.read(tmp_path / "stability.nc")["variant"].values) == ["midpoint[angles]"]
     assert runner.run(small, tmp_path, quick=True, quiet=True)["failures"]  # tried again, not forgotten
-
-
-CLOCKED = """
-import os, time
-from pathlib import Path
-import matplotlib.pyplot as plt
-import xarray as xr
-from symtop.runner.study import Case, Picture, Study
-
-def cases(quick):
-    return [Case("spheroid", ("midpoint", "strang")[k % 2], {"k": k}, k >= 8, f"case-{k}") for k in range(16)]
-
-def measure(case):
-    begin, crew = time.monotonic(), Path(os.environ["CREW"])
-    (crew / str(os.getpid())).touch()
-    while not case.timed and len(list(crew.iterdir())) < 2 and time.monotonic() < begin + 60.0:
-        time.sleep(0.01)  # until the second worker has begun a case, too
-    time.sleep(0.05)
-    one = xr.Dataset({"begin": begin, "end": time.monotonic(), "process": os.getpid(), "timed": float(case.timed)})
-    return one.expand_dims(k=[case.settings["k"]])
-
-STUDY = Study("clocked", "Clocked", "Alone?", cases, measure)
-"""
-
-
-@pytest.mark.parametrize("count", [pytest.param(8, marks=pytest.mark.slow), 2])
-def test_timed_cases_run_one_at_a_time_in_workers_that_are_there_already(tmp_path, monkeypatch, count):
-    """Few of them, too: workers have the kernels, this process has not. (Side by side: `test_pool`.)"""
-    monkeypatch.setattr("symtop.runner.pool.slowdown", lambda *_: math.inf)
-    (tmp_path / "crew").mkdir()
-    monkeypatch.setenv("CREW", str(tmp_path / "crew"))
-    (tmp_path / "clocked.py").write_text(CLOCKED.replace("range(16)", f"range({8 + count})"))
-    runner.run(runner.load(str(tmp_path / "clocked.py")), tmp_path / "r", jobs=2, quiet=True)
-    found = [store.load_case(path) for path in (tmp_path / "r").rglob("cases/clocked/*.npz")]
-    spans = {timed: sorted((float(one["begin"][0]), float(one["end"][0])) for one in found if one["timed"][0] == timed)
-             for timed in (0.0, 1.0)}  # fmt: skip
-    crew = {timed: {int(one["process"][0]) for one in found if one["timed"][0] == timed} for timed in (0.0, 1.0)}
-    assert [len(spans[timed]) for timed in (0.0, 1.0)] == [8, count]
-    assert all(end <= begin for (_, end), (begin, _) in pairwise(spans[1.0]))
-    assert max(end for _, end in spans[0.0]) <= spans[1.0][0][0]
-    assert any(begin < end for (_, end), (begin, _) in pairwise(spans[0.0]))  # the control: two at once
-    assert crew[1.0] <= crew[0.0]
-    assert os.getpid() not in crew[0.0]

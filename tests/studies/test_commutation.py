@@ -34,11 +34,6 @@ def slope(scene_name, name):
     return power_law(table["commutation_step_size"], table["commutation_gap"]).slope
 
 
-@pytest.mark.parametrize("scene_name", SCENES)
-def test_the_midpoint_rule_commutes_with_the_reduction(scene_name):
-    assert commutes(symtop.scene(scene_name), symtop.integrator("midpoint"))
-
-
 @pytest.mark.parametrize("node", [0.0, 0.3, 1.0])
 def test_every_rule_of_one_node_commutes_with_the_reduction(node):
     assert commutes(random_scenes(1, seed=31)[0], symtop.discrete_lagrangian("one", (node,), (1.0,)))

@@ -55,7 +55,6 @@ def axis_errors(name, scene, h, steps, marks=None):
 
 def test_verlet_is_stable_up_to_h_omega_2():
     limit, _ = linear_limits(integrator("stormer-verlet"), STEADY, np.linspace(0.05, 4.0, 80) / OMEGA)
-    assert limit * OMEGA == pytest.approx(2.0, abs=5e-4)
     assert limit * OMEGA == pytest.approx(2.0, abs=1e-8)
     for phase, stays in ((1.9995, True), (2.0005, False)):
         momenta = STEADY.top.momenta(STEADY.start)
@@ -254,12 +253,6 @@ def test_the_sleeping_threshold_shifts_as_theory_says(name, h):
     assert sleeping_threshold(integrator(name), h) == pytest.approx(integrator(name).sleeps_from(h), abs=1e-8)
 
 
-def test_the_closed_forms_are_what_they_are():
-    a = integrator("strang").sleeps_from(0.5)
-    assert a * math.tan(a * 0.5 / 4.0) == pytest.approx(0.5, abs=1e-10)
-    assert integrator("cayley").sleeps_from(0.5) == math.sqrt(4.25)
-
-
 @pytest.mark.parametrize("name", ["midpoint", "stormer-verlet", "trapezoidal", "gauss-2", "gauss-6"])
 def test_methods_without_a_shift_keep_the_threshold(name):
     for h in (0.1, 1.0):
@@ -302,31 +295,19 @@ def test_the_splitting_window():
     assert not sign_changes(lambda h: sleep_margin(integrator("cayley"), 6.0, h), np.linspace(0.5, 1.5, 201) * unit)
 
 
-def test_its_width_is_1_1111_to_first_order():
-    """4 mgl I1/(I3 w3)^2 = 0.1111 at w3 = 6; the true width over that goes to 1 as the spin grows."""
-    ratios = []
-    for spin in (6.0, 12.0, 24.0, 48.0):
-        unit, first = 2.0 * math.pi / spin, 4.0 / spin**2
-        margin = lambda h, spin=spin: sleep_margin(integrator("strang"), spin, h)
-        edges = sign_changes(margin, np.array([1.0 + 0.3 * first, 1.0 + 3.0 * first]) * unit)
-        ratios.append((edges[0] / unit - 1.0) / first)
-    assert pytest.approx(1.1111, abs=5e-5) == 1.0 + 4.0 / 6.0**2
-    assert ratios[0] == pytest.approx(1.109, abs=1e-3)
-    assert ratios[-1] == pytest.approx(1.0, abs=2e-3)
-    assert all(np.diff(ratios) < 0.0)
-
-
 # ---- the separatrix --------------------------------------------------------------------------------------------------
 
 
 def test_errors_grow_by_half_of_g_and_the_horizon_is_their_logarithm():
-    scene = scenes.scene("separatrix")
+    """Negative control: elsewhere they do not grow like that."""
+    scene, h = scenes.scene("separatrix"), 0.0125
     g = math.sqrt(scene.top.mgl / scene.top.I1)
-    h = 0.0125
-    error, _ = axis_errors("strang", scene, h / g, 1200)
     times = np.arange(1201) * h
     window = (times > 7.0) & (times < 13.0)
-    assert np.polyfit(times[window], np.log(error[window]), 1)[0] == pytest.approx(0.5, abs=0.01)
+    slopes = [np.polyfit(times[window], np.log(axis_errors("strang", where, step, 1200)[0][window]), 1)[0]
+              for where, step in ((scene, h / g), (scenes.scene("goldstein"), h))]  # fmt: skip
+    assert slopes[0] == pytest.approx(0.5, abs=0.01)
+    assert abs(slopes[1]) < 0.25
     measured = [separatrix_horizon(integrator("strang"), scene, step) for step in (0.1, 0.05, 0.025, 0.0125)]
     for entry in measured:
         assert entry.reached == pytest.approx(entry.predicted, abs=0.3 / g)
@@ -343,13 +324,6 @@ def test_a_run_that_leaves_its_chart_before_it_is_wrong_is_told_from_one_that_is
     assert math.isnan(broken.reached)
     assert broken.predicted < 80.0
     assert separatrix_horizon(integrator("strang"), scene, 0.1).broken == 0.0
-
-
-def test_elsewhere_errors_do_not_grow_like_that():
-    error, _ = axis_errors("strang", scenes.scene("goldstein"), 0.0125, 1200)
-    times = np.arange(1201) * 0.0125
-    window = (times > 7.0) & (times < 13.0)
-    assert abs(np.polyfit(times[window], np.log(error[window]), 1)[0]) < 0.25
 
 
 # ---- the solver ------------------------------------------------------------------------------------------------------
@@ -398,20 +372,14 @@ def test_nothing_survives_a_third_of_a_turn_a_step(name, place):
     assert abs(trace(method, STEADY, third).trace) < 1.01  # a linear analysis sees nothing
 
 
-@pytest.mark.parametrize("name", ["gauss-2", "gauss-4", "gauss-12"])
-def test_gauss_methods_have_no_limit_and_no_resonance(name):
-    """They keep the energy and both momenta, so that a displaced top stays on its level line at every step."""
+@pytest.mark.parametrize("name", ["gauss-2", "gauss-4", "gauss-12", "cayley"])
+def test_gauss_methods_and_the_integrable_map_have_no_limit_and_no_resonance(name):
+    """They keep an energy and both momenta, so that a displaced top stays on its level line at every step."""
     method = integrator(name)
     limit, third = linear_limits(method, STEADY, np.linspace(0.02, 10.0, 300) / OMEGA)
     assert math.isnan(limit)
     for h in (third, *(phase / OMEGA for phase in (2.0, 5.0, 10.0))):
         assert surviving_displacements(method, STEADY, [h], 1000)[0] == pytest.approx(0.3)
-
-
-def test_the_integrable_map_has_no_resonance():
-    cayley = integrator("cayley")
-    _, third = linear_limits(cayley, STEADY, np.linspace(0.05, 4.0, 80) / OMEGA)
-    assert surviving_displacements(cayley, STEADY, [third], 3000)[0] == pytest.approx(0.3)
 
 
 def test_what_is_measured_is_the_first_displacement_that_is_lost_and_larger_ones_may_stay():
@@ -425,25 +393,11 @@ def test_what_is_measured_is_the_first_displacement_that_is_lost_and_larger_ones
     assert not survives(verlet, STEADY, STEADY.start.theta, [0.03, 0.1, 0.2], math.sqrt(3.0) / OMEGA, 3000).any()
 
 
-@pytest.mark.slow
-def test_over_200_000_steps():
-    verlet = integrator("stormer-verlet")
-    h = math.sqrt(3.0) / OMEGA
-    theta = STEADY.start.theta
-    assert not survives(verlet, STEADY, theta, 2e-5, h, 200_000)
-    assert survives(verlet, STEADY, theta, 1e-2, 1.06 * h, 200_000)
-    assert survives(verlet, STEADY, theta, 1e-2, 0.93 * h, 200_000)
-
-
 # ---- adaptive Runge-Kutta --------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def rk45():
-    return symtop.simulate("spheroid", "rk45", tolerance=1e-6, horizon=200.0, samples=401, guard=False)
-
-
-def test_rk45_loses_energy_and_momenta_linearly(rk45):
+def test_rk45_loses_energy_and_momenta_linearly():
+    rk45 = symtop.simulate("spheroid", "rk45", tolerance=1e-6, horizon=200.0, samples=401, guard=False)
     lost = {name: rk45[name].values - rk45[name].values[0] for name in ("energy", "p_phi", "p_psi")}
     assert -6e-3 < lost["energy"][-1] < -5e-3
     for name in ("p_phi", "p_psi"):
