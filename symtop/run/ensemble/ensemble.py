@@ -98,7 +98,7 @@ def ensemble(
     settings = {name: value for name, value in zip(names, values, strict=True) if value is not None}
     job = _job(read, method, chart, settings, tolerance, count, limit, shown)
     if scheduler is not None:
-        cluster.check_sent(scheduler, job.part(slice(0, 1)), method.name)
+        cluster.check_sent(scheduler, job.of(slice(0, 1)), method.name)
     order = job.order() if path is None else None
     ordered = replace(job if order is None else job.of(order), continuous=path is not None)
     chunks = list(ordered.chunks())
@@ -143,12 +143,15 @@ def ensemble(
 
 def _computed(job: Job, chunks: list[slice], threads: int, scheduler: str | None) -> Generator[Any, None, None]:
     """The columns of each chunk, in their order."""
-    parts = map(job.part, chunks)
+    parts = map(job.of, chunks)
     if scheduler is None:
         yield from in_threads(Job.columns, parts, threads)
     else:
-        with cluster.connected(scheduler) as client:
+        client = cluster.connect(scheduler)
+        try:
             yield from in_order(client.get_executor(pure=False), Job.columns, parts, cluster.width(client))
+        finally:
+            cluster.leave(client)
 
 
 def _fill(columns: dict[str, Any], part: dict[str, Any], chunk: Any, n: int) -> None:
