@@ -219,7 +219,9 @@ def _in_options(error: SymtopError, command: click.Command | None) -> str:
         both = {"scene", "integrator"} <= {one.name for one in parameters if isinstance(one, click.Argument)}
         order = ", and the scene comes first" if both else ""
         return f"{kind} {name!r} is unknown; it is the name of {other}{order}"
-    return f"{sentence} (symtop {kind}s lists all)"
+    own = {"scene": {"body": f"{BODY} with --body I1,I2,I3"}, "integrator": {}}[kind] | {"plugin": "--plugin FILE"}
+    ways = " or ".join(words for name, words in own.items() if name in {one.name for one in options})
+    return f"{sentence} (symtop {kind}s lists all{ways and f'; one of your own: {ways}'})"
 
 
 @contextlib.contextmanager

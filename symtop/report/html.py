@@ -26,20 +26,6 @@ def slug(heading: str) -> str:
     return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
-class Anchors:
-    """Names for the things on a page that a link may lead to, each given once."""
-
-    def __init__(self, *taken: str) -> None:
-        self.given = {*taken}
-
-    def __call__(self, name: str) -> str:
-        """The name, with a number behind it if it was given before."""
-        later = (f"{name}-{count}" for count in itertools.count(1))
-        free = next(one for one in itertools.chain([name], later) if one not in self.given)
-        self.given.add(free)
-        return free
-
-
 class Writer:
     """Writes pieces of one page; `images` has source, width and height of each figure by its address.
 
@@ -49,7 +35,7 @@ class Writer:
     def __init__(
         self, images: Mapping[str, Mapping[str, Any]], markers: Callable[[str, str], str], *taken: str
     ) -> None:
-        self.images, self.markers, self.anchor = images, markers, Anchors(*taken)
+        self.images, self.markers, self.anchors = images, markers, {*taken}  # what links may lead to, each once
         self._shown = 0  # figures so far: the first ones, of the front page, are loaded at once
         self._parser = MarkdownIt("commonmark", {"html": False}).enable("table")
 
@@ -60,6 +46,13 @@ class Writer:
             made += [self._markdown(text[end : piece.start()]), self._piece(piece)]
             end = piece.end()
         return "\n".join(filter(None, [*made, self._markdown(text[end:])]))
+
+    def anchor(self, name: str) -> str:
+        """A name for a thing on the page, with a number behind it if it was given before."""
+        later = (f"{name}-{count}" for count in itertools.count(1))
+        free = next(one for one in itertools.chain([name], later) if one not in self.anchors)
+        self.anchors.add(free)
+        return free
 
     def _piece(self, piece: re.Match[str]) -> str:
         if piece["formula"] is None:

@@ -89,7 +89,7 @@ def chart_of(method: Integrator, watched: str, observe: str | None = None) -> st
         one_of("observe", observe or "attitude", ("axis", "attitude"))
         if BODY not in method.solvers:
             able = ", ".join(name for name, entry in methods().items() if BODY in entry.solvers)
-            raise SymtopError(f"integrator must have a chart for bodies without symmetry, not {method.name}: {able}")
+            raise SymtopError(f"integrator must have the chart body, of a RigidBody, not {method.name}: {able}")
         return BODY
     if observe is not None:
         return method.chart_for(one_of("observe", observe, OBSERVABLES))

@@ -89,6 +89,7 @@ def test_a_body_from_its_moments_about_the_centre_is_the_spheroid():
         ),
         (lambda: symtop.Angles.from_axis(symtop.SymmetricTop(1, 1, 1), [0, 0, 2], [0, 0, 1]), "axis must have unit"),
         (lambda: symtop.SymmetricTop.from_inertia(1, 1, 3, 1), "axial must be at most 2 at_centre"),
+        (lambda: symtop.RigidBody.from_inertia(np.eye(3), mass=2.0), "needs mgl, which is mass times gravity times"),
         (lambda: symtop.SymmetricTop.from_inertia(1, 1, 1, 1, gravity=-9.81), "gravity must be at least 0"),
     ],
 )  # fmt: skip

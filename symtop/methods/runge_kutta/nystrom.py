@@ -23,7 +23,7 @@ from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import row_of, store, written_out
 from symtop.methods.runge_kutta.pair_tables import Row
-from symtop.methods.runge_kutta.pairs import Method, rms, solver, trying, weighing
+from symtop.methods.runge_kutta.pairs import Method, combination, rms, solver, trying
 from symtop.methods.splitting.angles import force_angles
 
 
@@ -76,7 +76,7 @@ def _stages(nodes: Sequence[float], rows: Sequence[Row]) -> Any:
     """``(par, state, first, slopes, h)`` to the k of a step, a tuple of tuples; nothing is read from `slopes`."""
 
     def stage(i: int) -> Callable[..., Any]:
-        bend, node = weighing(rows[i - 1]), nodes[i - 1]
+        bend, node = combination(rows[i - 1]), nodes[i - 1]
 
         def k(par, state, made, slopes, h):  # type: ignore[no-untyped-def]
             flown = state[0] + node * h * state[1] / par.I1
@@ -89,7 +89,7 @@ def _stages(nodes: Sequence[float], rows: Sequence[Row]) -> Any:
 
 def _total(weights: Row, velocity: Row) -> Any:
     """``(par, made, h)`` to what the forces add to (theta, p_theta, phi, psi)."""
-    bend, turn = weighing(weights), weighing(velocity)
+    bend, turn = combination(weights), combination(velocity)
 
     def added(par, made, h):  # type: ignore[no-untyped-def]
         return bend((0.0,), made, h * h / par.I1) + turn((0.0, 0.0, 0.0), made, h)
