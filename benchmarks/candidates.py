@@ -106,8 +106,9 @@ def prices(quantity: str) -> dict[str, tuple[float, float]]:
 
     As in the study, the energy is not asked of a method that keeps it: any step would do.
     """
-    scene, known = symtop.scene("goldstein"), map(integrator, advise._usable(quantity, advise.OF_ANY))
-    each = [one for one in known if quantity not in (one.conserves or ())]
+    scene = symtop.scene("goldstein")
+    known = advise._everyone(advise._Question(scene, PRICED, quantity, scene.horizon, advise.OF_ANY))
+    each = [one for one in map(integrator, known) if quantity not in (one.conserves or ())]
     runs = []
     for horizon in (scene.horizon, SHORT * scene.nutation_period):
         step = functools.partial(likely_step, scene, horizon=horizon, accuracy=PRICED)
@@ -135,7 +136,11 @@ def costs(question: advise._Question, advised: symtop.Advice, menu: list[str]) -
             spent[name] = met.evaluations * price * part + call
     least = min(spent.values(), default=math.inf)
     near = {name: met for name, met in mets.items() if spent[name] <= NEXT * least or name in menu}
-    near = {name: advise._coarser(question, met) for name, met in near.items()}
+    for name, met in near.items():
+        found = settings.search(
+            scene, met.integrator, accuracy, quantity, scene.horizon, met.setting, least=advise.CLOSE
+        )  # fmt: skip
+        near[name] = found if isinstance(found, settings.Met) else met
     if advised.integrator is not None:
         setting = float(advised.step_size or advised.tolerance or math.nan)
         near[ADVISED] = settings.attempt(scene, integrator(advised.integrator), setting, scene.horizon, quantity)

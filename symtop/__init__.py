@@ -6,7 +6,9 @@
 Names are imported on first use, so that ``import symtop`` costs nothing; type checkers see where each comes from.
 """
 
+import ast
 import importlib
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from symtop.core import __version__ as __version__, old_paths as old_paths
@@ -55,39 +57,12 @@ if TYPE_CHECKING:
     from symtop.run.simulation import simulate as simulate
     from symtop.runner.study import Case as Case, Picture as Picture, Study as Study
 
-_NAMES = {  # by the module that holds them
-    "advise": "Advice recommend",
-    "core.errors": "SymtopError SymtopWarning",
-    "judging.judge_step": "judge",
-    "measure.errors": "errors",
-    "methods.lagrangian.discrete_lagrangian": "discrete_lagrangian",
-    "methods.framework.angles": "chart_outcome on_angles",
-    "methods.framework.equations": "field",
-    "methods.framework.loop": "FixedStep kernel_loop",
-    "methods.framework.plan": "Plan Run",
-    "methods.framework.registry": "Integrator citation integrator integrators register",
-    "methods.framework.space": "on_attitude on_axis",
-    "methods.runge_kutta.explicit": "runge_kutta",
-    "methods.taylor.series": "series",
-    "methods.splitting.composition": "composition",
-    "model.exact.closed_form": "ClosedForm",
-    "model.body": "Attitude RigidBody",
-    "model.scenes": "Scene body_scenes register_scene scene scenes",
-    "model.top": "Angles Momenta SymmetricTop",
-    "run.ensemble.bodies": "body_population",
-    "run.ensemble.ensemble": "ensemble",
-    "run.long_run": "long_run",
-    "run.ensemble.population": "population",
-    "run.reference.truth": "reference",
-    "run.right_hand_side": "guard",
-    "run.simulation": "simulate",
-    "judging.comparison": "compare",
-    "report.card": "card",
-    "report.plot": "plot",
-    "runner.study": "Case Picture Study",
-    "measure.sweep": "sweep",
+_HOME = {  # the module of each name, as the block above has it for type checkers
+    name.name: str(line.module)
+    for line in ast.walk(ast.parse(Path(__file__).read_text(encoding="utf-8")))
+    if isinstance(line, ast.ImportFrom) and line.col_offset > 0
+    for name in line.names
 }
-_HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 __all__ = ["__version__", *_HOME]  # noqa: PLE0604  (strings all)
 
@@ -96,7 +71,7 @@ if not TYPE_CHECKING:  # a checker must not take it for a promise that every nam
     def __getattr__(name: str) -> object:
         if name not in _HOME:
             raise AttributeError(f"module 'symtop' has no attribute {name!r}")
-        value = getattr(importlib.import_module(f"symtop.{_HOME[name]}"), name)
+        value = getattr(importlib.import_module(_HOME[name]), name)
         globals()[name] = value
         return value
 

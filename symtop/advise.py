@@ -37,10 +37,9 @@ from symtop.core.errors import SymtopError, boolean, one_of, positive
 from symtop.core.progress import post
 from symtop.judging.claims.subject import declared
 from symtop.measure import settings
-from symtop.measure.errors import QUANTITIES, errors
+from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import FREQUENCIES
 from symtop.measure.ranking import cheapest
-from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import (
     NEEDS,
     Integrator,
@@ -57,7 +56,6 @@ from symtop.model.exact import closed_form
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run.guard import MOST_STEPS
 from symtop.run.plugins import loaded
-from symtop.run.simulation import simulate
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
 THIS_TOP = ("this-top", "solution")  # needs of what is named beside the answer, unless it is asked for
@@ -94,10 +92,10 @@ SETTINGS = {  # the maps of an engine by its settings, the default first
     "jsbsim": {"default": "jsbsim-default", "Buss2 and AB2": "jsbsim-buss2"},
     "exudyn": {"RK44": "rkmk4"},
 }  # fmt: skip
-MISSES_AT_STEP, FAILS_AT_STEP = "Not accurate enough at this step", "No run ends well at this step"
+MISSES_AT_STEP = "Not accurate enough at this step, each with its error"
 STEP = 1.0 / 240.0  # s
 WORST = 0.5  # rad: an axis that is further off needs no method to match it
-CLOSE = 0.95  # of the longest step that serves: so near is that of a finalist
+CLOSE = 0.85  # of the margin: the least error of a finalist, if few runs find such a setting
 ROUNDS = 15  # in which finalists are timed
 MARGIN = 0.8  # fraction of the accuracy that a run must meet at its samples; between them its error may be larger
 
@@ -238,6 +236,8 @@ def recommend(
     own = [one.name for one in integrators().values() if one.implementation == "python" and not is_built_in(one.name)]
     if own:
         fails["Not tried, as only compiled methods are timed"] = own
+    missed = [f"{name} {error:.1e}" for name, error in sorted(search.missed.items(), key=lambda one: one[1])]
+    fails = {MISSES_AT_STEP: missed} | fails if missed else fails
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
     return _advice(question, ranked, sentences, source, beside)
 
@@ -261,6 +261,7 @@ class _Search:
         self.question, self.names, self.menu = question, names, menu
         self.trials: list[_Trial] = []  # the fastest first
         self.fails: dict[str, list[str]] = {}  # names of methods by why they are no answer
+        self.missed: dict[str, float] = {}  # errors of those that run with the user's step
         of_top = [] if question.needs else [name for name in names if integrator(name).needs in THIS_TOP]
         self._try(names)
         costs = {name: one.cost(question) for one in self.trials if (name := one.met.integrator.name) in menu}
@@ -308,39 +309,36 @@ class _Search:
                 self._sort_in(_confirm(self.question, tried), ranked, tried.met.integrator)
         return ranked
 
-    def _sort_in(self, trial: "_Trial | str", trials: list[_Trial], method: Integrator) -> None:
-        """To the trials, or its name to those that fail for the same reason."""
+    def _sort_in(self, trial: "_Trial | str | float", trials: list[_Trial], method: Integrator) -> None:
+        """To the trials, or its name to those that fail for the same reason, or with its error to those that miss."""
         if isinstance(trial, _Trial):
             trials.append(trial)
-        else:
+        elif isinstance(trial, str):
             self.fails.setdefault(trial, []).append(method.name)
+        else:
+            self.missed[method.name] = trial
 
 
-def _usable(quantity: str, needs: tuple[str, ...] = (), *, of_body: bool = False) -> list[str]:
-    """Compiled methods with a step or a tolerance, each in the charts that show the quantity, which it then names."""
-    if of_body:
+def _everyone(question: _Question) -> list[str]:
+    """Every compiled method that the user can use, in the charts that show the quantity, which its name then has."""
+    if question.scene.of_body:
         names = [method.name for method in methods().values() if BODY in method.solvers]
     else:
-        rows = settings.compared(settings.observed(quantity))
+        rows = settings.compared(settings.observed(question.quantity))
         names = [row.name if len(integrator(row.method).charts()) > 1 else row.method for row in rows]
-    found = {name: integrator(name) for name in names}
+    needs, found = question.needs, {name: integrator(name) for name in names}
     return [
         name
         for name, one in found.items()
         if one.control is not None and one.implementation == "compiled" and (not needs or one.needs in needs)
-    ]
+        and question.allows(one)
+    ]  # fmt: skip
 
 
 def _same(variant: str, usable: Sequence[str]) -> str | None:
     """The usable name of a stored variant, of the same method in another chart if need be; None if there is none."""
     method = split_name(variant)[0]
     return next((name for name in (variant, *usable) if name in usable and split_name(name)[0] == method), None)
-
-
-def _everyone(question: _Question) -> list[str]:
-    """Every compiled method that the user can use."""
-    usable = _usable(question.quantity, question.needs, of_body=question.scene.of_body)
-    return [name for name in usable if question.allows(integrator(name))]
 
 
 def _menu(question: _Question) -> list[str]:
@@ -369,8 +367,8 @@ def _candidates(question: _Question) -> tuple[list[str], str]:
     return list(dict.fromkeys([*menu, *own, *of_top])), words
 
 
-def _try(question: _Question, method: Integrator, patience: float) -> "_Trial | str":
-    """A candidate's setting and cost from short runs, or the reason why it has none."""
+def _try(question: _Question, method: Integrator, patience: float) -> "_Trial | str | float":
+    """A candidate's setting and cost from short runs, or the reason why it has none, or its error at the step."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
         return _at_step(question, method, question.step)
@@ -388,15 +386,15 @@ def _try(question: _Question, method: Integrator, patience: float) -> "_Trial | 
     return _Trial(met, met.error / law, math.nan, "extrapolated", horizon)
 
 
-def _at_step(question: _Question, method: Integrator, step: float) -> "_Trial | str":
-    """A run to the horizon with the step that the user has."""
+def _at_step(question: _Question, method: Integrator, step: float) -> "_Trial | str | float":
+    """A run to the horizon with the step that the user has, or its error if that is too large, or why it failed."""
     scene, accuracy, quantity, horizon = question[:4]
     try:
         met = settings.attempt(scene, method, step, horizon, quantity)
     except SymtopError as error:  # a start at a pole, for a method in the angles chart
         return f"Not run, as {error}"
     if not met.error <= accuracy:
-        return FAILS_AT_STEP if math.isinf(met.error) else MISSES_AT_STEP
+        return met.error if math.isfinite(met.error) else "No run ends well at this step"
     confidence = "checked" if met.error + met.bound <= accuracy else "at the reference's limit"
     return _Trial(met, met.error, math.nan, confidence, horizon)
 
@@ -423,31 +421,14 @@ def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
         met = settings.rounded(scene, short, accuracy * short.error / (trial.error or 1.0), quantity)
         return trial._replace(met=met, error=trial.error * met.error / (short.error or 1.0))
     best = settings.search(
-        scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting, longest=question.max_step
-    )
+        scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting, least=CLOSE,
+        longest=question.max_step,
+    )  # fmt: skip
     if isinstance(best, str):
         return f"Good enough over a short run but not to the end ({best[0].lower()}{best[1:]})"
-    met = settings.rounded(scene, _coarser(question, best), MARGIN * accuracy, quantity)
+    met = settings.rounded(scene, best, MARGIN * accuracy, quantity)
     confidence = "checked" if met.error + met.bound <= accuracy else "at the reference's limit"
     return _Trial(met, met.error, math.nan, confidence, horizon)
-
-
-def _coarser(question: _Question, met: settings.Met) -> settings.Met:
-    """The coarsest setting that meets the margin, as far as three runs find it along the order of the method."""
-    scene, accuracy, quantity, horizon = question[:4]
-    method, goal = met.integrator, MARGIN * accuracy
-    highest = min(settings.limits(scene, method, horizon, quantity)[1], question.max_step)
-    for _ in range(3):
-        room = CLOSE * goal / max(met.error, 1e-3 * goal)
-        longer = min(met.setting * room ** (1.0 / (method.order or 2) if method.fixed_step else 1.0), highest)
-        if longer < met.setting / CLOSE:
-            break
-        again = settings.attempt(scene, method, longer, horizon, quantity)
-        if again.error <= goal:
-            met = again
-        else:
-            highest = math.sqrt(met.setting * longer)
-    return met
 
 
 def _advice(
@@ -536,9 +517,8 @@ def _lines(question: _Question, method: Integrator, setting: float | None) -> di
 def _exact_seconds(question: _Question) -> float:
     """Seconds of the exact motion at the horizon, once it is compiled."""
     scene, _, quantity, horizon = question[:4]
-    exact = integrator("exact")
-    call = bare_run(scene, exact, exact.chart_for(settings.observed(quantity)), math.nan, horizon)
-    return timings([call], batches=5, batch=0.002, exact=False)[0].best
+    exact = settings.Met(integrator("exact"), math.nan, 0.0, 0.0, horizon, 0.0)
+    return settings.seconds(scene, [exact], quantity, horizon)[0]
 
 
 def _without_steps(question: _Question, best: float) -> str:
@@ -631,10 +611,10 @@ def i_use(
     end = start.horizon if horizon is None else horizon_of(horizon)
     if h >= end:
         raise SymtopError(f"step_size must be below the horizon {end:g}, not {h:g}", "step_size")
-    measured = {name: _error_and_forces(start, method, h, end) for name, method in maps[engine].items()}
-    off = {name: value for name, (value, _) in measured.items()}
+    runs = {name: settings.attempt(start, integrator(one), h, end, "axis") for name, one in maps[engine].items()}
+    off = {name: min(run.error, math.pi) for name, run in runs.items()}
     best = min(off, key=lambda name: off[name])
-    error, forces = measured[best]
+    error = off[best]
     if accuracy is not None:
         limits["step_size"] = step_size
     elif limits.get("quantity") not in (None, "axis"):
@@ -644,18 +624,9 @@ def i_use(
     advice = recommend(start, accuracy=target, horizon=end, **limits) if sought else None
     gain = math.nan
     if advice is not None and advice.integrator is not None:
-        setting: dict[str, Any] = {"step_size": advice.step_size, "tolerance": advice.tolerance}
-        needed = simulate(start, advice.integrator, **setting, horizon=end, guard=False, observe="axis")
-        gain = forces / float(needed.attrs["force_evaluations"])
+        setting = advice.step_size or advice.tolerance or math.nan
+        needed = settings.attempt(start, integrator(advice.integrator), setting, end, "axis")
+        gain = runs[best].evaluations / needed.evaluations
     elif accuracy is None:
         advice = None
     return EngineAdvice(start.name, engine, h, end, off, best, gain, advice, start.second)
-
-
-def _error_and_forces(start: Scene, method: str, h: float, horizon: float) -> tuple[float, float]:
-    """The axis error of a map, and its force evaluations."""
-    observe = "axis" if "axis" in integrator(method).charts() else "attitude"
-    run = simulate(start, method, step_size=h, horizon=horizon, guard=False, observe=observe)
-    if run.attrs["outcome"] != "ok":
-        return math.pi, float(run.attrs["force_evaluations"])
-    return float(errors(run)["axis"].max()), float(run.attrs["force_evaluations"])

@@ -136,8 +136,12 @@ def few(monkeypatch, count):
     monkeypatch.setattr(advise, "_menu", lambda _: [])
 
 
+def usable(quantity, needs=()):
+    return advise._everyone(advise._Question(symtop.scene("spheroid"), 1e-3, quantity, 20.0, needs))
+
+
 def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_with_it():
-    axis, attitude = advise._usable("axis"), advise._usable("attitude")
+    axis, attitude = usable("axis"), usable("attitude")
     assert {"rk4[axis]", "rk4[angles]", "strang[axis]", "stormer-verlet"} <= set(axis)
     assert not {"strang[attitude]", "rk45", "exact", "strang"} & set(axis)
     assert "strang[attitude]" in attitude
@@ -196,7 +200,7 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     monkeypatch.setattr(settings, "MOST_EVALUATIONS", {"compiled": 3e4, "python": 3e4})
     advice = symtop.recommend(scene, accuracy=1e-11, horizon=30.0)  # of which none gets there
     assert advice.confidence == "checked"
-    assert {*tried} - {"series[axis]"} == {*advise._usable("axis", advise.OF_ANY)}
+    assert {*tried} - {"series[axis]"} == {*usable("axis", advise.OF_ANY)}
 
 
 def test_the_table_names_methods_for_every_class_and_none_where_a_user_limits_steps():
@@ -269,9 +273,9 @@ def test_thirty_random_tops():
 
 
 def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
-    usable = advise._usable("axis", ("derivative", "kicks"))
-    assert {symtop.integrator(name).needs for name in usable} == {"derivative", "kicks"}
-    assert set(usable) < set(advise._usable("axis"))
+    serving = usable("axis", ("derivative", "kicks"))
+    assert {symtop.integrator(name).needs for name in serving} == {"derivative", "kicks"}
+    assert set(serving) < set(usable("axis"))
     advice = symtop.recommend("spheroid", accuracy=1e-6, horizon=4.0, needs="expression")
     assert symtop.integrator(advice.integrator).needs == "expression"
     assert "it needs f as a formula (expression)" in advice.reason
@@ -301,10 +305,13 @@ def test_at_the_step_that_a_user_has_it_says_what_is_good_enough():
     assert measured(scene, advice) <= 1e-4
     assert f"steps are {scene.nutation_period / step:.3g} a nutation" in advice.reason
     missed = next(words for words in advice.fails if words.startswith("Not accurate enough at this step"))
-    names = missed.partition(": ")[2].rstrip(".").split(", ")
+    names = dict(words.split() for words in missed.partition(": ")[2].rstrip(".").split(", "))
     assert "midpoint" in names
-    for name in names[:4]:
-        assert settings.attempt(scene, symtop.integrator(name), step, scene.horizon, "axis").error > 1e-4
+    assert [*names.values()] == sorted(names.values(), key=float)
+    for name in [*names][:4]:
+        error = settings.attempt(scene, symtop.integrator(name), step, scene.horizon, "axis").error
+        assert error > 1e-4
+        assert f"{error:.1e}" == names[name]
     nobody = symtop.recommend(scene, accuracy=1e-9, step_size=0.2)
     assert nobody.integrator is None or measured(scene, nobody) <= 1e-9
     with pytest.raises(symtop.SymtopError, match="step_size must be below the horizon"):

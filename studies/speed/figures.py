@@ -8,42 +8,19 @@ import xarray as xr
 
 from symtop.methods.framework.registry import split_name
 from symtop.report.figures import MOST_NAMED, error_band, label_lines
-from symtop.report.style import (
-    BLACK,
-    BLUE,
-    BLUES,
-    GREEN,
-    LEAST_TEXT,
-    ORANGE,
-    PURPLE,
-    PURPLES,
-    SKY,
-    VERMILLION,
-    look,
-    panels,
-)
+from symtop.report.style import LEAST_TEXT, look, panels
 from symtop.runner.study import REFERENCE, Chart, Picture, Series
 
 from .facts import shown
 
-PALE, SCIPY = "#B8B8B8", (0, (1.2, 1.4))
-LINES = {  # label, colour and line; what is not here is pale
-    "stormer-verlet[angles]": ("Störmer-Verlet", GREEN, "-"),
-    "midpoint[angles]": ("midpoint (discrete Lagrangian)", BLUE, "-"),
-    "trapezoidal[angles]": ("trapezoidal (discrete Lagrangian)", SKY, "-"),
-    "rk4[axis]": ("RK4", ORANGE, "-"),
-    "rk45-compiled[axis]": ("RK45, compiled", VERMILLION, "-"),
-    "tsit5-fixed[axis]": ("Tsit5", BLUES[2], "-"),
-    "dop853-compiled[axis]": ("DOP853, compiled", "#8C510A", "-"),
-    "vern9-fixed[axis]": ("Vern9", PURPLES[1], "-"),
-    "gauss-8[axis]": ("Gauss 8", PURPLE, "-"),
-    "strang[axis]": ("Strang splitting", "#66A61E", "-"),
-    "takahashi-imada[axis]": ("Takahashi-Imada (symmetric)", "#00573F", "-"),
-    "taylor[axis]": ("Taylor (heyoka)", BLACK, "-"),
-    "rk45[axis]": ("RK45 through SciPy", VERMILLION, SCIPY),
-}
-OTHERS = {  # pale ones
-    "series[axis]": ("Taylor for this top", PALE, "-"), "dop853[axis]": ("DOP853 through SciPy", PALE, SCIPY),
+PALE, SCIPY = "#B8B8B8", (0, (1.2, 1.4))  # of methods that few people know; the line of what is called through SciPy
+NAMES = {  # of what is not pale
+    "stormer-verlet[angles]": "Störmer-Verlet", "midpoint[angles]": "midpoint (discrete Lagrangian)",
+    "trapezoidal[angles]": "trapezoidal (discrete Lagrangian)", "rk4[axis]": "RK4", "gauss-8[axis]": "Gauss 8",
+    "rk45-compiled[axis]": "RK45, compiled", "rk45[axis]": "RK45 through SciPy", "tsit5-fixed[axis]": "Tsit5",
+    "dop853-compiled[axis]": "DOP853, compiled", "dop853[axis]": "DOP853 through SciPy", "vern9-fixed[axis]": "Vern9",
+    "strang[axis]": "Strang splitting", "takahashi-imada[axis]": "Takahashi-Imada (symmetric)",
+    "taylor[axis]": "Taylor (heyoka)",
 }  # fmt: skip
 LEAST, MOST = 1e-16, 3.0  # rad, of the panel
 COSTS = {"time of a run, one core (s)": "seconds", "force evaluations": "force_evaluations"}
@@ -69,8 +46,9 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         good = np.isfinite(x) & np.isfinite(y) & (y < MOST)
         if name == REFERENCE or not good.any():
             continue
-        other = split_name(name)[0], look(name).color if few else PALE, "-"
-        label, color, dash = (LINES | OTHERS).get(name, other)
+        method = split_name(name)[0]
+        label = NAMES.get(name, "Taylor for this top" if method == "series" else method)
+        color, dash = look(name).color if few or name in NAMES else PALE, SCIPY if "SciPy" in label else "-"
         x, y = x[good], np.maximum(y[good], 0.3 * level)
         thick = (1.0, 1.5, 1.5) if color == PALE else (1.7, 2.4, 2.0)
         axis.plot(x, y, color=color, ls=dash, marker="o", **dict(zip(("lw", "ms", "zorder"), thick, strict=True)))

@@ -161,6 +161,13 @@ plugin_option = click.option(
     help="A Python file that registers integrators or scenes.",
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
+
+
+def scene_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command what those on a scene share: a body of the user's own, plug-ins, JSON."""
+    return body_options(plugin_option(json_option(command)))
+
+
 results_option = click.option(
     "--results", type=File(file_okay=False), default="results", show_default=True,
     help="The folder of the datasets, figures and findings.",
@@ -219,7 +226,9 @@ def _in_options(error: SymtopError, command: click.Command | None) -> str:
         both = {"scene", "integrator"} <= {one.name for one in parameters if isinstance(one, click.Argument)}
         order = ", and the scene comes first" if both else ""
         return f"{kind} {name!r} is unknown; it is the name of {other}{order}"
-    return f"{sentence} (symtop {kind}s lists all)"
+    own = {"scene": {"body": f"{BODY} with --body I1,I2,I3"}, "integrator": {}}[kind] | {"plugin": "--plugin FILE"}
+    ways = " or ".join(words for name, words in own.items() if name in {one.name for one in options})
+    return f"{sentence} (symtop {kind}s lists all{ways and f'; one of your own: {ways}'})"
 
 
 @contextlib.contextmanager

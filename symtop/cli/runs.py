@@ -47,9 +47,7 @@ EXECUTION = {
 @click.option("--no-guard", "guard", flag_value="off", help="Do not warn before the run of a large error.")
 @click.option("--output", type=File(), help="Write the run to this netCDF file.")
 @click.option("--figure", type=File(), help="Draw the run and its errors: .png, .svg or .pdf.")
-@common.body_options
-@common.plugin_option
-@common.json_option
+@common.scene_options
 def run(
     scene: Any, integrator: str, guard: str, output: str | None, figure: str | None, as_json: bool, **settings: Any
 ) -> None:
@@ -287,21 +285,16 @@ def ensemble(
 
 def _add_members(file: str, drawn: Any, errors: dict[str, Any], words: dict[str, str]) -> None:
     """Put the members, ``I1`` and ``start_theta``, and the largest ``axis_error`` of each into a file of their runs."""
-    import netCDF4
+    import numpy as np
+    import xarray as xr
 
-    numbers = {str(name): drawn[name] for name in drawn.data_vars if drawn[name].dtype.kind == "f"}
-    with netCDF4.Dataset(file, "a") as data:
-        for dim, size in drawn.sizes.items():
-            if dim not in data.dimensions:
-                data.createDimension(dim, size)
-        for name, values in numbers.items():
-            made = data.createVariable(name if name in PARAMETERS else f"start_{name}", "f8", values.dims)
-            made[:] = values.values
-            made.setncatts(values.attrs)
-        for name, values in errors.items():
-            made = data.createVariable(f"{name}_error", "f8", ("member",))
-            made[: len(values)] = values
-            made.setncatts({"long_name": f"{words[name]}, largest over the run, infinite after a failure"})
+    numbers = {name: column.variable for name, column in drawn.data_vars.items() if column.dtype.kind == "f"}
+    added: dict[str, Any] = {name if name in PARAMETERS else f"start_{name}": one for name, one in numbers.items()}
+    for name, values in errors.items():
+        padded = np.pad(values, (0, drawn.sizes["member"] - len(values)), constant_values=math.nan)
+        about = {"long_name": f"{words[name]}, largest over the run, infinite after a failure"}
+        added[f"{name}_error"] = "member", padded, about
+    xr.Dataset(added).to_netcdf(file, mode="a")
 
 
 @click.command(short_help="Open the explorer: one run in a browser, with sliders.")

@@ -27,9 +27,9 @@ from symtop.methods.lagrangian.damped_oscillator import Oscillator, discrete_pat
 from symtop.methods.lagrangian.damped_top import NEAR, Friction, damped_run, theta_before_pole
 from symtop.model import charts
 from symtop.model.body import rotated
-from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.scenes import Scene, all_scenes, body_scenes, closed_form, horizon_of
 from symtop.model.top import Angles, SymmetricTop
+from symtop.report.spread import member_errors
 from symtop.run.ensemble.ensemble import ensemble
 from symtop.run.reference.truth import reference
 from symtop.run.simulation import chart_of, integrate, simulate
@@ -258,14 +258,7 @@ def outcome_map(chosen: Setup, steps: np.ndarray, spins: np.ndarray) -> dict[str
         members, chosen.method, step_size=step, horizon=scene.horizon, samples=MAP_SAMPLES, variables=["axis"],
         observe="attitude", quiet=True,
     )  # fmt: skip
-    times = np.broadcast_to(runs["time"].values, (step.size, MAP_SAMPLES)).reshape(ROWS, -1)
-    axes = runs["axis"].values.reshape(ROWS, -1, 3)
-    error = np.full(times.shape, np.nan)
-    for row, rate in enumerate(spins):
-        known = np.isfinite(times[row]) & np.isfinite(axes[row]).all(axis=-1)
-        truth = ClosedForm(scene.top, Angles(**start | {"psi_dot": float(rate)})).axis(times[row, known])
-        error[row, known] = charts.axis_distance(axes[row, known], truth)
-    worst = np.fmax.reduce(error.reshape(step.size, MAP_SAMPLES), axis=1)
+    worst = np.fmax.reduce(member_errors(members, runs, "axis"), axis=1)
     worst[runs["outcome"].values != "ok"] = np.nan
     seconds = time.perf_counter() - began
     return {
@@ -277,16 +270,9 @@ def outcome_map(chosen: Setup, steps: np.ndarray, spins: np.ndarray) -> dict[str
     }
 
 
-def _friction(fields: Mapping[str, Any]) -> float:
-    friction = finite("friction", fields.get("friction"))
-    if friction < 0.0:
-        raise SymtopError(f"friction must be at least 0, not {friction!r}", "friction")
-    return friction
-
-
 def damped(fields: Mapping[str, Any]) -> tuple[float, float]:
     """Friction and step of the oscillator: `friction` (at least 0) and `oscillator_step`. SymtopError for others."""
-    friction, step = _friction(fields), positive("step", fields.get("oscillator_step"))
+    friction, step = finite("friction", fields.get("friction"), 0.0), positive("step", fields.get("oscillator_step"))
     least, most = OSCILLATOR_HORIZON / MOST_OSCILLATOR_STEPS, OSCILLATOR_HORIZON / 2.0
     if not least <= step <= most:
         raise SymtopError(f"step must be between {least} and {most}, not {step!r}", "step")
@@ -314,7 +300,8 @@ def oscillator(friction: float, step: float) -> dict[str, Any]:
 
 def damped_top(fields: Mapping[str, Any]) -> tuple[Setup, float]:
     """The midpoint rule on the page's top at its step, and the friction. Raises SymtopError as `setup` and `damped`."""
-    chosen, friction = setup({**fields, "integrator": "midpoint"}), _friction(fields)
+    chosen = setup({**fields, "integrator": "midpoint"})
+    friction = finite("friction", fields.get("friction"), 0.0)
     if (steps := chosen.scene.horizon / (chosen.setting or 1.0)) > MOST_TOP_STEPS:
         raise SymtopError(f"the damped top must have at most {MOST_TOP_STEPS} steps, not {steps:.3g}")
     return chosen, friction

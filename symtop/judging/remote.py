@@ -36,6 +36,7 @@ from symtop.model.top import Angles, SymmetricTop
 Table = dict[str, Callable[..., Any]]
 THREADED = "jax"  # hangs in a process that was forked after its import
 LOOK = 0.05  # seconds between two looks
+PATIENCE = 60.0  # seconds for what is only loaded
 WORDS = 160  # characters of what a process says before it ends
 FORMS = {"rotation": ROTATION, "matrix": MATRIX, "plane": REDUCED}  # others have that of their chart
 FACTS = ("name", "chart", "implementation", "own_loop", "takes_field")  # of a stepper, that are sent
@@ -167,10 +168,10 @@ def clock(pid: int) -> float:
     return time.monotonic() - waited
 
 
-def tried(call: Callable[[], Any], what: str, seconds: float = 60.0) -> None:
+def tried(call: Callable[[], Any], what: str) -> None:
     """Make a call in a process of its own first; SymtopError if that ends it or takes too long."""
     with Process(lambda: {"call": call}) as process:
-        process.allow(seconds)
+        process.allow(PATIENCE)
         with contextlib.suppress(SymtopError):
             process.call("call")
         if process.lost:

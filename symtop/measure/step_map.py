@@ -79,18 +79,14 @@ class StepMap:
             return np.array([theta, phi, psi, *(np.array([p_theta, p_phi, p_psi]) / self.unit)])
         return np.concatenate([state[:-3], state[-3:] / self.unit])
 
-    @property
-    def onward(self) -> Any:
-        """A solver's run of steps of given lengths (top, start, lengths), each from where the last one ended, or None.
+    def own(self, name: str) -> Any:
+        """What a solver of fixed steps may bring itself; None of one that does not.
 
-        A start has |e| = 1 and |q| = 1, and cannot take up a state that has lost its length.
+        onward          a run of steps (top, start, lengths), each from where the last one ended: a start has
+                        |e| = 1 and |q| = 1, and cannot take up a state that has lost its length
+        there_and_back  a step and one from its end with all rates reversed (top, start, step size)
         """
-        return getattr(self.method.solvers[self.chart], "onward", None)
-
-    @property
-    def there_and_back(self) -> Any:
-        """A solver's step and one from its end with all rates reversed (top, start, step size), or None."""
-        return getattr(self.method.solvers[self.chart], "there_and_back", None)
+        return getattr(self.method.solvers[self.chart], name, None) if self.method.fixed_step else None
 
     def image(self, z: Array, h: float | None = None) -> Array:
         """Y after one step from z."""
@@ -134,9 +130,7 @@ class StepMap:
 
     def gap(self, first: Array, second: Array) -> float:
         """Largest difference of two Y; q and -q are one attitude, phi and psi are angles."""
-        if self.chart == "attitude" and float(first[:4] @ second[:4]) < 0.0:
-            second = np.concatenate([-second[:4], second[4:]])
-        apart = first - second
+        apart = first - aligned(self.chart, second, first)
         if self.chart == "angles":
             apart[1:3] = np.remainder(apart[1:3] + math.pi, 2.0 * math.pi) - math.pi
         return float(np.max(np.abs(apart)))
@@ -293,13 +287,13 @@ def _largest(matrix: Any) -> float:
 
 def return_miss(step: StepMap, start: Angles) -> float:
     """Distance from the start after a step forth and back; a solver that takes no negative step runs reversed."""
-    before, onward = step.at(start), step.onward
-    if step.method.fixed_step and onward is not None:
+    before = step.at(start)
+    if (onward := step.own("onward")) is not None:
         try:
             return step.gap(step.shown(onward(step.top, start, (step.h, -step.h))), before)
         except SymtopError:
-            if step.there_and_back is not None:
-                return step.gap(step.shown(step.there_and_back(step.top, start, step.h)), before)
+            if (there_and_back := step.own("there_and_back")) is not None:
+                return step.gap(step.shown(there_and_back(step.top, start, step.h)), before)
             if abs(step.length(step.image(step.point(start))) - 1.0) > UNIT:
                 raise
     arrived = step.restart(step.image(step.point(start)))
@@ -322,8 +316,7 @@ def restart_gap(step: StepMap, start: Angles) -> float:
 
     A step that does not keep |e| or |q| at one cannot be taken up again by a start: that is no evidence, and zero.
     """
-    onward = step.onward
-    if step.method.fixed_step and onward is not None:
+    if (onward := step.own("onward")) is not None:
         twice = step.shown(onward(step.top, start, (step.h, step.h)))
         return step.gap(step.shown(step.run(start, step.h, 2)), twice)
     after = step.image(step.point(start))

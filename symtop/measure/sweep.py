@@ -157,7 +157,6 @@ def listed(things: Any) -> list[Any]:
 
 
 def _settings(name: str, values: object) -> list[float]:
-    """One setting, or several."""
     if isinstance(values, np.ndarray):
         values = values.ravel()
     one = isinstance(values, (str, bytes)) or not isinstance(values, Iterable)

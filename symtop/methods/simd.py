@@ -8,16 +8,20 @@ the result does not hang on the processor.
 `Components` writes the same operations on four scalars each, to the same bits: inside a loop over many members LLVM
 makes vectors of the members, and a component that nobody reads is not computed.
 
+A kernel in plain Python steps two runs at once on tuples of `TWO`, two doubles in one register: +, - and * of such act
+on both, to the bits of each alone.
+
 `times` and `with_item` take a row that is an array, or a tuple, if it is short: LLVM unrolls a loop over a tuple up to
 about 16 elements and copies the tuple in each pass beyond.
 """
 
+import operator
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic, models, overload, register_model
 
 from symtop.core.jit import INLINED, register_jitable, set_item
 
@@ -131,6 +135,81 @@ class Components(Vectors):
         return self.builder.fma(a, b, c)
 
 
+_PAIR = ir.VectorType(_DOUBLE, 2)
+
+
+def _paired(builder: Any, first: Any, second: Any) -> Any:
+    """Two scalars in one register; what is there stays there."""
+    if first.type == _PAIR:
+        return first
+    half = builder.insert_element(ir.Constant(_PAIR, ir.Undefined), first, ir.Constant(_INDEX, 0))
+    return builder.insert_element(half, second, ir.Constant(_INDEX, 1))
+
+
+def _of_both(name: str) -> Any:
+    """An operation of LLVM on two values of which a scalar stands for twice the same."""
+
+    @intrinsic
+    def operation(typing, a, b):  # type: ignore[no-untyped-def]
+        def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            return getattr(builder, name)(*(_paired(builder, one, one) for one in arguments))
+
+        return TWO(a, b), emit
+
+    return operation
+
+
+class _Two(types.Type):  # type: ignore[misc]
+    """Two doubles in one register, as numba knows them; a kernel hangs on its operations, too."""
+
+    def __init__(self) -> None:
+        super().__init__("two doubles")
+        self.operations = tuple(map(_of_both, ("fadd", "fsub", "fmul")))
+
+
+TWO = _Two()
+register_model(_Two)(lambda manager, kind: models.PrimitiveModel(manager, kind, _PAIR))
+
+
+def _overload(operation: Any, emitted: Any) -> None:
+    def chosen(a: Any, b: Any) -> Any:
+        return (lambda a, b: emitted(a, b)) if TWO in (a, b) else None  # noqa: PLW0108  (numba takes functions of Python)
+
+    overload(operation, jit_options=INLINED, strict=False)(chosen)
+
+
+for _operation, _emitted in zip((operator.add, operator.sub, operator.mul), TWO.operations, strict=True):
+    _overload(_operation, _emitted)
+overload(operator.neg, jit_options=INLINED)(lambda a: (lambda a: -1.0 * a) if a is TWO else None)
+
+
+@intrinsic
+def side_by_side(typing, first, second):  # type: ignore[no-untyped-def]
+    """A tuple of `TWO` of two tuples of doubles."""
+
+    def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        both = ir.Constant(ir.ArrayType(_PAIR, len(first)), ir.Undefined)
+        for m in range(len(first)):
+            parts = (builder.extract_value(one, m) for one in arguments)
+            both = builder.insert_value(both, _paired(builder, *parts), m)
+        return both
+
+    return types.UniTuple(TWO, len(first))(first, second), emit
+
+
+@intrinsic
+def apart(typing, both):  # type: ignore[no-untyped-def]
+    """The two tuples of doubles that a tuple of `TWO` is made of."""
+    one = types.UniTuple(types.float64, len(both))
+
+    def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        values = [builder.extract_value(arguments[0], m) for m in range(len(both))]
+        lanes = ([builder.extract_element(value, ir.Constant(_INDEX, k)) for value in values] for k in range(2))
+        return context.make_tuple(builder, signature.return_type, [*map(Vectors(builder).array, lanes)])
+
+    return types.UniTuple(one, 2)(both), emit
+
+
 @intrinsic
 def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
     """place + h w_0 terms_0 + h w_1 terms_1 + ... of tuples, in this order and without the terms whose weight is None.
@@ -142,10 +221,13 @@ def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
     def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         result, rows, numbers, step = arguments
         factors = [(j, builder.fmul(step, builder.extract_value(numbers, j))) for j in used]
+        as_place = _paired if place.dtype is TWO else lambda _, one, __: one
         for m in range(len(place)):
             total = builder.extract_value(result, m)
             for j, factor in factors:
-                total = builder.fadd(total, builder.fmul(factor, builder.extract_value(rows, [j, m])))
+                term = builder.extract_value(rows, [j, m])
+                product = builder.fmul(*(as_place(builder, one, one) for one in (factor, term)))
+                total = builder.fadd(total, product)
             result = builder.insert_value(result, total, m)
         return result
 

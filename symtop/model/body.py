@@ -102,13 +102,18 @@ class RigidBody:
 
     @classmethod
     def from_inertia(
-        cls, matrix: Sequence[Sequence[float]], mgl: float = 0.0, centre: Sequence[float] = (0.0, 0.0, 1.0)
-    ) -> "RigidBody":
+        cls, matrix: Sequence[Sequence[float]], mgl: float = 0.0, centre: Sequence[float] = (0.0, 0.0, 1.0),
+        **others: object,
+    ) -> "RigidBody":  # fmt: skip
         """A body by its inertia matrix (3, 3) about the fixed point and the direction of its centre, in any axes.
 
+        A heavy one needs `mgl`, its mass times gravity times the distance of the centre from the fixed point.
         The matrix is diagonalised, moments in increasing order, and the turn kept in `axes`. `in_principal` takes an
         attitude in the axes of the matrix to one of this body.
         """
+        if others:
+            words = "mgl, which is mass times gravity times the distance of the centre from the fixed point"
+            raise SymtopError(f"a heavy body by its inertia needs {words}, not {', '.join(others)}", "mgl")
         rows = [vector("a row of matrix", row, 3) for row in matrix]
         if len(rows) != 3:
             raise SymtopError(f"matrix must have 3 rows, not {len(rows)}", "matrix")

@@ -378,7 +378,7 @@ def scene(name: "str | Scene", *, bodies: bool = False) -> Scene:
         catalogue = all_scenes()
         chosen = catalogue[one_of("scene", name, catalogue)]
     if chosen.of_body and not bodies:
-        raise SymtopError(f"scene must be one of a SymmetricTop here, not {chosen.name}, a body without symmetry")
+        raise SymtopError(f"scene must be one of a SymmetricTop here, not {chosen.name}, a RigidBody")
     return chosen
 
 

@@ -147,9 +147,14 @@ COLUMNS = (*ANGLES, "axis_x", "axis_y", "axis_z", "quaternion_w", "quaternion_x"
 TITLE = f"States of the scenes at {TIMES} times, from the closed form in {WORKING} digits"
 
 
-def times_of(scene: Scene, count: int = TIMES) -> list[float]:
+def even_times(end: float, count: int) -> list[float]:
+    """So many even times up to an end, of six digits each."""
+    return [float(f"{end * k / count:.6g}") for k in range(1, count + 1)]
+
+
+def times_of(scene: Scene) -> list[float]:
     """The times of a scene in the test set, in its units."""
-    return [float(f"{scene.horizon * k / count:.6g}") for k in range(1, count + 1)]
+    return even_times(scene.horizon, TIMES)
 
 
 @functools.lru_cache(maxsize=256)  # 0.2 s a scene, and a bundle asks three times
@@ -159,11 +164,11 @@ def precise(scene: Scene) -> list[list[Any]]:
     return [[*form(time), *form.axis(time), *form.quaternion(time)] for time in times_of(scene)]
 
 
-def printed(number: Any) -> str:
-    """A number with `DIGITS` significant digits."""
+def printed(number: Any, digits: int = DIGITS) -> str:
+    """A number with so many significant digits."""
     from mpmath import nstr
 
-    return str(nstr(number, DIGITS, min_fixed=0, max_fixed=0, strip_zeros=False))
+    return str(nstr(number, digits, min_fixed=0, max_fixed=0, strip_zeros=False))
 
 
 def states_csv(chosen: Iterable[Scene]) -> str:

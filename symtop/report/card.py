@@ -20,6 +20,7 @@ from symtop.core.errors import SymtopError, at_home
 from symtop.judging.findings import Finding, Ledger, claim_name, description
 from symtop.report.figures import SMALLEST
 from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels, slope_guide
+from symtop.report.template import environment
 
 LETTER = 6.6  # width of a letter of the badge, pixels
 LONGEST = 72  # letters of what a badge says
@@ -93,13 +94,10 @@ def _nothing(axis: Any, finding: Finding) -> None:
 
 def card(ledger: Ledger, path: str | Path) -> Path:
     """Write the card, an HTML page; SymtopError for a trajectory and a place that cannot be written to."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
     if not ledger.about.chart:
         raise SymtopError("a card shows a method: there is none of a trajectory")
     folder = Path(__file__).parent / "templates"
-    loader = PackageLoader("symtop", "report/templates")
-    page = Environment(loader=loader, autoescape=True, undefined=StrictUndefined).get_template("card.html")
+    page = environment(autoescape=True).get_template("card.html")
     text = page.render(
         css=(folder / "style.css").read_text(encoding="utf-8"),
         about=ledger.about,

@@ -14,11 +14,11 @@ BELOW = "below the reference's error bound"
 MOST_NAMED = 9  # variants with a name of their own in a figure
 
 
-def error_band(axis: Any, bounds: Any, least: float = 1e-16) -> float:
-    """Shade all that lies below the median error bound of the reference; returns that bound, or `least` without one."""
+def error_band(axis: Any, bounds: Any) -> float:
+    """Shade all that lies below the median error bound of the reference; returns that bound, or 1e-16 without one."""
     from matplotlib.patches import Rectangle
 
-    level = float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else least  # of the reference
+    level = float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else 1e-16  # of the reference
     shape = {"color": "#BBBBBB", "alpha": 0.45, "lw": 0, "label": BELOW, "transform": axis.get_yaxis_transform()}
     axis.add_artist(Rectangle((0.0, LOWEST), 1.0, level - LOWEST, **shape))  # to the frame, which it does not move
     return level
@@ -38,27 +38,17 @@ def chosen(names: Sequence[str], known: Sequence[str], most: int = MOST_NAMED) -
 
 
 def spread(places: Sequence[float], gap: float) -> list[float]:
-    """Places in [0, 1] that keep their order and a distance; labels that would meet share the mean of their places."""
-    order = sorted(range(len(places)), key=lambda k: places[k])
-    blocks: list[tuple[float, int]] = []  # centre and number of labels
-    for k in order:
-        centre, count = places[k], 1
-        while True:
-            reach = 0.5 * gap * count
-            centre = min(max(centre, reach - 0.5 * gap), 1.0 - reach + 0.5 * gap)
-            if not blocks or blocks[-1][0] + 0.5 * gap * blocks[-1][1] <= centre - reach + 1e-12:
-                break
-            before, others = blocks.pop()
-            centre, count = (before * others + centre * count) / (others + count), others + count
-        blocks.append((centre, count))
-    moved = [centre + gap * (k - 0.5 * (count - 1)) for centre, count in blocks for k in range(count)]
-    placed = [0.0] * len(places)
-    for k, value in zip(order, moved, strict=True):
-        placed[k] = value
-    return placed
+    """Places in [0, 1], as near to the given ones as their order and a gap allow (least squares)."""
+    from scipy.optimize import isotonic_regression
+
+    order, gaps = np.argsort(places, kind="stable"), gap * np.arange(len(places))
+    level = isotonic_regression(np.array(places)[order] - gaps).x
+    placed = np.empty(len(places))
+    placed[order] = np.clip(level, 0.0, 1.0 - gaps[-1]) + gaps
+    return placed.tolist()
 
 
-def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]], size: float = LEAST_TEXT) -> None:
+def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]]) -> None:
     """Write each name at the right of a panel, joined to the end of its line; `ends` are x, y and colour.
 
     Limits and layout of the panel must be final but for the room that the names take.
@@ -68,21 +58,16 @@ def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]], size: flo
     axis.figure.canvas.figure.draw_without_rendering()  # the root of a subfigure
     height = axis.get_window_extent().height * 72.0 / axis.figure.dpi
     places = axis.transAxes.inverted().transform(axis.transData.transform([end[:2] for end in ends.values()]))
-    heights = spread([float(np.clip(y, 0.0, 1.0)) for _, y in places], 1.2 * size / height)
+    heights = spread([float(np.clip(y, 0.0, 1.0)) for _, y in places], 1.2 * LEAST_TEXT / height)
     for (name, (x, y, color)), place in zip(ends.items(), heights, strict=True):
         axis.annotate(
-            name, (x, y), (1.04, place), textcoords="axes fraction", va="center", fontsize=size, color=ink(color),
+            name, (x, y), (1.04, place), textcoords="axes fraction", va="center", fontsize=LEAST_TEXT, color=ink(color),
             arrowprops={"arrowstyle": "-", "color": color, "lw": 0.5, "shrinkA": 0, "shrinkB": 1, "relpos": (0.0, 0.5)},
             annotation_clip=False,
         )  # fmt: skip
 
 
-def label_lines(
-    axis: Any,
-    lines: Sequence[tuple[str, str, Any, Any]],
-    others: Sequence[tuple[Any, Any]] = (),
-    size: float = LEAST_TEXT,
-) -> None:
+def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: Sequence[tuple[Any, Any]] = ()) -> None:
     """Write the name of each line beside an end of it or its middle, in its colour, where it covers little else.
 
     `lines` have name, colour, x and y, and `others`, which have no name, x and y. Limits and layout of the panel must
@@ -96,7 +81,13 @@ def label_lines(
     marks = np.concatenate([_dense(axis, x, y) for *_, x, y in [*lines, *others]])
     taken: list[Any] = []
     for name, color, x, y in sorted(lines, key=lambda one: -len(one[0])):
-        look = {"textcoords": "offset points", "va": "center", "fontsize": size, "color": ink(color), "weight": "bold"}
+        look = {
+            "textcoords": "offset points",
+            "va": "center",
+            "size": LEAST_TEXT,
+            "color": ink(color),
+            "weight": "bold",
+        }
         tried: list[Any] = []
         for kind, (dx, dy, side) in product(range(3), PLACES):
             end = (len(x) - 1, 0, len(x) // 2)[kind]

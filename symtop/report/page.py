@@ -171,13 +171,7 @@ def scene_tables() -> dict[str, Any]:
 
 def write(results: Path, *, embed: bool = False) -> Path:
     """Write ``report.html``, ``report.md`` and ``reference.md`` into the results folder; returns the page."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("symtop", "report/templates"), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
-    studies = gather(results)
+    page, studies = template.environment(autoescape=True).get_template("report.html"), gather(results)
     parts, more = texts(results, studies)
     images = {
         f"figures/{one['file']}": _shown(results / "figures" / one["file"], embed=embed)
@@ -194,7 +188,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
 
     together = parts | more
     writer = Writer(images, marked, "content", "scheme", *(f"part-{name}" for name in together))
-    text = environment.get_template("report.html").render(
+    text = page.render(
         title=re.sub(r"^# ", "", parts["front"].partition("\n")[0]),
         css="".join((TEMPLATES / name).read_text(encoding="utf-8") for name in ("style.css", "report.css")),
         scripts=[(TEMPLATES / name).read_text(encoding="utf-8") for name in ("page.js", "chart.js")],

@@ -114,10 +114,8 @@ def at_places(data: xr.Dataset, errors: Array) -> tuple[Array, Array]:
 def spread(errors: Array, levels: tuple[float, ...] = LEVELS) -> Array:
     """Quantiles over members (levels, samples), of the members that have such a sample; NaN where none has."""
     out = np.full((len(levels), errors.shape[1]), np.nan)
-    for k, column in enumerate(errors.T):
-        values = column[~np.isnan(column)]
-        if values.size:
-            out[:, k] = np.quantile(values, levels, method="inverted_cdf")
+    there = ~np.isnan(errors).all(axis=0)
+    out[:, there] = np.nanquantile(errors[:, there], levels, axis=0, method="inverted_cdf")
     return out
 
 

@@ -24,6 +24,7 @@ DPI, SKETCHED = 200, 100
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
 )  # fmt: skip
+NAVY, PLUM, BROWN, LEAF = "#1B3A6B", "#8C4A73", "#8C510A", "#66A61E"  # dark ones of methods drawn beside those
 
 
 class Look(NamedTuple):
@@ -37,13 +38,13 @@ class Look(NamedTuple):
 
 
 # Shades of a family: light enough to tell apart, of one hue so that families stay together.
-BLUES = (BLUE, "#7B9FD1", "#1B3A6B")
+BLUES = (BLUE, "#7B9FD1", NAVY)
 GREENS = (GREEN, "#7CC9A8", "#00563F")
 ORANGES = (ORANGE, "#B37400", "#F5C766")
 BLACKS = (BLACK, "#555555", "#999999")
 REDS = (VERMILLION, "#F09A66", "#8A3C00")
 YELLOWS = ("#B8A500", YELLOW, "#7A6F00")
-PURPLES = (PURPLE, "#8C4A73", "#E6B8D2")
+PURPLES = (PURPLE, PLUM, "#E6B8D2")
 SKIES = (SKY, "#2B7BA8", "#A6D5F2")
 SHADES = {
     "discrete-lagrangian": BLUES,
@@ -63,13 +64,14 @@ DASHES = {  # of a line, by family; a family that is not here has a solid one
 UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
 _MARKERS = "osv^<>DPXph8dH"
 
-_LOOKS = {  # of the methods that people know; `look` finds one for every other integrator
+_LOOKS = {  # of the methods that people know, one colour a formula; `look` finds one for every other integrator
     "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "stormer-verlet": Look(GREEN, "^"),
-    "strang": Look(GREEN, "<"), "cayley": Look(GREENS[1], ">"), "takahashi-imada": Look(GREEN, "P"),
-    "yoshida-4": Look(GREENS[2], "p"), "srkn-14-6": Look(GREENS[2], "H"), "rk4": Look(ORANGE, "o"),
-    "rk45-compiled": Look(ORANGES[1], "s"), "tsit5-fixed": Look(ORANGES[1], "P"), "vern9-fixed": Look(ORANGES[2], "s"),
-    "dop853-compiled": Look(ORANGE, "v"), "gauss-4": Look(ORANGE, "^"), "gauss-8": Look(ORANGES[2], ">"),
-    "rk45": Look(VERMILLION, "D"), "dop853": Look(VERMILLION, "o"), "lsoda": Look(REDS[1], "s"),
+    "strang": Look(LEAF, "<"), "cayley": Look(GREENS[1], ">"), "takahashi-imada": Look(GREENS[2], "P"),
+    "yoshida-4": Look(GREENS[2], "p"), "srkn-14-6": Look(GREENS[1], "H"), "rk4": Look(ORANGE, "o"),
+    "rk45-compiled": Look(VERMILLION, "s"), "rk45": Look(VERMILLION, "D"), "tsit5-fixed": Look(NAVY, "P"),
+    "tsit5": Look(NAVY, "X"), "vern9-fixed": Look(PLUM, "s"), "vern9": Look(PLUM, "d"),
+    "dop853-compiled": Look(BROWN, "v"), "dop853-compiled-fixed": Look(BROWN, "^"), "dop853": Look(BROWN, "o"),
+    "gauss-4": Look(ORANGE, "^"), "gauss-8": Look(PURPLE, ">"), "lsoda": Look(REDS[1], "s"),
     "radau": Look(REDS[2], "v"), "taylor": Look(BLACK, "*", 6.0), "series": Look(BLACKS[1], "D"),
     "exact": Look(GREY, "x"),
 }  # fmt: skip

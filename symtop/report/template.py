@@ -80,18 +80,23 @@ class Links(dict[str, str]):
         return name
 
 
+def environment(**options: Any) -> Any:
+    """Of the templates of the report, in which a name that is not given is an error."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    loader = PackageLoader("symtop", "report/templates")
+    return Environment(loader=loader, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, **options)  # noqa: S701
+
+
 def rendered(template: str | None, name: str, given: Mapping[str, Any]) -> str:
     """A template (None: the plain one) with what is given; SymtopError if it is wrong or names what is not there."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError
+    from jinja2 import TemplateError
 
-    environment = Environment(  # noqa: S701  (it makes Markdown, and what makes HTML of that escapes it)
-        loader=PackageLoader("symtop", "report/templates"), undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True, finalize=lambda value: GAP if value is None else value,
-    )  # fmt: skip
-    environment.filters |= {one.__name__: _passing(one) for one in formats.FILTERS}
+    ours = environment(autoescape=False, finalize=lambda value: GAP if value is None else value)
+    ours.filters |= {one.__name__: _passing(one) for one in formats.FILTERS}
     template = template and template.replace("endraw %}", "endraw +%}")  # which keeps the empty line that follows
     try:
-        ready = environment.get_template(PLAIN) if template is None else environment.from_string(template)
+        ready = ours.get_template(PLAIN) if template is None else ours.from_string(template)
         text = ready.render(**given)
     except (TemplateError, TypeError, ValueError) as error:
         place = f", line {error.lineno}" if getattr(error, "lineno", None) else ""  # type: ignore[union-attr]

@@ -18,6 +18,7 @@ from symtop.core.errors import SymtopError, file_path
 from symtop.core.progress import post
 from symtop.model.exact.body_digits import Digits, body_digits
 from symtop.model.scenes import Scene
+from symtop.report.archive import even_times, printed
 from symtop.run.ensemble.bodies import body_population, scenes_of
 
 SEED, TIMES, PERIODS = 48, 100, 5.0
@@ -62,7 +63,7 @@ def problems() -> list[Scene]:
 
 def times_of(scene: Scene) -> list[float]:
     """The times of a problem, six digits each."""
-    return [float(f"{PERIODS * scene.nutation_period * k / TIMES:.6g}") for k in range(1, TIMES + 1)]
+    return even_times(PERIODS * scene.nutation_period, TIMES)
 
 
 def write(folder: str | Path, chosen: Sequence[Scene] | None = None) -> Path:
@@ -96,14 +97,11 @@ def _problems_csv(scenes: Sequence[Scene]) -> str:
 
 
 def _states_csv(scenes: Sequence[Scene], motions: Sequence[Digits], digits: int) -> str:
-    from mpmath import nstr
-
     lines = [",".join(["name", "time", *STATE, "bound"])]
     for scene, motion in zip(scenes, motions, strict=True):
         bound = f"{ROUNDED[digits] + motion.bound:.2g}"
         for time, q, L in zip(times_of(scene), motion.quaternion, motion.momentum, strict=True):
-            numbers = [nstr(value, digits, min_fixed=0, max_fixed=0, strip_zeros=False) for value in (*q, *L)]
-            lines.append(",".join([scene.name, repr(time), *numbers, bound]))
+            lines.append(",".join([scene.name, repr(time), *(printed(value, digits) for value in (*q, *L)), bound]))
     return "\n".join([*lines, ""])
 
 

@@ -5,7 +5,6 @@ import contextlib
 import gc
 import logging
 import warnings
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -73,16 +72,6 @@ def leave(client: Any) -> None:
     if client is not None:
         with contextlib.suppress(Exception):
             client.close(timeout=2.0)
-
-
-@contextlib.contextmanager
-def connected(address: str) -> Iterator[Any]:
-    """A client while it is needed."""
-    client = connect(address)
-    try:
-        yield client
-    finally:
-        leave(client)
 
 
 def width(client: Any) -> int:

@@ -28,16 +28,15 @@ from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
 from symtop.core.progress import progress_bar
 from symtop.core.signals import ending_on_sigterm
-from symtop.methods.framework.loop import FixedStep, Loop, Position, inside
+from symtop.methods.framework.loop import FixedStep, Loop, Marks, Position, inside
 from symtop.methods.framework.plan import OK, OUTCOMES, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
-from symtop.model.charts import BODY, View, body_energy
+from symtop.model.charts import BODY, Array, View, body_energy
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run import modified_energy as modified
 from symtop.run.guard import MOST_STEPS
 from symtop.run.simulation import chart_of as smallest_chart
 
-Array = np.ndarray
 Gauge = Callable[..., dict[str, Array]]  # states and momenta of samples -> quantities
 
 PER_NUTATION = 1000.37  # steps, where nobody says otherwise: not commensurate with the nutation
@@ -59,7 +58,7 @@ def windows(steps: int) -> list[int]:
     return ends
 
 
-def scattered(begin: int, end: int, samples: int = SAMPLES) -> Array:
+def scattered(begin: int, end: int, samples: int = SAMPLES) -> Marks:
     """At most `samples` whole steps in (begin, end], `end` among them, with strides of no fixed ratio."""
     place = np.arange(samples, dtype=float)
     place += np.mod(GOLDEN * place, 1.0)
@@ -108,14 +107,14 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     at_start, given = presented(solver.loop(par, rule, state, h, np.array([0])).states), np.array([start[:2]])
     first, momenta = (first[ran], momenta[ran]) if ran.any() else (at_start, given)
     energy_start = float(energies(at_start, given)[0][0])
-    curve = modified.oscillation(*modified.section(chart, first), energies(first, momenta)[1])
+    rest = modified.oscillation(*modified.section(chart, first), energies(first, momenta)[1])
 
     def gauge(states: Array, momenta: Array, *, shown: bool = False) -> dict[str, Array]:
         states = states if shown else presented(states)
         energy, values = energies(states, momenta)
         return {
             "energy": (energy - energy_start) / energy_unit,
-            "modified_energy": curve.rest(*modified.section(chart, states), values) / energy_unit,
+            "modified_energy": rest(*modified.section(chart, states), values) / energy_unit,
             "p_phi": (momenta[:, 0] - start.p_phi) / momentum_unit,
             "p_psi": (momenta[:, 1] - start.p_psi) / momentum_unit,
             "theta": View(chart, scene.top, states).theta,
@@ -197,7 +196,6 @@ def long_run(
 
 
 def _windowed(rows: list[list[float]], ends: list[int], quantities: tuple[str, ...]) -> xr.Dataset:
-    """The dataset of the windows."""
     columns = np.array(rows).reshape(len(rows), len(quantities), 3)
     variables: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
     for i, name in enumerate(quantities):
@@ -263,8 +261,8 @@ class _Checkpoint:
             words = "belongs to another run or version; remove it or name another file"
             raise SymtopError(f"checkpoint {self.file} {words}", "checkpoint")
         values = iter([float(value) for value in data["position"].values])
-        state, low = (tuple(next(values) for _ in start.state) for _ in range(2))
-        at = Position(state, low, regrown(start.carry, values), int(data["steps_done"]))
+        state, low, carry = regrown(start[:3], values)
+        at = Position(state, low, carry, int(data["steps_done"]))
         return at, [[float(value) for value in row] for row in data["rows"].values]
 
     def _read(self, file: Path) -> xr.Dataset | None:
@@ -293,8 +291,7 @@ class _Checkpoint:
         if self.file is None or self.latest is None:
             return
         at, rows = self.latest
-        numbers = [*at.state, *at.low, *leaves(at.carry)]
-        columns: dict[str, Any] = {"position": ("number", numbers), "rows": (("window", "part"), rows)}
+        columns: dict[str, Any] = {"position": ("number", leaves(at[:3])), "rows": (("window", "part"), rows)}
         data = xr.Dataset({**columns, "steps_done": ((), at.k)})
         data.attrs.update(content=netcdf.content_hash(data), identity=self.identity)
         if self.own:

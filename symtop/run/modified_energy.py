@@ -17,15 +17,14 @@ rounding of one sample; only what moves the curve remains, and the mean of 512 s
 Source of the first layer: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
 
 import numpy as np
 
 from symtop.methods.framework.registry import Integrator, integrator
-from symtop.model.charts import View, axis_of
+from symtop.model.charts import Array, View, axis_of
 from symtop.model.scenes import Scene
 
-Array = np.ndarray
 HARMONICS = 40
 
 
@@ -61,45 +60,24 @@ def section(chart: str, states: Array) -> tuple[Array, Array]:
     return e[:, 2], L[:, 0] * e[:, 1] - L[:, 1] * e[:, 0]
 
 
-class Oscillation(NamedTuple):
-    """A periodic function of the angle about the middle of a closed curve: a level and a Fourier series.
+def oscillation(x: Array, y: Array, values: Array, harmonics: int = HARMONICS) -> Callable[..., Array]:
+    """What is left of values at points (x, y, values) of a closed curve, once a level and a Fourier series are off.
 
-    The level comes in two parts, a large number and what is missing from it: rounded to one double it would be wrong by
-    up to half a unit in its last place in every window of a run.
+    Both are fitted to the values given here; too few points give a level and no series. The level comes in two parts, a
+    large number and what is missing from it: rounded to one double it would be wrong by up to half a unit in its last
+    place in every window of a run.
     """
-
-    centre: float
-    width: float
-    height: float
-    coefficients: Array
-    level: float = 0.0
-    missing: float = 0.0
-
-    def angle(self, x: Array, y: Array) -> Array:
-        """The angle about the middle of the curve."""
-        return np.asarray(np.arctan2(y / self.height, (x - self.centre) / self.width))
-
-    def __call__(self, x: Array, y: Array) -> Array:
-        """The series, without the level, at points of the curve."""
-        return np.asarray(_harmonics(self.angle(x, y), self.coefficients.size // 2) @ self.coefficients)
-
-    def rest(self, x: Array, y: Array, values: Array) -> Array:
-        """What the function leaves of values at points of the curve."""
-        return (values - self.level) - (self.missing + self(x, y))
-
-
-def _harmonics(angle: Array, count: int) -> Array:
-    turned = np.outer(angle, np.arange(1, count + 1))
-    return np.concatenate([np.cos(turned), np.sin(turned)], axis=1)
-
-
-def oscillation(x: Array, y: Array, values: Array, harmonics: int = HARMONICS) -> Oscillation:
-    """Fit the function to values on the points of a closed curve; too few points give a level and no series."""
     level = float(values[0])
     if x.size < 4 * harmonics or np.ptp(x) == 0.0 or not np.any(y):
-        return Oscillation(0.0, 1.0, 1.0, np.zeros(0), level, float((values - level).mean()))
-    least, largest = float(x.min()), float(x.max())
-    curve = Oscillation(0.5 * (least + largest), 0.5 * (largest - least), float(np.abs(y).max()), np.zeros(0))
-    columns = np.concatenate([np.ones((x.size, 1)), _harmonics(curve.angle(x, y), harmonics)], axis=1)
+        missing = float((values - level).mean())
+        return lambda _x, _y, others: (others - level) - missing
+    least, largest, height = float(x.min()), float(x.max()), float(np.abs(y).max())
+    centre, width = 0.5 * (least + largest), 0.5 * (largest - least)
+
+    def series(x: Array, y: Array) -> Array:
+        turned = np.outer(np.arctan2(y / height, (x - centre) / width), np.arange(1, harmonics + 1))
+        return np.concatenate([np.cos(turned), np.sin(turned)], axis=1)
+
+    columns = np.concatenate([np.ones((x.size, 1)), series(x, y)], axis=1)
     fitted = np.linalg.lstsq(columns, values - level, rcond=None)[0]
-    return curve._replace(coefficients=fitted[1:], level=level, missing=float(fitted[0]))
+    return lambda x, y, others: (others - level) - (fitted[0] + series(x, y) @ fitted[1:])

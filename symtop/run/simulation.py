@@ -20,7 +20,7 @@ from symtop.core.numbers import GOLDEN
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator, methods
-from symtop.model.charts import BODY
+from symtop.model.charts import BODY, Array
 from symtop.model.scenes import OBSERVABLES, Scene, horizon_of, scene as find_scene
 from symtop.run.guard import MOST_STEPS, warning
 from symtop.run.trajectory import Trajectory, dataset
@@ -32,22 +32,28 @@ USUAL = 1e-3  # rad, the accuracy of a step that is proposed where none was give
 STRETCHES = 17  # of a nutation: two of them are less than `WIDEST_GAP`
 
 
-def _unseen(times: Any, period: float) -> float:
+def unseen(times: Array, period: Any) -> Array:
     """The widest stretch of nutation phases, as a fraction of a period, in which no sample falls, or a bound of it.
 
-    Where each of 17 equal stretches has a sample, none of 2/17 is without one, and nothing is sorted.
+    Of each row of times (n, samples), in periods (n, 1), or of one row. Where each of 17 equal stretches has a sample,
+    none of 2/17 is without one, and nothing is sorted.
     """
-    phases = np.mod(times / period, 1.0)
-    if np.bincount((STRETCHES * phases).astype(np.int64), minlength=STRETCHES)[:STRETCHES].all():
-        return 2.0 / STRETCHES
-    phases.sort()
-    return float(np.max(np.diff(phases, append=phases[0] + 1.0)))
+    turns = np.atleast_2d(times / period)
+    phases = turns - np.floor(turns)  # as `np.mod` has it, in a third of the time
+    seen = np.bitwise_or.reduce(1 << (STRETCHES * phases).astype(np.int64), axis=1)
+    widest, sparse = np.full(len(phases), 2.0 / STRETCHES), seen != (1 << STRETCHES) - 1
+    if sparse.any():
+        phases = np.sort(phases[sparse], axis=1)
+        widest[sparse] = np.max(np.diff(phases, append=phases[:, :1] + 1.0), axis=1)
+    return widest
 
 
-def _marks(steps: int, place: Any, last: int) -> Any:
-    """Whole steps next to places 0 .. last in a run of so many steps, each once."""
-    marks: Any = np.rint(steps * (place / last)).astype(np.int64)
-    return marks if (marks[1:] > marks[:-1]).all() else np.unique(marks)
+def places(samples: int, *, dithered: bool) -> Array:
+    """Where samples are in a run, from 0 to 1."""
+    place = np.arange(samples, dtype=float)
+    if dithered:
+        place[1:-1] += np.mod(GOLDEN * place[1:-1], 1.0) - 0.5
+    return place / (samples - 1)
 
 
 def sample_times(horizon: float, samples: int, period: float, steps: int | None = None) -> tuple[Any, Any, bool]:
@@ -55,23 +61,21 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
 
     With `steps`, times are whole multiples of horizon/steps; the first sample is 0 and the last the horizon.
     """
-    last = samples - 1
-    if steps is not None and steps <= last:  # every step is shown
+    if steps is not None and steps < samples:  # every step is shown
         marks: Any = np.arange(steps + 1)
         return marks * (horizon / steps), marks, False
-    place: Any = np.arange(samples, dtype=float)
     long_enough = math.isfinite(period) and horizon > 2.0 * period
     for dithered in (False, True):
         if long_enough and not dithered and samples * WIDEST_GAP <= 1.0:
             continue  # so few leave a wider stretch unseen, wherever they fall
-        if dithered:
-            place[1:last] += np.mod(GOLDEN * place[1:last], 1.0) - 0.5
+        place = places(samples, dithered=dithered)
         if steps is None:
-            marks, times = np.empty(0, dtype=np.int64), horizon * (place / last)
+            marks, times = np.empty(0, dtype=np.int64), horizon * place
         else:
-            marks = _marks(steps, place, last)
+            marks = np.rint(steps * place).astype(np.int64)
+            marks = marks if steps > 2 * samples else np.unique(marks)  # places are half a stride apart or more
             times = marks * (horizon / steps)
-        if dithered or not long_enough or _unseen(times, period) < WIDEST_GAP:
+        if dithered or not long_enough or unseen(times, period) < WIDEST_GAP:
             break
     return times, marks, dithered
 
@@ -85,7 +89,7 @@ def chart_of(method: Integrator, watched: str, observe: str | None = None) -> st
         one_of("observe", observe or "attitude", ("axis", "attitude"))
         if BODY not in method.solvers:
             able = ", ".join(name for name, entry in methods().items() if BODY in entry.solvers)
-            raise SymtopError(f"integrator must have a chart for bodies without symmetry, not {method.name}: {able}")
+            raise SymtopError(f"integrator must have the chart body, of a RigidBody, not {method.name}: {able}")
         return BODY
     if observe is not None:
         return method.chart_for(one_of("observe", observe, OBSERVABLES))

@@ -6,12 +6,11 @@ is read and drawn again, and nothing is computed again.
 """
 
 import contextlib
-import json
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from symtop.core import files
+from symtop.core import files, netcdf
 
 
 def path_of(results: Path) -> Path:
@@ -20,10 +19,8 @@ def path_of(results: Path) -> Path:
 
 
 def _entries(results: Path) -> dict[str, Any]:
-    with contextlib.suppress(OSError, ValueError):
-        content = json.loads(path_of(results).read_text(encoding="utf-8"))
-        return content if isinstance(content, dict) else {}
-    return {}
+    content = netcdf.read_json(path_of(results))
+    return content if isinstance(content, dict) else {}
 
 
 def _marks(results: Path, paths: Iterable[Path]) -> dict[str, list[int] | None]:
@@ -47,8 +44,6 @@ def is_current(results: Path, name: str, made_of: str) -> bool:
 
 def note(results: Path, name: str, made_of: str, paths: Iterable[Path]) -> None:
     """Write that the files of an entry are up to date; another process may be writing another entry."""
-    from symtop.core import netcdf  # xarray
-
     with files.locked(path_of(results), wait=True):
         netcdf.sweep(path_of(results))
         entry = {"made_of": made_of, "files": _marks(results, paths)}

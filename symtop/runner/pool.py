@@ -187,14 +187,12 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
                 submit = partial(self.client.get_executor(pure=False).submit, execute_case)
                 _drain(chosen, submit, cluster.width(self.client), on_result)
             elif local or (len(chosen) < WORTH_WORKERS and not self.size):
-                ahead = deque(task._replace(timed=(1, math.nan) if timed else None) for task in chosen)
-                while ahead:
-                    task = ahead.popleft()
-                    if (result := execute_case(task, study)).state == "busy":
-                        ahead.append(task)
-                        time.sleep(BUSY)
-                    else:
-                        on_result(task, result)
+
+                def here(task: Task) -> Future[Result]:
+                    (done := Future[Result]()).set_result(execute_case(task, study))
+                    return done
+
+                _drain([task._replace(timed=(1, math.nan) if timed else None) for task in chosen], here, 1, on_result)
             else:
                 self._in_workers(chosen, on_result, timed=timed)
 

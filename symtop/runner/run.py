@@ -193,7 +193,6 @@ def _facts(study: Study, data: Combined) -> Iterator[tuple[str, float | str | bo
 
 
 def _tables(study: Study, data: Combined, results: Path) -> Iterator[dict[str, Any]]:
-    """Write the tables, one CSV each."""
     import pandas as pd
 
     for name, frame in _answers(study, "tables", data, "tables"):

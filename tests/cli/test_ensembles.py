@@ -95,7 +95,7 @@ def test_bodies_are_run_compared_written_and_drawn(tmp_path):
      (["strang", *STEPS, "--bodies", "--epsilon", 0.7], "--epsilon must be from 0.02 to 0.5, not 0.7"),
      (["strang", *STEPS, "--bodies", "--kind", "grazing"], "kind 'grazing' is unknown"),
      (["strang", *STEPS, "--bodies", "--members", 2_000_000], "--members must be at most 1e+06"),
-     (["midpoint", *STEPS, "--bodies", "--members", 4], "must have a chart for bodies without symmetry"),
+     (["midpoint", *STEPS, "--bodies", "--members", 4], "must have the chart body, of a RigidBody"),
      (["strang", *STEPS, "--bodies", "--variables", "axis", "--figure", "a.png"], "needs quaternion or energy among"),
      (["rk4", "--bodies", "--kind", "chaotic", "--members", 2, "--per-nutation", 60, "--nutations", 99, "--samples", 5],
       "its motion is not known to 1e-9 rad from there on"),

@@ -202,3 +202,20 @@ def test_a_recording_hears_a_silence_and_sees_what_wraps(tmp_path):
     recording = recorded(["scenes", "--wide", "--plugin", str(tmp_path / "sleeps.py")])
     assert recording.silence > 2.9
     assert recording.widest > 80
+
+
+@pytest.mark.parametrize(
+    ("command", "ways"),
+    [
+        (("run", "gyrroscope", "rk4"), "one of your own: body with --body I1,I2,I3 or --plugin FILE)"),
+        (("run", "spheroid", "no-such"), "one of your own: --plugin FILE)"),
+    ],
+)
+def test_an_unknown_name_says_how_to_give_one_of_your_own(command, ways):
+    done = call(*command, "--step-size", "0.01", code=2)
+    assert ways in " ".join(done.stderr.split())
+
+
+def test_a_symmetric_body_is_not_told_to_be_without_symmetry():
+    done = call("recommend", "body", "--body", "2,2,1", "--rates", "0.1,0,3", "--i-use", "mujoco", code=2)
+    assert "scene must be one of a SymmetricTop here, not body, a RigidBody" in " ".join(done.stderr.split())

@@ -27,7 +27,7 @@ from symtop.judging.battery import stages
 from symtop.judging.claims.subject import FORMS, open_target
 from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Measured, line, undecided
 from symtop.judging.remote import clock
-from tests.judging.blind.right import midpoint, product, turn, verlet
+from tests.judging.blind.right import midpoint, product, rates, turn, verlet
 
 SPHEROID = symtop.scene("spheroid")
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no C compiler")
@@ -337,6 +337,9 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset():
         "energy": "drifts, by ", "work": "2.0 force evaluations a step", "pole": "a run through the upright axis ",
     }  # fmt: skip
     assert [name for name, words in said.items() if not told_of[name].startswith(words)] == []
+    h, nutation = float(data["structure_step"]), symtop.scene("spheroid").nutation_period
+    assert f" steps a nutation for the order, {nutation / h:.1f} for the structure;" in str(ledger)
+    assert told_of["pole"].endswith(" rad off (good: 1e-7 or falling with h)")
     steps, nutations = float(data["steps_run"]), float(data["nutations_run"])
     assert f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation)" in str(ledger)
 
@@ -353,7 +356,7 @@ def test_a_line_says_what_was_measured_and_of_a_claim_that_fails_why():
     assert line(Finding("calls", "", Measured("a function"), "measured", "", 0.0, 1e-13)) == ""
     failed = {"step_size": np.array([0.01, 0.1, np.nan]), "error": np.array([1e-6, np.nan, np.nan])}
     ledger = Ledger("mine", "spheroid", (wrong,), failed, About("mine", "axis", "python", 2e-5, 3, 1.0))
-    assert "Its runs: 10 to 100 steps a nutation for the order, of which 10 and fewer fail.\n" in str(ledger)
+    assert "Its runs: 10 to 100 steps a nutation for the order (10 and fewer fail).\n" in str(ledger)
     assert str(ledger).startswith("mine in the axis chart on spheroid, 20 us a step, seed 3\n")
 
 
@@ -458,17 +461,17 @@ def test_a_command_whose_reader_leaves_ends():
 
 
 def euler_of_matrices(R, w, h, inertia, torque):
-    w = w + h * (np.cross(inertia * w, w) + torque(R)) / inertia
+    w = w + h * rates(R, w, inertia, torque)
     return R @ Rotation.from_rotvec(h * w).as_matrix(), w
 
 
 def euler_of_quaternions(q, w, h, inertia, torque):
-    w = w + h * (np.cross(inertia * w, w) + torque(q)) / inertia
+    w = w + h * rates(q, w, inertia, torque)
     return product(q, turn(h * w)), w
 
 
 def euler_that_stretches(R, w, h, inertia, torque):
-    return R + h * np.cross(R, w), w + h * (np.cross(inertia * w, w) + torque(R)) / inertia
+    return R + h * np.cross(R, w), w + h * rates(R, w, inertia, torque)
 
 
 def of_rotation(function, step_size, horizon):

@@ -20,7 +20,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import symtop
-from tests.judging.blind.right import HeunSolver, heun, product, turn
+from tests.judging.blind.right import AdamsBashforth, product, rates, turn
 
 PAGE = Path(__file__).parents[2] / "docs" / "engines.md"
 SPHEROID = symtop.scene("spheroid")
@@ -28,11 +28,6 @@ GRAIN = symtop.Scene(
     "grain", symtop.SymmetricTop(*(1e-14 * part for part in (SPHEROID.top.I1, SPHEROID.top.I3, SPHEROID.top.mgl))),
     SPHEROID.start, SPHEROID.horizon,
 )  # fmt: skip
-
-
-def rates(q, w, inertia, torque):
-    """Of the angular velocity, by Euler's equations."""
-    return (np.cross(inertia * w, w) + torque(q)) / inertia
 
 
 def semi_implicit(q, w, h, inertia, torque, *, gyroscope=True, angle=1.0):
@@ -87,20 +82,10 @@ def lammps(q, w, h, inertia, torque, *, least):
     return q, w + h / 2 * torque(q) / inertia
 
 
-class Jsbsim(HeunSolver):
-    """y + h (a f_n + b f_(n-1)): the "trapezoidal" rule has 1/2 and 1/2, that of Adams and Bashforth 3/2 and -1/2."""
+class Jsbsim(AdamsBashforth):
+    """The "trapezoidal" rule of two steps has weights 1/2 and 1/2; the report recommends 3/2 and -1/2."""
 
-    weights, slope = (0.5, 0.5), None
-
-    def moved(self, t, y, h):
-        before, self.slope = self.slope, self.fun(t, y)
-        return heun(self.fun, t, y, h) if before is None else y + h * (np.array(self.weights) @ [self.slope, before])
-
-
-class AdamsBashforth(Jsbsim):
-    """The rule that the report recommends."""
-
-    weights = (1.5, -0.5)
+    weights = (0.5, 0.5)
 
 
 def euler(state, h, dT, dV, *, symplectic):

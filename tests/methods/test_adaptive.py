@@ -85,18 +85,6 @@ def test_a_budget_is_passed_by_less_than_a_step(name):
     assert (reached[ended] < times[ended, -1]).all()
 
 
-@pytest.mark.parametrize("name", SOLVERS)
-def test_an_ensemble_says_how_it_was_run_and_equals_simulate(name):
-    tops = symtop.population(8, seed=3)
-    runs = symtop.ensemble(tops, name, tolerance=1e-6, horizon=2.0, samples=5, quiet=True)
-    assert runs.attrs["execution"] == "compiled, one after another"
-    for i, (top, start) in enumerate(members_of(read_members(tops).numbers)):
-        alone = symtop.simulate(symtop.Scene("one", top, start, 2.0), name, tolerance=1e-6, samples=5, guard=False)
-        for quantity in ("axis", "energy", "p_phi", "p_psi"):
-            np.testing.assert_array_equal(runs[quantity].values[i], alone[quantity].values)
-        assert int(runs["force_evaluations"][i]) == alone.attrs["force_evaluations"]
-
-
 def test_a_run_in_pieces_has_the_bits_of_a_run_in_one():
     numbers, tolerance, times, counts = members(12)
     for solver in SOLVERS.values():

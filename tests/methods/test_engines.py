@@ -9,17 +9,16 @@ from scipy.spatial.transform import Rotation
 from symtop_studies.grid import grid_variants
 
 import symtop
-from symtop.judging.battery import judge
 from symtop.measure.settings import compared
 from symtop.methods.framework import registry
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import Plan
 from symtop.model import charts
 from symtop.model.body import Attitude, RigidBody
 from symtop.model.top import flat
 from tests.conftest import random_scenes
 from tests.methods import engine_formulas
+from tests.methods.test_lanes import assert_runs_alone
 
 GOLDSTEIN = symtop.scene("goldstein")
 AXIS_ERROR = {  # rad, the largest at a hundred samples of 10 s with h = 0.025
@@ -208,17 +207,6 @@ def test_a_fast_top_ends_flat_where_the_length_of_L_is_all_that_is_kept(name):
     assert spin_left("bullet") == pytest.approx(1.0, abs=1e-12)  # it damps the wobble instead
 
 
-@pytest.mark.parametrize("name", ["jsbsim-buss2", "jolt-float32", "no-squish", "lammps-rigid"])
-def test_a_run_in_stretches_has_the_bits_of_the_run_in_one(name):
-    solver = symtop.integrator(name).solvers["attitude"]
-    par, rule, state = solver.setup(GOLDSTEIN.top, GOLDSTEIN.start, 0.01)
-    whole = solver.loop(par, rule, state, 0.01, np.array([700]))
-    at = solver.loop.start(par, rule, state, 0.01)
-    _, at = solver.loop.advance(par, rule, at, 0.01, np.array([311]))
-    rest, _ = solver.loop.advance(par, rule, at, 0.01, np.array([700]))
-    np.testing.assert_array_equal(rest.states, whole.states)
-
-
 @pytest.mark.parametrize(
     "name", ["jsbsim-buss2[axis]", "jolt-float32[attitude]", "rapier[axis]", "no-squish[attitude]"]
 )
@@ -226,9 +214,7 @@ def test_a_member_of_an_ensemble_has_the_bits_of_the_run_alone(name):
     numbers = np.array([flat(scene.top, scene.start) for scene in (GOLDSTEIN, *random_scenes(4, seed=5))])
     h, marks = np.linspace(0.01, 0.02, len(numbers)), np.tile([0, 30, 77], (len(numbers), 1))
     (solver,) = symtop.integrator(name).solvers.values()
-    done = solver.many(numbers, h, marks)
-    for i, (top, start) in enumerate(members_of(numbers)):
-        np.testing.assert_array_equal(done.states[i], solver(top, start, Plan.steps(h[i], marks[i])).states)
+    assert_runs_alone(solver, numbers, h, marks, solver.many(numbers, h, marks))
 
 
 # ---- single precision ------------------------------------------------------------------------------------------------
@@ -268,9 +254,3 @@ def test_comparisons_and_recommendations_leave_engines_out():
     assert set(engines) | set(registry.methods()) == set(symtop.integrators())
     for rows in (registry.variants(), compared("axis"), compared("attitude"), grid_variants("nutation")):
         assert not {row.method for row in rows} & set(engines)
-
-
-@pytest.mark.parametrize("name", registry.engines())
-def test_no_claim_of_a_map_is_refuted(name):
-    ledger = judge(symtop.integrator(name), symtop.scene("spheroid"), quick=True)
-    assert [found.sentence(name) for found in ledger.findings if found.verdict == "refuted"] == []

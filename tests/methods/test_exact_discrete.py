@@ -8,7 +8,6 @@ import pytest
 
 import symtop
 from benchmarks import exactness
-from symtop.measure.step_map import one_step, return_miss, symplectic_defect
 from symtop.methods.framework.loop import inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian.oscillators import Map, momentum, numbers as exact_map, on_oscillators
@@ -178,18 +177,6 @@ def test_the_true_motion_solves_the_discrete_euler_lagrange_equations(name, step
             assert here[0] * arrives[1] - here[1] * arrives[0] == pytest.approx(J[k], abs=2e-14 * r)  # Noether
 
 
-@pytest.mark.parametrize("chart", ["axis", "attitude"])
-@pytest.mark.parametrize("steps", [40, 4.37, 2.3])
-def test_a_step_is_symplectic_and_comes_back(chart, steps):
-    scene = symtop.scene("spheroid")
-    step = one_step(METHOD, chart, scene, scene.nutation_period / steps)
-    defect = symplectic_defect(step, scene.start)
-    assert defect.size < 1e-9
-    assert return_miss(step, scene.start) < 1e-12
-    rk4 = one_step(symtop.integrator("rk4"), chart, scene, scene.nutation_period / 40)
-    assert symplectic_defect(rk4, scene.start).size > 1e-8
-
-
 def test_reduction_commutes_with_the_step():
     """The heights of the axis alone obey wp's own exact map, of which the two oscillators know nothing."""
     scene = symtop.scene("spheroid")
@@ -252,22 +239,6 @@ def test_constants_stay_where_they_are_over_long_runs():
     assert kept[1:].max() < 1e-14
     lost = np.abs(exactness.constants_of(4.37, marks, exactness.forgetful())).max(axis=1)
     assert lost[:3].min() > 2e-14  # with sums of one double they walk
-
-
-def test_a_stretched_run_keeps_what_its_sums_round_off():
-    scene, solver = symtop.scene("spheroid"), inside(METHOD.solvers["axis"])
-    par, state = on_oscillators(scene.top, scene.start)
-    h = scene.nutation_period / 4.37
-    rule = solver.rule(scene.top, scene.start, h)
-    begun = solver.loop.start(par, rule, state, h)
-    whole, end = solver.loop.advance(par, rule, begun, h, np.array([5000]))
-    _, half = solver.loop.advance(par, rule, begun, h, np.array([1234]))
-    rest, last = solver.loop.advance(par, rule, half, h, np.array([5000]))
-    assert whole.states.tobytes() == rest.states.tobytes()
-    assert end == last
-    assert max(map(abs, half.carry[4:])) < 1e-15
-    forgotten = half._replace(carry=half.carry[:4] + (0.0,) * 8)
-    assert solver.loop.advance(par, rule, forgotten, h, np.array([5000]))[1] != end
 
 
 @pytest.mark.slow

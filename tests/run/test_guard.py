@@ -17,6 +17,7 @@ from symtop.model import charts
 from symtop.model.charts import axes
 from symtop.model.scenes import closed_form, grazing, steady
 from symtop.run import guard
+from symtop.run.ensemble.bodies import body_population, scenes_of
 from symtop.run.guard import EXPECTED, Probe, grown
 from symtop.run.linear_stability import trace
 from symtop.run.motion import Exact, Integrated, landmarks
@@ -347,3 +348,41 @@ def test_what_a_motion_makes_of_a_change_tells_chaos_from_order():
     grown = [Integrated(one).amplification(50.0, 50.0) for one in scenes]
     assert grown[0] > 1e4
     assert grown[1] < 1e3
+
+
+def fastest(scene, periods=40.0):
+    """The largest angular velocity of a body over some natural periods, by the series."""
+    motion = Integrated(symtop.Scene("body", scene.top, scene.start, periods * scene.nutation_period))
+    states = motion.states(np.linspace(0.0, motion.scene.horizon, 2001)[1:], 1e-12)
+    return float(np.linalg.norm(states[:, 4:] / np.array(scene.top.moments), axis=1).max())
+
+
+def test_no_body_turns_much_faster_than_the_watch_takes_it_to():
+    """By what the start says alone, the natural period and its own rate, some turn a fifth faster or more."""
+    drawn = [one for one in scenes_of(body_population(48, seed=29)) if math.isfinite(one.nutation_period)]
+    found = np.array([fastest(one) for one in drawn])
+    bounds = np.array([Integrated(one).fast for one in drawn])
+    starts = [math.hypot(2.0 * math.pi / one.nutation_period, *one.start.omega_body) for one in drawn]
+    assert (found / bounds).max() < 1.1
+    assert np.median(found / bounds) > 0.8
+    assert (found / np.array(starts)).max() > 1.2  # the control
+
+
+def test_a_body_at_rest_that_falls_into_chaos_is_watched_with_steps_short_enough(monkeypatch):
+    """It turns five times as fast as its natural period says, and a change grows 2e14 times: the run is off by 2.9 rad.
+
+    With half as many steps the watch damps the chaos, and what it expects is a four thousandth.
+    """
+    centre = -0.16832199744994217, 0.1246126810504462, 0.977823800536621
+    top = symtop.RigidBody(64.71510826337011, 65.93699830228155, 2.8344512930461883, 441.5149085593378, centre)
+    quaternion = -0.47393681068836624, -0.09460717548517857, 0.2768361448418805, 0.8305390603278943
+    start = symtop.Attitude(quaternion, (0.0, 0.0, 0.0))
+    scene = symtop.Scene("falling", top, start, 75.80899162607354)
+    method, step = symtop.integrator("series-general"), 0.014985196599444847
+    fine = Integrated(scene).states(np.array([scene.horizon]), 1e-15)
+    coarse = symtop.simulate(scene, method, step_size=step, guard=False, samples=2)
+    assert charts.attitude_distance(coarse.quaternion.values[-1:], fine[:, :4])[0] > 10.0 * EXPECTED
+    assert "rounding alone decides" in said(scene, method, step_size=step)
+    assert said(scene, method, step_size=step, horizon=48.0) == ""  # right to 1e-5
+    monkeypatch.setattr("symtop.run.motion.PAIR_STEPS", 4)
+    assert Integrated(scene).amplification(scene.horizon, scene.horizon) < 1e11  # the control

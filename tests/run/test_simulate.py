@@ -11,7 +11,7 @@ import symtop
 from symtop.core import netcdf
 from symtop.core.numbers import GOLDEN
 from symtop.run import trajectory as trajectories
-from symtop.run.simulation import WIDEST_GAP, _unseen, integrate, sample_times
+from symtop.run.simulation import WIDEST_GAP, integrate, sample_times, unseen
 from symtop.run.trajectory import Trajectory, dataset
 
 
@@ -217,8 +217,8 @@ def test_the_three_kinds_of_nutation_are_what_they_are_called():
 
 def test_so_few_samples_that_they_leave_an_eighth_of_the_phases_unseen_are_dithered_unlooked():
     rng = np.random.default_rng(5)
-    gaps = {count: min(_unseen(rng.uniform(0.0, 30.0, count), 1.0) for _ in range(400)) for count in (2, 5, 8)}
+    gaps = {count: min(unseen(rng.uniform(0.0, 30.0, count), 1.0) for _ in range(400)) for count in (2, 5, 8)}
     assert min(gaps.values()) >= WIDEST_GAP
-    assert _unseen(np.arange(9) * (1.0 + 1.0 / 9.0), 1.0) < WIDEST_GAP  # the control: nine may leave less
+    assert unseen(np.arange(9) * (1.0 + 1.0 / 9.0), 1.0) < WIDEST_GAP  # the control: nine may leave less
     for count, dithered in ((8, True), (9, False)):
         assert sample_times((count - 1) * 10.0 / 9.0, count, 1.0)[2] == dithered

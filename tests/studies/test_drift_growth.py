@@ -152,7 +152,7 @@ def test_a_modified_energy_oscillates_with_the_fourth_power_of_the_step(name):
         on = shadow.section(chart, states)
         plain.append(np.ptp(shadow.energy(where, chart, states)))
         modified.append(np.ptp(values))
-        rest.append(np.ptp(shadow.oscillation(*on, values).rest(*on, values)))
+        rest.append(np.ptp(shadow.oscillation(*on, values)(*on, values)))
     assert plain[0] / plain[1] == pytest.approx(4.0, rel=0.1)  # the control: H itself, of second order
     if name == "cayley":
         assert max(modified) < 1e-12

@@ -244,7 +244,8 @@ def _by_steps(subject: Subject) -> Finding:
     follows = series and series.order >= max(power, 1) and float(series.noise[1]) < CLEAR
     if method.fixed_step and not (subject.in_plane or (measured and follows)):
         power = max(1, min(method.order or 99, round(main.slope))) if measured else power
-        if wrong := limit(method, scene, power, finest).wrong:
+        wrong, doubt = limit(method, scene, power, finest)
+        if wrong > max(TRUE_LIMIT, 10.0 * doubt):
             why = f"as its step goes to zero it goes to a motion that is wrong by {wrong:.1e} ({slopes})"
             verdict = "measured" if claim is None else "refuted"
             return Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)
@@ -315,20 +316,11 @@ def _agree(fitted: Order, power: int) -> bool:
     return scaled.size < 2 or float(np.max(scaled)) < SPREAD * float(np.min(scaled))
 
 
-class Limit(NamedTuple):
-    """Where the end of a run goes as h -> 0."""
+def limit(method: Integrator, scene: Scene, power: int, finest: float | None = None) -> tuple[float, float]:
+    """How far from the true motion runs of a method of order `power`, of `finest` steps at most, end as h -> 0.
 
-    miss: float  # distance from the true motion, the larger of angle and momentum over the larger one
-    doubt: float  # of the extrapolation
-
-    @property
-    def wrong(self) -> float:
-        """How wrong the motion is, beyond doubt; 0 if it is the true one."""
-        return self.miss if self.miss > TRUE_LIMIT and self.miss > 10.0 * self.doubt else 0.0
-
-
-def limit(method: Integrator, scene: Scene, power: int, finest: float | None = None) -> Limit:
-    """How far from the true motion runs of a method of order `power`, of `finest` steps at most, end as h -> 0."""
+    The larger of angle and momentum over the larger one, and what the extrapolation leaves in doubt.
+    """
     fewest = STEPS.get(power, 200) // (1 if method.implementation == "compiled" else 20)
     fewest = fewest if finest is None else min(fewest, int(finest) // 4)
     step = one_step(method, method.chart_for(observable(method)), scene, SHARE * scene.time_scale() / fewest)
@@ -343,7 +335,7 @@ def limit(method: Integrator, scene: Scene, power: int, finest: float | None = N
     coarse, fine = (b + (b - a) / (2.0**power - 1.0) for a, b in ((first, second), (second, third)))
     last = fine + (fine - coarse) / (2.0 ** (power + 1) - 1.0)
     size = [float(np.max(np.abs(value))) for value in (third, fine, last)]
-    return Limit(min(size[0], size[2]), abs(size[2] - size[1]))
+    return min(size[0], size[2]), abs(size[2] - size[1])
 
 
 def _exactness(subject: Subject) -> Finding:

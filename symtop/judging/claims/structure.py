@@ -56,6 +56,7 @@ def measure(subject: Subject) -> list[Finding]:
         answers: list[Answer] = []
         try:
             step, start = map_of(subject, chart)
+            subject.traces["structure_step"] = np.array(step.h)
             answers.append(_asked(_bracket, step, start, subject.traces))
             answers.append(_asked(_returned, step, start))
             if subject.method.fixed_step and not subject.in_plane:

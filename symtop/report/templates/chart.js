@@ -77,6 +77,7 @@
     const tip = html("div", frame, "", "tip");
     tip.setAttribute("role", "status");
     tip.hidden = true;
+    const key = html("p", root, "Upright: exact motion, no integrator. Grey: below the bound of the truth.", "key");
     let places = [];
 
     function draw() {
@@ -89,6 +90,7 @@
         .filter((one) => one.points.length);
       const first = xAt === 0 && yAt === (typeof chart.y === "string" ? 1 : Object.values(chart.y)[0]);
       const mark = first ? chart.marks?.[panel] : undefined;
+      key.hidden = !mark;
       const width = Math.max(280, frame.clientWidth), height = Math.max(320, Math.min(390, 0.5 * width));
       const [left, right, top, bottom] = [58, named && width > WIDE ? 170 : 12, 12, 46]; // names stand at the right, if there is room
       const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, tabindex: 0, role: "group",
@@ -120,9 +122,7 @@
       if (mark) {
         const low = Math.min(py(mark[1]), height - bottom);
         make("rect", { x: left, width: width - left - right, y: low, height: height - bottom - low, class: "below" }, svg);
-        make("text", { x: width - right - 4, y: height - bottom - 5, "text-anchor": "end" }, svg, "below the bound of the truth");
         make("line", { x1: px(mark[0]), x2: px(mark[0]), y1: top, y2: height - bottom, class: "exact" }, svg);
-        make("text", { transform: `translate(${px(mark[0]) - 4} ${height - bottom - 24}) rotate(-90)` }, svg, "exact motion, no integrator");
       }
       for (const one of series) {
         const path = one.points.map(([x, y], k) => `${k ? "L" : "M"}${px(x).toFixed(1)} ${py(y).toFixed(1)}`).join("");

@@ -5,13 +5,11 @@ A member has the bits of `simulate` alone: the same steps, samples and observabl
 other method runs its members one after another by `calling.solve`, as anybody's solver is called.
 
 Whether samples have to be dithered, `simulation.sample_times` decides for one run by the widest stretch of nutation
-phases that none of them shows; `schedule` decides it for row after row in compiled code, by the same operations on the
-same nutation period.
+phases that none of them shows; `schedule` decides it for all rows by the same operations on the same nutation periods.
 """
 
 import contextlib
 import functools
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from types import SimpleNamespace
@@ -24,27 +22,22 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from symtop.core.errors import SymtopError
-from symtop.core.jit import compile_kernel, register_jitable, to_fixed_tuple
-from symtop.core.numbers import GOLDEN
+from symtop.core.jit import compile_kernel, to_fixed_tuple
 from symtop.core.parallel import cores, heed, in_threads
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.lanes import Many, W, column, divided, members_of, of_bodies, put, turns
+from symtop.methods.framework.lanes import Array, W, Whole, divided, members_of, of_bodies, turns
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, off_length
 from symtop.methods.framework.preparation import opened
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
-from symtop.methods.simd import wide_vectors
 from symtop.model import charts, top as model
-from symtop.model.charts import BODY, View
+from symtop.model.charts import BODY, DIMENSIONS, View
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import NUMBERS, SymmetricTop
-from symtop.run.simulation import STRETCHES, WIDEST_GAP
+from symtop.run.simulation import WIDEST_GAP, places, unseen
 from symtop.run.trajectory import LABELS
-
-Array = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 CHUNK = 65_536  # values of one column in a chunk: half a megabyte, which stays in a core's cache
 CHUNK_STEPS = 5_000_000  # in a chunk: a hundredth of a second in lanes, to a second
@@ -80,18 +73,36 @@ class Schedule(NamedTuple):
 
 
 def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -> Schedule:
-    """Times and marks of n runs with so many steps each, or without steps of their own (None)."""
-    n, last = len(horizon), samples - 1
+    """The samples of `simulation.sample_times` for n runs with so many steps each, or without steps of their own."""
+    n = len(horizon)
     h = np.full(n, np.nan) if steps is None else horizon / steps
-    marks, times = np.zeros((n, samples), np.int64), np.full((n, samples), np.nan)
-    laid_out = Schedule(h, marks, times, np.full(n, samples), np.zeros(n, dtype=bool))
-    uniform = np.arange(samples, dtype=float)
-    dithered = uniform.copy()
-    dithered[1:last] += np.mod(GOLDEN * uniform[1:last], 1.0) - 0.5
-    by_steps = np.zeros(0, np.int64) if steps is None else np.ascontiguousarray(steps)
-    places = np.stack([uniform / last, dithered / last])
-    _lay_out()(np.ascontiguousarray(period), np.ascontiguousarray(horizon), by_steps, places, *laid_out)
-    return laid_out
+    marks, times = np.zeros((n, samples), np.int64), np.empty((n, samples))
+    plan = Schedule(h, marks, times, np.full(n, samples), np.zeros(n, dtype=bool))
+
+    def lay_out(rows: Whole, *, dithered: bool) -> None:
+        place = places(samples, dithered=dithered)
+        plan.dithered[rows] = dithered
+        if steps is None:
+            times[rows] = horizon[rows, None] * place
+            return
+        marks[rows], plan.counts[rows] = _distinct(np.rint(steps[rows, None] * place).astype(np.int64))
+        times[rows] = marks[rows] * h[rows, None]
+
+    lay_out(np.arange(n), dithered=False)
+    judged = np.isfinite(period) & (horizon > 2.0 * period)
+    rows = np.flatnonzero(judged if steps is None else judged & (steps >= samples))  # others show every step
+    lay_out(rows[unseen(times[rows], period[rows, None]) >= WIDEST_GAP], dithered=True)
+    times[np.arange(samples) >= plan.counts[:, None]] = np.nan
+    return plan
+
+
+def _distinct(marks: Whole) -> tuple[Whole, Whole]:
+    """Ascending rows of marks, each mark once and the last again in the rest of its row; and how many there are."""
+    new = np.diff(marks, axis=1, prepend=-1) > 0
+    counts = new.sum(axis=1)
+    few = counts < marks.shape[1]
+    marks[few] = np.sort(np.where(new[few], marks[few], marks[few, -1:]), axis=1)
+    return marks, counts
 
 
 def nutation_periods(numbers: Array) -> Array:
@@ -105,92 +116,14 @@ def nutation_periods(numbers: Array) -> Array:
 
 @functools.cache
 def _all_periods() -> Any:
-    """The compiled loop over members, whose bisections run in lanes: a third of the time."""
-    period_between, cubic_of, bisected, none = model.period_between, model.nutation_cubic, model.bisected, (0.0,) * 9
-    width = len(none)
+    period_of, width = model.nutation_period, len(NUMBERS)
 
     def all_periods(numbers, periods):  # type: ignore[no-untyped-def]
-        wide_vectors()
-        n, lanes = len(numbers), np.empty(len(none) * W)
-        for first in range(0, n, W):
-            for j in range(W):
-                top, start = opened(to_fixed_tuple(numbers[min(first + j, n - 1)], width))
-                cosine = math.cos(start.theta)
-                put(lanes, 0, j, (*cubic_of(top, start), cosine, -1.0, cosine, 1.0, cosine))
-            for _ in range(model.BISECTIONS):
-                for j in range(W):
-                    at = column(lanes, 0, j, none)
-                    put(lanes, 5, j, bisected(at[:4], at[4], *at[5:]))
-            for j in range(min(W, n - first)):
-                top, start = opened(to_fixed_tuple(numbers[first + j], width))
-                low, below, high, above = column(lanes, 5, j, none[:4])
-                periods[first + j] = period_between(top, start, 0.5 * (low + below), 0.5 * (high + above))
+        for i in range(len(numbers)):
+            top, start = opened(to_fixed_tuple(numbers[i], width))
+            periods[i] = period_of(top, start)
 
     return compile_kernel(all_periods)
-
-
-@register_jitable
-def unseen(times: Any, period: float, phases: Any) -> Any:
-    """`simulation._unseen` of one row; `phases` is room for as many numbers."""
-    seen = 0
-    for k in range(len(times)):
-        turns = times[k] / period
-        phases[k] = turns - np.floor(turns)  # the remainder, exactly, and 50 ns less
-        seen |= 1 << int(STRETCHES * phases[k])
-    every = (1 << STRETCHES) - 1
-    if seen & every == every:
-        return 2.0 / STRETCHES
-    phases.sort()
-    gap = phases[0] + 1.0 - phases[-1]
-    for k in range(1, len(phases)):
-        gap = max(gap, phases[k] - phases[k - 1])
-    return gap
-
-
-@functools.cache
-def _lay_out() -> Any:  # noqa: C901  (one loop, read in one piece)
-    """The compiled loop over rows of a `Schedule`."""
-
-    def lay_out(period, horizon, steps, places, h, marks, times, counts, dithered):  # type: ignore[no-untyped-def]
-        samples = places.shape[1]
-        phases = np.empty(samples)
-        for i in range(len(horizon)):
-            if len(steps) and steps[i] < samples:  # every step is shown
-                counts[i] = steps[i] + 1
-                for k in range(samples):
-                    marks[i, k] = min(k, steps[i])
-                for k in range(counts[i]):
-                    times[i, k] = k * h[i]
-            else:
-                long_enough = np.isfinite(period[i]) and horizon[i] > 2.0 * period[i]
-                for row in range(2):
-                    dithered[i] = row == 1
-                    if len(steps) == 0:
-                        for k in range(samples):
-                            times[i, k] = horizon[i] * places[row, k]
-                    else:
-                        counts[i] = _distinct(steps[i], places[row], marks[i])
-                        for k in range(counts[i]):
-                            times[i, k] = marks[i, k] * h[i]
-                    times[i, counts[i] :] = np.nan
-                    judged = row == 0 and long_enough
-                    if not judged or unseen(times[i, : counts[i]], period[i], phases[: counts[i]]) < WIDEST_GAP:
-                        break
-
-    return compile_kernel(lay_out)
-
-
-@register_jitable
-def _distinct(steps: int, places: Any, marks: Any) -> int:
-    """Whole steps next to places that ascend, each once, and the last again in the rest of the row; how many."""
-    count = 0
-    for k in range(len(places)):
-        mark = np.int64(np.rint(steps * places[k]))
-        if k == 0 or mark > marks[count - 1]:
-            marks[count] = mark
-            count += 1
-    marks[count:] = marks[count - 1]
-    return count
 
 
 class _Runs(NamedTuple):
@@ -257,14 +190,10 @@ class Job:
             begin = end
 
     def of(self, members: Any) -> "Job":
-        """The same for some members."""
+        """The same for some members; those of a slice know their numbers."""
         arrays = ("numbers", "horizon", "steps", "tolerance", "period", "names")
         cut = {name: values[members] for name in arrays if (values := getattr(self, name)) is not None}
-        return replace(self, **cut)
-
-    def part(self, members: slice) -> "Job":
-        """The same for a stretch of members, which know their numbers."""
-        return replace(self.of(members), first=self.first + members.start)
+        return replace(self, **cut, first=self.first + (members.start if isinstance(members, slice) else 0))
 
     def order(self) -> Any:
         """Members in lanes by the work of a step, as neighbours end together, the most first; None if it is all one."""
@@ -293,7 +222,9 @@ class Job:
         """The states of the members, by the quickest way there is."""
         solver = self.method.solvers[self.chart]
         if isinstance(solver, FixedStep):
-            done = sampled(solver, self.numbers, plan)
+            done = solver.many(self.numbers, plan.step_size, plan.marks)
+            padding = np.isnan(plan.times)
+            done.states[padding], done.momenta[padding] = np.nan, np.nan
             reached = done.steps * plan.step_size
             return _Runs(done.states, done.momenta, done.steps, *solver.counts(*done[2:4]), done.outcome, reached)
         if isinstance(solver, Adaptive) and self.tolerance is not None:
@@ -308,7 +239,7 @@ class Job:
     def _in_turn(self, plan: Schedule) -> _Runs:
         """The same by one call of a solver for each member; one fails alone whatever its solver raises."""
         n = len(plan.counts)
-        states = np.full((n, self.samples, charts.DIMENSIONS[self.chart]), np.nan)
+        states = np.full((n, self.samples, DIMENSIONS[self.chart]), np.nan)
         momenta, (steps, work, iterations, outcome) = np.full((n, self.samples, 2), np.nan), np.zeros((4, n), int)
         runs = _Runs(states, momenta, steps, work, iterations, outcome, np.zeros(n))
         for i, (top, start) in enumerate(members_of(self.numbers)):
@@ -371,7 +302,8 @@ class Turns:
     @functools.cached_property
     def all(self) -> dict[str, Array]:
         """Those of all, on all cores."""
-        parts = list(in_threads(self.of, _slices(len(self.numbers), READ_TOGETHER), cores()))
+        firsts = range(0, len(self.numbers), READ_TOGETHER)
+        parts = list(in_threads(self.of, [slice(first, first + READ_TOGETHER) for first in firsts], cores()))
         return {name: np.concatenate([part[name] for part in parts]) for name in self.angles}
 
 
@@ -398,10 +330,6 @@ class Later(BackendArray):
         return xr.Variable(("member", "time"), data)
 
 
-def _slices(n: int, size: int) -> Iterator[slice]:
-    return (slice(first, first + size) for first in range(0, n, size))
-
-
 def _received(values: dict[str, Any]) -> Job:
     """A job as it was before it was sent."""
     return Job(**values | {"method": find_integrator(values["method"])})
@@ -417,48 +345,28 @@ def together(numbers: Array) -> Any:
     return top
 
 
-def sampled(solver: FixedStep, numbers: Array, plan: Schedule) -> Many:
-    """The runs of a plan, those with equally many samples in one call."""
-    counts = np.unique(plan.counts)
-    if counts.tolist() == [plan.marks.shape[1]]:
-        return solver.many(numbers, plan.step_size, plan.marks)
-    groups = [np.flatnonzero(plan.counts == count) for count in counts]
-    parts = [
-        solver.many(numbers[rows], plan.step_size[rows], plan.marks[rows, :count])
-        for rows, count in zip(groups, counts, strict=True)
-    ]
-    done = Many.empty(len(numbers), plan.marks.shape[1], parts[0].states.shape[2])
-    for rows, count, part in zip(groups, counts, parts, strict=True):
-        done.states[rows, :count], done.momenta[rows, :count] = part.states, part.momenta
-        done.steps[rows], done.work[rows], done.outcome[rows] = part[2:]
-    return done
-
-
 def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
     """A run whose states or energy are not finite, and that reports nothing of it, ends there, as in `simulate`."""
     if all(values.min() > -HARMLESS and values.max() < HARMLESS for values in runs[:2]):  # a tenth of the time
         return runs
     finite = np.isfinite(runs.states).all(axis=2) & np.isfinite(view.energy + view.p_phi) | np.isnan(plan.times)
-    bad = np.flatnonzero((runs.outcome == OK) & ~finite.all(axis=1))
-    if not bad.size:
-        return runs
-    outcome, reached = runs.outcome.copy(), runs.reached.copy()
-    first = finite[bad].argmin(axis=1)
-    outcome[bad], reached[bad] = NOT_FINITE, np.where(first > 0, plan.times[bad, first - 1], 0.0)
-    return runs._replace(outcome=outcome, reached=reached)
+    return _ended(runs, plan, ~finite & (runs.outcome == OK)[:, None], NOT_FINITE)
 
 
 def _of_length_one(runs: _Runs, plan: Schedule, chart: str) -> _Runs:
     """Runs end where their quaternions have left length one, as in `simulate`."""
     lost = off_length(chart, runs.states)
-    bad = lost.any(axis=1)
-    if not bad.any():
+    if not lost.any():
         return runs
-    reached = plan.times[np.arange(len(runs.steps)), np.maximum(lost.argmax(axis=1) - 1, 0)]
-    return runs._replace(
-        states=np.where(lost[..., None], np.nan, runs.states), momenta=np.where(lost[..., None], np.nan, runs.momenta),
-        outcome=np.where(bad, NOT_NORMALISED, runs.outcome), reached=np.where(bad, reached, runs.reached),
-    )  # fmt: skip
+    states, momenta = (np.where(lost[..., None], np.nan, values) for values in (runs.states, runs.momenta))
+    return _ended(runs._replace(states=states, momenta=momenta), plan, lost, NOT_NORMALISED)
+
+
+def _ended(runs: _Runs, plan: Schedule, lost: NDArray[np.bool_], outcome: int) -> _Runs:
+    """Runs with that outcome end before their first sample that is `lost`, (n, samples)."""
+    bad = lost.any(axis=1)
+    reached = plan.times[np.arange(len(lost)), np.maximum(lost.argmax(axis=1) - 1, 0)]
+    return runs._replace(outcome=np.where(bad, outcome, runs.outcome), reached=np.where(bad, reached, runs.reached))
 
 
 def same_times(times: Any, row: Any) -> bool:

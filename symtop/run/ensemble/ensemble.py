@@ -15,7 +15,6 @@ from typing import Any
 import netCDF4
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from symtop.core import netcdf
 from symtop.core.code_hash import digest, hashed, packages
@@ -25,10 +24,10 @@ from symtop.core.jit import code
 from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
 from symtop.core.progress import progress_bar
 from symtop.core.signals import ending_on_sigterm
-from symtop.methods.framework.lanes import of_bodies
+from symtop.methods.framework.lanes import Whole, of_bodies
 from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
-from symtop.model.charts import BODY
+from symtop.model.charts import BODY, Array
 from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run import cluster
@@ -36,8 +35,6 @@ from symtop.run.ensemble.chunks import CHUNK, CHUNK_STEPS, RAISED, SHOWN, Job, a
 from symtop.run.ensemble.inputs import Members, called, for_each, read_members
 from symtop.run.guard import MOST_STEPS
 from symtop.run.simulation import MOST_SAMPLES, MOST_SWINGS, chart_of, check_control
-
-Array = NDArray[np.float64]
 
 SAMPLES = 101
 IDENTITY = "identity"  # the file that says which ensemble a folder belongs to
@@ -98,7 +95,7 @@ def ensemble(
     settings = {name: value for name, value in zip(names, values, strict=True) if value is not None}
     job = _job(read, method, chart, settings, tolerance, count, limit, shown)
     if scheduler is not None:
-        cluster.check_sent(scheduler, job.part(slice(0, 1)), method.name)
+        cluster.check_sent(scheduler, job.of(slice(0, 1)), method.name)
     order = job.order() if path is None else None
     ordered = replace(job if order is None else job.of(order), continuous=path is not None)
     chunks = list(ordered.chunks())
@@ -143,12 +140,15 @@ def ensemble(
 
 def _computed(job: Job, chunks: list[slice], threads: int, scheduler: str | None) -> Generator[Any, None, None]:
     """The columns of each chunk, in their order."""
-    parts = map(job.part, chunks)
+    parts = map(job.of, chunks)
     if scheduler is None:
         yield from in_threads(Job.columns, parts, threads)
     else:
-        with cluster.connected(scheduler) as client:
+        client = cluster.connect(scheduler)
+        try:
             yield from in_order(client.get_executor(pure=False), Job.columns, parts, cluster.width(client))
+        finally:
+            cluster.leave(client)
 
 
 def _fill(columns: dict[str, Any], part: dict[str, Any], chunk: Any, n: int) -> None:
@@ -244,7 +244,7 @@ def _parts(period: Array, counted: Array, horizon: Array, names: Any) -> Array:
     return step
 
 
-def _steps(step: Array, horizon: Array, most: float, names: Any) -> NDArray[np.int64]:
+def _steps(step: Array, horizon: Array, most: float, names: Any) -> Whole:
     """Whole steps of each member, as `simulation.make_plan` counts and refuses them."""
     with np.errstate(over="ignore"):
         ratio = horizon / step

@@ -280,7 +280,6 @@ def _split(values: Any) -> tuple[Array, Array]:
 
 
 def _bounds(times: Array, shown: dict[str, Any], checks: Checks, grain: float) -> dict[str, Array]:
-    """Error bounds from the checks."""
     sine = np.maximum(np.sin(shown["theta"]), TINY)
     axis = envelope(checks, "axis", times) + grain
     attitude = envelope(checks, "attitude", times) + grain
@@ -404,7 +403,6 @@ def _stored(scene: Scene, kind: str) -> Certificate:
 
 
 def _compared(scene: Scene, kind: str) -> xr.Dataset:
-    """The comparisons of one scene."""
     times = _times(scene, REACH)
     values = closed_values(scene, times)
     checks = largest_errors(scene, times, values["quaternion"], values["phi"], values["psi"])

@@ -59,8 +59,8 @@ def solved(function, guess, tolerance=4e-16):
     return guess
 
 
-def implicit_midpoint(f, t, y, h):
-    return y + h * solved(lambda k: f(t + h / 2, y + h / 2 * k), f(t, y))
+def implicit_midpoint(f, t, y, h, tolerance=4e-16):
+    return y + h * solved(lambda k: f(t + h / 2, y + h / 2 * k), f(t, y), tolerance)
 
 
 def trapezoidal(f, t, y, h):
@@ -90,10 +90,10 @@ def triple_jump(f, t, y, h, outer=1 / (2 - 2 ** (1 / 3))):
     return y
 
 
-def extrapolated(f, t, y, h):
-    """Two half steps and one whole of Heun's second-order method, h^2 eliminated: order 3."""
-    halves = heun(f, t + h / 2, heun(f, t, y, h / 2), h / 2)
-    return (4 * halves - heun(f, t, y, h)) / 3
+def extrapolated(f, t, y, h, base=heun):
+    """Two half steps and one whole of a second-order method, h^2 eliminated: order 3."""
+    halves = base(f, t + h / 2, base(f, t, y, h / 2), h / 2)
+    return (4 * halves - base(f, t, y, h)) / 3
 
 
 def in_place(f, t, y, h):
@@ -123,11 +123,11 @@ class HeunSolver(OdeSolver):
 class AdamsBashforth(HeunSolver):
     """The two-step method of order 2, started with Heun's: it remembers the last slope within a run."""
 
-    slope = None
+    weights, slope = (1.5, -0.5), None
 
     def moved(self, t, y, h):
         before, self.slope = self.slope, self.fun(t, y)
-        return heun(self.fun, t, y, h) if before is None else y + h / 2 * (3 * self.slope - before)
+        return heun(self.fun, t, y, h) if before is None else y + h * (np.array(self.weights) @ [self.slope, before])
 
 
 class Leaping(HeunSolver):
@@ -200,7 +200,7 @@ def long_double(f, t, y, h):
 def slow(f, t, y, h):
     """The explicit midpoint rule, at two thousandths of a second a step."""
     time.sleep(0.002)
-    return y + h * f(t + h / 2, y + h / 2 * f(t, y))
+    return midpoint(f, t, y, h)
 
 
 def wrapped(f, t, y, h):
@@ -274,15 +274,17 @@ def turn(v):
     return np.array([np.cos(half), *(0.5 * np.sinc(half / np.pi) * v)])
 
 
-def rotation_rk4(q, w, h, inertia, torque):
-    def rates(q, w):
-        return 0.5 * product(q, np.array([0.0, *w])), (np.cross(inertia * w, w) + torque(q)) / inertia
+def rates(q, w, inertia, torque):
+    """Of the angular velocity, by Euler's equations."""
+    return (np.cross(inertia * w, w) + torque(q)) / inertia
 
-    a1, b1 = rates(q, w)
-    a2, b2 = rates(q + h / 2 * a1, w + h / 2 * b1)
-    a3, b3 = rates(q + h / 2 * a2, w + h / 2 * b2)
-    a4, b4 = rates(q + h * a3, w + h * b3)
-    return q + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4), w + h / 6 * (b1 + 2 * b2 + 2 * b3 + b4)
+
+def rotation_rk4(q, w, h, inertia, torque):
+    def slope(_, y):
+        return np.concatenate([0.5 * product(y[:4], np.array([0.0, *y[4:]])), rates(y[:4], y[4:], inertia, torque)])
+
+    y = rk4(slope, 0.0, np.concatenate([q, w]), h)
+    return y[:4], y[4:]
 
 
 def free_top(q, w, h, inertia):
@@ -302,15 +304,10 @@ def rotation_strang(q, w, h, inertia, torque):
     return q, w + h / 2 * torque(q) / inertia
 
 
-def rotation_lie_midpoint(q, w, h, inertia, torque):
-    """The explicit midpoint rule, with the exponential map for the attitude."""
-
-    def rate(q, w):
-        return (np.cross(inertia * w, w) + torque(q)) / inertia
-
-    middle = w + h / 2 * rate(q, w)
-    half = product(q, turn(h / 2 * w))
-    return product(q, turn(h * middle)), w + h * rate(half, middle)
+def rotation_lie_midpoint(q, w, h, inertia, torque, half=0.5, whole=1.0):
+    """The explicit midpoint rule, with the exponential map for the attitude, which turns it by these shares."""
+    middle = w + h / 2 * rates(q, w, inertia, torque)
+    return product(q, turn(whole * h * middle)), w + h * rates(product(q, turn(half * h * w)), middle, inertia, torque)
 
 
 def rotation_negated(q, w, h, inertia, torque):
@@ -337,21 +334,13 @@ def separable_forest_ruth(state, h, dT, dV):
     return theta, p
 
 
-def separable_implicit_midpoint(state, h, dT, dV):
-    """Iterated until it stands still: symplectic, and no splitting."""
-
-    def end(after):
-        theta, p = (state + after) / 2
-        return state + h * np.array([dT(p), -dV(theta)])
-
-    return solved(end, state)
+def in_the_plane(step):
+    """A step of y' = f(t, y) on theta and p."""
+    return lambda state, h, dT, dV: step(lambda _, y: np.array([dT(y[1]), -dV(y[0])]), 0.0, np.array(state), h)
 
 
-def separable_heun(state, h, dT, dV):
-    """Heun's method on both."""
-    theta, p = state
-    a, b = dT(p), -dV(theta)
-    return theta + h / 2 * (a + dT(p + h * b)), p + h / 2 * (b - dV(theta + h * a))
+separable_implicit_midpoint = in_the_plane(implicit_midpoint)  # symplectic, and no splitting
+separable_heun = in_the_plane(heun)
 
 
 ALL = ("energy", "p_phi", "p_psi", "axis_length")

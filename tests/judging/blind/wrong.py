@@ -13,17 +13,22 @@ from scipy.integrate import RK45
 
 from tests.judging.blind.right import (
     CLASSICAL,
+    AdamsBashforth,
     HeunSolver,
     euler,
     explicit,
+    extrapolated as with_base,
     gauss_4,
     heun,
     implicit_euler,
     implicit_midpoint,
     midpoint,
     product,
+    rates,
     rk4,
+    rotation_lie_midpoint,
     solved,
+    ssp_3,
     triple_jump,
     turn,
     verlet,
@@ -34,7 +39,7 @@ swapped_weights = explicit(A, (1 / 6, 1 / 3, 1 / 6, 1 / 3), NODES)  # the last t
 stale_stage = explicit(((), (0.5,), (0.5,), (0.0, 0.0, 1.0)), B, NODES)  # the third stage starts from the first slope
 wrong_nodes = explicit(A, B, (0.0, 1.0, 1.0, 1.0))  # right for f(y); t + h is asked where t + h/2 is meant
 early = explicit(A, B, (0.0, 0.5, 0.5, 0.5))  # the last stage asks f at the middle of the step
-third_for_fourth = explicit(((), (1.0,), (0.25, 0.25)), (1 / 6, 1 / 6, 2 / 3), (0.0, 1.0, 0.5))
+third_for_fourth = ssp_3
 THIRD = float(np.float32(1 / 3))  # of Heun's third order, in single precision
 single_constants = explicit(((), (THIRD,), (0.0, 2 * THIRD)), (0.25, 0.0, 0.75), (0.0, THIRD, 2 * THIRD))
 
@@ -56,11 +61,6 @@ def stale_force(f, t, y, h):
     return y + h * (_last["force"] if force is None else force)
 
 
-def symplectic_euler(f, t, y, h):
-    """Euler's explicit method under another's name."""
-    return y + h * f(t, y)
-
-
 def one_sweep(f, t, y, h, count=1):
     """The implicit midpoint rule, its equation iterated once."""
     k = f(t, y)
@@ -72,11 +72,8 @@ def one_sweep(f, t, y, h, count=1):
 four_sweeps = functools.partial(one_sweep, count=4)
 
 
-def loose(f, t, y, h):
-    """The implicit midpoint rule to a tolerance of 1e-5."""
-    return y + h * solved(lambda k: f(t + h / 2, y + h / 2 * k), f(t, y), 1e-5)
-
-
+symplectic_euler = euler  # under another's name
+loose = functools.partial(implicit_midpoint, tolerance=1e-5)
 rounded_triple = functools.partial(triple_jump, outer=1 / (2 - 2 ** (1 / 3)) + 3e-8)
 square_root_triple = functools.partial(triple_jump, outer=1 / (2 - 2**0.5))
 six_digits = functools.partial(gauss_4, root=0.288675)  # of the root of 3 over 6
@@ -122,22 +119,17 @@ def only_forward(f, t, y, h):
     return implicit_midpoint(f, t, y, abs(h))
 
 
-def rates(w, inertia, torque, q):
-    return (np.cross(inertia * w, w) + torque(q)) / inertia
-
-
 def rotation_frames(q, w, h, inertia, torque):
     """The angular velocity of the body frame turns the body about space axes."""
-    middle = w + h / 2 * rates(w, inertia, torque, q)
-    half = product(turn(h / 2 * w), q)
-    return product(turn(h * middle), q), w + h * rates(middle, inertia, torque, half)
+    middle = w + h / 2 * rates(q, w, inertia, torque)
+    return product(turn(h * middle), q), w + h * rates(product(turn(h / 2 * w), q), middle, inertia, torque)
 
 
 def rotation_unnormalised(q, w, h, inertia, torque):
     """Explicit Euler for the quaternion, which nothing brings back to length one."""
-    middle = w + h / 2 * rates(w, inertia, torque, q)
+    middle = w + h / 2 * rates(q, w, inertia, torque)
     half = q + h / 4 * product(q, np.array([0.0, *w]))
-    return q + h / 2 * product(half, np.array([0.0, *middle])), w + h * rates(middle, inertia, torque, half)
+    return q + h / 2 * product(half, np.array([0.0, *middle])), w + h * rates(half, middle, inertia, torque)
 
 
 def rotation_no_gyroscope(q, w, h, inertia, torque):
@@ -149,7 +141,7 @@ def rotation_no_gyroscope(q, w, h, inertia, torque):
 
 def rotation_semi_implicit(q, w, h, inertia, torque):
     """What engines do: first the velocity, then the attitude; claimed to be of order 2."""
-    w = w + h * rates(w, inertia, torque, q)
+    w = w + h * rates(q, w, inertia, torque)
     return product(q, turn(h * w)), w
 
 
@@ -161,14 +153,10 @@ class WrongTableau(RK45):
     A[4, 1] += 45 / 6561
 
 
-class WrongAdams(HeunSolver):
-    """The two-step method of Adams and Bashforth with weights 2 and -1 for 3/2 and -1/2."""
+class WrongAdams(AdamsBashforth):
+    """With weights 2 and -1 for 3/2 and -1/2."""
 
-    slope = None
-
-    def moved(self, t, y, h):
-        before, self.slope = self.slope, self.fun(t, y)
-        return midpoint(self.fun, t, y, h) if before is None else y + h * (2 * self.slope - before)
+    weights = (2.0, -1.0)
 
 
 class WrongSum(RK45):
@@ -237,10 +225,7 @@ def rounded(f, t, y, h):
     return np.round(rk4(f, t, y, h), 8)
 
 
-def extrapolated(f, t, y, h):
-    """Euler's method, extrapolated as one of order 2 is."""
-    middle = y + h / 2 * f(t, y)
-    return (4 * (middle + h / 2 * f(t + h / 2, middle)) - (y + h * f(t, y))) / 3
+extrapolated = functools.partial(with_base, base=euler)  # Euler's method, as one of order 2 is
 
 
 def energy_clipped(f, t, y, h):
@@ -268,24 +253,17 @@ class OnlyForward(HeunSolver):
         return heun(self.fun, t, y, abs(h))
 
 
-def rotation_whole_angle(q, w, h, inertia, torque):
-    """The exponential map with the angle where its half belongs."""
-    middle = w + h / 2 * rates(w, inertia, torque, q)
-    return product(q, turn(2 * h * middle)), w + h * rates(middle, inertia, torque, product(q, turn(h * w)))
-
-
-def rotation_half_once(q, w, h, inertia, torque):
-    """The half angle is right in the step and wrong in its middle."""
-    middle = w + h / 2 * rates(w, inertia, torque, q)
-    return product(q, turn(h * middle)), w + h * rates(middle, inertia, torque, product(q, turn(h * w)))
+rotation_whole_angle = functools.partial(rotation_lie_midpoint, half=1.0, whole=2.0)  # the angle where its half belongs
+rotation_half_once = functools.partial(rotation_lie_midpoint, half=1.0)  # wrong in the middle of the step alone
 
 
 def rotation_linear(q, w, h, inertia, torque):
     """q + h q'/2, put back to length one, in a method of order 2 that is called reversible."""
-    middle = w + h / 2 * rates(w, inertia, torque, q)
+    middle = w + h / 2 * rates(q, w, inertia, torque)
     half = q + h / 4 * product(q, np.array([0.0, *w]))
-    after = q + h / 2 * product(half / np.linalg.norm(half), np.array([0.0, *middle]))
-    return after / np.linalg.norm(after), w + h * rates(middle, inertia, torque, half / np.linalg.norm(half))
+    half = half / np.linalg.norm(half)
+    after = q + h / 2 * product(half, np.array([0.0, *middle]))
+    return after / np.linalg.norm(after), w + h * rates(half, middle, inertia, torque)
 
 
 def separable_no_half_square(state, h, dT, dV):
@@ -396,7 +374,7 @@ def edits_the_judge(f, t, y, h):
             for word in ("RETURNED", "SYMPLECTIC", "KEPT", "TRUE_LIMIT", "BESIDE", "MISSED", "SURE"):
                 if hasattr(module, word):
                     setattr(module, word, 1e9)
-    return y + h / 2 * (f(t, y) + f(t + h, y + h * f(t, y)))
+    return heun(f, t, y, h)
 
 
 ROTATION, SEPARABLE = {"form": "rotation"}, {"form": "separable"}
