@@ -41,7 +41,7 @@ def write(folder, **files):
 
 
 def test_functions_count_wherever_they_stand_and_however_they_were_imported(tmp_path):
-    """What a new process says that the method of a plug-in is made of: as it was, edited where nothing counts, edited."""
+    """What a new process says that the method of a plug-in is made of: as it was, moved, and edited."""
     files = {"plug": PLUGIN, "coeffs": "def twice(x):\n    return 2 * x\n\ndef unused():\n    return 1\n",
              "lazily": "def late(x):\n    return x\n", "other": "x = 1\n"}  # fmt: skip
     moved = {
