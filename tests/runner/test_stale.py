@@ -87,7 +87,7 @@ METHODS = "symtop.methods"
         (f"{METHODS}.library.scipy_ivp:compiled_field", SCIPY),
         (f"{METHODS}.runge_kutta.explicit:later_stages", {"rk4"}),  # the guard's watch reaches what pairs are made of
         (f"{METHODS}.splitting.reversible:march", {"stormer-verlet-reversible"}),
-        (f"{METHODS}.lie_group.generalised_alpha:turn", {"generalised-alpha"}),
+        (f"{METHODS}.lie_group.generalised_alpha:_corrected", {"generalised-alpha"}),
         (f"{METHODS}.taylor.heyoka:propagate", {"taylor", "taylor-longdouble", "taylor-quad"}),
         ("symtop.cli.common:as_text", set()),
         ("symtop.report.page:write", set()),
