@@ -40,7 +40,6 @@ from symtop.measure import settings
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import FREQUENCIES
 from symtop.measure.ranking import cheapest
-from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import (
     NEEDS,
     Integrator,
@@ -518,9 +517,8 @@ def _lines(question: _Question, method: Integrator, setting: float | None) -> di
 def _exact_seconds(question: _Question) -> float:
     """Seconds of the exact motion at the horizon, once it is compiled."""
     scene, _, quantity, horizon = question[:4]
-    exact = integrator("exact")
-    call = bare_run(scene, exact, exact.chart_for(settings.observed(quantity)), math.nan, horizon)
-    return timings([call], batches=5, batch=0.002, exact=False)[0].best
+    exact = settings.Met(integrator("exact"), math.nan, 0.0, 0.0, horizon, 0.0)
+    return settings.seconds(scene, [exact], quantity, horizon)[0]
 
 
 def _without_steps(question: _Question, best: float) -> str:

@@ -218,7 +218,7 @@ static inline Turn turn(const Par *par, const Rule *rule, Vector e, Vector L, Ca
 #define MOST 50
 #define ENOUGH 1e-14
 
-typedef struct { double m, f, gamma, beta, turn, shares[SHARES]; } Rule;
+typedef struct { double m, f, gamma, beta, shares[SHARES]; } Rule;
 typedef struct { Vector a, change; } Carry;
 
 static inline Vector rates(const Par *par, Vector e, Vector x) {

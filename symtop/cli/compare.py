@@ -6,19 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from symtop.cli.clock import ticking
-from symtop.cli.common import (
-    File,
-    as_text,
-    body_options,
-    check_outputs,
-    completing,
-    json_option,
-    plugin_option,
-    say,
-    say_written,
-    table,
-    warn,
-)  # fmt: skip
+from symtop.cli.common import File, as_text, check_outputs, completing, say, say_written, scene_options, table, warn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,9 +26,7 @@ COLUMNS = ("step_size", "tolerance", "steps_per_nutation", "error", "seconds", "
 @click.option("--budget", type=float, help="Most force evaluations of a run; 3e6 by default, 5e4 of plain Python.")
 @click.option("--output", "-o", type=File(), help="Write all runs to this netCDF file.")
 @click.option("--figure", type=File(), help="Draw error against cost: .png, .svg or .pdf.")
-@body_options
-@plugin_option
-@json_option
+@scene_options
 def compare(
     scene: Any, methods: tuple[str, ...], output: str | None, figure: str | None, as_json: bool, **options: Any
 ) -> None:

@@ -41,9 +41,7 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 @click.option("--card", type=File(dir_okay=False), help="Write a page with two figures and the ledger (HTML).")
 @click.option("--badge", type=File(dir_okay=False), help="Write a badge for a README (SVG).")
 @click.option("--figure", type=File(dir_okay=False), help="Draw its error against evaluations, beside four methods.")
-@common.body_options
-@plugin_option
-@json_option
+@common.scene_options
 def judge(
     target: str, scene: Any, output: str | None, card: str | None, badge: str | None, figure: str | None, as_json: bool,
     **options: Any,
@@ -182,9 +180,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
 @click.option("--keeps", help="Only what does not let it drift: energy or momenta.")
 @click.option("--quantity", help="Of what: axis, which is the default, attitude (that of a body), theta, energy, ...")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
-@common.body_options
-@plugin_option
-@json_option
+@common.scene_options
 def recommend(scene: Any, accuracy: float | None, engine: str | None, as_json: bool, **options: Any) -> None:
     """Find the cheapest integrator and step that meet an accuracy on a SCENE.
 

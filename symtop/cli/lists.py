@@ -12,11 +12,11 @@ import click
 from symtop.cli.common import (
     File,
     as_text,
-    body_options,
     completing,
     facts,
     json_option,
     plugin_option,
+    scene_options,
     table,
     terminal_width,
 )
@@ -127,9 +127,7 @@ def _integrator_page(described: Record) -> str:
 @click.command(short_help="List the scenes, or show one in full.")
 @click.argument("name", required=False, shell_complete=completing("all scenes"))
 @wide_option
-@json_option
-@body_options
-@plugin_option
+@scene_options
 def scenes(name: Any, wide: bool, as_json: bool) -> None:
     """List every scene with its purpose, or show the one called NAME: its top, start, horizon and motion.
 

@@ -47,9 +47,7 @@ EXECUTION = {
 @click.option("--no-guard", "guard", flag_value="off", help="Do not warn before the run of a large error.")
 @click.option("--output", type=File(), help="Write the run to this netCDF file.")
 @click.option("--figure", type=File(), help="Draw the run and its errors: .png, .svg or .pdf.")
-@common.body_options
-@common.plugin_option
-@common.json_option
+@common.scene_options
 def run(
     scene: Any, integrator: str, guard: str, output: str | None, figure: str | None, as_json: bool, **settings: Any
 ) -> None:

@@ -29,14 +29,7 @@ from symtop.core.parallel import cores
 from symtop.explore import answers, cost
 
 STATIC = Path(__file__).parent / "static"
-PAGES = {
-    "/": ("page.html", "text/html; charset=utf-8"),
-    **{
-        f"/{name}.js": (f"{name}.js", "text/javascript; charset=utf-8")
-        for name in ("explore", "draw", "portrait", "map", "cost", "stories")
-    },
-    "/style.css": ("style.css", "text/css; charset=utf-8"),
-}
+KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}  # of its files
 PATIENCE = 60.0  # seconds to wait for the rest of a request, or for the next one of a connection
 MOST_WAITING = 256  # connections that the system holds until a thread takes them
 MOST_OPEN, FEW, HURRY = 256, 64, 2.0  # connections at once; those beyond a few wait so many seconds for a request
@@ -121,9 +114,9 @@ class Handler(BaseHTTPRequestHandler):
         """The page, its files and the catalogue."""
         if not self._is_local():
             return
-        if self.place in PAGES:
-            name, kind = PAGES[self.place]
-            self._reply(200, (STATIC / name).read_bytes(), kind)
+        file = STATIC / (self.place.removeprefix("/") or "page.html")
+        if file.parent == STATIC and file.suffix in KINDS and file.is_file():
+            self._reply(200, file.read_bytes(), f"{KINDS[file.suffix]}; charset=utf-8")
         elif self.place == "/catalogue":
             self._reply(200, json.dumps(answers.catalogue()).encode(), JSON)
         else:

@@ -51,11 +51,8 @@ def error_table(
     rows: list[dict[str, float | str]] = []
     enough = False
     for setting in settings:
-        if enough:
-            rows.append(blank_row(method))
-            continue
-        rows.append(error_row(scene, method, setting, horizon, observe))
-        enough = float(rows[-1]["force_evaluations"]) > ENOUGH[method.implementation]
+        rows.append(blank_row(method) if enough else error_row(scene, method, setting, horizon, observe))
+        enough = enough or float(rows[-1]["force_evaluations"]) > ENOUGH[method.implementation]
     return as_table(rows)
 
 

@@ -25,6 +25,7 @@ import xarray as xr
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, one_of, positive
 from symtop.core.numbers import EPSILON, real_numbers
+from symtop.measure.conservation import CONSTANTS
 from symtop.methods.framework.lanes import members_of
 from symtop.model import charts
 from symtop.model.body import Attitude, RigidBody
@@ -183,7 +184,6 @@ def errors_against(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str
 LENGTH = 1e-3  # how far from one the length of an axis or a quaternion may be: more than single precision leaves
 FAR, NEAR = 0.1, 0.01  # rad from the true attitude: another order of a quaternion, and the right one
 BEYOND = 100.0  # horizons: milliseconds for seconds are a thousand
-CONSTANTS = ("energy", "p_phi", "p_psi")
 SHAPES = {"axis": (3,), "quaternion": (4,), "momentum": (3,), **dict.fromkeys(("theta", "phi", "psi", *CONSTANTS), ())}
 ENOUGH = ("axis", "quaternion", "theta")  # one of them there must be
 

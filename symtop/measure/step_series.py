@@ -94,11 +94,7 @@ def step_series(step: StepMap, start: Angles, period: float) -> Series:
     Raises SymtopError if no step succeeds.
     """
     z, before = step.point(start), step.at(start)
-
-    def image(h: float) -> Array:
-        return aligned(step.chart, step.image(z, h), before)
-
-    return compared(image, step.motion(start), period, step.chart)
+    return compared(lambda h: aligned(step.chart, step.image(z, h), before), step.motion(start), period, step.chart)
 
 
 def compared(

@@ -30,6 +30,12 @@ def plus(a: Any, s: Any, b: Any) -> Any:
 
 
 @register_jitable
+def conjugate(q: Any) -> Any:
+    """q*."""
+    return q[0], -q[1], -q[2], -q[3]
+
+
+@register_jitable
 def rotated(q: Any, v: Any) -> Any:
     """q v q* of a unit quaternion."""
     u = q[1], q[2], q[3]
@@ -43,6 +49,14 @@ def solve3(a: Any, b: Any, c: Any, y: Any) -> Any:
     bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
     inverse = 1.0 / dot(a, bc)
     return inverse * dot(bc, y), inverse * dot(ca, y), inverse * dot(ab, y)
+
+
+@register_jitable
+def summed(state: Any, step: Any) -> Any:
+    """state + step, component by component."""
+    for i in range(len(state)):
+        state = set_item(state, i, state[i] + step[i])
+    return state
 
 
 @register_jitable
@@ -64,9 +78,7 @@ def accumulate(state: Any, low: Any, dstate: Any) -> Any:
 @register_jitable
 def accumulate_plainly(state: Any, low: Any, dstate: Any) -> Any:
     """Sums without compensation, as everybody else's loop has them: to compare."""
-    for i in range(len(state)):
-        state = set_item(state, i, state[i] + dstate[i])
-    return state, low
+    return summed(state, dstate), low
 
 
 @register_jitable

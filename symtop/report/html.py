@@ -63,17 +63,18 @@ class Writer:
         return f'<div class="formulas">{shown}</div>'
 
     def _markdown(self, text: str) -> str:
-        tokens, title, made = self._parser.parse(text), "", []
-        for begin, end in _blocks(tokens):
-            block = tokens[begin:end]
+        blocks, title, made = _blocks(self._parser.parse(text)), "", []
+        while blocks:
+            block = blocks.pop(0)
             kind = block[0].type
             bold = _title(block[1]) if kind == "paragraph_open" else ""
             if bold:
                 block[0].attrSet("class", "title")
             if kind == "paragraph_open" and _only(block[1], "image"):
-                made.append(self._figure(block[1].children[0]))  # type: ignore[index]
-            elif kind == "paragraph_open" and made and made[-1].endswith("<figcaption></figcaption></figure>"):
-                made[-1] = self._captioned(made[-1], self._rendered(block[1:2]))
+                below = blocks[0] if blocks else block
+                captioned = below[0].type == "paragraph_open" and not _only(below[1], "image")
+                caption = blocks.pop(0)[1:2] if captioned else []
+                made.append(self._figure(block[1].children[0], caption))  # type: ignore[index]
             elif kind == "table_open":
                 made.append(self._table(block, title))
             elif kind == "heading_open":
@@ -91,23 +92,19 @@ class Writer:
         level = block[0].tag
         return f'<{level} id="{name}">{self._rendered(block[1:2])} {link(name, block[1].content)}</{level}>'
 
-    def _figure(self, image: Token) -> str:
+    def _figure(self, image: Token, caption: Sequence[Token]) -> str:
         address, alt = str(image.attrs["src"]), html.escape(image.content)
         shown = self.images.get(address, {})
         size = f' width="{shown["width"]}" height="{shown["height"]}"' if shown else ""
         lazy = ' loading="lazy" decoding="async"' if self._shown >= AT_ONCE else ""
         self._shown += 1
         name = self.anchor(Path(address).stem)
+        words = f"{self._rendered(caption)} {link(name, f'figure {name}')}" if caption else ""
         return (
             f'<figure id="{name}"><div class="scroll" tabindex="0" role="region" aria-label="Figure {name}"><img '
             f'src="{shown.get("source", address)}"{size}{lazy} alt="{alt}"></div>'
-            "<figcaption></figcaption></figure>"
+            f"<figcaption>{words}</figcaption></figure>"
         )
-
-    def _captioned(self, figure: str, caption: str) -> str:
-        name = figure.partition('id="')[2].partition('"')[0]
-        words = f"<figcaption>{caption} {link(name, f'figure {name}')}</figcaption>"
-        return figure.replace("<figcaption></figcaption>", words)
 
     def _table(self, block: Sequence[Token], title: str) -> str:
         name = self.anchor(slug(title) or "table")
@@ -126,10 +123,10 @@ def link(name: str, what: str) -> str:
     return f'<a class="anchor" href="#{name}" aria-label="Link to {html.escape(what)}">#</a>'
 
 
-def _blocks(tokens: Sequence[Token]) -> list[tuple[int, int]]:
-    """Beginning and end of each block of the highest level."""
+def _blocks(tokens: Sequence[Token]) -> list[Sequence[Token]]:
+    """The blocks of the highest level."""
     ends = [place + 1 for place, token in enumerate(tokens) if token.level == 0 and token.nesting <= 0]
-    return list(itertools.pairwise([0, *ends]))
+    return [tokens[begin:end] for begin, end in itertools.pairwise([0, *ends])]
 
 
 def _only(inline: Token, kind: str) -> bool:

@@ -28,16 +28,15 @@ from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
 from symtop.core.progress import progress_bar
 from symtop.core.signals import ending_on_sigterm
-from symtop.methods.framework.loop import FixedStep, Loop, Position, inside
+from symtop.methods.framework.loop import FixedStep, Loop, Marks, Position, inside
 from symtop.methods.framework.plan import OK, OUTCOMES, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
-from symtop.model.charts import BODY, View, body_energy
+from symtop.model.charts import BODY, Array, View, body_energy
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run import modified_energy as modified
 from symtop.run.guard import MOST_STEPS
 from symtop.run.simulation import chart_of as smallest_chart
 
-Array = np.ndarray
 Gauge = Callable[..., dict[str, Array]]  # states and momenta of samples -> quantities
 
 PER_NUTATION = 1000.37  # steps, where nobody says otherwise: not commensurate with the nutation
@@ -59,7 +58,7 @@ def windows(steps: int) -> list[int]:
     return ends
 
 
-def scattered(begin: int, end: int, samples: int = SAMPLES) -> Array:
+def scattered(begin: int, end: int, samples: int = SAMPLES) -> Marks:
     """At most `samples` whole steps in (begin, end], `end` among them, with strides of no fixed ratio."""
     place = np.arange(samples, dtype=float)
     place += np.mod(GOLDEN * place, 1.0)

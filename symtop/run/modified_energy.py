@@ -22,10 +22,9 @@ from collections.abc import Callable
 import numpy as np
 
 from symtop.methods.framework.registry import Integrator, integrator
-from symtop.model.charts import View, axis_of
+from symtop.model.charts import Array, View, axis_of
 from symtop.model.scenes import Scene
 
-Array = np.ndarray
 HARMONICS = 40
 
 

@@ -87,7 +87,7 @@ def test_an_answer_on_a_body_is_the_run_beside_its_truth():
             answers.answer(answers.setup(fields("heavy-chaotic", "rk4", **{"step_size": 1e3} | wrong)))
     with pytest.raises(SymtopError, match="map must be of a top"):
         answers.grid(fields("tennis-racket", "rk4"))
-    with pytest.raises(SymtopError, match="chart for bodies"):
+    with pytest.raises(SymtopError, match="must have the chart body"):
         answers.setup(fields("tennis-racket", "midpoint"))
 
 

@@ -9,7 +9,7 @@ import pytest
 import symtop
 from symtop.core.jit import compile_kernel
 from symtop.methods.runge_kutta import nystrom
-from symtop.methods.runge_kutta.nystrom import DPRKN8, Reduced
+from symtop.methods.runge_kutta.nystrom import DPRKN8, REDUCED
 from symtop.model.scenes import closed_form
 
 NODES = np.array([0.0, *DPRKN8.c])
@@ -85,7 +85,7 @@ def test_the_table_has_order_eight_and_its_estimate_six():
 
 def compiled(name, scene, h, **changed):
     """What `sample` returns for a step of h from the start of a scene, or `refine` leaves in the last row."""
-    form = Reduced()
+    form = REDUCED
     par, state = form.prepare(scene.top, scene.start)
     par = par._replace(**changed)
     method = nystrom.Nystrom(DPRKN8)(form.field)

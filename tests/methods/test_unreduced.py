@@ -90,7 +90,7 @@ def one_iteration(par, rule, state, carry, h):
     """A step with a single Newton iteration from the last rates: the equations are solved to O(h^2) only."""
     w, v, u = carry[0]
     sums = kernel._node_sums(par, rule, state[0], (w, v, u), h)
-    dw, dv, du = kernel._correction(kernel._inertia, par, sums, (w, v, u), state[3:], h)
+    dw, dv, du = kernel._correction(par, sums, (w, v, u), state[3:], h)
     w, v, u = w + dw, v + dv, u + du
     sums = kernel._node_sums(par, rule, state[0], (w, v, u), h)
     p_theta, p_phi, p_psi = par.I1 * w + h * sums.after, sums.across * v + sums.mixed * u, sums.mixed * v + par.I3 * u
@@ -125,11 +125,7 @@ def test_newtons_jacobian_is_that_of_the_discrete_legendre_transform(rule):
         rate = root + distance * np.array([1.0, -0.7, 0.4])
         sums = kernel._node_sums(par, table, state[0], tuple(rate), h)
         sums = sums._replace(**{name: value + 0.01 for name, value in sums._asdict().items() if name == spoil})
-        return np.max(
-            np.abs(
-                rate + kernel._correction(kernel._inertia, par, sums, tuple(rate), left_momenta(tuple(root)), h) - root
-            )
-        )
+        return np.max(np.abs(rate + kernel._correction(par, sums, tuple(rate), left_momenta(tuple(root)), h) - root))
 
     assert miss(1e-3, "") / miss(5e-4, "") == pytest.approx(4.0, rel=0.02)
     for entry in ("stiffness", "before_v", "before_u", "after_v", "after_u"):

@@ -78,7 +78,7 @@ METHODS = "symtop.methods"
         (f"{METHODS}.library.scipy_ivp:compiled_field", SCIPY),
         (f"{METHODS}.runge_kutta.explicit:weighted", {"rk4", "rk45-compiled", "tsit5", "dop853-compiled", "vern9"}),
         (f"{METHODS}.splitting.reversible:march", {"stormer-verlet-reversible"}),
-        (f"{METHODS}.lie_group.generalised_alpha:turn", {"generalised-alpha"}),
+        (f"{METHODS}.lie_group.generalised_alpha:_corrected", {"generalised-alpha"}),
         (f"{METHODS}.taylor.heyoka:propagate", {"taylor", "taylor-longdouble", "taylor-quad"}),
         ("symtop.cli.common:as_text", set()),
         ("symtop.report.page:write", set()),

@@ -81,7 +81,7 @@ from symtop.methods.framework.preparation import Body, Preparation
 from symtop.methods.framework.registry import ENGINE, Integrator
 from symtop.methods.framework.space import L_at, e_at, finite_outcome, observe_attitude, observe_axis, q_at
 from symtop.methods.splitting.body import SORTED, five_rotations
-from symtop.methods.vectors import cross, dot, plus, scaled
+from symtop.methods.vectors import conjugate, cross, dot, plus, scaled, summed
 from symtop.model.body import product
 from symtop.model.charts import BODY
 
@@ -111,7 +111,22 @@ class EngineBody(NamedTuple):
     one: float = 1.0
 
 
-def _prepared(place_at: Callable[..., Any], size: int, *, rates: bool) -> Preparation:
+@register_jitable
+def turned(p: Any, v: Any) -> Any:
+    """How far the rotation p moves a vector: p v p* - v."""
+    u = p[1], p[2], p[3]
+    c = cross(u, v)
+    d = plus(cross(u, c), p[0], c)
+    return d[0] + d[0], d[1] + d[1], d[2] + d[2]  # doubled by addition, in any precision
+
+
+@register_jitable
+def rotated(par: Any, p: Any, v: Any) -> Any:
+    """p v p*."""
+    return plus(v, par.one, turned(p, v))
+
+
+def _top_prepared(place_at: Callable[..., Any], size: int, *, rates: bool) -> Preparation:
     """A start as (e, L) or (q, L), or with `rates` w for L: the angular momentum of a body whose moments are one."""
 
     def prepare(top, at):  # type: ignore[no-untyped-def]
@@ -121,30 +136,17 @@ def _prepared(place_at: Callable[..., Any], size: int, *, rates: bool) -> Prepar
     return Preparation(prepare, size)
 
 
-def _top_momentum(par: Any, e: Any, w: Any) -> Any:
-    return plus(scaled(par.I1, w), (par.I3 - par.I1) * dot(e, w), e)
+def _body_prepared(*, rates: bool) -> Preparation:
+    """The same of a body without symmetry."""
 
+    def prepare(body, at):  # type: ignore[no-untyped-def]
+        q, v = (at.w, at.x, at.y, at.z), (at.M1, at.M2, at.M3)
+        if rates:
+            v = body.a1 * at.M1, body.a2 * at.M2, body.a3 * at.M3
+        par = EngineBody(body.I1, body.I2, body.I3, body.c1, body.c2, body.c3, 0.0, 0.5, 1.0)
+        return par, (*q, *rotated(par, q, v))
 
-def _top_velocity(par: Any, e: Any, L: Any) -> Any:
-    return plus(scaled(par.one / par.I1, L), (par.one / par.I3 - par.one / par.I1) * dot(e, L), e)
-
-
-def _top_torque(par: Any, e: Any) -> Any:
-    return -par.mgl * e[1], par.mgl * e[0], par.zero
-
-
-def _top_pulled(par: Any, e: Any, up: Any) -> Any:
-    return scaled(par.mgl, cross(up, e))
-
-
-def _top_oriented(par: Any, e: Any, p: Any) -> Any:
-    return rotated(par, p, e)
-
-
-@register_jitable
-def conjugate(q: Any) -> Any:
-    """q*."""
-    return q[0], -q[1], -q[2], -q[3]
+    return prepared(prepare)
 
 
 def _body_momentum(par: Any, q: Any, w: Any) -> Any:
@@ -157,23 +159,23 @@ def _body_velocity(par: Any, q: Any, L: Any) -> Any:
     return rotated(par, q, (M[0] / par.I1, M[1] / par.I2, M[2] / par.I3))
 
 
-def _body_pulled(par: Any, q: Any, up: Any) -> Any:
-    return cross(up, rotated(par, q, (par.c1, par.c2, par.c3)))
-
-
-def _body_torque(par: Any, q: Any) -> Any:
-    return _body_pulled(par, q, (par.zero, par.zero, par.one))
-
-
-def _body_oriented(par: Any, q: Any, p: Any) -> Any:
-    return product(p, q)
-
-
-momentum = by_length((3, _top_momentum), (4, _body_momentum))  # I_s w
-velocity = by_length((3, _top_velocity), (4, _body_velocity))  # I_s^-1 L
-torque = by_length((3, _top_torque), (4, _body_torque))  # gravity about the fixed point
-pulled = by_length((3, _top_pulled), (4, _body_pulled))  # the same where the vertical is `up`
-oriented = by_length((3, _top_oriented), (4, _body_oriented))  # after a rotation p
+# of the orientation of a top, its axis, or of a body, its attitude
+momentum = by_length(  # I_s w
+    (3, lambda par, e, w: plus(scaled(par.I1, w), (par.I3 - par.I1) * dot(e, w), e)), (4, _body_momentum)
+)
+velocity = by_length(  # I_s^-1 L
+    (3, lambda par, e, L: plus(scaled(par.one / par.I1, L), (par.one / par.I3 - par.one / par.I1) * dot(e, L), e)),
+    (4, _body_velocity),
+)
+pulled = by_length(  # gravity about the fixed point where the vertical is `up`
+    (3, lambda par, e, up: scaled(par.mgl, cross(up, e))),
+    (4, lambda par, q, up: cross(up, rotated(par, q, (par.c1, par.c2, par.c3)))),
+)
+torque = by_length(
+    (3, lambda par, e: (-par.mgl * e[1], par.mgl * e[0], par.zero)),
+    (4, lambda par, q: pulled(par, q, (par.zero, par.zero, par.one))),
+)
+oriented = by_length((3, lambda par, e, p: rotated(par, p, e)), (4, lambda _par, q, p: product(p, q)))  # after a turn p
 
 
 @register_jitable
@@ -213,30 +215,10 @@ def normalised(par: Any, q: Any) -> Any:
 
 
 @register_jitable
-def turned(p: Any, v: Any) -> Any:
-    """How far the rotation p moves a vector: p v p* - v."""
-    u = p[1], p[2], p[3]
-    c = cross(u, v)
-    d = plus(cross(u, c), p[0], c)
-    return d[0] + d[0], d[1] + d[1], d[2] + d[2]  # doubled by addition, in any precision
-
-
-@register_jitable
-def rotated(par: Any, p: Any, v: Any) -> Any:
-    """p v p*."""
-    return plus(v, par.one, turned(p, v))
-
-
-@register_jitable
 def axis(q: Any) -> Any:
     """The axis of an attitude, the third column of its matrix."""
     x, y = q[1] * q[3] + q[0] * q[2], q[2] * q[3] - q[0] * q[1]
     return x + x, y + y, q[0] * q[0] - q[1] * q[1] - q[2] * q[2] + q[3] * q[3]
-
-
-@register_jitable
-def _itself(q: Any) -> Any:
-    return q
 
 
 @register_jitable
@@ -255,62 +237,56 @@ def _nothing(par: Any, e: Any, v: Any) -> Any:
 
 
 @register_jitable
-def _momenta(L: Any, e: Any) -> Any:
-    """p_phi = L_z and p_psi = L.e."""
-    return L[2], L[0] * e[0] + L[1] * e[1] + L[2] * e[2]
+def _axis_placed(y: Any) -> Any:
+    """What a map takes for the orientation of a state, and its axis."""
+    e = y[0], y[1], y[2]
+    return e, e
 
 
 @register_jitable
-def _after(before: Any, dstate: Any, i: int) -> Any:
-    return before[i] + dstate[i], before[i + 1] + dstate[i + 1], before[i + 2] + dstate[i + 2]
+def _attitude_placed(y: Any) -> Any:
+    e = axis(y)
+    return e, e
 
 
-def _observe_rates_on_axis(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
-    e = _after(before, dstate, 0)
-    return _momenta(momentum(par, e, _after(before, dstate, 3)), e)
+@register_jitable
+def _body_placed(y: Any) -> Any:
+    q = y[0], y[1], y[2], y[3]
+    return q, axis(q)
 
 
-def _observe_rates_on_attitude(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
-    e = axis((before[0] + dstate[0], *_after(before, dstate, 1)))
-    return _momenta(momentum(par, e, _after(before, dstate, 4)), e)
+def _observing(placed: Callable[..., Any]) -> Callable[..., Any]:
+    """p_phi = L_z and p_psi = L.e of a state with rates."""
+
+    def observe(par, rule, before, dstate, h):  # type: ignore[no-untyped-def]
+        y = summed(before, dstate)
+        orientation, e = placed(y)
+        L = momentum(par, orientation, y[-3:])
+        return L[2], dot(L, e)
+
+    return observe
 
 
-def _observe_rates_on_body(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
-    q = before[0] + dstate[0], *_after(before, dstate, 1)
-    return _momenta(momentum(par, q, _after(before, dstate, 4)), axis(q))
+def _presenting(placed: Callable[..., Any]) -> Callable[..., Any]:
+    """Momenta in the place of rates."""
+
+    def present(par, rule, state, k, h):  # type: ignore[no-untyped-def]
+        return (*state[:-3], *momentum(par, placed(state)[0], state[-3:]))
+
+    return present
 
 
-def _present_rates_on_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    e = state[0], state[1], state[2]
-    return (*e, *momentum(par, e, (state[3], state[4], state[5])))
-
-
-def _present_rates_on_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
+@register_jitable
+def _in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
+    """A momentum in the axes of the body."""
     q = state[0], state[1], state[2], state[3]
-    return (*q, *momentum(par, axis(q), (state[4], state[5], state[6])))
+    return (*q, *rotated(par, conjugate(q), state[4:]))
 
 
-def _present_rates_on_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    q = state[0], state[1], state[2], state[3]
-    b = rotated(par, conjugate(q), (state[4], state[5], state[6]))
-    return (*q, par.I1 * b[0], par.I2 * b[1], par.I3 * b[2])
-
-
-def _present_momentum_on_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    q = state[0], state[1], state[2], state[3]
-    return (*q, *rotated(par, conjugate(q), (state[4], state[5], state[6])))
-
-
-def _body_with_momentum(body: Any, at: Any) -> Any:
-    q = at.w, at.x, at.y, at.z
-    par = EngineBody(body.I1, body.I2, body.I3, body.c1, body.c2, body.c3, 0.0, 0.5, 1.0)
-    return par, (*q, *rotated(par, q, (at.M1, at.M2, at.M3)))
-
-
-def _body_with_rates(body: Any, at: Any) -> Any:
-    q = at.w, at.x, at.y, at.z
-    par = EngineBody(body.I1, body.I2, body.I3, body.c1, body.c2, body.c3, 0.0, 0.5, 1.0)
-    return par, (*q, *rotated(par, q, (body.a1 * at.M1, body.a2 * at.M2, body.a3 * at.M3)))
+def _momentum_in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
+    """The same of rates."""
+    w, x, y, z, b1, b2, b3 = _in_body(par, rule, state, k, h)
+    return w, x, y, z, par.I1 * b1, par.I2 * b2, par.I3 * b3
 
 
 class Carried(NamedTuple):
@@ -322,14 +298,16 @@ class Carried(NamedTuple):
 
 
 VELOCITY = {
-    "axis": Carried(_prepared(e_at, 6, rates=True), _observe_rates_on_axis, _present_rates_on_axis),
-    "attitude": Carried(_prepared(q_at, 7, rates=True), _observe_rates_on_attitude, _present_rates_on_attitude),
-    BODY: Carried(prepared(_body_with_rates), _observe_rates_on_body, _present_rates_on_body),
+    "axis": Carried(_top_prepared(e_at, 6, rates=True), _observing(_axis_placed), _presenting(_axis_placed)),
+    "attitude": Carried(
+        _top_prepared(q_at, 7, rates=True), _observing(_attitude_placed), _presenting(_attitude_placed)
+    ),
+    BODY: Carried(_body_prepared(rates=True), _observing(_body_placed), _momentum_in_body),
 }
 ANGULAR_MOMENTUM = {
-    "axis": Carried(_prepared(e_at, 6, rates=False), observe_axis),
-    "attitude": Carried(_prepared(q_at, 7, rates=False), observe_attitude),
-    BODY: Carried(prepared(_body_with_momentum), observe_attitude, _present_momentum_on_body),
+    "axis": Carried(_top_prepared(e_at, 6, rates=False), observe_axis),
+    "attitude": Carried(_top_prepared(q_at, 7, rates=False), observe_attitude),
+    BODY: Carried(_body_prepared(rates=False), observe_attitude, _in_body),
 }
 
 
@@ -353,22 +331,19 @@ def axis_loop(step: Callable[..., Any], carried: Carried, reused: Callable[..., 
     return kernel_loop(begin, increment, carried.observe, present=carried.present)
 
 
-def _of_top(number: Callable[..., Any]) -> Callable[..., Any]:
-    @register_jitable
-    def narrowed(par):  # type: ignore[no-untyped-def]
-        numbers = number(par.I1), number(par.I3), number(par.mgl)
-        return EngineTop(*numbers, number(par.zero), number(par.half), number(par.one))
+def _narrowing(number: Callable[..., Any], count: int) -> Callable[..., Any]:
+    """The first `count` numbers of a record in a precision."""
+    if count == 0:
 
-    return narrowed
+        def narrowed(par):  # type: ignore[no-untyped-def]
+            return ()
+    else:
+        before, last = _narrowing(number, count - 1), count - 1
 
+        def narrowed(par):  # type: ignore[no-untyped-def]
+            return (*before(par), number(par[last]))
 
-def _of_body(number: Callable[..., Any]) -> Callable[..., Any]:
-    @register_jitable
-    def narrowed(par):  # type: ignore[no-untyped-def]
-        moments, c = (number(par.I1), number(par.I2), number(par.I3)), (number(par.c1), number(par.c2), number(par.c3))
-        return EngineBody(*moments, *c, number(par.zero), number(par.half), number(par.one))
-
-    return narrowed
+    return register_jitable(narrowed)
 
 
 def attitude_loop(
@@ -377,16 +352,17 @@ def attitude_loop(
 ) -> Loop:  # fmt: skip
     """The loop on the attitude around a map, of a top or of a `body` without symmetry, in the precision of `number`."""
     register_jitable(step)
-    narrowed, orientation = (_of_body(number), _itself) if body else (_of_top(number), axis)
+    kind: Any = EngineBody if body else EngineTop
+    narrowed, placed = _narrowing(number, len(kind._fields)), _body_placed if body else _attitude_placed
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        return reused(par, orientation((state[0], state[1], state[2], state[3])), (state[4], state[5], state[6]))
+        return reused(par, placed(state)[0], (state[4], state[5], state[6]))
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        there, cut = narrowed(par), Substeps(rule.parts, number(rule.share))
+        there, cut = kind(*narrowed(par)), Substeps(rule.parts, number(rule.share))
         q = number(state[0]), number(state[1]), number(state[2]), number(state[3])
         v = number(state[4]), number(state[5]), number(state[6])
-        p, v, carry = step(there, cut, orientation(q), v, carry, number(h))
+        p, v, carry = step(there, cut, placed(q)[0], v, carry, number(h))
         q = normalised(there, product(p, q))
         dstate = (
             _double(q[0]) - state[0], _double(q[1]) - state[1], _double(q[2]) - state[2], _double(q[3]) - state[3],
@@ -409,11 +385,6 @@ class Substeps(NamedTuple):
 def _pulled(par: Any, e: Any, w: Any, h: Any) -> Any:
     """w + h I_s^-1 tau."""
     return plus(w, h, velocity(par, e, torque(par, e)))
-
-
-def _top_implicit(par: Any, e: Any, w: Any, r: Any, h: Any) -> Any:
-    k = h * (par.I1 - par.I3) * dot(e, w)
-    return scaled(par.one / (par.I1 * par.I1 + k * k), plus(scaled(par.I1, r), -k, cross(e, r)))
 
 
 @register_jitable
@@ -440,7 +411,13 @@ def _body_implicit(par: Any, q: Any, w: Any, r: Any, h: Any) -> Any:
     return rotated(par, q, _solved(par, h, columns, rotated(par, back, r)))
 
 
-implicit = by_length((3, _top_implicit), (4, _body_implicit))  # J^-1 r, of a top of a right side across the axis
+def _top_implicit(par: Any, e: Any, w: Any, r: Any, h: Any) -> Any:
+    """r lies across the axis."""
+    k = h * (par.I1 - par.I3) * dot(e, w)
+    return scaled(par.one / (par.I1 * par.I1 + k * k), plus(scaled(par.I1, r), -k, cross(e, r)))
+
+
+implicit = by_length((3, _top_implicit), (4, _body_implicit))  # J^-1 r
 
 
 @register_jitable
@@ -453,27 +430,10 @@ def _rescaled(par: Any, e: Any, w: Any, h: Any) -> Any:
     return velocity(par, e, scaled(stretch, N))
 
 
-@register_jitable
-def _explicit(par: Any, e: Any, w: Any, h: Any) -> Any:
-    return plus(w, h, acceleration(par, e, w))
-
-
-@register_jitable
-def _newton_step(par: Any, e: Any, w: Any, h: Any) -> Any:
-    return plus(w, h, implicit(par, e, w, moment(par, e, w), h))
-
-
-@register_jitable
 def _implicit_then_torque(par: Any, e: Any, w: Any, h: Any) -> Any:
     return _pulled(par, e, plus(w, -h, implicit(par, e, w, cross(w, momentum(par, e, w)), h)), h)
 
 
-@register_jitable
-def _rescaled_then_torque(par: Any, e: Any, w: Any, h: Any) -> Any:
-    return _pulled(par, e, _rescaled(par, e, w, h), h)
-
-
-@register_jitable
 def _torque_then_rescaled(par: Any, e: Any, w: Any, h: Any) -> Any:
     """|L| kept by a change of w: in single precision I_s^-1 (I_s w) would round w the same way in every step."""
     w = _pulled(par, e, w, h)
@@ -507,13 +467,9 @@ def _body_projected(par: Any, q: Any, L: Any, h: Any) -> Any:
 projected = by_length((3, _top_projected), (4, _body_projected))
 
 
-@register_jitable
-def _projected_then_torque(par: Any, e: Any, w: Any, h: Any) -> Any:
-    return _pulled(par, e, projected(par, e, momentum(par, e, w), h), h)
-
-
 def _kicked(rate: Callable[..., Any], turn: Callable[..., Any] = exponential) -> Callable[..., Any]:
     """The map that changes w by ``rate(par, e, w, h)`` and turns the body by the new one."""
+    register_jitable(rate)
 
     def step(par, rule, e, w, carry, h):  # type: ignore[no-untyped-def]
         w = rate(par, e, w, h)
@@ -739,19 +695,21 @@ def built_in() -> list[Integrator]:
         _engine("no-gyro-linear", _kicked(_pulled, linear), None,
                 "cannon-es, ODE with its gyroscopic mode off: no gyroscopic term, a linear turn", "cannon-es ode",
                 "p_psi", energy_error="bounded"),
-        _engine("mujoco-euler", _kicked(_explicit), 1, "MuJoCo Euler, PyBullet, DART: explicit gyroscopic term",
-                "mujoco pybullet dart"),
-        _engine("mujoco-implicit", _kicked(_newton_step), 1, "MuJoCo implicit: one Newton step of the velocity",
-                "mujoco", "p_psi"),
+        _engine("mujoco-euler", _kicked(lambda par, e, w, h: plus(w, h, acceleration(par, e, w))), 1,
+                "MuJoCo Euler, PyBullet, DART: explicit gyroscopic term", "mujoco pybullet dart"),
+        _engine("mujoco-implicit",
+                _kicked(lambda par, e, w, h: plus(w, h, implicit(par, e, w, moment(par, e, w), h))), 1,
+                "MuJoCo implicit: one Newton step of the velocity", "mujoco", "p_psi"),
         *_both("bullet", _kicked(_implicit_then_torque), 1,
                "Bullet by default: implicit gyroscopic term, then the torque", "bullet", "p_psi"),
-        *_both("jolt", _kicked(_rescaled_then_torque), 1, "Jolt with its gyroscopic term: |L| kept, then the torque",
-               "jolt"),
+        *_both("jolt", _kicked(lambda par, e, w, h: _pulled(par, e, _rescaled(par, e, w, h), h)), 1,
+               "Jolt with its gyroscopic term: |L| kept, then the torque", "jolt"),
         *_both("physx", _kicked(_torque_then_rescaled), 1, "PhysX with its gyroscopic flag: the torque, then |L| kept",
                "physx"),
         *_both("rapier", substepped, 1, "Rapier by default: four substeps, |L| kept in each",
                "rapier", rule=Substeps(4, 0.25)),
-        _engine("ode", _kicked(_projected_then_torque, linear), 1,
+        _engine("ode", _kicked(
+                    lambda par, e, w, h: _pulled(par, e, projected(par, e, momentum(par, e, w), h), h), linear), 1,
                 "ODE by default: gyroscopic term implicit in the velocity", "ode lacoursiere-2006"),
         _engine("lammps-rigid", richardson, 2, "LAMMPS fix rigid: half kicks around an extrapolated rotation",
                 "lammps", "p_phi", carried=ANGULAR_MOMENTUM),

@@ -64,18 +64,6 @@ def _momenta(body: Any, at: Any) -> Any:
     return at.M1 * g1 + at.M2 * g2 + at.M3 * g3, at.M3
 
 
-def _on_body(body: Any, at: Any) -> Any:
-    return body, (at.w, at.x, at.y, at.z, at.M1, at.M2, at.M3)
-
-
-def _turned(body: Any, at: Any) -> Any:
-    return body, (at.w, -at.x, -at.y, -at.z, at.M1, at.M2, at.M3)
-
-
-def _turned_back(par: Any, t: float, y: Any) -> Any:
-    return y[0], -y[1], -y[2], -y[3], y[4], y[5], y[6]
-
-
 def _of_top(top: Any, at: Any) -> Any:
     w, x, y, z = q_at(at)
     a1, a3 = 1.0 / top.I1, 1.0 / top.I3
@@ -96,7 +84,9 @@ def prepared(numbers: Any) -> Preparation:
     return Preparation(numbers, 7, opened=opened, momenta=_momenta, given=14)
 
 
-on_body, turned, turned_back = prepared(_on_body), prepared(_turned), Shown(_turned_back, 7)
+on_body = prepared(lambda body, at: (body, (at.w, at.x, at.y, at.z, at.M1, at.M2, at.M3)))
+turned = prepared(lambda body, at: (body, (at.w, -at.x, -at.y, -at.z, at.M1, at.M2, at.M3)))
+turned_back = Shown(lambda _par, _t, y: (y[0], -y[1], -y[2], -y[3], y[4], y[5], y[6]), 7)
 
 
 @register_jitable

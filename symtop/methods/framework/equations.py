@@ -23,7 +23,8 @@ from symtop.core.numbers import real_numbers
 from symtop.methods.framework import angles, body, space
 from symtop.methods.framework.angles import BareTop, field_angles
 from symtop.methods.framework.plan import OUTCOMES, Array, Run
-from symtop.methods.framework.space import SpaceTop, field_attitude, field_axis
+from symtop.methods.framework.space import SpaceTop, axis_of, field_attitude, field_axis
+from symtop.methods.vectors import dot
 from symtop.model import charts
 from symtop.model.charts import BODY, CHARTS, space_momenta
 from symtop.model.top import Angles, SymmetricTop
@@ -74,31 +75,23 @@ def as_run(
     return Run(shown, p_phi, p_psi, steps, evaluations, 0, OUTCOMES[outcome], reached)
 
 
-@register_jitable
-def _angles(I1: Any, I3: Any, mgl: Any, y: Any) -> Any:
-    return field_angles(BareTop(I1, I3, mgl), y)
-
-
-@register_jitable
-def _axis(I1: Any, I3: Any, mgl: Any, y: Any) -> Any:
-    return field_axis(SpaceTop(I1, mgl, 0.0), y)
-
-
-@register_jitable
 def _attitude(I1: Any, I3: Any, mgl: Any, y: Any) -> Any:
     """With L.e taken from the state; in the kernels it is a parameter of the run."""
-    w, x, v, z = y[0], y[1], y[2], y[3]
-    along = 2.0 * (x * z + w * v) * y[4] + 2.0 * (v * z - w * x) * y[5] + (w * w - x * x - v * v + z * z) * y[6]
+    along = dot(axis_of(y[0], y[1], y[2], y[3]), (y[4], y[5], y[6]))
     return field_attitude(SpaceTop(I1, mgl, along * (1.0 / I3 - 1.0 / I1)), y)
 
 
-_RIGHT = {"angles": (_angles, (6,)), "axis": (_axis, (6,)), "attitude": (_attitude, (7,))}  # and the shape of y
+_RIGHT: dict[str, tuple[Callable[..., Any], tuple[int]]] = {  # of the numbers of a top and y; the shape of y
+    "angles": (lambda I1, I3, mgl, y: field_angles(BareTop(I1, I3, mgl), y), (6,)),
+    "axis": (lambda I1, _I3, mgl, y: field_axis(SpaceTop(I1, mgl, 0.0), y), (6,)),
+    "attitude": (_attitude, (7,)),
+}
 
 
 @functools.cache
 def _kernel(chart: str) -> Any:
     """f(I1, I3, mgl, y) -> y' of a chart, compiled."""
-    right = _RIGHT[chart][0]
+    right = register_jitable(_RIGHT[chart][0])
 
     def kernel(I1, I3, mgl, y):  # type: ignore[no-untyped-def]
         return np.array(right(I1, I3, mgl, y))

@@ -9,7 +9,7 @@ a symmetric rule gives, with the mean rates (w, v, u) = (dtheta, dphi, dpsi)/h a
 
 and psi likewise, so that the momenta are not conserved but balanced, p_phi1 - p_phi0 = -c_phi (phi1 - phi0) exactly:
 the motion itself has the same invariants p_phi + c_phi phi and p_psi + c_psi psi, and the discrete one keeps them to
-rounding. Order 2. With c = 0 this kernel is `unreduced`. Not in the registry, whose methods step the free top.
+rounding. Order 2. The kernel is that of `unreduced`. Not in the registry, whose methods step the free top.
 
 The motion has no closed form; its truth is a pair of integrations by DOP853 at tolerance 1e-13. One has the six
 Euler-Lagrange equations, the other the four that remain when both momenta are eliminated by their balance.
@@ -24,11 +24,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.core.jit import register_jitable
 from symtop.methods.framework.angles import accelerations, with_rates
-from symtop.methods.framework.loop import March, Marks, kernel_loop
+from symtop.methods.framework.loop import March, Marks
 from symtop.methods.lagrangian.discrete_lagrangian import RULES, quadrature
-from symtop.methods.lagrangian.unreduced import begin, observe, unreduced_step, with_momenta
+from symtop.methods.lagrangian.unreduced import march, with_momenta
 from symtop.methods.library.scipy_ivp import integrated
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
@@ -44,44 +43,14 @@ class Friction(NamedTuple):
     spin: float
 
 
-class DampedTop(NamedTuple):
-    """The top and its friction."""
-
-    I1: float
-    I3: float
-    mgl: float
-    c_phi: float
-    c_psi: float
-
-
-@register_jitable
-def _inertia(par: Any, sums: Any, h: float) -> Any:
-    """That of `unreduced` with half a step of friction."""
-    return sums.across + 0.5 * h * par.c_phi, par.I3 + 0.5 * h * par.c_psi
-
-
-@register_jitable
-def _momenta(par: Any, sums: Any, v: float, u: float, h: float) -> Any:
-    """D2 L_d + F_d^+, from the sums and from nothing else: the balance is a result, not an input."""
-    p_phi = sums.across * v + sums.mixed * u - 0.5 * h * par.c_phi * v
-    return p_phi, sums.mixed * v + par.I3 * u - 0.5 * h * par.c_psi * u
-
-
-def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (theta, phi, psi, p_theta, p_phi, p_psi); the work counted is the number of Newton iterations."""
-    return unreduced_step(_inertia, _momenta, par, rule, state, carry, h)
-
-
-march = kernel_loop(begin, increment, observe)
-
-
 def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Marks) -> March:
     """States (theta, phi, psi, p_theta, p_phi, p_psi) after the numbers of steps in `marks`, shape (samples, 6).
 
     `rule` is a name of `discrete_lagrangian.RULES`. SymtopError for a start at a pole.
     """
-    free, state = with_momenta(scene.top, scene.start)
-    return march(DampedTop(free.I1, free.I3, free.mgl, *friction), quadrature(*RULES[rule][:2])[0], state, h, marks)
+    top, state = with_momenta(scene.top, scene.start)
+    damped = top._replace(c_phi=friction.precession, c_psi=friction.spin)
+    return march(damped, quadrature(*RULES[rule][:2])[0], state, h, marks)
 
 
 def _six_equations(scene: Scene, friction: Friction) -> Rates:

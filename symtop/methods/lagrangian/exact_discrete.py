@@ -69,7 +69,7 @@ from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import finite_outcome
 from symtop.methods.lagrangian import oscillators
 from symtop.methods.lagrangian.oscillators import Map, OscillatorTop, attitude_state, axis_state, on_oscillators
-from symtop.methods.vectors import accumulate_plainly
+from symtop.methods.vectors import accumulate_plainly, summed
 
 SHARE = 0.5  # of what breaks |chi| = 1 that a step takes off: all of it would feed on the rounding that the loop sums
 IDLE = 2e-15  # |chi|^2 may be off by as much: below that, what is seen of it is the rounding of |Z|^2
@@ -198,9 +198,7 @@ def _between(state: Any, after: Any, carry: Any) -> Any:
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     """p_phi and p_psi after the step, from J = r Im(conj(Z) W)."""
-    s = before
-    for i in range(8):
-        s = set_item(s, i, s[i] + dstate[i])
+    s = summed(before, dstate)
     first, second = rule.r1 * (s[0] * s[5] - s[1] * s[4]), rule.r2 * (s[2] * s[7] - s[3] * s[6])
     return -2.0 * par.I1 * (first - second), -2.0 * par.I1 * (first + second)
 
@@ -234,21 +232,13 @@ def _unwound(rule: Any, s: Any, k: int) -> Any:
 
 
 def present_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """(e, L), as wide as the kernel's state."""
-    return (*axis_state(par, _unwound(rule, state, k)), 0.0, 0.0)
+    """(e, L)."""
+    return axis_state(par, _unwound(rule, state, k))
 
 
 def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """(q, L), as wide as the kernel's state."""
-    return (*attitude_state(par, _unwound(rule, state, k), k * h), 0.0)
-
-
-def _first_six(par: Any, t: float, state: Any) -> Any:
-    return state[0], state[1], state[2], state[3], state[4], state[5]
-
-
-def _first_seven(par: Any, t: float, state: Any) -> Any:
-    return state[0], state[1], state[2], state[3], state[4], state[5], state[6]
+    """(q, L)."""
+    return attitude_state(par, _unwound(rule, state, k), k * h)
 
 
 def _side_by_side(par: Any, rule: Any, state: Any, carry: Any) -> Any:
@@ -266,7 +256,10 @@ march_axis, march_attitude = (
 
 def built_in() -> list[Integrator]:
     """`exact-discrete`."""
-    charts = {"axis": (march_axis, Shown(_first_six, 6)), "attitude": (march_attitude, Shown(_first_seven, 7))}
+    charts = {  # a sample is not as wide as a state
+        "axis": (march_axis, Shown(lambda _par, _t, state: state[:6], 6)),
+        "attitude": (march_attitude, Shown(lambda _par, _t, state: state[:7], 7)),
+    }
     return [
         Integrator(
             name="exact-discrete", family="discrete-lagrangian",

@@ -14,6 +14,7 @@ All three momenta are variables of the state: p_phi and p_psi are conserved only
 Order 2, symplectic, symmetric if the rule is. It shows that the reduced kernel assumed nothing: in exact arithmetic
 both are one map. It is not a method to use: its solver iterates more often (the study `reduction` measures both), p1 is
 formed at full size, so that no compensated sum undoes its rounding, and p_phi - p_psi cos(theta) cancels near a pole.
+Friction of the bearings, of which a top of the registry has none, enters as `damped_top` says.
 Source: Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357.
 """
 
@@ -24,7 +25,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.angles import BareTop, chart_outcome, require_chart
+from symtop.methods.framework.angles import chart_outcome, require_chart
 from symtop.methods.framework.loop import FixedStep, kernel_loop
 from symtop.methods.framework.newton import Correction, newton
 from symtop.methods.framework.plan import NOT_CONVERGED
@@ -87,15 +88,10 @@ def _solve(first: Any, second: Any, third: Any, right: Any) -> Any:
 
 
 @register_jitable
-def _inertia(par: Any, sums: Any, h: float) -> Any:
-    return sums.across, par.I3
-
-
-@register_jitable
-def _correction(inertia: Any, par: Any, sums: Any, rate: Any, momentum: Any, h: float) -> Any:
-    """Newton's correction to the rates."""
+def _correction(par: Any, sums: Any, rate: Any, momentum: Any, h: float) -> Any:
+    """Newton's correction to the rates; half a step of friction stands beside the inertia."""
     w, v, u = rate
-    across, along = inertia(par, sums, h)
+    across, along = sums.across + 0.5 * h * par.c_phi, par.I3 + 0.5 * h * par.c_psi
     residual = (
         momentum[0] - par.I1 * w + h * sums.before,
         momentum[1] - across * v - sums.mixed * u,
@@ -128,7 +124,6 @@ class _Step(NamedTuple):
     rule: Any
     state: Any
     h: float
-    inertia: Any
 
 
 @register_jitable
@@ -149,17 +144,15 @@ def _correct(step: Any, sums: Any, rate: Any) -> Any:
     of 1e-8, p_phi of `goldstein` walks off linearly, 2e-12 in 1e6 steps at h = 0.01 against 3e-13.
     """
     w, v, u = rate
-    dw, dv, du = _correction(step.inertia, step.par, sums, rate, step.state[3:], step.h)
+    dw, dv, du = _correction(step.par, sums, rate, step.state[3:], step.h)
     change, size = abs(dw) + abs(dv) + abs(du), abs(w) + abs(v) + abs(u)
     return Correction((dw, dv, du), (w + dw, v + dv, u + du), change, NEGLIGIBLE * size, step.rule.tolerance * size)
 
 
-@register_jitable
-def unreduced_step(inertia: Any, momenta: Any, par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
+def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, phi, psi, p_theta, p_phi, p_psi); the work counted is the number of Newton iterations.
 
-    `inertia(par, sums, h)` is the diagonal of the system for (p_phi0, p_psi0), `momenta(par, sums, v, u, h)` both at
-    the end: friction adds a term to each.
+    D2 L_d and the friction come from the sums and from nothing else: that momenta balance is a result, not an input.
     """
     # the rates are smooth in time: the parabola through their last three values predicts the next ones
     near, far, farther = carry
@@ -168,23 +161,13 @@ def unreduced_step(inertia: Any, momenta: Any, par: Any, rule: Any, state: Any, 
         3.0 * (near[1] - far[1]) + farther[1],
         3.0 * (near[2] - far[2]) + farther[2],
     )
-    equations = _Step(par, rule, state, h, inertia)
-    solution = newton(_evaluate, _correct, _from_the_start, equations, guess, rule.iterations)
+    solution = newton(_evaluate, _correct, _from_the_start, _Step(par, rule, state, h), guess, rule.iterations)
     (w, v, u), sums = solution.x, solution.trial
     outcome = chart_outcome(state[0] + h * w) if solution.converged else NOT_CONVERGED
-    p_phi, p_psi = momenta(par, sums, v, u, h)
+    p_phi = sums.across * v + sums.mixed * u - 0.5 * h * par.c_phi * v
+    p_psi = sums.mixed * v + par.I3 * u - 0.5 * h * par.c_psi * u
     step = (h * w, h * v, h * u, par.I1 * w + h * sums.after - state[3], p_phi - state[4], p_psi - state[5])
     return step, ((w, v, u), carry[0], carry[1]), solution.evaluations, outcome
-
-
-@register_jitable
-def _momenta(par: Any, sums: Any, v: float, u: float, h: float) -> Any:
-    return sums.across * v + sums.mixed * u, sums.mixed * v + par.I3 * u
-
-
-def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step."""
-    return unreduced_step(_inertia, _momenta, par, rule, state, carry, h)
 
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
@@ -195,9 +178,19 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
 march = kernel_loop(begin, increment, observe)
 
 
+class DampedTop(NamedTuple):
+    """The top and viscous coefficients of its bearings, for precession and for spin."""
+
+    I1: float
+    I3: float
+    mgl: float
+    c_phi: float
+    c_psi: float
+
+
 def _with_momenta(top: Any, at: Any) -> Any:
     momenta = conserved(top, at)
-    return BareTop(top.I1, top.I3, top.mgl), (
+    return DampedTop(top.I1, top.I3, top.mgl, 0.0, 0.0), (
         at.theta, at.phi, at.psi, top.I1 * at.theta_dot, momenta.p_phi, momenta.p_psi,
     )  # fmt: skip
 

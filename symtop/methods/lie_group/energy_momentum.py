@@ -94,7 +94,7 @@ def _close(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> An
     return m, v, scaled(h, gravity(par, _mean(opened[:3], u))), carry
 
 
-march = iterated_loop(_start, _again, _close, MOST, opened=6, unknowns=3)
+march = iterated_loop((_start, _again, _close), MOST, opened=6, unknowns=3)
 
 
 def built_in() -> list[Integrator]:

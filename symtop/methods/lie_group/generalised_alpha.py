@@ -16,18 +16,16 @@ Sources: Bruls, Cardona, Arnold, Mech. Mach. Theory 48 (2012) 121; Chung, Hulber
 """
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from symtop.core.errors import SymtopError, finite
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import axis_of
-from symtop.methods.lie_group.loop import SPUN, gravity, in_both_charts, inertia, iterated, lie_loop, moved
-from symtop.methods.splitting.rotor import EXACT, near, rotor
-from symtop.methods.vectors import cross, plus, scaled, solve3
+from symtop.methods.lie_group.loop import SPUN, Parts, gravity, in_both_charts, inertia, iterated_loop, moved
+from symtop.methods.splitting.rotor import exact, near
+from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
 MOST = 50  # iterations of a step; 4 to 6 are the rule
 ENOUGH = 1e-14  # a correction of W', relative to its parts, that is rounding
@@ -40,7 +38,6 @@ class Alpha(NamedTuple):
     f: float
     gamma: float
     beta: float
-    turn: float = float(EXACT)  # what `rotor` asks of a rule
     shares: tuple[float, ...] = (1.0,)
 
 
@@ -51,36 +48,12 @@ def _rates(par: Any, e: Any, x: Any) -> Any:
     return plus(scaled(1.0 / par.I1, x), along, e)
 
 
-@register_jitable
-def _initial(par: Any, state: Any) -> Any:
-    """W' of the start, in space."""
-    e = axis_of(state[0], state[1], state[2], state[3])
-    w = _rates(par, e, (state[4], state[5], state[6]))
-    return _rates(par, e, plus(gravity(par, e), -1.0, cross(w, inertia(par, e, w))))
-
-
 def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     """a and W' of the start, in space."""
-    carry, change = np.empty(6), _initial(par, state)
-    for k in range(3):
-        carry[k] = carry[3 + k] = change[k]
-    return carry
-
-
-@register_jitable
-def _known(rule: Any, a: Any, before: Any) -> Any:
-    """What a_1 has beside W'_1, and the share that it has of that."""
-    share = 1.0 / (1.0 - rule.m)
-    return scaled(share, plus(scaled(rule.f, before), -rule.m, a)), share * (1.0 - rule.f)
-
-
-@register_jitable
-def _ahead(rule: Any, w: Any, a: Any, known: Any, share: float, h: float, slope: Any) -> Any:
-    """a_1, the rotation vector and the gain of W that follow from W'_1, and the square of half the angle."""
-    b = plus(known, share, slope)
-    angle = scaled(h, plus(plus(w, h * (0.5 - rule.beta), a), h * rule.beta, b))
-    gain = plus(scaled(h * (1.0 - rule.gamma), a), h * rule.gamma, b)
-    return b, angle, gain, 0.25 * (angle[0] * angle[0] + angle[1] * angle[1] + angle[2] * angle[2])
+    e = axis_of(state[0], state[1], state[2], state[3])
+    w = _rates(par, e, (state[4], state[5], state[6]))
+    change = _rates(par, e, plus(gravity(par, e), -1.0, cross(w, inertia(par, e, w))))
+    return (*change, *change)
 
 
 @register_jitable
@@ -105,82 +78,56 @@ def _corrected(par: Any, e: Any, w: Any, m: float, v: Any, gain: Any, by: float,
     return plus(slope, 1.0, change), size, ended
 
 
-@register_jitable
-def _ended(par: Any, e: Any, w: Any, m: float, v: Any, gain: Any, b: Any, slope: Any) -> Any:
-    """The change of L, and a and W' of the next step in the axes that the rotation leads to."""
-    b, after = plus(b, 1.0, moved(m, v, b)), plus(slope, 1.0, moved(m, v, slope))
-    J = inertia(par, e, plus(w, 1.0, gain))
-    return plus(inertia(par, e, gain), 1.0, moved(m, v, J)), b, after
+def _parts(rotation: Callable[..., Any], *, alone: bool) -> Parts:
+    """The parts of an iteration in the body's axes of the start, with the rotor of any angle, or of one below 2.
 
+    x is W'_1, the size of its last correction, and alone what the last pass made of W'_1, which registers hold; in
+    lanes W'_1 before that correction, of which it is made again.
+    """
 
-def turn(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
-    """One step, in the body's axes of its start; the work counted is the number of iterations."""
-    a, before = (carry[0], carry[1], carry[2]), (carry[3], carry[4], carry[5])
-    w = _rates(par, e, L)
-    known, share = _known(rule, a, before)
-    slope, last = before, math.inf
-    for k in range(MOST):
-        b, angle, gain, square = _ahead(rule, w, a, known, share, h, slope)
-        s, m = rotor(rule, square, 0.5)
-        v = scaled(s, angle)
-        slope, last, ended = _corrected(par, e, w, m, v, gain, h * rule.gamma * share, slope, last)
-        if ended:
-            dL, b, after = _ended(par, e, w, m, v, gain, b, slope)
-            for i in range(3):
-                carry[i], carry[3 + i] = b[i], after[i]
-            return m, v, dL, k + 1, OK
-    return 0.0, a, a, MOST, NOT_CONVERGED
+    @register_jitable
+    def made_of(rule, carry, h, opened, slope):  # type: ignore[no-untyped-def]
+        """a_1, the rotation and the gain of W that follow from W'_1, its share in a_1, and is the angle below 2."""
+        w, a, part = opened[3:], carry[:3], 1.0 / (1.0 - rule[0])
+        known, share = scaled(part, plus(scaled(rule[1], carry[3:]), -rule[0], a)), part * (1.0 - rule[1])
+        b = plus(known, share, slope)
+        angle = scaled(h, plus(plus(w, h * (0.5 - rule[3]), a), h * rule[3], b))
+        square = 0.25 * dot(angle, angle)
+        s, m = rotation(square, 0.5)
+        return b, m, scaled(s, angle), plus(scaled(h * (1.0 - rule[2]), a), h * rule[2], b), share, square < 1.0
 
+    def start(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
+        before, room = carry[3:], (0.0,) * 10 if alone else (0.0,) * 3
+        return (*e, *_rates(par, e, L)), (*before, math.inf, *room)
 
-# ---- in lanes: x is W'_1, the size of its last correction, and W'_1 before that, which the rotation is made of -------
+    def again(par, rule, carry, h, opened, x):  # type: ignore[no-untyped-def]
+        slope = x[:3]
+        b, m, v, gain, share, is_near = made_of(rule, carry, h, opened, slope)
+        after, size, ended = _corrected(par, opened[:3], opened[3:], m, v, gain, h * rule[2] * share, slope, x[3])
+        rest = (*b, m, *v, *gain) if alone else slope
+        return (*after, size, *rest), ended, not (alone or is_near)
 
+    def close(par, rule, carry, h, opened, x):  # type: ignore[no-untyped-def]
+        """The rotation, the change of L, and a and W' of the next step in the axes that the rotation leads to."""
+        if alone:
+            b, m, v, gain = x[4:7], x[7], x[8:11], x[11:]
+        else:
+            b, m, v, gain, _, _ = made_of(rule, carry, h, opened, x[4:])
+        J = inertia(par, opened[:3], plus(opened[3:], 1.0, gain))
+        dL = plus(inertia(par, opened[:3], gain), 1.0, moved(m, v, J))
+        return m, v, dL, (*plus(b, 1.0, moved(m, v, b)), *plus(x[:3], 1.0, moved(m, v, x[:3])))
 
-def _carried(par: Any, rule: Any, state: Any, h: float) -> Any:
-    change = _initial(par, state)
-    return (*change, *change)
+    return start, again, close
 
 
 def _numbers(rule: Any) -> Any:
     return rule.m, rule.f, rule.gamma, rule.beta
 
 
-@register_jitable
-def _rule(numbers: Any) -> Alpha:
-    return Alpha(numbers[0], numbers[1], numbers[2], numbers[3], float(EXACT), (1.0,))
-
-
-@register_jitable
-def _near(numbers: Any, carry: Any, h: float, opened: Any, slope: Any) -> Any:
-    """a_1, the rotation of an angle below 2, the gain, by how much W'_1 enters it, and is the angle below 2."""
-    rule = _rule(numbers)
-    known, share = _known(rule, carry[:3], carry[3:])
-    b, angle, gain, square = _ahead(rule, opened[3:], carry[:3], known, share, h, slope)
-    s, m = near(square, 0.5)
-    return b, m, scaled(s, angle), gain, h * rule.gamma * share, square < 1.0
-
-
-def _start(par: Any, numbers: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
-    before = carry[3:]
-    return (*e, *_rates(par, e, L)), (*before, math.inf, *before)
-
-
-def _again(par: Any, numbers: Any, carry: Any, h: float, opened: Any, x: Any) -> Any:
-    slope = x[:3]
-    _, m, v, gain, by, is_near = _near(numbers, carry, h, opened, slope)
-    after, size, ended = _corrected(par, opened[:3], opened[3:], m, v, gain, by, slope, x[3])
-    return (*after, size, *slope), ended, not is_near
-
-
-def _close(par: Any, numbers: Any, carry: Any, h: float, opened: Any, x: Any) -> Any:
-    b, m, v, gain, _, _ = _near(numbers, carry, h, opened, x[4:])
-    dL, b, after = _ended(par, opened[:3], opened[3:], m, v, gain, b, x[:3])
-    return m, v, dL, (*b, *after)
-
-
-_LANES = iterated(
-    _start, _again, _close, MOST, opened=6, unknowns=7, numbers=_numbers, count=4, begin=_carried, carry=6
-)
-march = lie_loop(turn, _begin, lambda _: _LANES)
+march = iterated_loop(
+    _parts(exact, alone=True), MOST, in_lanes=_parts(near, alone=False), begin=_begin, opened=6, unknowns=7, carry=6,
+    count=4, numbers=_numbers,
+)  # fmt: skip
 
 
 def generalised_alpha(name: str, spectral_radius: float, *, summary: str = "") -> Integrator:

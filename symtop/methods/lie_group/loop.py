@@ -3,7 +3,7 @@
 A map sees the axis and the momentum, since nothing of a symmetric top hangs on more, and returns a rotation as a
 quaternion less one, (m, v) = p - 1, and the change of L:
 
-    turn(par, rule, e, L, carry, h) -> (m, v, dL, work, outcome),      q <- p q,   e <- p e p*,   L <- L + dL
+    turn(par, rule, e, L, carry, h) -> (m, v, dL, carry, work, outcome),    q <- p q,   e <- p e p*,   L <- L + dL
 
 `rule.shares` are the parts that a step is composed of, in units of h: (1,) for the map itself, and five of Suzuki's for
 order 4. The axis chart shows (e, L) of the same run: one kernel, and its attitude has the bits of its axis.
@@ -28,7 +28,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.body import observe_turned, turned, turned_back
+from symtop.methods.framework.body import turned, turned_back
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
@@ -45,14 +45,6 @@ def _on_body(top: Any, at: Any) -> Any:
     return Body(top.I1, top.I3, top.mgl), _attitude_numbers(top, at)[1]
 
 
-def _axis_shown(par: Any, t: float, y: Any) -> Any:
-    return (*axis_of(y[0], y[1], y[2], y[3]), y[4], y[5], y[6])
-
-
-def _spin_shown(par: Any, t: float, y: Any) -> Any:
-    return with_spin(par, y, t)
-
-
 class Carried(NamedTuple):
     """How the body's spin is stepped: what a kernel starts from, and how the attitude is shown."""
 
@@ -61,9 +53,9 @@ class Carried(NamedTuple):
     top: Any  # the NamedTuple of the numbers of the top
 
 
-UNSPUN = Carried(on_attitude, Shown(_spin_shown, 7), SpaceTop)
+UNSPUN = Carried(on_attitude, Shown(lambda par, t, y: with_spin(par, y, t), 7), SpaceTop)
 SPUN = Carried(Preparation(_on_body, 7), None, Body)
-_AXIS = Shown(_axis_shown, 6)
+_AXIS = Shown(lambda _par, _t, y: (*axis_of(y[0], y[1], y[2], y[3]), y[4], y[5], y[6]), 6)
 STILL = (0.0,) * 7  # no increment
 
 
@@ -127,7 +119,7 @@ def lie_loop(
         effort = outcome = 0
         for share in rule.shares:
             q, L = reached(state, step)
-            m, v, dL, work, outcome = turn(par, rule, axis_of(*q), L, carry, h * share)
+            m, v, dL, carry, work, outcome = turn(par, rule, axis_of(*q), L, carry, h * share)
             effort += work
             if outcome != OK:
                 break
@@ -147,13 +139,8 @@ def in_both_charts(loop: Loop, rule: Any, carried: Carried, forces: int, *, impl
     }
 
 
-def body_loop(turn: Callable[..., Any], begin: Callable[..., Any] = no_carry) -> Loop:
-    """The loop on (q*, M) of a body without symmetry around ``turn(par, rule, Gamma, M, carry, h)``."""
-    return lie_loop(turn, begin, observe=observe_turned)
-
-
 def on_body(loop: Loop, rule: Any, forces: int, *, implicit: bool) -> dict[str, FixedStep]:
-    """The solver of a body without symmetry."""
+    """The solver of a body without symmetry around a map of Gamma and M, whose loop has `observe_turned`."""
     return {BODY: FixedStep(loop, rule, turned, forces, implicit=implicit, present=turned_back)}
 
 
@@ -225,14 +212,9 @@ def stepped(
     return Lanes(step, lay, lambda _: 0.0, size, carried.top, SIZE, carry, effort, lambda _: room, begin, show)
 
 
-@register_jitable
-def _no_numbers(rule: Any) -> Any:
-    return (0.0,)
-
-
 def iterated(  # noqa: C901  (the loops of one step, read in one piece)
     start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int, *,
-    opened: int, unknowns: int, numbers: Callable[..., Any] = _no_numbers, count: int = 1,
+    opened: int, unknowns: int, numbers: Callable[..., Any] = lambda _: (0.0,), count: int = 1,
     begin: Callable[..., Any] = no_carry, carry: int = 1,
 ) -> Lanes:  # fmt: skip
     """An iterated map of a body in lanes, from the parts of which its `turn` is made.
@@ -307,12 +289,19 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
     return stepped(part, lay, count, 1, carried=SPUN, carry=carry, begin=begin, room=room)
 
 
+Parts = tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # start, again and close of `iterated`
+
+
 def iterated_loop(
-    start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int, *,
-    opened: int, unknowns: int,
+    parts: Parts, most: int, *, begin: Callable[..., Any] = no_carry, in_lanes: Parts | None = None, **sizes: Any
 ) -> Loop:  # fmt: skip
-    """The loop, for one and in lanes, around a map made of the parts that `iterated` takes; its work are the passes."""
-    lanes = iterated(start, again, close, most, opened=opened, unknowns=unknowns)
+    """The loop, for one and in lanes, around a map made of the parts that `iterated` takes; its work are the passes.
+
+    `in_lanes` are the parts without a branch, where there is one.
+    """
+    lanes, (start, again, close) = iterated(*(in_lanes or parts), most, begin=begin, **sizes), parts
+    for function in parts:
+        register_jitable(function)
 
     def turn(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
         fixed, x = start(par, rule, e, L, carry, h)
@@ -321,6 +310,6 @@ def iterated_loop(
             x, ended, lost = again(par, rule, carry, h, fixed, x)
             work += 1
         m, v, dL, carry = close(par, rule, carry, h, fixed, x)
-        return m, v, dL, work, OK if ended and not lost else NOT_CONVERGED
+        return m, v, dL, carry, work, OK if ended and not lost else NOT_CONVERGED
 
-    return lie_loop(turn, lanes=lambda _: lanes)
+    return lie_loop(turn, begin, lambda _: lanes)

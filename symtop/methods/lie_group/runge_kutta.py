@@ -38,6 +38,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable
+from symtop.methods.framework.body import observe_turned
 from symtop.methods.framework.lanes import Lanes, W, column
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.registry import Integrator
@@ -242,13 +243,13 @@ def _turning(element: Callable[..., Any]) -> Callable[..., Any]:
                 if rule.bent != 0.0:
                     slope, g = bent_back(w, f, slope, g)
                 _store(slopes, i, slope, g)
-        return made[0], made[1], made[3], stages, OK
+        return made[0], made[1], made[3], slopes, stages, OK
 
     return turn
 
 
 march = lie_loop(_turning(_of_top), _begin, lambda rule: _of_shape(tuple(map(int, rule.counts)), rule.bent != 0.0))
-march_body = loop.body_loop(_turning(_of_body), _begin)
+march_body = lie_loop(_turning(_of_body), _begin, observe=observe_turned)
 
 
 def lie_runge_kutta(

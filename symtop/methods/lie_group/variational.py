@@ -34,12 +34,12 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.body import torque
+from symtop.methods.framework.body import observe_turned, torque
 from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group import loop
-from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, iterated_loop, moved
+from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, iterated_loop, lie_loop, moved
 from symtop.methods.splitting.coefficients import SUZUKI_4
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
@@ -55,13 +55,6 @@ class Variational(NamedTuple):
     shares: tuple[float, ...] = (1.0,)
 
 
-@register_jitable
-def _one(par: Any, A: float, square: float) -> Any:
-    """The first n of the discrete rigid body."""
-    return (1.0,)
-
-
-@register_jitable
 def _next_n(par: Any, A: float, square: float, x: Any) -> Any:
     """Newton's next n, whether it is the last, and whether there is none."""
     d, rate, n = par.I3 - par.I1, A / par.I3, x[0]
@@ -73,19 +66,6 @@ def _next_n(par: Any, A: float, square: float, x: Any) -> Any:
     return (n,), gap <= ENOUGH * slope * n, not slope > 0.0
 
 
-@register_jitable
-def _of_n(par: Any, A: float, x: Any) -> Any:
-    """n, i and x of the discrete rigid body."""
-    return x[0], par.I1, A / par.I3 * x[0]
-
-
-@register_jitable
-def _interval(par: Any, A: float, square: float) -> Any:
-    """The first k of Cayley's retraction, and the interval that it lies in."""
-    return 0.0, 0.0, square / par.I1 + A * A / par.I3
-
-
-@register_jitable
 def _next_k(par: Any, A: float, square: float, x: Any) -> Any:
     """Newton's next k, the middle of the interval where that leaves it, and whether it is the last."""
     k, low, high = x
@@ -101,17 +81,16 @@ def _next_k(par: Any, A: float, square: float, x: Any) -> Any:
     return (after, low, high), abs(after - k) <= ENOUGH * j, False
 
 
-@register_jitable
-def _of_k(par: Any, A: float, x: Any) -> Any:
-    """n, i and x of Cayley's retraction."""
-    return 1.0, par.I1 + x[0], A / (par.I3 + x[0])
-
-
 # The equation for one number, in functions of what a holds along the axis and of the square of what lies across:
 #     first(par, A, square) -> x
 #     after(par, A, square, x) -> (x, ended, lost)      one iteration
 #     rates(par, A, x) -> (n, i, x)
-RIGID_BODY, RETRACTION = (_one, _next_n, _of_n), (_interval, _next_k, _of_k)
+RIGID_BODY = lambda _par, _A, _square: (1.0,), _next_n, lambda par, A, x: (x[0], par.I1, A / par.I3 * x[0])
+RETRACTION = (  # k from 0 in the interval that it lies in
+    lambda par, A, square: (0.0, 0.0, square / par.I1 + A * A / par.I3),
+    _next_k,
+    lambda par, A, x: (1.0, par.I1 + x[0], A / (par.I3 + x[0])),
+)
 
 
 @register_jitable
@@ -135,6 +114,8 @@ def _rotated(par: Any, e: Any, across: Any, half: float, n: float, i: float, x: 
 
 def _loop(first: Callable[..., Any], after: Callable[..., Any], rates: Callable[..., Any], unknowns: int) -> Loop:
     """The step by one of the two equations, with so many numbers in x: for one, and in lanes."""
+    for function in (first, after, rates):
+        register_jitable(function)
 
     def start(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
         across, A = _kicked(par, e, L, 0.5 * h)
@@ -148,7 +129,7 @@ def _loop(first: Callable[..., Any], after: Callable[..., Any], rates: Callable[
         n, i, along = rates(par, opened[6], x)
         return (*_rotated(par, opened[:3], opened[3:6], 0.5 * h, n, i, along), carry)
 
-    return iterated_loop(start, again, close, MOST, opened=8, unknowns=unknowns)
+    return iterated_loop((start, again, close), MOST, opened=8, unknowns=unknowns)
 
 
 MARCH = {MOSER_VESELOV: _loop(*RIGID_BODY, 1), EULER_POINCARE: _loop(*RETRACTION, 3)}
@@ -182,10 +163,10 @@ def turn_body(par: Any, rule: Any, g: Any, M: Any, carry: Any, h: float) -> Any:
         work += 1
     m, v = cayley(scaled(-1.0, u))  # space turns the other way
     kick = plus(torque(par, *g), 1.0, torque(par, *plus(g, 1.0, moved(m, v, g))))
-    return m, v, plus(moved(m, v, kicked), half, kick), work, OK if ended and not lost else NOT_CONVERGED
+    return m, v, plus(moved(m, v, kicked), half, kick), carry, work, OK if ended and not lost else NOT_CONVERGED
 
 
-march_body = loop.body_loop(turn_body)
+march_body = lie_loop(turn_body, observe=observe_turned)
 
 
 def lie_variational(name: str, rule: Variational, order: int, summary: str, reference: str) -> Integrator:

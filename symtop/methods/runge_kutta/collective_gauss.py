@@ -33,14 +33,10 @@ from symtop.methods.framework.preparation import Later
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group.loop import UNSPUN, in_both_charts, lie_loop
 from symtop.methods.runge_kutta.gauss import ROUND_OFF, SWEEPS, gauss_rule, packed, stage_weights
+from symtop.methods.vectors import conjugate
 from symtop.model.body import product
 
 ORIGIN = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-
-
-@register_jitable
-def _conjugate(q: Any) -> Any:
-    return q[0], -q[1], -q[2], -q[3]
 
 
 @register_jitable
@@ -48,7 +44,7 @@ def _field(par: Any, e: Any, y: Any) -> Any:
     """Time derivative of (g, r)."""
     g, r = (y[0], y[1], y[2], y[3]), (y[4], y[5], y[6], y[7])
     quarter = 0.25 / par.I1
-    L = product(r, _conjugate(g))  # its vector is 2 L
+    L = product(r, conjugate(g))  # its vector is 2 L
     w = 0.0, quarter * L[1], quarter * L[2], quarter * L[3]
     moves, turns = product(w, g), product(w, r)
     a, b, c, d = product(g, (0.0, e[0], e[1], e[2]))
@@ -106,10 +102,10 @@ def turn(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
         step = set_item(step, m, total)
     # Im(r g*)/2 - L with g = 1 + dg, r = 2 L + dr: no difference of large numbers
     dg, dr = (step[0], step[1], step[2], step[3]), (step[4], step[5], step[6], step[7])
-    back = _conjugate(dg)
+    back = conjugate(dg)
     linear, bent = product((0.0, L[0], L[1], L[2]), back), product(dr, back)
     dL = (0.5 * (dr[1] + bent[1]) + linear[1], 0.5 * (dr[2] + bent[2]) + linear[2], 0.5 * (dr[3] + bent[3]) + linear[3])
-    return step[0], (step[1], step[2], step[3]), dL, effort, outcome
+    return step[0], (step[1], step[2], step[3]), dL, work, effort, outcome
 
 
 march = lie_loop(turn, _begin)

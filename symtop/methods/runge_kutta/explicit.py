@@ -36,7 +36,7 @@ from symtop.methods.framework.plan import OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop
 from symtop.methods.simd import combined, wide_vectors
-from symtop.methods.vectors import accumulate, zero
+from symtop.methods.vectors import accumulate, summed, zero
 from symtop.model.charts import BODY
 
 
@@ -151,15 +151,6 @@ def add(place: Any, slope: Any, weight: float) -> Any:
 
 
 @register_jitable
-def plus(state: Any, step: Any) -> Any:
-    """state + step, component by component."""
-    total = state
-    for m in range(len(state)):
-        total = set_item(total, m, state[m] + step[m])
-    return total
-
-
-@register_jitable
 def later_stages(field: Any, par: Any, a: Any, stages: int, state: Any, slopes: Any, h: float) -> None:
     """Fill the rows 1 .. stages-1 of `slopes`; row 0 is the slope at the start of the step."""
     row = 0
@@ -191,7 +182,7 @@ def _loop(form: Formulation, top: Any, dimension: int) -> Loop:
 
     @register_jitable
     def ended(state, step):  # type: ignore[no-untyped-def]
-        return ended_at(plus(state, step))
+        return ended_at(summed(state, step))
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
         store(carry, 0, field(par, state))

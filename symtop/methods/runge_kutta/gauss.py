@@ -452,12 +452,8 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
 
         return renewed
 
-    moving = [m for m in range(dimension) if m != STILL]
-    extrapolate, sweep = ahead(moving[0]), stage(0)
-    for m in moving[1:]:
-        extrapolate = _after(extrapolate, ahead(m))
-    for i in range(1, stages):
-        sweep = _after(sweep, stage(i))
+    extrapolate = functools.reduce(_after, [ahead(m) for m in range(dimension) if m != STILL])
+    sweep = functools.reduce(_after, map(stage, range(stages)))
 
     @register_jitable
     def judge(block, j, largest):  # type: ignore[no-untyped-def]

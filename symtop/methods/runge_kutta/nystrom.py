@@ -19,10 +19,11 @@ from typing import Any, NamedTuple
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import LEAST_TOLERANCE, chart_outcome, on_angles
+from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import row_of, store, written_out
 from symtop.methods.runge_kutta.pair_tables import Row
-from symtop.methods.runge_kutta.pairs import Method, rms, solver, summed, trying
+from symtop.methods.runge_kutta.pairs import Method, combination, rms, solver, trying
 from symtop.methods.splitting.angles import force_angles
 
 
@@ -75,7 +76,7 @@ def _stages(nodes: Sequence[float], rows: Sequence[Row]) -> Any:
     """``(par, state, first, slopes, h)`` to the k of a step, a tuple of tuples; nothing is read from `slopes`."""
 
     def stage(i: int) -> Callable[..., Any]:
-        bend, node = summed(rows[i - 1]), nodes[i - 1]
+        bend, node = combination(rows[i - 1]), nodes[i - 1]
 
         def k(par, state, made, slopes, h):  # type: ignore[no-untyped-def]
             flown = state[0] + node * h * state[1] / par.I1
@@ -88,7 +89,7 @@ def _stages(nodes: Sequence[float], rows: Sequence[Row]) -> Any:
 
 def _total(weights: Row, velocity: Row) -> Any:
     """``(par, made, h)`` to what the forces add to (theta, p_theta, phi, psi)."""
-    bend, turn = summed(weights), summed(velocity)
+    bend, turn = combination(weights), combination(velocity)
 
     def added(par, made, h):  # type: ignore[no-untyped-def]
         return bend((0.0,), made, h * h / par.I1) + turn((0.0, 0.0, 0.0), made, h)
@@ -107,14 +108,10 @@ def _field(par: Any, state: Any) -> Any:
     return state[1] / par.I1, slope, precession, turn
 
 
-class Reduced(NamedTuple):
-    """The reduced angles as `pairs.loop` takes a chart."""
-
-    field: Callable[..., Any] = _field
-    ended: Callable[..., Any] = register_jitable(lambda state: chart_outcome(state[0]))
-    observe: Callable[..., Any] = _observe
-    prepare: Any = on_angles
-    present: None = None
+REDUCED = FORMS["angles"]._replace(
+    field=_field, ended=register_jitable(lambda state: chart_outcome(state[0])), observe=_observe, prepare=on_angles,
+    present=None,
+)  # fmt: skip
 
 
 class Nystrom(NamedTuple):
@@ -173,7 +170,7 @@ def built_in() -> list[Integrator]:
     return [
         Integrator(
             name="dprkn8", family="runge-kutta", control="tolerance", order=8,
-            solvers={"angles": solver(Reduced(), Nystrom(DPRKN8), 3)},
+            solvers={"angles": solver(REDUCED, Nystrom(DPRKN8), 3)},
             summary="Runge-Kutta-Nystrom pair 8(6) of Dormand, El-Mikkawy and Prince on the reduced angles, compiled",
             explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi", "p_psi"}),
             least_tolerance=LEAST_TOLERANCE, reference="dormand-el-mikkawy-prince-1987", needs="kicks", general=False,

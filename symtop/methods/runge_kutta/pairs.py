@@ -36,10 +36,10 @@ from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import as_it_steps
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.runge_kutta.explicit import Tableau, add, plus, row_of, store, weighted, written_out
+from symtop.methods.runge_kutta.explicit import Tableau, add, row_of, store, weighted, written_out
 from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5, VERN9, Row, Table
 from symtop.methods.simd import apart, combined, side_by_side
-from symtop.methods.vectors import accumulate, zero
+from symtop.methods.vectors import accumulate, summed, zero
 
 BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
 EVALUATIONS = 1_000_000_000  # a run's limit: about half a minute
@@ -74,7 +74,7 @@ def interpolate(dense: Any, state: Any, slopes: Any, h: float, x: float) -> Any:
     for i in range(len(dense)):
         row = dense[i]
         weights = set_item(weights, i, x * (row[0] + x * (row[1] + x * (row[2] + x * row[3]))))
-    return plus(state, weighted(weights, state, slopes, h))
+    return summed(state, weighted(weights, state, slopes, h))
 
 
 @register_jitable
@@ -204,7 +204,7 @@ def _forget(slopes: Any, i: int, slope: Any) -> None:
     """Slopes that nobody reads again."""
 
 
-def summed(weights: Sequence[float]) -> Any:
+def combination(weights: Sequence[float]) -> Any:
     """``(place, made, h)`` to place + h sum_j w_j k_j, term by term, of a tuple of slopes."""
     used = tuple(float(weight) if weight else None for weight in weights)
 
@@ -218,7 +218,7 @@ def _stages(field: Callable[..., Any], rows: Sequence[Row], keep: Callable[..., 
     """``(par, state, first, slopes, h)`` to the slopes of a step, a tuple of tuples; `keep` writes each down."""
 
     def stage(i: int) -> Callable[..., Any]:
-        place = summed(rows[i - 1])
+        place = combination(rows[i - 1])
 
         def slope(par, state, made, slopes, h):  # type: ignore[no-untyped-def]
             new = field(par, place(state, made, h))
@@ -249,15 +249,15 @@ class Pair(NamedTuple):
         """What `loop` steps by: attempts, their error, and samples."""
         table, dense = self.table, self.table.dense
         keep = store if dense else _forget
-        stages, total = _stages(field, table.a, keep), summed(table.b)
-        error, third, cost = summed(table.error), summed(table.third), len(table.a) + 1
+        stages, total = _stages(field, table.a, keep), combination(table.b)
+        error, third, cost = combination(table.error), combination(table.third), len(table.a) + 1
         two = bool(self.table.third)
 
         @register_jitable
         def attempt(par, state, slopes, h, tolerance):  # type: ignore[no-untyped-def]
             none, first = zero(state), row_of(slopes, 0, state)
             made = stages(par, state, first, slopes, h)
-            new = plus(state, total(none, made, h))
+            new = summed(state, total(none, made, h))
             last = field(par, new)
             store(slopes, cost, last)
             size = rms(error(none, (*made, last), h), state, new, tolerance)
@@ -273,7 +273,7 @@ class Pair(NamedTuple):
         @register_jitable
         def shorter(par, state, new, slopes, h, x):  # type: ignore[no-untyped-def]
             part = x * h
-            return plus(state, total(zero(state), stages(par, state, row_of(slopes, 0, state), slopes, part), part))
+            return summed(state, total(zero(state), stages(par, state, row_of(slopes, 0, state), slopes, part), part))
 
         sample, power = polynomial if dense else shorter, -1.0 / (self.estimate + 1)
         parts = Method(trying(attempt, cost, power), nothing_more, sample, cost, power)
@@ -314,7 +314,7 @@ def _order_seven(table: Table, field: Callable[..., Any], cost: int) -> dict[str
     @register_jitable
     def refine(par, state, slopes, h):  # type: ignore[no-untyped-def]
         for i in range(len(extra)):
-            place = plus(state, weighted(extra[i, : cost + 1 + i], state, slopes, h))
+            place = summed(state, weighted(extra[i, : cost + 1 + i], state, slopes, h))
             store(slopes, cost + 1 + i, field(par, place))
         return len(extra)
 
@@ -340,14 +340,14 @@ def fixed_loop(chart: str, pair: Pair) -> Loop:
     """The loop with fixed steps in one chart; the rule is the table as a `Tableau`, for whoever wants to see it."""
     form = FORMS[chart]
     field, ended_at, rows = form.field, form.ended, pair.table.a[: len(pair.table.b) - 1]
-    stages, total, cost = _stages(field, rows, _forget), summed(pair.table.b), len(pair.table.b)
+    stages, total, cost = _stages(field, rows, _forget), combination(pair.table.b), len(pair.table.b)
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
         return 0.0
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
         step = total(zero(state), stages(par, state, field(par, state), rule.b, h), h)
-        return step, carry, cost, ended_at(plus(state, step))
+        return step, carry, cost, ended_at(summed(state, step))
 
     return kernel_loop(begin, increment, form.observe)
 
@@ -361,7 +361,7 @@ def two_runs(chart: str, pair: Pair, compare: Callable[..., float]) -> Callable[
     """
     form: Any = FORMS[chart]
     field, numbers, opened = form.field, form.prepare.numbers, form.prepare.opened
-    stages, total = _stages(field, pair.table.a[: len(pair.table.b) - 1], _forget), summed(pair.table.b)
+    stages, total = _stages(field, pair.table.a[: len(pair.table.b) - 1], _forget), combination(pair.table.b)
 
     def run(near, far, h, marks, given, seen):  # type: ignore[no-untyped-def]
         par, first = numbers(*opened(near))

@@ -104,13 +104,11 @@ def kick_space(par: Any, force: Any, step: Any, pull: float, bend: float) -> Any
     return (*step[:-3], step[-3] - strength * y, step[-2] + strength * x, step[-1])
 
 
-@register_jitable
 def force_axis(par: Any, state: Any, step: Any) -> Any:
     """The present axis: what a kick needs."""
     return state[0] + step[0], state[1] + step[1], state[2] + step[2]
 
 
-@register_jitable
 def turn_axis(state: Any, step: Any, s: float, m: float) -> Any:
     """Rotation about L by the angle of s and m."""
     x, y, z = state[0] + step[0], state[1] + step[1], state[2] + step[2]
@@ -127,12 +125,6 @@ def turn_axis(state: Any, step: Any, s: float, m: float) -> Any:
     )  # fmt: skip
 
 
-@register_jitable
-def _ended_axis(state: Any, step: Any) -> int:
-    return finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4])
-
-
-@register_jitable
 def process_axis(s: float, x: float, y: float, z: float, Lx: float, Ly: float, Lz: float) -> Any:
     """Flow of G = L.(e x z) for a time s."""
     c, d = np.cosh(s), np.sinh(s)
@@ -140,18 +132,11 @@ def process_axis(s: float, x: float, y: float, z: float, Lx: float, Ly: float, L
     return x / D, y / D, (z * c + d) / D, D * Lx - d * Lz * x, D * Ly - d * Lz * y, Lz
 
 
-@register_jitable
-def _no_spin(par: Any, state: Any, t: float) -> Any:
-    return state
-
-
-@register_jitable
 def force_attitude(par: Any, state: Any, step: Any) -> Any:
     """The present axis."""
     return axis_of(state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3])
 
 
-@register_jitable
 def turn_attitude(state: Any, step: Any, s: float, m: float) -> Any:
     """Rotation about L by the angle of s and m, without the spin about the body's axis."""
     w, x, y, z = state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3]
@@ -166,12 +151,6 @@ def turn_attitude(state: Any, step: Any, s: float, m: float) -> Any:
     )  # fmt: skip
 
 
-@register_jitable
-def _ended_attitude(state: Any, step: Any) -> int:
-    return finite_outcome(step[0] + step[1] + step[2] + step[3] + step[4] + step[5])
-
-
-@register_jitable
 def process_attitude(s: float, w: float, x: float, y: float, z: float, Lx: float, Ly: float, Lz: float) -> Any:
     """Flow of G = L.(e x z) for a time s; phi and psi do not move."""
     ex, ey, ez = axis_of(w, x, y, z)
@@ -192,9 +171,19 @@ class Kernel(NamedTuple):
     lanes: Callable[[Composition], Lanes]
 
 
-def _kernel(force: Any, turned: Any, ended: Any, process: Any, spun: Any, dimension: int) -> Kernel:
+def _kernel(force: Any, turned: Any, process: Any, spun: Any, dimension: int) -> Kernel:
     """The functions of a chart; `process` is the flow of G, `spun` adds the spin to a sample."""
     zeros = (0.0,) * dimension
+    for part in (force, turned, process, spun):
+        register_jitable(part)
+
+    @register_jitable
+    def ended(state, step):  # type: ignore[no-untyped-def]
+        total = step[0] + step[1]
+        for i in range(2, dimension - 1):  # all but L_z
+            total += step[i]
+        return finite_outcome(total)
+
     exact, cayley = (
         composed(force, kick_space, drift, ended, top=SpaceTop, dimension=dimension, carry=3, still=1)
         for drift in without_branch(turned)
@@ -222,8 +211,8 @@ def _kernel(force: Any, turned: Any, ended: Any, process: Any, spun: Any, dimens
     return Kernel(begin, increment, enter, present, lambda rule: exact if rule.turn == EXACT else cayley)
 
 
-AXIS = _kernel(force_axis, turn_axis, _ended_axis, process_axis, _no_spin, 6)
-ATTITUDE = _kernel(force_attitude, turn_attitude, _ended_attitude, process_attitude, with_spin, 7)
+AXIS = _kernel(force_axis, turn_axis, process_axis, lambda _par, state, _t: state, 6)
+ATTITUDE = _kernel(force_attitude, turn_attitude, process_attitude, with_spin, 7)
 march_axis = kernel_loop(*AXIS[:2], observe_axis, *AXIS[2:4], lanes=AXIS.lanes)
 march_attitude = kernel_loop(*ATTITUDE[:2], observe_attitude, *ATTITUDE[2:4], lanes=ATTITUDE.lanes)
 

@@ -300,24 +300,9 @@ SERIES = 200_000_000  # of one run: about half a minute
 ACCEPTED, SAFETY, GROW, EARLIER = 4.0, 0.95, 4.0, 0.25
 
 
-@register_jitable
-def _as_summed(par: Any, state: Any, t: float) -> Any:
-    return state
-
-
-@register_jitable
-def _first_three(state: Any) -> Any:
-    return state[0], state[1], state[2]
-
-
-@register_jitable
-def _of_quaternion(state: Any) -> Any:
-    return axis_of(state[0], state[1], state[2], state[3])
-
-
 CHARTS: dict[str, tuple[Any, ...]] = {  # preparation, series, sample(par, state, t), axis of a state
-    "axis": (space.on_axis, axis_sum, _as_summed, _first_three),
-    "attitude": (space.on_attitude, attitude_sum, with_spin, _of_quaternion),
+    "axis": (space.on_axis, axis_sum, lambda _par, state, _t: state, lambda state: state[:3]),
+    "attitude": (space.on_attitude, attitude_sum, with_spin, lambda state: axis_of(*state[:4])),
 }
 
 
@@ -334,6 +319,7 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
     """
     preparation, series_of, sample, axis = CHARTS[chart]
     prepare, size, series = preparation.numbers, preparation.size, series_of(order)
+    sample, axis = register_jitable(sample), register_jitable(axis)
 
     @register_jitable
     def terms(state, body, h):  # type: ignore[no-untyped-def]

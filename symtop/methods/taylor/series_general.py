@@ -34,8 +34,9 @@ from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.runge_kutta.explicit import plus, row_of, store
+from symtop.methods.runge_kutta.explicit import row_of, store
 from symtop.methods.runge_kutta.pairs import Method, nothing_more, solver
+from symtop.methods.vectors import summed
 from symtop.model.charts import BODY
 
 ORDER = 16  # with a fixed step
@@ -115,11 +116,11 @@ class Quadratic(NamedTuple):
             if not after > t:
                 return state, t, step, order, STEP_TOO_SMALL
             c[0, 0] = order
-            return plus(state, tail(state, c, order, after - t)), after, step, order, OK
+            return summed(state, tail(state, c, order, after - t)), after, step, order, OK
 
         @register_jitable
         def sample(par, state, new, c, h, x):  # type: ignore[no-untyped-def]
-            return plus(state, tail(state, c, int(c[0, 0]), x * h))
+            return summed(state, tail(state, c, int(c[0, 0]), x * h))
 
         return Method(advance, nothing_more, sample, 0, -0.5)
 
@@ -183,7 +184,7 @@ def loop(chart: str) -> Loop:
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
         fill(par, state, carry, ORDER)
         step = tail(state, carry, ORDER, h)
-        return step, carry, 1, ended_at(plus(state, step))
+        return step, carry, 1, ended_at(summed(state, step))
 
     return kernel_loop(begin, increment, form.observe)
 

@@ -68,7 +68,7 @@ from symtop.model.exact.double_double import (
     whole_part,
 )
 from symtop.model.exact.elliptic import Nome, arsinh, imaginary_argument, nome_of, real_argument
-from symtop.model.exact.samples import LONGEST_TIME, TURN, line
+from symtop.model.exact.samples import LONGEST_TIME, TURN, cubic, line
 from symtop.model.lazy_kernel import LazyKernel
 
 STEADY, TRIGONOMETRIC, HYPERBOLIC, SEPARATRIX = 0.0, 1.0, 2.0, 3.0  # kinds of motion
@@ -130,12 +130,6 @@ def _even(c: Constants, place: int, w0: float, w1: float, w2: float, w3: float) 
     c[place], c[place + 1], c[place + 2], c[place + 3] = w0 - w2, w1 - 3.0 * w3, 2.0 * w2, 4.0 * w3
 
 
-@inlined
-def _cubic(c: Constants, place: int, x: float) -> float:
-    value: float = c[place] + x * (c[place + 1] + x * (c[place + 2] + x * c[place + 3]))
-    return value
-
-
 @shared
 def _trigonometric(c: Constants, nome: Nome, sn: DoubleDouble, cn: DoubleDouble) -> DoubleDouble:
     """Cubics for k1^2 <= 1/2 and a pole sn : cn; d arg T/dv at v = 0."""
@@ -146,9 +140,9 @@ def _trigonometric(c: Constants, nome: Nome, sn: DoubleDouble, cn: DoubleDouble)
     _odd(c, COSINE, -1.0, 1.0, w1, w2, w3)
     _even(c, THETA_3, 1.0, e1, e2, e3)
     _even(c, THETA_4, 1.0, -e1, e2, -e3)
-    start, quarter = _cubic(c, THETA_4, 1.0), _cubic(c, THETA_4, -1.0)
-    aside = _cubic(c, SINE, -1.0)
-    c[A1] *= start * start / (_cubic(c, COSINE, 1.0) * _cubic(c, THETA_3, 1.0))
+    start, quarter = cubic(c, THETA_4, 1.0), cubic(c, THETA_4, -1.0)
+    aside = cubic(c, SINE, -1.0)
+    c[A1] *= start * start / (cubic(c, COSINE, 1.0) * cubic(c, THETA_3, 1.0))
     c[A2] *= (quarter * quarter + (c[NOME] * aside) * (c[NOME] * aside)) / (quarter * aside)
 
     sinh, cosh = imaginary_argument(sn, cn, nome) if cn[0] > 0.0 else (ZERO, ONE)  # symmetric: Q cosh 2y is nothing
@@ -220,12 +214,12 @@ def _orbit(c: Constants, phase: float) -> tuple[Vector, float, float, float]:
         v = TURN * phase
         sine, cosine = math.sin(v), math.cos(v)
         x = (cosine - sine) * (cosine + sine)
-        odd, even = sine * _cubic(c, SINE, x), _cubic(c, THETA_4, x)
+        odd, even = sine * cubic(c, SINE, x), cubic(c, THETA_4, x)
         real, imag = even * even, (c[NOME] * odd) * (c[NOME] * odd)
         per = 1.0 / (real + imag)
-        m1 = c[A1] * (cosine * _cubic(c, COSINE, x)) * _cubic(c, THETA_3, x) * per
+        m1 = c[A1] * (cosine * cubic(c, COSINE, x)) * cubic(c, THETA_3, x) * per
         m = (m1, c[A2] * odd * even * per, c[A3] * (real - imag) * per)
-        return m, _cubic(c, REAL, x), sine * cosine * _cubic(c, IMAG, x), 0.0
+        return m, cubic(c, REAL, x), sine * cosine * cubic(c, IMAG, x), 0.0
     w = c[PER_PHASE] * phase
     back, w = math.copysign(1.0, w), min(abs(w), FAR)
     grown = math.exp(w)
@@ -241,7 +235,7 @@ def _orbit(c: Constants, phase: float) -> tuple[Vector, float, float, float]:
     m1 = c[A1] * ((1.0 - r2) - q4 + p4 * (r4 + q4 * q4)) * per
     m = (m1, back * c[A2] * (f2 - b2) * per, 2.0 * c[A3] * rising * falling * per)
     x = 0.5 * (grown2 + shrunk2)
-    real, imag = (1.0 + shrunk2) * _cubic(c, REAL, x), back * (1.0 - shrunk2) * _cubic(c, IMAG, x)
+    real, imag = (1.0 + shrunk2) * cubic(c, REAL, x), back * (1.0 - shrunk2) * cubic(c, IMAG, x)
     return m, real, imag, c[SIGN] * c[LEAN] * back * w
 
 

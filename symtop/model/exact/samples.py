@@ -37,7 +37,8 @@ def line(c: Constants, place: int, t: float) -> tuple[float, float]:
 
 
 @inlined
-def _cubic(c: Constants, place: int, x: float) -> float:
+def cubic(c: Constants, place: int, x: float) -> float:
+    """The cubic at a place of the constants, at x."""
     value: float = c[place] + x * (c[place + 1] + x * (c[place + 2] + x * c[place + 3]))
     return value
 
@@ -111,22 +112,20 @@ def wave(c: Constants, t: float) -> Wave:
     if c[at.HYPERBOLIC] > 0.0:
         odd, even = _sinh_cosh(angle)
         twice = 1.0 + 2.0 * odd * odd
-        far_real, far_imag = _cubic(c, frame + at.FAR_REAL, twice), odd * even * _cubic(c, frame + at.FAR_IMAG, twice)
+        far_real, far_imag = cubic(c, frame + at.FAR_REAL, twice), odd * even * cubic(c, frame + at.FAR_IMAG, twice)
     else:
         odd, even = math.sin(angle), math.cos(angle)
         twice = 1.0 - 2.0 * odd * odd
-        far_real, far_imag = even * _cubic(c, frame + at.FAR_REAL, twice), odd * _cubic(c, frame + at.FAR_IMAG, twice)
-    near_odd = _cubic(c, frame + at.NEAR_IMAG, twice)
-    near_real, near_imag = even * _cubic(c, frame + at.NEAR_REAL, twice), odd * near_odd
+        far_real, far_imag = even * cubic(c, frame + at.FAR_REAL, twice), odd * cubic(c, frame + at.FAR_IMAG, twice)
+    near_odd = cubic(c, frame + at.NEAR_IMAG, twice)
+    near_real, near_imag = even * cubic(c, frame + at.NEAR_REAL, twice), odd * near_odd
     far_size = math.sqrt(far_real * far_real + far_imag * far_imag)
     through = c[frame + at.THROUGH] > 0.0
     near_size = near_imag if through else math.sqrt(near_real * near_real + near_imag * near_imag)
     per_near = 1.0 / near_odd if through else odd / near_size
     square = near_size * near_size + far_size * far_size  # theta_4(z)^2
-    nod = (
-        c[frame + at.STEEPNESS] * even * per_near * _cubic(c, at.BEND, 2.0 * twice * twice - 1.0) / (far_size * square)
-    )
-    bend = _cubic(c, at.BEND, twice) * odd
+    nod = c[frame + at.STEEPNESS] * even * per_near * cubic(c, at.BEND, 2.0 * twice * twice - 1.0) / (far_size * square)
+    bend = cubic(c, at.BEND, twice) * odd
     leaning = c[frame + at.LEANING] * (bend * bend) / square
     lean, size = c[frame + at.LEAN] + leaning, abs(c[frame + at.LEAN]) + abs(leaning)  # b - a u and its terms
 

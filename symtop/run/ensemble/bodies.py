@@ -26,7 +26,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, finite, one_of, whole
@@ -34,12 +33,10 @@ from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
 from symtop.model.body import PARTS, Attitude, RigidBody
-from symtop.model.charts import BODY, attitude_distance
+from symtop.model.charts import BODY, Array, attitude_distance
 from symtop.model.scenes import Scene
 from symtop.run.ensemble.population import between, check_memory, octaves, signs
 from symtop.run.trajectory import LABELS
-
-Array = NDArray[np.float64]
 
 FREE = ("short-axis", "long-axis", "near-separatrix", "near-symmetric", "needle")
 HEAVY = ("regular", "chaotic", "lagrange")

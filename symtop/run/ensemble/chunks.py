@@ -26,7 +26,7 @@ from symtop.core.jit import compile_kernel, to_fixed_tuple
 from symtop.core.parallel import cores, heed, in_threads
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.lanes import W, divided, members_of, of_bodies, turns
+from symtop.methods.framework.lanes import Array, W, Whole, divided, members_of, of_bodies, turns
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, off_length
 from symtop.methods.framework.preparation import opened
@@ -38,9 +38,6 @@ from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import NUMBERS, SymmetricTop
 from symtop.run.simulation import WIDEST_GAP, places, unseen
 from symtop.run.trajectory import LABELS
-
-Array = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 CHUNK = 65_536  # values of one column in a chunk: half a megabyte, which stays in a core's cache
 CHUNK_STEPS = 5_000_000  # in a chunk: a hundredth of a second in lanes, to a second

@@ -15,7 +15,6 @@ from typing import Any
 import netCDF4
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from symtop.core import netcdf
 from symtop.core.code_hash import digest, hashed, packages
@@ -25,10 +24,10 @@ from symtop.core.jit import code
 from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
 from symtop.core.progress import progress_bar
 from symtop.core.signals import ending_on_sigterm
-from symtop.methods.framework.lanes import of_bodies
+from symtop.methods.framework.lanes import Whole, of_bodies
 from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
-from symtop.model.charts import BODY
+from symtop.model.charts import BODY, Array
 from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run import cluster
@@ -36,8 +35,6 @@ from symtop.run.ensemble.chunks import CHUNK, CHUNK_STEPS, RAISED, SHOWN, Job, a
 from symtop.run.ensemble.inputs import Members, called, for_each, read_members
 from symtop.run.guard import MOST_STEPS
 from symtop.run.simulation import MOST_SAMPLES, MOST_SWINGS, chart_of, check_control
-
-Array = NDArray[np.float64]
 
 SAMPLES = 101
 IDENTITY = "identity"  # the file that says which ensemble a folder belongs to
@@ -247,7 +244,7 @@ def _parts(period: Array, counted: Array, horizon: Array, names: Any) -> Array:
     return step
 
 
-def _steps(step: Array, horizon: Array, most: float, names: Any) -> NDArray[np.int64]:
+def _steps(step: Array, horizon: Array, most: float, names: Any) -> Whole:
     """Whole steps of each member, as `simulation.make_plan` counts and refuses them."""
     with np.errstate(over="ignore"):
         ratio = horizon / step

@@ -13,12 +13,10 @@ from numpy.typing import NDArray
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, positive, shown
 from symtop.model.body import PARTS, from_flat
-from symtop.model.charts import BODY
+from symtop.model.charts import BODY, Array
 from symtop.model.exact.closed_form import checked_numbers
 from symtop.model.scenes import OBSERVABLES, Scene, scene
 from symtop.model.top import NUMBERS, flat
-
-Array = NDArray[np.float64]
 
 TOP = dict.fromkeys(NUMBERS, 1)
 NEEDED = {"nine": NUMBERS[:4], "14": ("I1", "I2", "I3", "omega_body")}  # the others are as in `Angles`, or

@@ -35,13 +35,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, one_of, whole
+from symtop.model.charts import Array
 from symtop.model.top import NUMBERS
-
-Array = NDArray[np.float64]
 
 MOST = 1e9  # members
 BYTES = 400  # of memory that a member takes

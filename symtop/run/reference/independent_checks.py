@@ -10,6 +10,7 @@ integral over the motion. Its own error is what becomes of a last place of mgl a
 """
 
 import functools
+import importlib.util
 import math
 import time
 from dataclasses import replace
@@ -86,11 +87,7 @@ def iterate_map_with_error(scene: Scene, times: Array) -> tuple[Any, Array]:
 
 def have_heyoka() -> bool:
     """heyoka has wheels for Linux only."""
-    try:
-        import heyoka  # noqa: F401
-    except ImportError:
-        return False
-    return True
+    return importlib.util.find_spec("heyoka") is not None
 
 
 def check_times(scene: Scene, horizon: float) -> Array:
