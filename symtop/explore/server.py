@@ -58,18 +58,15 @@ _at_work = threading.BoundedSemaphore(cores())  # of 200 runs that take turns in
 
 
 class Server(ThreadingHTTPServer):
-    """A thread for each of `MOST_OPEN` connections; what one fails of is nobody else's business."""
+    """A thread for each connection, `MOST_OPEN` at most; what one fails of is nobody else's business."""
 
     request_queue_size = MOST_WAITING
     daemon_threads = True
-    open, told = 0, 0.0  # connections; when the last refusal was reported
-    counting = threading.Lock()
+    told = 0.0  # when the last refusal was reported
 
     def process_request(self, request: Any, client_address: Any) -> None:
         """Give the connection a thread, or refuse it (503) and say so, at most once a second."""
-        with self.counting:
-            self.open += 1
-        if self.open <= MOST_OPEN:
+        if threading.active_count() <= MOST_OPEN:
             super().process_request(request, client_address)
             return
         if time.monotonic() - self.told > 1.0:
@@ -80,12 +77,6 @@ class Server(ThreadingHTTPServer):
             request.sendall(BUSY)
             request.recv(LONGEST_BODY)  # closed with unread bytes, the answer would be lost
         self.shutdown_request(request)
-
-    def shutdown_request(self, request: Any) -> None:
-        """Close a connection, which counts no more."""
-        with self.counting:
-            self.open -= 1
-        super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ARG002
         """Say in one line what went wrong, unless the browser has only left."""
@@ -103,7 +94,7 @@ class Handler(BaseHTTPRequestHandler):
     @property
     def timeout(self) -> float:  # type: ignore[override]
         """Seconds to wait for bytes: where many connections are open, an idle one makes room."""
-        return PATIENCE if getattr(self.server, "open", 0) <= FEW else HURRY
+        return PATIENCE if threading.active_count() <= FEW else HURRY
 
     def handle(self) -> None:
         """Answer the requests of one connection, until the browser closes it, even in the middle of one."""

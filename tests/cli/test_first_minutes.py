@@ -72,6 +72,10 @@ def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(axis_only, 
     assert {file.suffix for file in (tmp_path / "quick" / "only" / "figures").iterdir()} == {".png"}  # no PDF to print
     state = call(*words, "--status")
     assert state.output.strip() == f"convergence: {lines[0].split()[1]} done"
+    call("report", "--results", tmp_path / "quick" / "only", "--plugin", axis_only)
+    page = (tmp_path / "quick" / "only" / "report.html").read_text(encoding="utf-8")
+    assert "on-the-axis" in page
+    assert "of-a-user" in page
     call("study", "convergence", "--only", "no-such", code=2)
     nothing = call("study", "truth", "--quick", "--only", "on-the-axis", "--plugin", axis_only, code=2)
     assert "study truth has no case of on-the-axis" in nothing.stderr

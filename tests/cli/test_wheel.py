@@ -13,13 +13,6 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 TRAP = "raise SystemExit('a study of the working directory was run')\n"
-MINE = """
-import symtop
-
-symtop.register(symtop.runge_kutta("my-heun", ((), (1.0,)), (0.5, 0.5), order=2))
-top, start = symtop.SymmetricTop(1.5, 1.0, 3.0), symtop.Angles(theta=1.0, psi_dot=4.0)
-symtop.register_scene(symtop.Scene("my-top", top, start, horizon=6.0))
-"""
 
 
 def run(*command, **settings):
@@ -64,14 +57,6 @@ def test_a_wheel_in_an_empty_folder(tmp_path):
     assert "@article" in here(symtop, "integrators", "midpoint")
     assert "BAD" not in here(symtop, "doctor")
     assert {path.name for path in home.iterdir()} == {"studies", "results"}
-    mine = ("--plugin", tmp_path / "mine.py")  # somebody new adds a scene and a method, and finds both in a report
-    mine[1].write_text(MINE, encoding="utf-8")
-    assert "reached t = 6" in here(symtop, "run", "my-top", "my-heun", "--step-size", "0.01", *mine)
-    here(symtop, "study", "convergence", "--quick", "--only", "my-heun,midpoint", *mine)
-    here(symtop, "report", "--results", "results/quick/only", *mine)
-    page = (home / "results" / "quick" / "only" / "report.html").read_text(encoding="utf-8")
-    assert "my-heun" in page
-    assert "my-top" in page
 
 
 RUN = """

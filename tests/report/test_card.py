@@ -31,13 +31,9 @@ def test_the_card_is_one_page_with_two_figures_and_every_verdict(ledger, tmp_pat
         if finding.verdict != "inapplicable":
             assert f" {finding.verdict}</td>" in page
     assert page.count('<td class="refuted">✗ refuted') == len(ledger.refuted) == 2
-    left, right = (figure.axes[0] for figure in figures(ledger))
-    assert left.get_title() == f"order: {ledger['order'].measured}"
-    assert right.get_title().startswith("energy: drift, ")
-    assert [text.get_text() for text in left.texts] == ["$h^{2}$, as claimed"]
-    guide = left.lines[-1]
-    rise = guide.get_ydata()[1] / guide.get_ydata()[0]
-    assert rise == pytest.approx((guide.get_xdata()[1] / guide.get_xdata()[0]) ** 2)
+    titles = [figure.axes[0].get_title() for figure in figures(ledger)]
+    assert titles[0] == f"order: {ledger['order'].measured}"
+    assert titles[1].startswith("energy: drift, ")
 
 
 def test_the_energy_of_the_card_is_that_of_the_long_run(ledger):

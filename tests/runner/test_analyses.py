@@ -55,6 +55,12 @@ def script(tmp_path, monkeypatch):
     return written
 
 
+@pytest.fixture(scope="module")
+def pool():
+    with Pool(2) as workers:
+        yield workers
+
+
 def studied(results, *files):
     """Exit code and output of one command for several studies."""
     done = call("study", *files, "--results", results, "--jobs", "2", code=None)
@@ -87,18 +93,17 @@ def test_a_process_that_is_killed_is_done_without(script, tmp_path):
     assert not leftovers(tmp_path / "r")
 
 
-def test_a_case_whose_file_is_gone_has_failed(script, tmp_path):
+def test_a_case_whose_file_is_gone_has_failed(script, tmp_path, pool):
     """The study is not taken for whole without it, and the next run computes it again."""
     study, results = runner.load(script("first")), tmp_path / "r"
-    with Pool(2) as pool:
-        answer = runner.start(study, results, pool, quiet=True, beside=True)
-        gone, other = sorted((results / "cases" / "first").glob("*.npz"))
-        gone.unlink()
-        (failure,) = answer.result()["failures"]
-        assert gone.name in failure
-        assert other.name not in failure
-        again = runner.start(study, results, pool, quiet=True).result()
-        assert (again["failures"], again["computed"]) == ([], 1)
+    answer = runner.start(study, results, pool, quiet=True, beside=True)
+    gone, other = sorted((results / "cases" / "first").glob("*.npz"))
+    gone.unlink()
+    (failure,) = answer.result()["failures"]
+    assert gone.name in failure
+    assert other.name not in failure
+    again = runner.start(study, results, pool, quiet=True).result()
+    assert (again["failures"], again["computed"]) == ([], 1)
 
 
 def test_a_study_that_is_edited_before_it_is_concluded_is_drawn_again(script, tmp_path):
@@ -143,18 +148,17 @@ def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
     assert all(file.is_file() for file in others)
 
 
-def test_timed_cases_wait_for_the_analysis_of_the_study_before(script, tmp_path):
+def test_timed_cases_wait_for_the_analysis_of_the_study_before(script, tmp_path, pool):
     done = []
-    with Pool(2) as pool:
-        future = pool.analyse(time.sleep, 1.0)
+    future = pool.analyse(time.sleep, 1.0)
 
-        def measure(_):
-            done.append(future.done())
-            return xr.Dataset()
+    def measure(_):
+        done.append(future.done())
+        return xr.Dataset()
 
-        for timed in (False, True):
-            study = replace(runner.load(script("first")), timed=timed, measure=measure)
-            symtop.register_scene(replace(symtop.scene("spheroid"), name=f"here-{timed}"))  # cases of this process
-            here = replace(study, cases=lambda _, name=f"here-{timed}": [Case(name, "midpoint")])
-            runner.start(here, tmp_path / "r", pool, quiet=True)
+    for timed in (False, True):
+        study = replace(runner.load(script("first")), timed=timed, measure=measure)
+        symtop.register_scene(replace(symtop.scene("spheroid"), name=f"here-{timed}"))  # cases of this process
+        here = replace(study, cases=lambda _, name=f"here-{timed}": [Case(name, "midpoint")])
+        runner.start(here, tmp_path / "r", pool, quiet=True)
     assert done == [False, True]

@@ -63,14 +63,22 @@ def test_a_full_disk_ends_the_run_and_what_was_computed_is_kept(tmp_path, monkey
     assert "2 of 4 cases computed" in output
 
 
-def test_a_full_disk_in_the_words_of_the_netcdf_library(tmp_path, monkeypatch):
-    def full(self, *arguments, **options):
-        raise RuntimeError("NetCDF: HDF error")
+@pytest.mark.parametrize(
+    ("place", "name", "error", "says"),
+    [
+        (xr.Dataset, "to_netcdf", RuntimeError("NetCDF: HDF error"), "NetCDF: HDF error"),
+        (store.tempfile, "TemporaryFile", OSError(errno.EROFS, os.strerror(errno.EROFS)), "Read-only file system"),
+    ],
+)
+def test_what_the_netcdf_library_or_the_system_refuses_to_write(tmp_path, monkeypatch, place, name, error, says):
+    def refuse(*arguments, **options):
+        raise error
 
-    monkeypatch.setattr(xr.Dataset, "to_netcdf", full)
-    refused(tmp_path, "NetCDF: HDF error")
-    monkeypatch.setattr(netcdf, "LITTLE", 1e30)
-    refused(tmp_path, "no room is left")
+    monkeypatch.setattr(place, name, refuse)
+    refused(tmp_path, says)
+    if place is xr.Dataset:
+        monkeypatch.setattr(netcdf, "LITTLE", 1e30)
+        refused(tmp_path, "no room is left")
 
 
 @pytest.mark.slow
@@ -105,14 +113,6 @@ def test_results_that_are_a_file_or_cannot_be_made(tmp_path):
     assert code == 2
     assert "is a file" in output
     refused("/proc/nowhere", "/proc/nowhere")
-
-
-def test_a_folder_refused_by_the_system(tmp_path, monkeypatch):
-    def refuse(*arguments, **options):
-        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
-
-    monkeypatch.setattr(store.tempfile, "TemporaryFile", refuse)
-    refused(tmp_path, "Read-only file system")
 
 
 def test_a_folder_where_a_file_should_be(tmp_path):

@@ -1,18 +1,22 @@
 """Plug-ins: what one registers counts by the code that it reaches, and its mistakes are told with its name."""
 
+import json
+
 import pytest
 
 from symtop.core.code_hash import changes
 from tests.commands import call, printed_by
 
 CODE = """\
-import sys
+import json, sys
 import symtop
+from symtop.methods.framework import registry
 from symtop.run import plugins
 from symtop.runner import fingerprint
-(name,) = plugins.load(sys.argv[1])
-for label, value in fingerprint.made_of("method", symtop.integrator(name)).items():
-    print(label, value, sep="\\t")
+for folder in sys.argv[1:]:
+    (name,) = plugins.load(f"{folder}/plug.py")
+    print(json.dumps(fingerprint.made_of("method", symtop.integrator(name))))
+    del registry._registry[name], sys.path[0], sys.modules["coeffs"], sys.modules["lazily"]
 """
 PLUGIN = """\
 import importlib, pathlib, sys
@@ -29,29 +33,30 @@ symtop.register(symtop.Integrator(name="a-users", family="other", summary="", so
 """
 
 
-def made_of(plugin):
-    """What a new process says that the method of a plug-in is made of."""
-    return dict(line.split("\t") for line in printed_by(CODE, plugin).splitlines())
-
-
 def write(folder, **files):
-    for name, text in files.items():
-        (folder / f"{name}.py").write_text(text)
+    folder.mkdir(exist_ok=True)
+    for name, content in files.items():
+        (folder / f"{name}.py").write_text(content)
     return folder / "plug.py"
 
 
 def test_functions_count_wherever_they_stand_and_however_they_were_imported(tmp_path):
-    plugin = write(
-        tmp_path, plug=PLUGIN, coeffs="def twice(x):\n    return 2 * x\n\ndef unused():\n    return 1\n",
-        lazily="def late(x):\n    return x\n", other="x = 1\n",
-    )  # fmt: skip
-    before = made_of(plugin)
+    """What a new process says that the method of a plug-in is made of: as it was, moved, and edited."""
+    files = {"plug": PLUGIN, "coeffs": "def twice(x):\n    return 2 * x\n\ndef unused():\n    return 1\n",
+             "lazily": "def late(x):\n    return x\n", "other": "x = 1\n"}  # fmt: skip
+    moved = {
+        "plug": f"# moved\n{PLUGIN}",
+        "coeffs": "# a comment\ndef twice(x):\n    return 2 * x\n",
+        "other": "x = 2\n",
+    }
+    edits = {"lazily": "def late(x):\n    return -x\n", "coeffs": "def twice(x):\n    return 3 * x\n"}
+    folders = [write(tmp_path / name, **files | changed).parent
+               for name, changed in (("first", {}), ("moved", moved), ("edited", edits))]  # fmt: skip
+    before, same, other = map(json.loads, printed_by(CODE, *folders).splitlines())
     assert {"code plug.py", "code coeffs.py", "code lazily.py"} <= before.keys()
     assert "code other.py" not in before
-    write(tmp_path, coeffs="# a comment\ndef twice(x):\n    return 2 * x\n", other="x = 2\n", plug=f"# moved\n{PLUGIN}")
-    assert made_of(plugin) == before
-    write(tmp_path, lazily="def late(x):\n    return -x\n", coeffs="def twice(x):\n    return 3 * x\n")
-    assert changes(before, made_of(plugin)) == ["code coeffs.py", "code lazily.py"]
+    assert same == before
+    assert changes(before, other) == ["code coeffs.py", "code lazily.py"]
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from symtop_studies.speed import facts, figures, study
+from symtop_studies.speed import facts, study
 
 import symtop
 from symtop.measure import datasets
@@ -43,20 +43,6 @@ def test_a_cost_lies_between_the_runs_that_miss_and_meet_the_error(data):
     assert facts.cost(cell, middle, "force_evaluations") == pytest.approx(math.sqrt(seconds[1] * seconds[2]))
     assert facts.cost(cell, error[2], "force_evaluations") == pytest.approx(seconds[2])
     assert facts.cost(cell, 1e-3 * error.min(), "force_evaluations") == math.inf
-
-
-def test_the_chart_holds_every_run_and_the_marks_of_the_truth(data):
-    (chart,) = figures.charts(data)
-    assert list(chart.panels) == ["goldstein | 10 nutations"]
-    (marks,) = chart.marks.values()
-    assert marks[0] == float(facts.shown(data)["seconds"].sel(variant="exact").min())
-    points = {series.integrator: series.points for series in chart.panels["goldstein | 10 nutations"]}
-    assert "exact" not in points
-    place = chart.y["largest error of the axis (rad)"]
-    assert [point[place] for point in points["rk4[axis]"]] == [
-        float(f"{value:.3g}") for value in facts.shown(data)["axis"].sel(variant="rk4[axis]").values
-    ]
-    assert {point[place] for point in points["rk4[attitude]"]} == {None}
 
 
 def test_the_page_says_what_was_measured(data, tmp_path):

@@ -222,16 +222,6 @@ def axis(q: Any) -> Any:
 
 
 @register_jitable
-def _double(x: Any) -> Any:
-    return np.float64(x)
-
-
-@register_jitable
-def _single(x: Any) -> Any:
-    return np.float32(x)
-
-
-@register_jitable
 def _nothing(par: Any, e: Any, v: Any) -> Any:
     return 0.0
 
@@ -331,7 +321,7 @@ def axis_loop(step: Callable[..., Any], carried: Carried, reused: Callable[..., 
     return kernel_loop(begin, increment, carried.observe, present=carried.present)
 
 
-def _narrowing(number: Callable[..., Any], count: int) -> Callable[..., Any]:
+def _narrowing(number: Any, count: int) -> Callable[..., Any]:
     """The first `count` numbers of a record in a precision."""
     if count == 0:
 
@@ -348,7 +338,7 @@ def _narrowing(number: Callable[..., Any], count: int) -> Callable[..., Any]:
 
 def attitude_loop(
     step: Callable[..., Any], carried: Carried, reused: Callable[..., Any] = _nothing,
-    number: Callable[..., Any] = _double, *, body: bool = False,
+    number: Any = np.float64, *, body: bool = False,
 ) -> Loop:  # fmt: skip
     """The loop on the attitude around a map, of a top or of a `body` without symmetry, in the precision of `number`."""
     register_jitable(step)
@@ -365,8 +355,9 @@ def attitude_loop(
         p, v, carry = step(there, cut, placed(q)[0], v, carry, number(h))
         q = normalised(there, product(p, q))
         dstate = (
-            _double(q[0]) - state[0], _double(q[1]) - state[1], _double(q[2]) - state[2], _double(q[3]) - state[3],
-            _double(v[0]) - state[4], _double(v[1]) - state[5], _double(v[2]) - state[6],
+            np.float64(q[0]) - state[0], np.float64(q[1]) - state[1], np.float64(q[2]) - state[2],
+            np.float64(q[3]) - state[3], np.float64(v[0]) - state[4], np.float64(v[1]) - state[5],
+            np.float64(v[2]) - state[6],
         )  # fmt: skip
         total = dstate[0] + dstate[1] + dstate[2] + dstate[3] + dstate[4] + dstate[5] + dstate[6]
         return dstate, carry, 1, finite_outcome(total)
@@ -616,6 +607,15 @@ def _turn(k: int) -> Callable[..., Any]:
 _first_turn, _second_turn, _third_turn = map(_turn, range(3))
 
 
+@register_jitable
+def _five_turns(outer: Any, inner: Any, par: Any, q: Any, L: Any, h: float) -> Any:
+    q, L = outer(par, q, L, 0.5 * h)
+    q, L = _second_turn(par, q, L, 0.5 * h)
+    q, L = inner(par, q, L, h)
+    q, L = _second_turn(par, q, L, 0.5 * h)
+    return outer(par, q, L, 0.5 * h)
+
+
 def _increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (q, L); the free rotation leaves L in space as it is."""
     q, half = (state[0], state[1], state[2], state[3]), 0.5 * h
@@ -623,17 +623,9 @@ def _increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) 
     kicked = state[4] + kick[0], state[5] + kick[1], state[6] + kick[2]
     L = plus(kicked, 1.0, turned((q[0], -q[1], -q[2], -q[3]), kicked))
     if par.I3 < par.I1:
-        q, L = _first_turn(par, q, L, half)
-        q, L = _second_turn(par, q, L, half)
-        q, L = _third_turn(par, q, L, h)
-        q, L = _second_turn(par, q, L, half)
-        q, L = _first_turn(par, q, L, half)
+        q, L = _five_turns(_first_turn, _third_turn, par, q, L, h)
     else:
-        q, L = _third_turn(par, q, L, half)
-        q, L = _second_turn(par, q, L, half)
-        q, L = _first_turn(par, q, L, h)
-        q, L = _second_turn(par, q, L, half)
-        q, L = _third_turn(par, q, L, half)
+        q, L = _five_turns(_third_turn, _first_turn, par, q, L, h)
     q = normalised(par, q)
     kick = plus(kick, half, torque(par, axis(q)))
     dstate = (q[0] - state[0], q[1] - state[1], q[2] - state[2], q[3] - state[3], *kick)
@@ -680,7 +672,7 @@ def _both(
 ) -> list[Integrator]:  # fmt: skip
     """A map in double and in the single precision of the engine, there on the attitude as the engine steps it."""
     words, charts = f"{summary}, in single precision", ("attitude", BODY)
-    rounded = {at: attitude_loop(step, VELOCITY[at], number=_single, body=at == BODY) for at in charts}
+    rounded = {at: attitude_loop(step, VELOCITY[at], number=np.float32, body=at == BODY) for at in charts}
     return [
         _engine(name, step, order, summary, reference, keeps, rule=rule, energy_error=energy_error),
         _entry(f"{name}-float32", rounded, None, words, reference, rule=rule, precision="single"),
