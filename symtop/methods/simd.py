@@ -21,6 +21,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core.cgutils import unpack_tuple
 from numba.extending import intrinsic, models, overload, register_model
 
 from symtop.core.jit import INLINED, register_jitable, set_item
@@ -188,11 +189,8 @@ def side_by_side(typing, first, second):  # type: ignore[no-untyped-def]
     """A tuple of `TWO` of two tuples of doubles."""
 
     def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        both = ir.Constant(ir.ArrayType(_PAIR, len(first)), ir.Undefined)
-        for m in range(len(first)):
-            parts = (builder.extract_value(one, m) for one in arguments)
-            both = builder.insert_value(both, _paired(builder, *parts), m)
-        return both
+        numbers = zip(*(unpack_tuple(builder, one) for one in arguments), strict=True)
+        return context.make_tuple(builder, signature.return_type, [_paired(builder, *two) for two in numbers])
 
     return types.UniTuple(TWO, len(first))(first, second), emit
 
@@ -203,7 +201,7 @@ def apart(typing, both):  # type: ignore[no-untyped-def]
     one = types.UniTuple(types.float64, len(both))
 
     def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        values = [builder.extract_value(arguments[0], m) for m in range(len(both))]
+        values = unpack_tuple(builder, arguments[0])
         lanes = ([builder.extract_element(value, ir.Constant(_INDEX, k)) for value in values] for k in range(2))
         return context.make_tuple(builder, signature.return_type, [*map(Vectors(builder).array, lanes)])
 

@@ -30,7 +30,7 @@ from symtop.run.reference.sensitivity import displacement
 SERIES = {BODY: "series-general-adaptive", "axis": "series-adaptive"}
 FINE, CHECK = 1e-15, 1e-13  # tolerances: of the true motion, and of its check at one of so many times, the last first
 CHECKED, MULTIPLIED = 10, 1e5  # or at the first ones where A is less, which makes little of what they differ by
-CALM = 1e3  # times these tolerances where A and the growth of the guard's law are less up to the horizon
+CALM = 1e3  # times these tolerances where A and the law of the guard make less than that of an error by the horizon
 PAIR_STEPS = 7  # of two motions side by side, in a period of the fastest turn: with 5.3 chaos is damped away
 SWINGS = 8.0  # of the pull of a weight: twice what one swing adds to 2T
 MOVED = 1e-10  # of the natural frequency: small enough to show how much a motion beside a separatrix shears
@@ -106,15 +106,16 @@ class Growth(NamedTuple):
 
 @register_jitable
 def _apart(near: Any, far: Any, units: Any) -> Any:
-    """How far two states are apart, in place or in momentum; NaN of quaternions that have left length one."""
+    """How far two states are apart, in place or in momentum; NaN of what is lost, as a quaternion not of length one."""
     first = len(near) - 3  # of the momentum
     place, momentum, one, other = 0.0, 0.0, 0.0, 0.0
     for m in range(first):
         place, one, other = place + (far[m] - near[m]) ** 2, one + near[m] ** 2, other + far[m] ** 2
     for m in range(first, len(near)):
         momentum += (far[m] - near[m]) ** 2
-    lost = first == 4 and not max(abs(math.sqrt(one) - 1.0), abs(math.sqrt(other) - 1.0)) <= LENGTH
-    return math.nan if lost else max(math.sqrt(place) * units[0], math.sqrt(momentum) * units[1])
+    long = max(abs(math.sqrt(one) - 1.0), abs(math.sqrt(other) - 1.0)) if first == 4 else 0.0
+    sound = place + momentum < math.inf and long <= LENGTH
+    return max(math.sqrt(place) * units[0], math.sqrt(momentum) * units[1]) if sound else math.nan
 
 
 class Integrated:

@@ -20,7 +20,7 @@ from symtop.run import guard
 from symtop.run.ensemble.bodies import body_population, scenes_of
 from symtop.run.guard import EXPECTED, Probe, grown
 from symtop.run.linear_stability import trace
-from symtop.run.motion import Exact, Integrated, landmarks
+from symtop.run.motion import Exact, Integrated, _apart, landmarks
 from symtop.run.simulation import make_plan
 
 REMEDIED = ("spheroid", "goldstein", "cusp", "loop", "fast", "hairer-lubich-wanner", "grazing")
@@ -386,3 +386,12 @@ def test_a_body_at_rest_that_falls_into_chaos_is_watched_with_steps_short_enough
     assert said(scene, method, step_size=step, horizon=48.0) == ""  # right to 1e-5
     monkeypatch.setattr("symtop.run.motion.PAIR_STEPS", 4)
     assert Integrated(scene).amplification(scene.horizon, scene.horizon) < 1e11  # the control
+
+
+def test_two_motions_of_which_one_is_lost_are_not_compared():
+    whole, units = (1.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0), (1.0, 1.0)
+    for lost in ((math.nan, *whole[1:]), (1.002, *whole[1:]), (*whole[:6], math.inf)):
+        assert math.isnan(_apart(whole, lost, units))
+        assert math.isnan(_apart(lost, whole, units))
+    assert _apart(whole, (*whole[:6], 3.5), units) == 0.5
+    assert _apart(whole[1:], (1.002, *whole[2:]), units) == 1.002  # an axis

@@ -1,13 +1,17 @@
 """Speed as ratios within one run: a run of one step, and all that surrounds a run."""
 
 import functools
+import math
 
+import numpy as np
 import pytest
 
 import symtop
 from symtop.measure.timing import bare_run, timings
-from symtop.model.scenes import closed_form
+from symtop.methods.framework.plan import Plan
+from symtop.model.scenes import closed_form, scene
 from symtop.run.guard import forecast
+from symtop.run.motion import PAIR_STEPS, POINTS, Integrated
 from symtop.run.simulation import make_plan
 
 STEPS = 20_000
@@ -64,3 +68,24 @@ def test_two_samples_cost_no_more_than_501():
         calls = [functools.partial(ask, samples=count, observe="axis", guard=guard) for count in (2, 501)]
         two, many = (timing.best for timing in timings(calls, batches=80, batch=2e-3))
         assert two < many
+
+
+@pytest.mark.slow
+def test_the_guard_watches_two_motions_in_the_time_of_one():
+    """Of a body over 200 natural periods; one after the other they take twice as long."""
+    body = scene("heavy-brick", bodies=True)
+    watched = Integrated(symtop.Scene("long", body.top, body.start, 200.0 * body.nutation_period))
+    steps = math.ceil(watched.scene.horizon * watched.fast * PAIR_STEPS / (2.0 * math.pi))
+    plan = Plan.steps(watched.scene.horizon / steps, np.arange(1, POINTS + 1) * steps // POINTS)
+    solver = symtop.integrator("dop853-compiled-fixed").solvers["body"]
+
+    def alone():
+        solver(body.top, body.start, plan)
+
+    def both():
+        watched.known.clear()
+        watched.growth(watched.scene.horizon)
+
+    one, two, twice = (timing.best for timing in timings([alone, both, lambda: (alone(), alone())], 40, 2e-3))
+    assert two / one < 1.4
+    assert twice / one > 1.7

@@ -232,13 +232,13 @@ def _unwound(rule: Any, s: Any, k: int) -> Any:
 
 
 def present_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """(e, L)."""
-    return axis_state(par, _unwound(rule, state, k))
+    """(e, L), as wide as the kernel's state."""
+    return (*axis_state(par, _unwound(rule, state, k)), 0.0, 0.0)
 
 
 def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """(q, L)."""
-    return attitude_state(par, _unwound(rule, state, k), k * h)
+    """(q, L), as wide as the kernel's state."""
+    return (*attitude_state(par, _unwound(rule, state, k), k * h), 0.0)
 
 
 def _side_by_side(par: Any, rule: Any, state: Any, carry: Any) -> Any:
@@ -256,7 +256,7 @@ march_axis, march_attitude = (
 
 def built_in() -> list[Integrator]:
     """`exact-discrete`."""
-    charts = {  # a sample is not as wide as a state
+    charts = {
         "axis": (march_axis, Shown(lambda _par, _t, state: state[:6], 6)),
         "attitude": (march_attitude, Shown(lambda _par, _t, state: state[:7], 7)),
     }
