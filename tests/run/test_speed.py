@@ -14,8 +14,6 @@ from symtop.run.guard import forecast
 from symtop.run.motion import PAIR_STEPS, POINTS, Integrated
 from symtop.run.simulation import make_plan
 
-STEPS = 20_000
-
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["goldstein", "spheroid"])
