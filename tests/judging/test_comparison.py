@@ -17,7 +17,6 @@ from symtop.judging.comparison import cheapest
 from symtop.measure.accuracy import error_row
 from symtop.measure.sweep import failed_setting
 from symtop.measure.timing import bare_run
-from symtop.methods.framework.registry import _registry as registry
 
 METHODS = ["midpoint", "stormer-verlet", "rk4", "taylor"]
 BUDGET = 2e5
@@ -107,20 +106,11 @@ def refusing(top, start, plan):
     raise RuntimeError("no")
 
 
-@pytest.fixture
-def own():
-    """Two methods that are registered for a test: one runs, one raises."""
-    rk4 = symtop.integrator("rk4").solvers["axis"]
-    for name, solver in (("on-the-axis", rk4), ("refusing", refusing)):
+def test_own_scenes_and_methods_engines_and_scipy_take_part(clean_registry, tmp_path):
+    for name, solver in (("on-the-axis", symtop.integrator("rk4").solvers["axis"]), ("refusing", refusing)):
         symtop.register(
             symtop.Integrator(name, "other", "of a test", {"axis": solver}, implementation="python", order=4)
         )
-    yield
-    for name in ("on-the-axis", "refusing"):
-        del registry[name]
-
-
-def test_own_scenes_and_methods_engines_and_scipy_take_part(own, tmp_path):
     top = symtop.SymmetricTop.from_spheroid(mass=1, polar_radius=0.2, equatorial_radius=0.1, pivot_distance=0.25)
     scene = symtop.Scene("mine", top, symtop.Angles(theta=0.4, psi_dot=60.0), horizon=0.2)
     names = ["on-the-axis", "refusing", "mujoco-euler", "rk45", "rk4[axis]", "rk4[angles]", "exact"]

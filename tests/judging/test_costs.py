@@ -15,28 +15,7 @@ from symtop.judging.claims.subject import seconds_a_step
 from symtop.methods.framework.registry import Integrator
 
 SPHEROID = symtop.scene("spheroid")
-ATTEMPTS = 12  # runs that show what an attempt at a step costs
 STEP = SPHEROID.nutation_period / 118.02
-
-
-def forces_of_an_attempt(method: Integrator, chart: str) -> int:
-    """The number of forces that every step of an adaptive method comes in, rejected ones too; 1 if they vary.
-
-    A run costs the same number for its start and s forces for each attempt of a method with s stages: the costs of
-    `ATTEMPTS` runs to different times at different tolerances differ by multiples of s. Where a solver iterates until
-    it converges, they have no common divisor; by chance they had 2 in one case in 2000.
-    """
-    costs = []
-    for k in range(ATTEMPTS):
-        tolerance = max(10.0 ** (-4.0 - 0.4 * k), method.least_tolerance)
-        horizon = (1.37 + 0.23 * k) * SPHEROID.nutation_period
-        run = symtop.simulate(
-            SPHEROID, method.variant(chart), tolerance=tolerance, horizon=horizon, samples=2, guard=False
-        )
-        assert run.attrs["outcome"] == "ok"
-        costs.append(int(run.attrs["force_evaluations"]))
-    assert len(set(costs)) > ATTEMPTS // 2
-    return math.gcd(*(cost - costs[0] for cost in costs))
 
 
 def bytes_a_step(method: Integrator) -> float:
@@ -57,16 +36,6 @@ def bytes_a_step(method: Integrator) -> float:
         finally:
             tracemalloc.stop()
     return (peaks[2] - peaks[1]) / max(steps[2] - steps[1], 1)
-
-
-@pytest.mark.parametrize(
-    ("name", "forces"),
-    [("rk45", 6), ("rk45-compiled", 6), ("dop853", 12), ("lsoda", 1), pytest.param("radau", 1, marks=pytest.mark.slow)],
-)
-def test_an_explicit_adaptive_method_pays_the_same_for_every_attempt_and_one_that_iterates_does_not(name, forces):
-    charts = symtop.integrator(name).charts()[: None if forces > 1 else 1]
-    assert [forces_of_an_attempt(symtop.integrator(name), chart) for chart in charts] == [forces] * len(charts)
-    assert (symtop.integrator(name).explicit is True) is (forces > 1)
 
 
 # one of each loop: reduced chart, Newton, space frame, stages, two adaptive ones, SciPy's

@@ -12,7 +12,7 @@ from symtop.model.scenes import closed_form
 from symtop.run.simulation import integrate
 from tests.conftest import random_scenes
 
-DISCRETE = ("midpoint", "trapezoidal", "stormer-verlet")
+DISCRETE = {"midpoint": 1e-11, "trapezoidal": 1e-11, "stormer-verlet": 1e-11, "galerkin-simpson": 1e-13}  # of momenta
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def test_recomputed_momenta_stay_put_without_a_trend(million, name):
     assert run.steps == 1_000_000
     for quantity in ("p_phi", "p_psi"):
         change = residuals(symtop.scene("spheroid"), run)[quantity]
-        assert np.max(np.abs(change)) < 1e-11
+        assert np.max(np.abs(change)) < DISCRETE[name]
         assert not trend(run.time, change).significant
 
 
@@ -42,7 +42,8 @@ def test_energy_error_is_bounded_without_a_trend(million, name):
     line, power = trend(run.time, change), growth(run.time, change)
     assert not line.significant
     assert abs(power.slope) < 0.05
-    assert 1e-6 < np.max(np.abs(change)) < 1e-3  # of second order in the step: bounded, not small
+    # of second order in the step: bounded, not small; or of fourth
+    assert (1e-11 if name == "galerkin-simpson" else 1e-6) < np.max(np.abs(change)) < 1e-3
 
 
 def test_momenta_are_recomputed_and_not_copied():

@@ -13,8 +13,6 @@ from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
 from symtop.methods.framework.space import on_axis
-from symtop.methods.lagrangian.discrete_lagrangian import discrete_lagrangian
-from symtop.methods.runge_kutta.explicit import runge_kutta
 from symtop.methods.splitting.composition import composition
 from symtop.methods.splitting.space import march_axis
 from symtop.model.top import flat
@@ -194,24 +192,6 @@ def test_kicks_that_a_table_leaves_out_change_no_bit():
     for chart in ("axis", "attitude"):
         solver = method.solvers[chart]
         assert_runs_alone(solver, numbers, h, marks, solver.many(numbers, h, marks))
-
-
-@pytest.mark.parametrize(
-    ("a", "b"), [(((),), (1.0,)), (((), (1 / 3,), (0.0, 2 / 3)), (0.25, 0.0, 0.75))], ids=["euler", "heun-3"]
-)
-def test_tableaux_of_any_number_of_stages(a, b):
-    """A coefficient of 0 is carried out like any other: a slope that overflows makes NaN of the sum, as alone."""
-    solver = runge_kutta("any", a, b).solvers["axis"]
-    given = members(200, seed=6)
-    assert_runs_alone(solver, *given, solver.many(*given))
-
-
-def test_a_rule_of_ones_own_runs_in_lanes():
-    """Two nodes at the start, one inside, one at the end, and weights that are not symmetric."""
-    method = discrete_lagrangian("mixed", (0.0, 0.0, 0.3, 1.0), (0.1, 0.2, 0.3, 0.4))
-    solver, given = method.solvers["angles"], members(200, seed=8)
-    assert solver.in_lanes
-    assert_runs_alone(solver, *given, solver.many(*given))
 
 
 @pytest.mark.parametrize(("name", "steps"), [("takahashi-imada[attitude]", 250), ("kahan[axis]", 15)])

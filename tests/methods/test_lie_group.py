@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 import symtop
 from symtop.measure.published import published_values
-from symtop.measure.step_map import one_step, symplectic_defect
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.preparation import Body
@@ -63,17 +62,6 @@ def energies(scene, rows):
 
 
 # ---- what is kept ----------------------------------------------------------------------------------------------------
-
-
-def test_gauss_on_the_axis_lacks_the_bracket_that_the_collective_method_has():
-    scene = symtop.scene("spheroid")
-    h = scene.nutation_period / 4.37
-    defects = [
-        symplectic_defect(one_step(integrator(name), "axis", scene, h), scene.start).size
-        for name in ("gauss-6", "collective-gauss-6")
-    ]
-    assert defects[0] > 1e-5
-    assert defects[1] < 1e-11
 
 
 @pytest.mark.parametrize("name", [*LIE_TABLES, *COLLECTIVE, *VARIATIONAL])

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from symtop.methods.framework.lanes import W
+from symtop.methods.lagrangian.discrete_lagrangian import discrete_lagrangian
 from symtop.methods.lie_group.generalised_alpha import generalised_alpha
 from symtop.methods.lie_group.runge_kutta import LieTable, lie_runge_kutta
 from symtop.methods.lie_group.variational import EULER_POINCARE, Variational, lie_variational
+from symtop.methods.runge_kutta.explicit import runge_kutta
 from symtop.methods.splitting.coefficients import SUZUKI_4
 from tests.methods.test_lanes import FAR, ITERATED, SOLVERS, assert_runs_alone, left_alone, members
 
@@ -49,8 +51,11 @@ def of_table(*rows, bent=False):
         generalised_alpha("any", 0.0).solvers["axis"],
         with_shares("rkmk-se3-2[attitude]", (0.25, 0.75)),
         with_shares("generalised-alpha[axis]", (0.25, 0.5, 0.25)),
+        runge_kutta("any", ((),), (1.0,)).solvers["axis"],
+        runge_kutta("any", ((), (1 / 3,), (0.0, 2 / 3)), (0.25, 0.0, 0.75)).solvers["axis"],
+        discrete_lagrangian("mixed", (0.0, 0.0, 0.3, 1.0), (0.1, 0.2, 0.3, 0.4)).solvers["angles"],
     ],
-    ids=["euler", "heun", "euler-poincare-4", "alpha-0", "rkmk-twice", "alpha-thrice"],
+    ids=["euler", "heun", "euler-poincare-4", "alpha-0", "rkmk-twice", "alpha-thrice", "rk-1", "rk-3", "weights"],
 )
 def test_tables_and_compositions_of_ones_own_have_the_bits_of_runs_alone(solver):
     """A weight of 0 is carried out like any other, and each share of generalised-alpha goes on from the last one."""

@@ -69,15 +69,6 @@ def test_fixed_steps_have_order_sixteen(chart):
     assert_order("spheroid", integrator(f"series-general[{chart}]"), 16, 1.0, (12, 18), quantity)
 
 
-def test_it_follows_the_reduced_series_at_equal_steps_and_counts_as_much():
-    runs = [
-        symtop.simulate("spheroid", f"{name}[axis]", step_size=0.01, samples=81, guard=False)
-        for name in ("series", "series-general")
-    ]
-    np.testing.assert_allclose(runs[0]["axis"], runs[1]["axis"], rtol=0.0, atol=1e-12)
-    assert runs[0].attrs["force_evaluations"] == runs[1].attrs["force_evaluations"]
-
-
 def test_a_motion_without_end_of_steps_is_one_step():
     """At rest on its axis every coefficient but the first is zero."""
     rest = symtop.Scene("rest", symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(1.0), 5.0, observes="axis")

@@ -17,7 +17,6 @@ from symtop.model.scenes import closed_form
 
 TABLES = {name: method.table for name, method in tables.METHODS.items()}
 METHODS = {method.name: method for method in built_in()}
-STRANG = tables.STRANG
 
 
 def run(method, scene, h, marks, chart="attitude"):
@@ -48,45 +47,6 @@ def test_tables_sum_to_one_read_the_same_from_both_ends_and_integrate_polynomial
     assert quadrature_defect(table, order) < 3e-15
     wrong = table._replace(kick=(table.kick[0] + 1e-9, *table.kick[1:-1], table.kick[-1] - 1e-9))
     assert quadrature_defect(wrong, order) > 1e-10
-
-
-@pytest.mark.parametrize("name", ["yoshida-4", "suzuki-4", "kahan-li-6", "kahan-li-8", "suzuki-umeno-8"])
-def test_compositions_of_steps_meet_the_conditions_on_odd_powers(name):
-    table = TABLES[name]
-    sums = [math.fsum(g**k for g in table.drift) for k in range(3, table.order, 2)]
-    assert np.abs(sums).max() < 2e-15
-    assert abs(math.fsum(g ** (table.order + 1) for g in table.drift)) > 1e-6
-
-
-def nystrom_step(table, q, p, h):
-    """Kicks and drifts of H = |p|^2/2 + V(q), V a quartic without symmetry, in 64 bits of mantissa."""
-    q, p = np.array(q, np.longdouble), np.array(p, np.longdouble)
-    for i, b in enumerate(table.kick):
-        x, y = q
-        p = p - h * np.longdouble(b) * np.array([x**3 + 2 * x * y + x, x * x - y * y + 2 * y**3 + x * y])
-        if i < len(table.drift):
-            q = q + h * np.longdouble(table.drift[i]) * p
-    return q, p
-
-
-def nystrom_slope(table, h):
-    """Power of h in which one step and two of half its length differ: the order and 1."""
-    apart = []
-    for step in (np.longdouble(h), np.longdouble(h) / 2):
-        once = nystrom_step(table, (0.3, 0.4), (0.5, -0.2), step)
-        twice = nystrom_step(table, *nystrom_step(table, (0.3, 0.4), (0.5, -0.2), step / 2), step / 2)
-        apart.append(np.abs(np.concatenate(once) - np.concatenate(twice)).max())
-    return math.log2(apart[0] / apart[1])
-
-
-@pytest.mark.parametrize(
-    ("name", "h"), [("srkn-6-4", 0.1), ("srkn-11-6", 0.2), ("srkn-14-6", 0.05), ("srkn-19-8", 0.3)]
-)
-def test_nystrom_tables_have_their_order_on_any_potential(name, h):
-    table = TABLES[name]
-    assert abs(nystrom_slope(table, h) - (table.order + 1)) < 0.2
-    wrong = table._replace(drift=tables.exact_sum((table.drift[0] + 1e-3, *table.drift[1:-1], table.drift[-1] + 1e-3)))
-    assert nystrom_slope(wrong, h) < 4.0
 
 
 # ---- structure -------------------------------------------------------------------------------------------------------
@@ -211,15 +171,6 @@ def spin_power(name):
 def test_generalised_orders_remove_the_first_power_of_gravity(name):
     assert spin_power(name) > 3.9
     assert spin_power("suzuki-4") < 2.2  # order 4 too, but its error is of the first power
-
-
-def test_the_pole_benchmark_of_bruls_cardona_arnold():
-    scene = symtop.scene("bruls-cardona-arnold")
-    table = error_table(scene, METHODS["strang"], [2.0 / n for n in (2000, 4000, 8000, 16000, 32000)], 2.0, "axis")
-    assert table["axis"][0] < 1e-5
-    assert power_law(table["step_size"].values, table["axis"].values).slope == pytest.approx(2.0, abs=0.02)
-    verlet = symtop.simulate(scene, "stormer-verlet", step_size=1e-3, guard=False)
-    assert verlet.attrs["outcome"] != "ok" or verlet["axis"].values[-1] @ closed_form(scene).axis(2.0) < 0.99
 
 
 def test_a_processed_run_starts_where_it_was_told():

@@ -153,32 +153,6 @@ def test_digits_are_right_in_every_regime(kind):
 # ----------------------------------------------------------------------------------------- the equations of motion
 
 
-@pytest.mark.parametrize("kind", ["generic", "fast", "grazes the top", "near the separatrix", "free", "hanging"])
-def test_motion_satisfies_the_equations_of_motion(kind):
-    """Against five-point differences: step 1e-13, so that their own error is some 1e-52 times the fifth derivative."""
-    top, start = random_top(kind, np.random.default_rng([5, REGIMES.index(kind)]))
-    form, step, now = PreciseForm(top, start, digits=60), mp.mpf("1e-13"), mp.mpf("0.37")
-    with mp.workdps(80):
-        around = [form(now + k * step) for k in (-2, -1, 1, 2)]
-        at = form(now)
-        theta_dot, phi_dot, psi_dot, theta_ddot = (
-            (before2 - 8 * before + 8 * after - after2) / (12 * step)
-            for before2, before, after, after2 in (
-                [getattr(m, name) for m in around] for name in ("theta", "phi", "psi", "theta_dot")
-            )
-        )
-        sine, cosine, phi_rate = mp.sin(at.theta), mp.cos(at.theta), at.phi_dot
-        spin = at.psi_dot + phi_rate * cosine
-        torque = sine * (phi_rate * (top.I1 * phi_rate * cosine - top.I3 * spin) + top.mgl)
-        scale = 1 + abs(phi_rate) + abs(spin) + abs(torque)
-        assert abs(theta_dot - at.theta_dot) < 1e-25 * scale
-        assert abs(phi_dot - phi_rate) < 1e-25 * scale
-        assert abs(psi_dot - at.psi_dot) < 1e-25 * scale
-        assert abs(top.I1 * theta_ddot - torque) < 1e-25 * scale
-        assert abs(top.I1 * theta_ddot + torque) > 1e-6 * abs(torque)
-        assert abs(top.I1 * phi_rate * sine**2 + top.I3 * spin * cosine - form.p_phi) < 1e-50 * scale
-
-
 def _momentum(top, start):
     return space_state("axis", top, start)[3:]
 
@@ -206,7 +180,7 @@ def _integrate(top, start, times):
 @pytest.mark.parametrize(
     "kind",
     ["generic", "turning point", "cusp", "plane pendulum", "grazes the top", "grazes the bottom", "through the top",
-     "through the bottom", "flat body", "free", "hanging", "from the top", "asleep below", "nearly steady"],
+     "through the bottom", "flat body", "free", "hanging", "from the top", "asleep below", "nearly steady", "fast"],
 )  # fmt: skip
 def test_an_integration_of_the_attitude_ends_where_the_closed_form_says(kind):
     top, start = random_top(kind, np.random.default_rng([6, REGIMES.index(kind)]))
@@ -327,18 +301,6 @@ def test_free_top_precesses_about_its_momentum():
     assert form.nutation_period == pytest.approx(2.0 * math.pi * top.I1 / np.linalg.norm(momentum), rel=2 * EPS)
 
 
-def test_plane_pendulum_stays_in_its_plane():
-    top = SymmetricTop(1.0, 0.5, 2.0)
-    for rate in (0.3, 9.0):  # to and fro below, over the top
-        form, times = ClosedForm(top, Angles(2.0, 0.4, 0.1, rate, 0.0, 0.0)), np.linspace(0.0, 20.0, 2001)
-        motion, axis = form(times), form.axis(times)
-        assert np.abs(axis @ [math.cos(0.4), math.sin(0.4), 0.0]).max() < 2 * EPS
-        assert np.abs(np.sin(motion.phi - 0.4)).max() < 2 * EPS
-        energy = 0.5 * top.I1 * motion.theta_dot**2 + top.mgl * np.cos(motion.theta)
-        np.testing.assert_allclose(energy, top.energy(form.start), rtol=1e-14)
-    assert form.theta_range == (0.0, math.pi)
-
-
 @pytest.mark.parametrize("facing", [1.0, -1.0])
 @pytest.mark.parametrize("rate", [2.0, -2.0])
 def test_a_start_at_the_pole_moves_the_way_it_is_pushed(facing, rate):
@@ -349,18 +311,6 @@ def test_a_start_at_the_pole_moves_the_way_it_is_pushed(facing, rate):
     at = ClosedForm(top, start)(0.0)
     assert (float(at.theta), float(at.phi), float(at.psi)) == (0.0, 0.3, 0.0)
     assert float(at.theta_dot) == pytest.approx(rate, rel=2 * EPS)
-
-
-def test_hanging_top_is_the_standing_one_upside_down():
-    start = Angles(0.9, 0.4, 0.2, 0.5, 1.5, 3.0)
-    mirror = Angles(math.pi - 0.9, 0.4, -0.2, -0.5, 1.5, -3.0)
-    times = np.linspace(0.0, 3.0, 7)
-    down = ClosedForm(SymmetricTop(2.0, 1.0, -4.0), start)(times)
-    up = ClosedForm(SymmetricTop(2.0, 1.0, 4.0), mirror)(times)
-    np.testing.assert_allclose(down.theta, math.pi - up.theta, atol=1e-14)
-    np.testing.assert_allclose(down.phi, up.phi, atol=1e-13)
-    np.testing.assert_allclose(down.psi, -up.psi, atol=1e-13)
-    assert np.abs(down.theta - up.theta).max() > 0.1
 
 
 # ---------------------------------------------------------------------------------------- consistency of one motion

@@ -8,21 +8,10 @@ import symtop
 from symtop.model.body import from_flat
 from symtop.run.ensemble import chunks
 from symtop.run.ensemble.bodies import scenes_of
+from tests.run.test_ensemble import assert_alone
 
 BODIES = symtop.body_population(40, seed=4)
 SCENES = scenes_of(BODIES)
-
-
-def assert_alone(data, scenes, name, horizons, **setting):
-    for i, scene in enumerate(scenes):
-        one = data.isel(member=i)
-        given = setting or {"step_size": float(one.step_size)}
-        run = symtop.simulate(scene, name, horizon=horizons[i], samples=one.sizes["time"], guard=False, **given)
-        for variable in run.variables:
-            np.testing.assert_array_equal(one[variable].values, run[variable].values, err_msg=f"{variable} of {i}")
-        assert str(one.outcome.values) == run.attrs["outcome"]
-        for word in ("steps", "force_evaluations", "newton_iterations", "reached_time"):
-            assert one[word].item() == run.attrs[word]
 
 
 @pytest.mark.parametrize(
@@ -34,12 +23,12 @@ def assert_alone(data, scenes, name, horizons, **setting):
 def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, execution, per_nutation):
     data = symtop.ensemble(BODIES, name, per_nutation=per_nutation, nutations=12, samples=6, quiet=True)
     assert data.attrs["execution"] == execution
-    assert_alone(data, SCENES, name, [float(end) for end in data.horizon])
+    assert_alone(SCENES, name, data, 6)
 
 
 def test_methods_that_choose_their_steps_run_as_well():
     data = symtop.ensemble(SCENES[:8], "vern9", tolerance=1e-8, samples=6, quiet=True)
-    assert_alone(data, SCENES[:8], "vern9", [scene.horizon for scene in SCENES], tolerance=1e-8)
+    assert_alone(SCENES[:8], "vern9", data, 6, tolerance=1e-8)
 
 
 def test_scenes_and_a_population_are_the_same_members_and_threads_change_nothing(monkeypatch, tmp_path):

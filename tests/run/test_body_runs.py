@@ -129,10 +129,8 @@ def test_a_symmetric_body_moves_as_the_top_does(mgl: float) -> None:
     one, other = (symtop.reference(scene, times)["quaternion"].values for scene in (top, body))
     assert attitude_distance(one, other).max() < 2e-14
     run = symtop.simulate(body, "series-general", step_size=0.05, samples=21, guard=False)
-    assert (
-        attitude_distance(run["quaternion"].values, symtop.reference(top, run.time.values)["quaternion"].values).max()
-        < 1e-12
-    )
+    truth = symtop.reference(top, run.time.values)["quaternion"].values
+    assert attitude_distance(run["quaternion"].values, truth).max() < 1e-12
     assert body.top.energy(body.start) == pytest.approx(top.top.energy(at), rel=1e-14)
     assert body.top.momenta(body.start) == pytest.approx(top.top.momenta(at)[:2], rel=1e-14)
 
@@ -141,18 +139,12 @@ def test_splittings_keep_what_they_must() -> None:
     run = symtop.errors(symtop.simulate("check-case-2", "kahan-li-6", step_size=0.3, samples=101, guard=False))
     assert run["momentum"].max() < 4e-15
     assert 1e-10 < run["attitude"].max() < 1e-4  # and yet it has an error
-    heavy = [
-        symtop.errors(symtop.simulate("heavy-brick", "strang", step_size=h, horizon=2000.0, guard=False))
-        for h in (0.1, 0.05)
-    ]
-    for one in heavy:
-        energy, half = one["energy"].values, one.sizes["time"] // 2
-        assert one["p_phi"].max() < 2e-14
-        assert energy[half:].max() < 1.3 * energy[:half].max()  # it swings, and does not grow
-    grown = symtop.errors(symtop.simulate("heavy-brick", "rk4", step_size=0.05, horizon=2000.0, guard=False))[
-        "energy"
-    ].values
-    assert grown[-1] > 1.7 * grown[len(grown) // 2]
+    for name, step, kept in (("strang", 0.1, True), ("strang", 0.05, True), ("rk4", 0.05, False)):
+        errors = symtop.errors(symtop.simulate("heavy-brick", name, step_size=step, horizon=2000.0, guard=False))
+        energy, half = errors["energy"].values, errors.sizes["time"] // 2
+        assert bool(errors["p_phi"].max() < 2e-14) is kept
+        assert not kept or energy[half:].max() < 1.3 * energy[:half].max()  # it swings, and does not grow
+        assert kept or energy[-1] > 1.7 * energy[half]
 
 
 @pytest.mark.parametrize("mgl", [0.0, 1.0])
@@ -166,16 +158,10 @@ def test_five_rotations_are_of_order_four_on_one_free_body_in_one_order(moments:
 
 
 def test_a_variational_step_that_has_no_solution_ends_the_run() -> None:
-    ended = symtop.simulate("check-case-2", "lie-variational", step_size=6.0, guard=False)
+    methods = ("lie-variational", "euler-poincare")
+    ended, whole = (symtop.simulate("check-case-2", name, step_size=6.0, guard=False) for name in methods)
     assert ended.outcome == "not_converged"
-    assert (
-        float(
-            symtop.errors(symtop.simulate("check-case-2", "euler-poincare", step_size=6.0, guard=False))[
-                "momentum"
-            ].max()
-        )
-        < 2e-14
-    )
+    assert symtop.errors(whole)["momentum"].max() < 2e-14
 
 
 def gap(method: str, second: float, step: float) -> float:
@@ -193,13 +179,6 @@ def gap(method: str, second: float, step: float) -> float:
 def test_a_method_makes_the_steps_of_the_symmetric_top(method: str) -> None:
     """Two moments that are equal make the drift exact; two that are not make another method."""
     assert gap(method, 2.0, 0.1) < 2e-14
-    assert gap(method, 2.0 + 1e-6, 0.1) > 1e-7
-
-
-@pytest.mark.parametrize("method", [name for name, one in engines().items() if one.precision == "double"])
-def test_a_map_of_an_engine_makes_the_steps_of_the_symmetric_top(method: str) -> None:
-    """Some go from w to L and back in every step, whose rounding is the same each time: it adds up in w."""
-    assert gap(method, 2.0, 0.1) < 1e-11
     assert gap(method, 2.0 + 1e-6, 0.1) > 1e-7
 
 
@@ -223,10 +202,8 @@ def test_energy_and_momentum_of_a_run_are_those_of_its_states() -> None:
 def test_a_trajectory_of_another_program_is_judged() -> None:
     times = np.linspace(0.0, 30.0, 31)
     truth = symtop.reference("check-case-2", times)
-    assert (
-        symtop.errors({"time": times, "quaternion": truth["quaternion"].values}, "check-case-2")["attitude"].max()
-        < 1e-14
-    )
+    exact = symtop.errors({"time": times, "quaternion": truth["quaternion"].values}, "check-case-2")
+    assert exact["attitude"].max() < 1e-14
     turned = [product(q, (math.cos(ANGLE / 2), math.sin(ANGLE / 2), 0.0, 0.0)) for q in truth["quaternion"].values]
     off = symtop.errors({"time": times, "quaternion": np.array(turned)}, "check-case-2")["attitude"].values
     np.testing.assert_allclose(off, ANGLE, rtol=1e-9)
@@ -296,18 +273,8 @@ def test_a_body_of_ones_own_that_is_none(words: list[str], sentence: str) -> Non
 
 def test_a_body_of_ones_own_on_the_command_line() -> None:
     body, at = RigidBody(1.0, 1.2, 0.6, 1.0, (0.1, 0.0, 1.0)), Attitude((0.8, 0.6, 0.0, 0.0), (0.2, 0.3, 3.0))
-    options = [
-        "--body",
-        "1,1.2,0.6",
-        "--mgl",
-        "1",
-        "--centre",
-        "0.1,0,1",
-        "--attitude",
-        "0.8,0.6,0,0",
-        "--rates",
-        "0.2,0.3,3",
-    ]
+    heavy = ["--body", "1,1.2,0.6", "--mgl", "1", "--centre", "0.1,0,1"]
+    options = [*heavy, "--attitude", "0.8,0.6,0,0", "--rates", "0.2,0.3,3"]
     shown = CliRunner().invoke(main, ["scenes", "body", "--json", *options])
     stored = json.loads(shown.stdout)[0]
     assert stored["top"]["centre"] == list(body.centre)

@@ -28,13 +28,6 @@ from symtop.run.reference.truth import (
 TIMES = np.array([0.3, 17.0, 1e3, 1e6])
 
 
-@pytest.fixture
-def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
-    module._on_disk.cache_clear()
-    return tmp_path
-
-
 def test_views_and_integrals_agree_in_every_regime():
     """Rounding stays three digits below what is called suspicious, next to the poles as well."""
     forms.compile_now()

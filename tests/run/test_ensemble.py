@@ -23,19 +23,16 @@ def numbers_of(members):
     return np.stack([np.broadcast_to(column, members.sizes["member"]) for column in columns], axis=1)
 
 
-def scene_of(members, i, horizon):
-    return symtop.Scene(f"member-{i}", *next(members_of(numbers_of(members)[i : i + 1])), float(horizon))
-
-
 def assert_alone(members, name, data, samples, **setting):
     """Every member is what `simulate` returns."""
-    for i in range(members.sizes["member"]):
+    if isinstance(members, xr.Dataset):
+        members = [symtop.Scene("one", *pair, 1.0) for pair in members_of(numbers_of(members))]
+    for i, scene in enumerate(members):
         one = data.isel(member=i)
-        given = setting or {"step_size": float(one.step_size)}
-        run = symtop.simulate(
-            scene_of(members, i, one.horizon), name, samples=samples, guard=False, observe="attitude" if "psi" in data
-            else "axis", **given,
-        )  # fmt: skip
+        asked = {"samples": samples, "horizon": float(one.horizon), "guard": False} | setting
+        if not setting:
+            asked["step_size"] = float(one.step_size)
+        run = symtop.simulate(scene, name, observe="attitude" if {"psi", "quaternion"} & {*data} else "axis", **asked)
         shown = run.sizes["time"]
         for variable in run.variables:
             if variable not in ("component", "part"):

@@ -85,12 +85,13 @@ def test_a_run_in_stretches_has_the_bits_of_one_in_one_piece(name, h):
     solver = chart_of(symtop.integrator(name))[1]
     par, rule, state = solver.setup(WHERE.top, WHERE.start, h)
     marks = np.array([3, 50, 51, 200])
+    shown = slice(6 if name == "exact-discrete" else None)  # it steps eight numbers and shows six: others are not set
     whole = solver.loop(par, rule, state, h, marks)
     first, at = solver.loop.advance(par, rule, solver.loop.start(par, rule, state, h), h, marks[:2])
     again = at._replace(carry=regrown(at.carry, iter(leaves(at.carry))))
     for position in (at, again):
         second, end = solver.loop.advance(par, rule, position, h, marks[2:])
-        assert np.array_equal(np.concatenate([first.states, second.states]), whole.states)
+        assert np.array_equal(np.concatenate([first.states, second.states])[:, shown], whole.states[:, shown])
         assert np.array_equal(np.concatenate([first.momenta, second.momenta])[1:], whole.momenta[1:])
         assert (end.k, at.k) == (200, 50)
 

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pytest
 
 import symtop
 from symtop.methods.framework.plan import Plan
@@ -34,15 +33,3 @@ def test_a_scene_has_a_time_scale_even_on_a_separatrix():
     assert math.isinf(endless.nutation_period)
     assert endless.time_scale() == endless.horizon / 8.0
     assert endless.time_scale(4.0) == 0.5
-
-
-def test_the_scales_of_errors_are_those_of_the_scene():
-    momenta = SCENE.top.momenta(SCENE.start)
-    assert SCENE.momentum_scale == max(abs(momenta.p_phi), abs(momenta.p_psi))
-    theta = np.linspace(0.01, 3.13, 200_001)
-    spin = 0.5 * momenta.p_psi**2 / SCENE.top.I3
-    depth = SCENE.top.energy(SCENE.start) - spin - np.min(SCENE.top.potential(theta, momenta))
-    assert SCENE.energy_scale == pytest.approx(depth, rel=1e-8)
-    resting = symtop.Scene("rest", symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(theta=1.0), 1.0)
-    assert resting.momentum_scale > 0.0
-    assert resting.energy_scale > 0.0

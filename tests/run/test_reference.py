@@ -24,12 +24,6 @@ from symtop.run.reference.independent_checks import check_times, integrate, inte
 from symtop.run.reference.truth import UNCERTIFIED, Certificate, _cache_path, closed_bounds, closed_values
 
 
-@pytest.fixture
-def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
-    return tmp_path
-
-
 @functools.cache
 def true_values(where, times):
     """Quaternion and theta of the closed form in 50 digits, at each time."""
@@ -78,15 +72,13 @@ def check_bounds(count, precision, seed):
     return float(np.median(ratios))
 
 
-@pytest.mark.parametrize("precision", ["longdouble", "double", "closed-form"])
-def test_bounds_hold_on_random_tops_and_are_tight(precision):
-    assert check_bounds(3, precision, seed=11) < 100.0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("precision", ["longdouble", "closed-form"])
-def test_bounds_hold_on_500_random_tops(precision):
-    assert check_bounds(56, precision, seed=2026) < 100.0
+@pytest.mark.parametrize(
+    ("precision", "count", "seed"),
+    [*((precision, 3, 11) for precision in ("longdouble", "double", "closed-form")),
+     *(pytest.param(precision, 56, 2026, marks=pytest.mark.slow) for precision in ("longdouble", "closed-form"))],
+)  # fmt: skip
+def test_bounds_hold_on_random_tops_and_are_tight(precision, count, seed):
+    assert check_bounds(count, precision, seed) < 100.0
 
 
 @pytest.mark.parametrize("name", ["spheroid", "goldstein", "fast", "cusp"])

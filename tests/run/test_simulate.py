@@ -70,16 +70,6 @@ def test_samples_commensurate_with_the_nutation_are_dithered_and_said_to_be():
     assert blind.max() < 0.01 * every.max()
 
 
-def test_sampling_falls_on_whole_steps_and_covers_the_run():
-    times, marks, dithered = sample_times(8.0, 101, 1.18, steps=977)
-    assert not dithered
-    assert marks[0] == 0
-    assert marks[-1] == 977
-    assert times == pytest.approx(marks * (8.0 / 977))
-    few, _, _ = sample_times(8.0, 101, 1.18, steps=10)
-    assert few.size == 11  # no more samples than steps
-
-
 def sorted_times(horizon, samples, period, steps):
     """Samples as they are defined: each mark once, and the widest gap of all phases in their order."""
     last = samples - 1
