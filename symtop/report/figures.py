@@ -5,6 +5,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from matplotlib.patches import Rectangle
+from matplotlib.patheffects import withStroke
 
 from symtop.report.style import LEAST_TEXT, ink
 
@@ -16,8 +18,6 @@ MOST_NAMED = 9  # variants with a name of their own in a figure
 
 def error_band(axis: Any, bounds: Any) -> float:
     """Shade all that lies below the median error bound of the reference; returns that bound, or 1e-16 without one."""
-    from matplotlib.patches import Rectangle
-
     level = float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else 1e-16  # of the reference
     shape = {"color": "#BBBBBB", "alpha": 0.45, "lw": 0, "label": BELOW, "transform": axis.get_yaxis_transform()}
     axis.add_artist(Rectangle((0.0, LOWEST), 1.0, level - LOWEST, **shape))  # to the frame, which it does not move
@@ -87,6 +87,7 @@ def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: S
             "size": LEAST_TEXT,
             "color": ink(color),
             "weight": "bold",
+            "path_effects": [withStroke(linewidth=2.5, foreground="white")],  # over the lines that it covers
         }
         tried: list[Any] = []
         for kind, (dx, dy, side) in product(range(3), PLACES):
