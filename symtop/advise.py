@@ -236,7 +236,7 @@ def recommend(
     own = [one.name for one in integrators().values() if one.implementation == "python" and not is_built_in(one.name)]
     if own:
         fails["Not tried, as only compiled methods are timed"] = own
-    missed = [f"{name} {error:.1e}" for name, error in sorted(search.missed.items(), key=lambda one: one[1])]
+    missed = [f"{name} {error:.2e}" for name, error in sorted(search.missed.items(), key=lambda one: one[1])]
     fails = {MISSES_AT_STEP: missed} | fails if missed else fails
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
     return _advice(question, ranked, sentences, source, beside)
@@ -326,10 +326,10 @@ def _everyone(question: _Question) -> list[str]:
     else:
         rows = settings.compared(settings.observed(question.quantity))
         names = [row.name if len(integrator(row.method).charts()) > 1 else row.method for row in rows]
-    needs, found = question.needs, {name: integrator(name) for name in names}
+    needs, entries = question.needs, {name: integrator(name) for name in names}
     return [
         name
-        for name, one in found.items()
+        for name, one in entries.items()
         if one.control is not None and one.implementation == "compiled" and (not needs or one.needs in needs)
         and question.allows(one)
     ]  # fmt: skip

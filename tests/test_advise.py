@@ -318,7 +318,7 @@ def test_at_the_step_that_a_user_has_it_says_what_is_good_enough(monkeypatch):
     for name in [*names][:4]:
         error = settings.attempt(scene, symtop.integrator(name), step, scene.horizon, "axis").error
         assert error > 1e-4
-        assert f"{error:.1e}" == names[name]
+        assert f"{error:.2e}" == names[name]
     nobody = symtop.recommend(scene, accuracy=1e-9, step_size=0.2)
     assert nobody.integrator is None or measured(scene, nobody) <= 1e-9
     with pytest.raises(symtop.SymtopError, match="step_size must be below the horizon"):

@@ -5,7 +5,7 @@
 #define DIM 6
 #define LEAST (0.25 * 2.220446049250313e-16)
 
-typedef struct { double I1, I3, mgl; } Par;
+typedef struct { double I1, I3, mgl, c_phi, c_psi; } Par;
 typedef struct { double nodes[NODES], weights[NODES], tolerance, iterations; } Rule;
 typedef struct { double past[3][3]; } Carry;
 typedef struct { double before, after, stiffness, before_v, before_u, after_v, after_u, across, mixed; } Sums;
@@ -63,13 +63,14 @@ static inline int increment(
     Sums t = node_sums(par, rule, theta, rate[0], rate[1], rate[2], h);
     while (effort < most) {
         effort++;
+        double across = t.across + 0.5 * h * par->c_phi, along = par->I3 + 0.5 * h * par->c_psi;
         double right[3] = {
             momentum[0] - par->I1 * rate[0] + h * t.before,
-            momentum[1] - t.across * rate[1] - t.mixed * rate[2],
-            momentum[2] - t.mixed * rate[1] - par->I3 * rate[2],
+            momentum[1] - across * rate[1] - t.mixed * rate[2],
+            momentum[2] - t.mixed * rate[1] - along * rate[2],
         };
         double one[3] = {par->I1 - h * h * t.stiffness, -h * t.before_v, -h * t.before_u};
-        double two[3] = {h * t.after_v, t.across, t.mixed}, three[3] = {h * t.after_u, t.mixed, par->I3}, fix[3];
+        double two[3] = {h * t.after_v, across, t.mixed}, three[3] = {h * t.after_u, t.mixed, along}, fix[3];
         solve(one, two, three, right, fix);
         double change = fabs(fix[0]) + fabs(fix[1]) + fabs(fix[2]);
         double size = fabs(rate[0]) + fabs(rate[1]) + fabs(rate[2]);
@@ -84,8 +85,8 @@ static inline int increment(
     }
     for (int i = 0; i < 3; i++) step[i] = h * rate[i];
     step[3] = par->I1 * rate[0] + h * t.after - momentum[0];
-    step[4] = t.across * rate[1] + t.mixed * rate[2] - momentum[1];
-    step[5] = t.mixed * rate[1] + par->I3 * rate[2] - momentum[2];
+    step[4] = t.across * rate[1] + t.mixed * rate[2] - 0.5 * h * par->c_phi * rate[1] - momentum[1];
+    step[5] = t.mixed * rate[1] + par->I3 * rate[2] - 0.5 * h * par->c_psi * rate[2] - momentum[2];
     for (int i = 0; i < 3; i++) {
         carry->past[2][i] = carry->past[1][i];
         carry->past[1][i] = carry->past[0][i];

@@ -105,8 +105,8 @@ class Handler(BaseHTTPRequestHandler):
         """The page, its files and the catalogue."""
         if not self._is_local():
             return
-        file = STATIC / (self.place.removeprefix("/") or "page.html")
-        if file.parent == STATIC and file.suffix in KINDS and file.is_file():
+        file = {one.name: one for one in STATIC.iterdir()}.get(self.place.removeprefix("/") or "page.html")
+        if file is not None and file.suffix in KINDS:
             self._reply(200, file.read_bytes(), f"{KINDS[file.suffix]}; charset=utf-8")
         elif self.place == "/catalogue":
             self._reply(200, json.dumps(answers.catalogue()).encode(), JSON)

@@ -24,7 +24,7 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, one_of, positive
-from symtop.core.numbers import EPSILON, real_numbers
+from symtop.core.numbers import EPSILON
 from symtop.measure.conservation import CONSTANTS
 from symtop.methods.framework.lanes import members_of
 from symtop.model import charts
@@ -227,7 +227,7 @@ def sampled(run: xr.Dataset) -> xr.Dataset:
     """
     if "integrator" not in run.attrs or "time" not in run or run["time"].dims != ("time",):
         return run
-    there = np.isfinite(real_numbers("time", run["time"]))
+    there = np.isfinite(_numbers("time", run["time"]))
     return run if there.all() else run.isel(time=there)
 
 
@@ -241,7 +241,7 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
             f"data must be a Dataset or a mapping with time and axis, quaternion or theta, not {type(data).__name__}"
         )
     time = _times(data)
-    columns: dict[str, Any] = {name: real_numbers(name, data[name]) for name in SHAPES if name in data}
+    columns: dict[str, Any] = {name: _numbers(name, data[name]) for name in SHAPES if name in data}
     for name, values in columns.items():
         if values.shape != (wanted := (time.size, *SHAPES[name])):
             raise SymtopError(f"{name} must have the shape {wanted}, one row for each time, not {values.shape}")
@@ -264,7 +264,7 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
 def _times(data: Mapping[Any, Any]) -> charts.Array:
     if "time" not in data:
         raise SymtopError("data must hold time, elapsed since the start of the scene; there is none")
-    time = real_numbers("time", data["time"])
+    time = _numbers("time", data["time"])
     if time.ndim != 1 or time.size == 0:
         raise SymtopError(f"time must be a row of numbers, not of shape {time.shape}")
     bad = ~np.isfinite(time) | (np.diff(time, prepend=-1.0 if time[0] == 0.0 else 0.0) <= 0.0)
@@ -289,6 +289,15 @@ def completed(data: Trajectory) -> Trajectory:
         if theta is None and axis is not None:
             theta = charts.theta_from_axis(axis)
     return data._replace(axis=axis, quaternion=attitude, theta=theta)
+
+
+def _numbers(name: str, values: Any) -> charts.Array:
+    """Doubles of anything that holds real numbers, a table's text too; NaN where a sample is lost (None)."""
+    try:
+        given = np.asarray(values)
+        return given.astype(np.float64, casting="same_kind" if given.dtype.kind == "c" else "unsafe")
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SymtopError(f"{name} must be an array of real numbers, not {type(values).__name__}") from error
 
 
 def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:

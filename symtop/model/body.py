@@ -103,7 +103,7 @@ class RigidBody:
     @classmethod
     def from_inertia(
         cls, matrix: Sequence[Sequence[float]], mgl: float = 0.0, centre: Sequence[float] = (0.0, 0.0, 1.0),
-        **others: object,
+        **others: float,
     ) -> "RigidBody":  # fmt: skip
         """A body by its inertia matrix (3, 3) about the fixed point and the direction of its centre, in any axes.
 
@@ -111,6 +111,8 @@ class RigidBody:
         The matrix is diagonalised, moments in increasing order, and the turn kept in `axes`. `in_principal` takes an
         attitude in the axes of the matrix to one of this body.
         """
+        if unknown := sorted(others.keys() - {"mass", "gravity", "distance"}):
+            raise TypeError(f"from_inertia() got an unexpected keyword argument '{unknown[0]}'")
         if others:
             words = "mgl, which is mass times gravity times the distance of the centre from the fixed point"
             raise SymtopError(f"a heavy body by its inertia needs {words}, not {', '.join(others)}", "mgl")

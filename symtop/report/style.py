@@ -64,7 +64,7 @@ DASHES = {  # of a line, by family; a family that is not here has a solid one
 UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
 _MARKERS = "osv^<>DPXph8dH"
 
-_LOOKS = {  # of the methods that people know, one colour a formula; `look` finds one for every other integrator
+_LOOKS = {  # of methods that people know, in one colour with fixed steps and through SciPy; `look` finds others
     "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "stormer-verlet": Look(GREEN, "^"),
     "strang": Look(LEAF, "<"), "cayley": Look(GREENS[1], ">"), "takahashi-imada": Look(GREENS[2], "P"),
     "yoshida-4": Look(GREENS[2], "p"), "srkn-14-6": Look(GREENS[1], "H"), "rk4": Look(ORANGE, "o"),

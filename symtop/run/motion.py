@@ -1,8 +1,9 @@
 """The true motion beside a probe of the guard: by the closed form, or integrated where there is none.
 
 `Exact` knows a top's motion for ever. `Integrated` needs the equations alone, and so takes bodies too: a Taylor series
-of order 19 at rounding, or 15 where errors do not grow much, whose own error is its distance from one of order 16 or
-13, at the beginning or, where the motion multiplies errors, all the way. What the motion makes of an error is
+at rounding, for a body of order 19, or 15 where errors do not grow much. Its own error is its distance from a series
+of a looser tolerance, for a body of order 16 or 13, at the beginning or, where the motion multiplies errors, all the
+way. What the motion makes of an error is
 
     A(t) = max over s <= t of |y~(s) - y(s)|/delta,      |y~(0) - y(0)| = delta,
 

@@ -181,6 +181,18 @@ def test_nan_rows_of_a_foreign_trajectory_stay_nan(truth):
     assert np.isfinite(shown["attitude"].values[:20]).all()
 
 
+def test_a_tables_text_and_lost_samples_are_read_as_numbers():
+    """As a reader of CSV files has them; what a run holds at a lost sample is NaN."""
+    run = symtop.simulate("spheroid", "rk4", step_size=0.01, samples=41, guard=False)
+    lost = run["axis"].values.astype(object)
+    lost[7] = None
+    with pytest.warns(symtop.SymtopWarning, match="not a number from"):
+        shown = symtop.errors({"time": [str(time) for time in run["time"].values], "axis": lost}, "spheroid")["axis"]
+    whole = symtop.errors(run)["axis"]
+    assert np.isnan(shown[7])
+    np.testing.assert_allclose(np.delete(shown.values, 7), np.delete(whole.values, 7), atol=1e-14)
+
+
 AXIS = np.tile([0.0, 0.0, 1.0], (41, 1))
 
 
@@ -193,8 +205,8 @@ AXIS = np.tile([0.0, 0.0, 1.0], (41, 1))
         ({"time": TIMES[::-1], "axis": AXIS}, "spheroid", "increase"),
         ({"time": TIMES - 1.0, "axis": AXIS}, "spheroid", "at least 0"),
         ({"time": TIMES[:, None], "axis": AXIS}, "spheroid", "time must be a row"),
-        ({"time": ["a"] * 41, "axis": AXIS}, "spheroid", "time must be real numbers"),
-        ({"time": TIMES, "axis": AXIS + 0j}, "spheroid", "axis must be real numbers"),
+        ({"time": ["a"] * 41, "axis": AXIS}, "spheroid", "time must be an array of real numbers"),
+        ({"time": TIMES, "axis": AXIS + 0j}, "spheroid", "axis must be an array of real numbers"),
         ({"time": TIMES, "axis": AXIS.T}, "spheroid", r"shape \(41, 3\)"),
         ({"time": TIMES, "quaternion": AXIS}, "spheroid", r"shape \(41, 4\)"),
         ({"time": TIMES, "axis": AXIS, "energy": TIMES[:5]}, "spheroid", r"energy must have the shape \(41,\)"),

@@ -98,6 +98,11 @@ def test_bad_input_is_one_sentence(call, says):
         call()
 
 
+def test_a_misspelled_argument_is_named():
+    with pytest.raises(TypeError, match="unexpected keyword argument 'center'"):
+        symtop.RigidBody.from_inertia(np.eye(3), mgl=1.0, center=(0, 0, 1))
+
+
 def test_a_vector_is_turned_as_its_matrix_says():
     q = np.array([0.5, -0.5, 0.1, math.sqrt(0.49)])
     np.testing.assert_allclose(top.body_frame(q, (1.0, 2.0, -3.0)), matrix(q).T @ [1.0, 2.0, -3.0], atol=1e-15)

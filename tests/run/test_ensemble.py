@@ -341,6 +341,22 @@ def test_a_member_on_which_a_solver_raises_is_lost_alone_and_told(path, tmp_path
         xr.testing.assert_identical(one.isel(member=rest).drop_attrs(), bare.isel(member=rest).drop_attrs())
 
 
+def test_a_loop_in_plain_python_is_given_marks_that_increase():
+    """Members of fewer steps than samples, too, whose rows of marks end before those of others."""
+    rk4 = symtop.integrator("rk4[axis]")
+
+    def march(par, rule, state, h, marks):
+        assert (np.diff(marks) > 0).all()
+        return rk4.solvers["axis"].loop(par, rule, state, h, marks)
+
+    solver = dataclasses.replace(rk4.solvers["axis"], loop=march)
+    plain = dataclasses.replace(rk4, name="rk4-python[axis]", solvers={"axis": solver})
+    scenes = [dataclasses.replace(symtop.scene("spheroid"), name=str(k), horizon=0.1 * k) for k in (5, 40)]
+    one, other = (symtop.ensemble(scenes, method, step_size=0.1, samples=11, quiet=True) for method in (rk4, plain))
+    assert solver.in_python
+    xr.testing.assert_identical(one.drop_attrs(), other.drop_attrs())
+
+
 def test_a_solver_that_raises_on_every_member_is_refused_and_leaves_nothing(tmp_path):
     every = raising(TypeError, *range(36))
     for more in ({}, {"path": tmp_path / "runs.nc"}):

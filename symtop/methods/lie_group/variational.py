@@ -85,7 +85,7 @@ def _next_k(par: Any, A: float, square: float, x: Any) -> Any:
 #     first(par, A, square) -> x
 #     after(par, A, square, x) -> (x, ended, lost)      one iteration
 #     rates(par, A, x) -> (n, i, x)
-RIGID_BODY = lambda _par, _A, _square: (1.0,), _next_n, lambda par, A, x: (x[0], par.I1, A / par.I3 * x[0])
+RIGID_BODY = (lambda _par, _A, _square: (1.0,)), _next_n, (lambda par, A, x: (x[0], par.I1, A / par.I3 * x[0]))
 RETRACTION = (  # k from 0 in the interval that it lies in
     lambda par, A, square: (0.0, 0.0, square / par.I1 + A * A / par.I3),
     _next_k,

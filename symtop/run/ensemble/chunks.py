@@ -237,7 +237,7 @@ class Job:
     def _runs(self, plan: Schedule) -> _Runs:
         """The states of the members, by the quickest way there is."""
         solver = self.method.solvers[self.chart]
-        if isinstance(solver, FixedStep):
+        if isinstance(solver, FixedStep) and not solver.in_python:  # whose marks may stand still at the end of a row
             done = solver.many(self.numbers, plan.step_size, plan.marks)
             padding = np.isnan(plan.times)
             done.states[padding], done.momenta[padding] = np.nan, np.nan
