@@ -112,8 +112,9 @@ def examine(kind: str, count: int, first: int) -> Examined:
     for top, start in tops(count, SEED, [kind], first):
         form, precise = ClosedForm(top, start), PreciseForm(top, start, digits=DIGITS)
         found, allowed = motion_errors(form, precise)
-        apart = deviation(short(top, start)[0], precise_constants(top, start, precise))
-        if not ((found <= allowed).all() and (apart <= LIMITS).all()):
+        ours, _ = short(top, start)
+        apart = deviation(ours, precise_constants(top, start, precise))
+        if not ((found <= allowed).all() and (apart <= LIMITS).all() and apart[0] <= ours[at.RATE_ERROR]):
             broken.append(f"{kind}: {top} {start} {found.tolist()} {apart.tolist()}")
         motion, constants = np.maximum(motion, found), np.maximum(constants, apart)
         arithmetic[form.provenance.arithmetic] += 1

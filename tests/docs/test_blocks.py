@@ -13,7 +13,9 @@ import matplotlib.pyplot as plt
 import pytest
 
 from symtop.cli.main import main
+from symtop.judging.claims import order
 from tests.commands import call, ended, symtop
+from tests.judging.conftest import shorten
 from tests.pages import LANGUAGES, ROOT, Block, blocks, pages
 
 pytestmark = pytest.mark.usefixtures("clean_registry")  # what a page adds goes with its test
@@ -84,6 +86,9 @@ def follow(page, slow, folder, monkeypatch):
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend(folder)
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    if not slow:
+        shorten(monkeypatch)
+        monkeypatch.setattr(order, "DRAWS", (96, 8))
     reader = Page(page, slow=slow)
     for block in PAGES[page]:
         reader.follow(block)

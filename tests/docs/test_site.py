@@ -28,7 +28,8 @@ SOURCED = [  # modules of the mathematics that name where it is from
     ".".join(path.relative_to(ROOT).with_suffix("").parts)
     for room in ("model", "methods", "measure")
     for path in sorted((ROOT / "symtop" / room).glob("*.py"))
-    if re.search(r"\bSources?:", ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "")
+    if "Source" in (text := path.read_text(encoding="utf-8"))  # most have no need to be parsed
+    and re.search(r"\bSources?:", ast.get_docstring(ast.parse(text)) or "")
 ]
 SMALL = """# Report
 

@@ -12,6 +12,12 @@ def one_seed(monkeypatch):
     monkeypatch.setattr(judge_step.secrets, "randbelow", lambda most: 20_261_123 % most)
 
 
+def shorten(monkeypatch):
+    """A quick judging takes a third of the time."""
+    monkeypatch.setattr(subject, "LONG", (10.0, 0.8))
+    monkeypatch.setattr(subject, "SLOPES", (6.0, 0.5))
+
+
 @pytest.fixture
 def only(monkeypatch):
     """A function that leaves the claims of these names in the table of the battery, with a third of the time."""
@@ -20,8 +26,6 @@ def only(monkeypatch):
         left = [one._replace(claims=tuple(claim for claim in one.claims if claim in names)) for one in battery.TABLE]
         assert {claim for stage in left for claim in stage.claims} == {*names}
         monkeypatch.setattr(battery, "TABLE", tuple(stage for stage in left if stage.claims))
-        for budget in ("LONG", "SLOPES"):
-            full, quick = getattr(subject, budget)
-            monkeypatch.setattr(subject, budget, (full, quick / 3.0))
+        shorten(monkeypatch)
 
     return choose

@@ -6,7 +6,6 @@ the other files in C such that are not, or only at the scene's own start, of its
 
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -61,7 +60,7 @@ def test_a_correct_method_is_not_refuted(name):
     assert ledger["pole"].verdict in ("measured", "inapplicable")  # never claimed of a step
 
 
-@pytest.mark.parametrize("name", ["AdamsBashforth", "own_drift", "rotation_strang", "separable_forest_ruth"])
+@pytest.mark.parametrize("name", ["AdamsBashforth", "rotation_strang"])
 def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, only, monkeypatch):
     only(*(claim for stage in battery.TABLE for claim in stage.claims))
     monkeypatch.setattr(order, "DRAWS", (96, 8))
@@ -138,10 +137,8 @@ def test_the_order_of_a_correct_program_is_confirmed(tmp_path, only, monkeypatch
 
 
 @pytest.mark.slow
-def test_programs_of_other_languages():
-    """One in Python writes raw doubles, one in awk all digits or six."""
-    python = f"{sys.executable} {BLIND / 'heun_program.py'}"
-    confirmed(symtop.judge(python, quick=True, order=2, symplectic=False, **PROGRAM), "order", "symplectic")
+def test_a_program_in_another_language():
+    """One in awk writes all digits or six."""
     for digits, refuted in ((), False), (("-v OUT=%.6g",), True):
         if shutil.which("awk"):
             command = " ".join(["awk", *digits, "-f", str(BLIND / "midpoint.awk")])
@@ -170,9 +167,8 @@ def test_an_implicit_class_has_its_order_in_full():
 # ---- what is wrong ---------------------------------------------------------------------------------------------------
 
 QUICKLY = (
-    "wrong_nodes", "stale_force", "rotation_frames", "symplectic_euler", "late_euler", "half_symmetric",
-    "adams_from_memory", "edits_the_judge", "euler_in_a_spot", "WrongSum",
-    *(name for name in wrong.CLAIMS if name.startswith("separable")),
+    "stale_force", "rotation_frames", "symplectic_euler", "half_symmetric", "adams_from_memory", "edits_the_judge",
+    "euler_in_a_spot", "WrongSum", "separable_stale", "separable_damped",
 )  # fmt: skip
 
 
@@ -236,6 +232,7 @@ def test_the_same_seed_draws_the_same(only):
     only("order")
     first, again = (symtop.judge(wrong.late_euler, quick=True, order=4, seed=7) for _ in range(2))
     assert first["order"].why == again["order"].why
+    assert first.refuted == ["order"]
     assert "of seed 7" in first["order"].why
     assert first.about.seed == 7
 

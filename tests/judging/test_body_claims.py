@@ -4,14 +4,13 @@ import dataclasses
 import json
 
 import pytest
-from click.testing import CliRunner
 
 import symtop
-from symtop.cli.main import main
 from symtop.judging.battery import judge
 from symtop.judging.findings import Ledger
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import body_scenes
+from tests.commands import call
 
 FREE, HEAVY = (body_scenes()[name] for name in ("check-case-2", "heavy-brick"))
 
@@ -44,7 +43,6 @@ def test_false_claims_on_a_body_are_refuted() -> None:
 
 
 def test_the_command_judges_on_a_body() -> None:
-    done = CliRunner().invoke(main, ["claims", "strang", "--scene", "check-case-2", "--quick", "--json"])
-    assert done.exit_code == 0
+    done = call("claims", "strang", "--scene", "check-case-2", "--quick", "--json")
     findings = {one["claim"]: one["verdict"] for one in json.loads(done.stdout)}
     assert findings == {"order": "confirmed", "energy": "confirmed", "momentum": "confirmed"}

@@ -1,8 +1,5 @@
 """Registered integrators in a process of their own: one that knows its plan, and plug-ins that fail."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -10,6 +7,7 @@ import symtop
 from symtop.judging.battery import judge
 from symtop.judging.remote import Process, separated, solvers_of
 from symtop.methods.framework.plan import Run
+from tests import commands
 
 
 def seeing(below):
@@ -44,27 +42,26 @@ for solver in (nothing, leaves, crashes):
 
 
 def claims(plugin, *names):
-    """What `symtop claims` ends in; it would end this process with its own if it called the plug-in there."""
-    command = [sys.executable, "-m", "symtop.cli", "claims", *names, "--plugin", str(plugin), "--quick"]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    """Code, output and errors of `symtop claims`, which would end this process too if it called the plug-in there."""
+    return commands.ended(commands.symtop("claims", *names, "--plugin", plugin, "--quick"))
 
 
 def test_a_plug_in_that_fails_is_told_of(tmp_path):
     (tmp_path / "plugin.py").write_text(PLUGIN)
     said = {"nothing": "must return a Run", "leaves": "ended with code 0", "crashes": "was ended by SIGSEGV"}
     names = [f"{name}-at-once" for name in said]
-    done = claims(tmp_path / "plugin.py", *names)
-    assert done.returncode == 1
+    code, out, _ = claims(tmp_path / "plugin.py", *names)
+    assert code == 1
     for name, words in zip(names, said.values(), strict=True):
-        own = [line for line in done.stdout.splitlines() if line.startswith(f"{name}, ")]
+        own = [line for line in out.splitlines() if line.startswith(f"{name}, ")]
         assert any(words in line for line in own), own
 
 
 def test_a_plug_in_that_ends_its_process_when_it_is_loaded_is_told_of(tmp_path):
     (tmp_path / "plugin.py").write_text("import os\nos._exit(0)\n")
-    done = claims(tmp_path / "plugin.py")
-    assert done.returncode == 2
-    assert "plugin plugin.py cannot be loaded: its process ended with code 0" in done.stderr
+    code, _, err = claims(tmp_path / "plugin.py")
+    assert code == 2
+    assert "plugin plugin.py cannot be loaded: its process ended with code 0" in err
 
 
 def test_a_run_that_is_returned_is_one_of_numbers():

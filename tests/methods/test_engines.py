@@ -227,7 +227,8 @@ def test_in_single_precision_there_is_a_best_step(name, best, error):
     assert error / 2.5 < fine < 2.5 * error
     assert fine < coarse
     assert finest > 1.5 * fine
-    assert axis_error(f"{name}[attitude]", counts[2]) < 0.2 * finest  # in double it goes on
+    if name == "rapier":  # the control: in double it goes on
+        assert axis_error(f"{name}[attitude]", counts[2]) < 0.2 * finest
 
 
 # ---- among the other integrators -------------------------------------------------------------------------------------

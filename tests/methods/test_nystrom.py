@@ -83,15 +83,10 @@ def test_the_table_has_order_eight_and_its_estimate_six():
     assert order_of(wrong, DPRKN8.b, DPRKN8.velocity) < 8
 
 
-def compiled(name, scene, h, **changed):
-    """What `sample` returns for a step of h from the start of a scene, or `refine` leaves in the last row."""
-    form = REDUCED
-    par, state = form.prepare(scene.top, scene.start)
-    par = par._replace(**changed)
-    method = nystrom.Nystrom(DPRKN8)(form.field)
-    memory = np.zeros((3, 4))
-    memory[0] = form.field(par, state)
-    part = getattr(method, name)
+@functools.cache
+def kernel(name):
+    """Of `sample` or `refine`, from the start of a step."""
+    part = getattr(nystrom.Nystrom(DPRKN8)(REDUCED.field), name)
 
     def sample(par, state, memory, h):
         return part(par, state, state, memory, 1.0, h)
@@ -99,7 +94,16 @@ def compiled(name, scene, h, **changed):
     def refine(par, state, memory, h):
         return part(par, state, memory, h)
 
-    made = compile_kernel(sample if name == "sample" else refine)(par, state, memory, h)
+    return compile_kernel(sample if name == "sample" else refine)
+
+
+def compiled(name, scene, h, **changed):
+    """What `sample` returns for a step of h from the start of a scene, or `refine` leaves in the last row."""
+    par, state = REDUCED.prepare(scene.top, scene.start)
+    par = par._replace(**changed)
+    memory = np.zeros((3, 4))
+    memory[0] = REDUCED.field(par, state)
+    made = kernel(name)(par, state, memory, h)
     return par, made, memory[-1]
 
 

@@ -1,5 +1,7 @@
 """Ensembles of bodies without symmetry: the bits of `simulate`, errors by member, and members that are refused."""
 
+import functools
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -10,8 +12,15 @@ from symtop.run.ensemble import chunks
 from symtop.run.ensemble.bodies import scenes_of
 from tests.run.test_ensemble import assert_alone
 
-BODIES = symtop.body_population(40, seed=4)
-SCENES = scenes_of(BODIES)
+
+@functools.cache
+def bodies():
+    return symtop.body_population(40, seed=4)
+
+
+@functools.cache
+def scenes():
+    return scenes_of(bodies())
 
 
 @pytest.mark.parametrize(
@@ -21,29 +30,29 @@ SCENES = scenes_of(BODIES)
 )  # fmt: skip
 @pytest.mark.parametrize("per_nutation", [4, 30])  # a turn of more than a radian leaves its lane
 def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, execution, per_nutation):
-    data = symtop.ensemble(BODIES, name, per_nutation=per_nutation, nutations=12, samples=6, quiet=True)
+    data = symtop.ensemble(bodies(), name, per_nutation=per_nutation, nutations=12, samples=6, quiet=True)
     assert data.attrs["execution"] == execution
-    assert_alone(SCENES, name, data, 6)
+    assert_alone(scenes(), name, data, 6)
 
 
 def test_methods_that_choose_their_steps_run_as_well():
-    data = symtop.ensemble(SCENES[:8], "vern9", tolerance=1e-8, samples=6, quiet=True)
-    assert_alone(SCENES[:8], "vern9", data, 6, tolerance=1e-8)
+    data = symtop.ensemble(scenes()[:8], "vern9", tolerance=1e-8, samples=6, quiet=True)
+    assert_alone(scenes()[:8], "vern9", data, 6, tolerance=1e-8)
 
 
 def test_scenes_and_a_population_are_the_same_members_and_threads_change_nothing(monkeypatch, tmp_path):
     asked = {"step_size": 0.05, "horizon": 3.0, "samples": 5, "quiet": True}
-    data = symtop.ensemble(BODIES, "strang", **asked)
-    others = symtop.ensemble(SCENES, "strang", **asked)
+    data = symtop.ensemble(bodies(), "strang", **asked)
+    others = symtop.ensemble(scenes(), "strang", **asked)
     xr.testing.assert_identical(data.drop_vars("stratum").drop_attrs(), others.drop_vars("scene").drop_attrs())
     monkeypatch.setattr(chunks, "LEAST_STEPS", 100)
-    xr.testing.assert_identical(symtop.ensemble(BODIES, "strang", threads=3, **asked), data)
-    with symtop.ensemble(BODIES, "strang", path=tmp_path / "runs.nc", **asked) as written:
+    xr.testing.assert_identical(symtop.ensemble(bodies(), "strang", threads=3, **asked), data)
+    with symtop.ensemble(bodies(), "strang", path=tmp_path / "runs.nc", **asked) as written:
         xr.testing.assert_equal(written.load(), data)
 
 
 def test_errors_are_those_of_each_member_against_its_own_truth():
-    some = [SCENES[i] for i in (0, 2, 4, 12)]  # free
+    some = [scenes()[i] for i in (0, 2, 4, 12)]  # free
     asked = {"nutations": 3, "samples": 5, "quiet": True}
     data = symtop.ensemble(some, "strang", per_nutation=[100, 100, 100, 20], **asked)
     found = symtop.errors(data, some)
@@ -70,14 +79,14 @@ def test_plain_numbers_are_a_body_to_the_bit():
      (lambda data: data.assign(centre=data.I1), "centre of members must be rows of 3 numbers over member"),
      (lambda data: data.assign(quaternion=2.0 * data.quaternion), "member 0: quaternion must have unit length"),
      (lambda data: data.rename(mgl="MGL"), "members have no variable 'MGL'; did you mean mgl?"),
-     (lambda data: [*SCENES[:2], "spheroid"], "members must be all tops or all bodies without symmetry")],
+     (lambda data: [*scenes()[:2], "spheroid"], "members must be all tops or all bodies without symmetry")],
 )  # fmt: skip
 def test_bad_bodies_are_refused_in_one_sentence(change, words):
     with pytest.raises(symtop.SymtopError) as refused:
-        symtop.ensemble(change(BODIES), "rk4", step_size=0.1, horizon=1.0)
+        symtop.ensemble(change(bodies()), "rk4", step_size=0.1, horizon=1.0)
     assert words in str(refused.value)
 
 
 def test_a_method_without_the_chart_is_refused():
     with pytest.raises(symtop.SymtopError, match="must have the chart body, of a RigidBody, not stormer-verlet"):
-        symtop.ensemble(SCENES, "stormer-verlet", step_size=0.1)
+        symtop.ensemble(scenes(), "stormer-verlet", step_size=0.1)

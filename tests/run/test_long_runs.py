@@ -1,14 +1,12 @@
 """Long runs: the same bits in stretches, after kill -9 and in one piece; flat memory; rounding at its best."""
 
 import dataclasses
-import os
 import signal
 import subprocess
 import sys
 import time
 import tracemalloc
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +19,7 @@ from symtop.core.jit_functions import fused
 from symtop.methods.framework import loop as drive
 from symtop.run import long_run as longrun
 from symtop.run.long_run import chart_of, leaves, long_run, regrown, scattered, windows
-from tests.commands import call, printed_by
+from tests.commands import ROOT, call, printed_by
 
 WHERE = symtop.scene("spheroid")
 H = WHERE.nutation_period / 400.37
@@ -118,8 +116,7 @@ longrun.long_run(where, "midpoint", steps=4_000_000, step_size=where.nutation_pe
 @pytest.mark.parametrize("blow", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
     file = tmp_path / "run.nc"
-    environment = {**os.environ, "PYTHONPATH": _root()}
-    with subprocess.Popen([sys.executable, "-c", SCRIPT, str(file)], env=environment) as child:
+    with subprocess.Popen([sys.executable, "-c", SCRIPT, str(file)], cwd=ROOT) as child:
         try:
             deadline = time.monotonic() + 120.0
             while not file.is_file() and child.poll() is None and time.monotonic() < deadline:
@@ -168,10 +165,6 @@ def test_a_checkpoint_knows_a_method_by_what_it_holds_and_not_by_its_name():
     renamed = dataclasses.replace(symtop.integrator("strang"), name=plain.name)
     assert identity(renamed) != identity(plain)  # another kernel
     assert identity(dataclasses.replace(plain, summary="said otherwise")) == identity(plain)
-
-
-def _root() -> str:
-    return str(Path(symtop.__file__).resolve().parents[1])
 
 
 def test_an_interrupt_keeps_every_finished_window(tmp_path, monkeypatch):
@@ -347,6 +340,6 @@ for name in ("galerkin-simpson", "gauss-4", "stormer-verlet"):  # each builds an
     long_run.chart_of(symtop.integrator(name))[1].loop.plain.__wrapped__()
 print(identity())
 """
-    told = printed_by(script, PYTHONPATH=_root()).split()
+    told = printed_by(script, cwd=ROOT).split()
     here = longrun._identity(WHERE, symtop.integrator("midpoint"), 0.01, 1000, True)
     assert told == [str(here)] * 2

@@ -27,7 +27,7 @@ class Bodies:
 
 @pytest.mark.parametrize("kind", STRATA)
 def test_members_are_bodies_with_directions_of_length_one(kind):
-    drawn = Bodies(kind, 40)
+    drawn = Bodies(kind, 16)
     assert (drawn.high <= drawn.low + drawn.middle).all()
     for name in ("centre", "quaternion"):
         assert np.abs(np.linalg.norm(drawn.data[name].values, axis=1) - 1.0).max() < 1e-15
