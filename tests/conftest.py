@@ -12,7 +12,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
 
 os.environ.setdefault("SYMTOP_CACHE", str(Path(__file__).resolve().parent.parent / ".pytest_cache" / "symtop"))
 
@@ -29,7 +28,6 @@ if sys.modules.get("dask", sys) is None:  # the processes that share the tests o
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what runs in its background like that
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-from symtop.cli.main import main
 from symtop.core import files
 from symtop.methods.framework import registry
 from symtop.model import scenes
@@ -37,14 +35,15 @@ from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run import plugins
 from symtop.runner import scripts
+from tests.commands import call
 
 scripts.install()  # tests import `symtop_studies`
 
 
 LONGEST = (  # files whose tests take longest, begun first: one that begins last keeps a process busy alone
-    "test_blind", "test_faults", "test_explore", "test_random_runs", "test_adapters", "test_advise",
-    "test_without_heyoka", "test_study", "test_report", "test_adaptive", "test_runge_kutta", "test_reference",
-    "test_other_systems", "test_long_runs",
+    "test_blind", "test_adapters", "test_blocks", "test_random_runs", "test_reference", "test_exact", "test_claims",
+    "test_streamed", "test_explore", "test_first_minutes", "test_factors", "test_other_systems", "test_stale",
+    "test_right_hand_side", "test_analyses",
 )  # fmt: skip
 STORED = Path(__file__).resolve().parent.parent / "results" / "quick"
 
@@ -118,8 +117,7 @@ def quick_results(tmp_path_factory) -> Path:
             if STORED.is_dir():  # after `make quick`: what is up to date need not be computed twice
                 shutil.copytree(STORED, folder / "quick", dirs_exist_ok=True)
             with _registered_for_a_while():
-                made = CliRunner().invoke(main, ["study", "--all", "--quick", "--results", str(folder)])
-            assert made.exit_code == 0, made.output
+                call("study", "--all", "--quick", "--results", folder)
             done.touch()
     return folder / "quick"
 

@@ -37,14 +37,15 @@ class Recording(NamedTuple):
         return max(len(line) for line in re.split(r"[\r\n]+", plain))
 
 
-def recorded(words: list[str], limit: float = 300.0, **environment: str) -> Recording:
-    """Run a command of symtop on a pseudo-terminal; it is killed after so many seconds."""
+def recorded(words: list[str], limit: float = 300.0, code: str | None = None, **environment: str) -> Recording:
+    """Run a command of symtop, or Python code, on a pseudo-terminal; it is killed after so many seconds."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
     shape = {"COLUMNS": "80", "LINES": "24", "TERM": "xterm"}
     began = last = time.monotonic()
+    start = ["-m", "symtop.cli"] if code is None else ["-c", code]
     process = subprocess.Popen(
-        [sys.executable, "-m", "symtop.cli", *words], stdin=theirs, stdout=theirs,
+        [sys.executable, *start, *words], stdin=theirs, stdout=theirs,
         stderr=theirs, env={**os.environ, **shape, **environment},
     )  # fmt: skip
     os.close(theirs)
@@ -63,5 +64,5 @@ def recorded(words: list[str], limit: float = 300.0, **environment: str) -> Reco
         drawings.append((now - began, part.decode(errors="replace")))
     os.close(ours)
     process.kill() if time.monotonic() - began >= limit else None
-    code = process.wait()
-    return Recording(said.decode(errors="replace"), code, max(silence, time.monotonic() - last), drawings)
+    ended = process.wait()
+    return Recording(said.decode(errors="replace"), ended, max(silence, time.monotonic() - last), drawings)

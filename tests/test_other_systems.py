@@ -6,9 +6,7 @@ symtop runs on Windows; it shows that none of them is needed.
 
 import json
 
-import pytest
-
-from tests.commands import PROBE, customized
+from tests.commands import customized
 
 POORER = """
 import multiprocessing, multiprocessing.context, os, signal, sys
@@ -23,32 +21,31 @@ multiprocessing.get_all_start_methods = lambda: ["spawn"]
 """
 
 
-@pytest.fixture
-def poorer(tmp_path):
-    return customized(tmp_path, POORER)
+COMMANDS = """
+import importlib.util, json, os, signal
+from pathlib import Path
+from tests.commands import PROBE, call
+
+def computed(jobs):
+    return json.loads(call("study", PROBE, "--jobs", jobs, "--json").stdout)[0]["computed"]
+
+there = [importlib.util.find_spec("fcntl"), hasattr(os, "killpg"), hasattr(signal, "SIGALRM")]
+first = computed(2)
+next(Path("results/cases/probe").glob("loop--rk4*.npz")).unlink()
+again = computed(1)
+call("long", "spheroid", "midpoint", "--steps", 100_000, "--checkpoint", "run.nc")
+Path("euler.py").write_text("def step(f, t, y, h):\\n    return y + h * f(t, y)\\n")
+judged = call("judge", "euler.py", "--quick").stdout
+print(json.dumps({"there": there, "first": first, "again": again, "judged": judged}))
+"""
 
 
-def test_they_are_gone(poorer):
-    for code in ("import fcntl", "import os; os.killpg", "import signal; signal.SIGALRM"):
-        assert poorer(python=code).returncode == 1
-
-
-def test_a_study_in_workers_is_run_and_resumed(poorer, tmp_path):
-    done = poorer("study", PROBE, "--jobs", 2, "--json")
+def test_a_study_in_workers_is_resumed_a_long_run_ends_and_somebodys_step_is_judged(tmp_path):
+    """Commands in one process, as each start takes two seconds."""
+    done = customized(tmp_path, POORER)(python=COMMANDS)
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)[0]["computed"] == 12
-    next((tmp_path / "results" / "cases" / "probe").glob("loop--rk4*.npz")).unlink()
-    assert json.loads(poorer("study", PROBE, "--jobs", 1, "--json").stdout)[0]["computed"] == 1
-
-
-def test_a_long_run_ends_and_leaves_no_checkpoint(poorer, tmp_path):
-    done = poorer("long", "spheroid", "midpoint", "--steps", 100_000, "--checkpoint", "run.nc")
-    assert done.returncode == 0, done.stderr
-    assert not (tmp_path / "run.nc").exists()
-
-
-def test_somebodys_step_is_judged(poorer, tmp_path):
-    (tmp_path / "euler.py").write_text("def step(f, t, y, h):\n    return y + h * f(t, y)\n")
-    done = poorer("judge", "euler.py", "--quick")
-    assert done.returncode == 0, done.stderr
-    assert "order" in done.stdout
+    told = json.loads(done.stdout)
+    assert told["there"] == [None, False, False]
+    assert (told["first"], told["again"]) == (12, 1)
+    assert not (tmp_path / "run.nc").exists()  # the checkpoint
+    assert "order" in told["judged"]

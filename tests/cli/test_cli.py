@@ -34,11 +34,14 @@ def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):
     assert netcdf.read(path).attrs["outcome"] == "left_chart"
 
 
+OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --body I1,I2,I3 or --plugin FILE)"
+
+
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
-        ("run sferoid midpoint --step-size 0.1", ["scene 'sferoid'", "spheroid", "symtop scenes"]),
-        ("run spheroid midpont --step-size 0.1", ["integrator 'midpont'", "midpoint", "symtop integrators"]),
+        ("run sferoid midpoint --step-size 0.1", ["scene 'sferoid'", "spheroid", "symtop scenes", BODY]),
+        ("run spheroid midpont --step-size 0.1", ["integrator 'midpont'", "midpoint", "symtop integrators", OWN]),
         ("run midpoint spheroid", ["scene 'midpoint'", "an integrator", "scene comes first"]),
         ("run rk4[axis] spheroid", ["scene 'rk4[axis]'", "an integrator", "scene comes first"]),
         ("run spheroid goldstein", ["integrator 'goldstein'", "a scene", "scene comes first"]),

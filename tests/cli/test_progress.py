@@ -4,18 +4,20 @@ import re
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 
 import symtop
 from symtop.cli import runs
+from symtop.measure import timing
 from symtop.run.ensemble import population
 from tests.commands import call
 
 SLOW = """\
 import sys, time
 from symtop.cli import clock
-clock.FIRST, clock.EVERY = 0.2, 0.3
+clock.FIRST, clock.EVERY = 0.1, 0.15
 with clock.telling("judge"):
     time.sleep(float(sys.argv[1]))
     with clock.ticking("trying methods"):
@@ -28,7 +30,7 @@ def said(code, *words):
 
 
 def test_a_command_that_waits_says_what_it_does_and_for_how_long():
-    lines = said(SLOW, "1.0").splitlines()
+    lines = said(SLOW, "0.5").splitlines()
     assert lines[0].startswith("symtop: judge, ")
     assert lines[-1].startswith("symtop: trying methods, ")
     assert 3 <= len(lines) <= 8
@@ -49,13 +51,14 @@ def test_the_lines_end_with_a_command_that_is_killed():
     assert process.communicate(timeout=10)[1].count(b"symtop: judge") < 20  # the pipe is closed by all who wrote to it
 
 
-def test_a_run_of_many_steps_says_how_long_it_takes(capsys):
+def test_a_run_of_many_steps_says_how_long_it_takes(capsys, monkeypatch):
     """Steps of a microsecond: a million are not timed, five million take five seconds, a billion a quarter hour."""
-    few = []
+    few, now, step = [], [0.0], 1e-6
+    monkeypatch.setattr(timing, "time", SimpleNamespace(perf_counter=lambda: now[0]))
 
     def run(steps):
         few.append(steps)
-        time.sleep(0.3 + 1e-6 * steps)  # whatever the steps, as the set-up of a long run does
+        now[0] += 0.3 + step * steps  # whatever the steps, as the set-up of a long run does
 
     runs.estimate(1e6, run)
     assert not few
@@ -66,7 +69,8 @@ def test_a_run_of_many_steps_says_how_long_it_takes(capsys):
     assert 15 <= int(minutes[1]) <= 25
     assert max(few) < 1.1e6
     few.clear()
-    runs.estimate(3e6, lambda steps: few.append(steps) or time.sleep(1e-4 * steps))  # in plain Python
+    step = 1e-4  # in plain Python
+    runs.estimate(3e6, run)
     assert "take about 5" in capsys.readouterr().err
     assert sum(few) < 40_000
 

@@ -4,14 +4,10 @@ import base64
 import http.client
 import json
 import re
-import signal
 import socket
-import subprocess
-import sys
 import threading
 import time
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -218,26 +214,27 @@ def test_exports_over_http(site, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("method", "tolerance"),
+    ("method", "tolerance", "seconds"),
     [
-        ("taylor-quad", 1e-30),
-        ("rk45", 1e-9),
+        ("taylor-quad", 1e-30, 0.5),
+        ("rk45", 1e-9, 0.5),
         *(
-            pytest.param(*one, marks=pytest.mark.slow)
+            pytest.param(*one, answers.MOST_SECONDS, marks=pytest.mark.slow)
             for one in (("taylor-quad", 1e-6), ("taylor-longdouble", 1e-12), ("radau", 1e-6))
         ),
     ],
 )
-def test_a_run_to_its_budget_takes_two_seconds_within_a_factor_of_two(method, tolerance):
+def test_a_run_to_its_budget_takes_its_seconds_within_a_factor_of_two(method, tolerance, seconds, monkeypatch):
     """Processor time of this thread: other processes do not count."""
-    answers._budgets.clear()
+    monkeypatch.setattr(answers, "MOST_SECONDS", seconds)
+    monkeypatch.setattr(answers, "_budgets", {})
     chosen = answers.setup(fields(integrator=method, tolerance=tolerance, horizon=1e6))
     before = time.thread_time()
     assert chosen.budget <= answers.MOST_WORK[chosen.method.implementation]
     learnt = time.thread_time()
     assert learnt - before < 2.0
     answer = answers.answer(chosen)
-    assert time.thread_time() - learnt < 2.0 * answers.MOST_SECONDS
+    assert time.thread_time() - learnt < 2.0 * seconds
     assert answer["outcome"] == "out_of_budget"
     assert "limit on the work" in answer["message"]
     again = answers.setup(fields(integrator=method, tolerance=tolerance, horizon=1e6))
@@ -303,21 +300,6 @@ def test_a_bad_port_is_refused(site):
     for port in (site.server_address[1], 70_000):
         done = call("explore", "--no-browser", "--port", port, code=2)
         assert "port must be" in done.output
-
-
-def test_the_command_serves_until_it_is_ended():
-    command = [sys.executable, "-m", "symtop.cli", "explore", "--no-browser"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[2]) as process:
-        try:
-            port = int(re.search(r":(\d+)/", process.stdout.readline()).group(1))
-            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
-            connection.request("GET", "/")
-            assert b"symtop explore" in connection.getresponse().read()
-            connection.close()
-            process.send_signal(signal.SIGTERM)
-            assert process.wait(30) == 0
-        finally:
-            process.kill()
 
 
 PLOT = "document.querySelector('#plot-{}').toDataURL()"

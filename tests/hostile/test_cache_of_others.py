@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import stat
 import zlib
 
@@ -23,26 +24,31 @@ def _planted(x):
     return x * x * x
 
 
-@pytest.fixture
-def planted(tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
     """A cache that holds a kernel whose bitcode is another's."""
-    root = tmp_path / "new" / "cache"
-    monkeypatch.setenv("SYMTOP_CACHE", str(root))
-    before = os.umask(0o002)
-    try:
+    root, before = tmp_path_factory.mktemp("made") / "new" / "cache", os.umask(0o002)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SYMTOP_CACHE", str(root))
         assert compile_kernel(_doubled)(2.0) == 4.0
-    finally:
         os.umask(before)
-    (file,), (code,) = root.rglob("*.bitcode"), root.rglob("*.code")
-    kernel = compile_kernel(_planted)
-    monkeypatch.setattr(kernel, "_cache", jit._Cache(root / "kernels" / "aside"))
-    assert kernel(2.0) == 8.0
+        (file,), (code,) = root.rglob("*.bitcode"), root.rglob("*.code")
+        kernel = compile_kernel(_planted)
+        patch.setattr(kernel, "_cache", jit._Cache(root / "kernels" / "aside"))
+        assert kernel(2.0) == 8.0
     (other,) = (root / "kernels" / "aside").glob("*.bitcode")
     jit._write(file, jit._read(other, jit._name(other)), jit._name(file))
-    for path in [*other.parent.iterdir(), code]:
-        path.unlink()
-    other.parent.rmdir()
-    return root, file
+    code.unlink()
+    shutil.rmtree(other.parent)
+    return root.parent
+
+
+@pytest.fixture
+def planted(made, tmp_path, monkeypatch):
+    """A copy of it, and the file of that kernel."""
+    root = shutil.copytree(made, tmp_path / "new") / "cache"
+    monkeypatch.setenv("SYMTOP_CACHE", str(root))
+    return root, next(root.rglob("*.bitcode"))
 
 
 def test_what_is_made_is_the_users_alone(planted):

@@ -2,39 +2,36 @@
 
 import contextlib
 import json
-import os
+import re
+import signal
 import socket
 import struct
 import subprocess
 import sys
 import threading
 import time
+import urllib.request
 from pathlib import Path
 
 import pytest
 
-SCRIPT = (
-    "from symtop.explore.server import serve\ns = serve(0)\nprint(s.server_address[1], flush=True)\ns.serve_forever()\n"
-)
 QUESTION = json.dumps({
     "I1": 2.0, "I3": 1.0, "mgl": 1.0, "theta": 0.5, "phi": 0, "psi": 0, "theta_dot": 0, "phi_dot": 0, "psi_dot": 5.0,
     "horizon": 5.0, "integrator": "midpoint", "step_size": 0.01,
 }).encode()  # fmt: skip
 
 
-@pytest.fixture
-def crowd(tmp_path):
-    """The port of an explorer in a process of its own, the file of what it says, and that of its memory."""
-    log = tmp_path / "log"
-    with log.open("w") as said:
-        process = subprocess.Popen(
-            [sys.executable, "-c", SCRIPT], stdout=subprocess.PIPE, stderr=said, text=True, env={**os.environ}
-        )
+@pytest.fixture(scope="module")
+def crowd(tmp_path_factory):
+    """The port of the command that serves the explorer, the file of what it says, that of its memory, its process."""
+    log = tmp_path_factory.mktemp("explorer") / "log"
+    command = [sys.executable, "-m", "symtop.cli", "explore", "--no-browser"]
+    with log.open("w") as said, subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True) as process:
         try:
-            yield int(process.stdout.readline()), log, Path(f"/proc/{process.pid}/statm")
+            port = int(re.search(r":(\d+)/", process.stdout.readline()).group(1))
+            yield port, log, Path(f"/proc/{process.pid}/statm"), process
         finally:
             process.kill()
-            process.communicate()
 
 
 HEAD = b"%s %s HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\nContent-Length: %d\r\n\r\n"
@@ -72,7 +69,7 @@ def at_once(count, ask):
 
 @pytest.mark.parametrize("count", [pytest.param(20, id="few"), pytest.param(200, id="many", marks=pytest.mark.slow)])
 def test_a_crowd_is_served_and_nothing_is_said_of_those_who_leave(crowd, count):
-    port, log, memory = crowd
+    port, log, memory, _ = crowd
     sizes = []
     for _ in range(3):
         at_once(count, lambda: asked(port, b"/run", QUESTION, leave=True))
@@ -87,7 +84,7 @@ def test_three_thousand_connections_are_refused_and_forgotten(crowd):
 
     Those within the limit, some of whom never finish a sentence, keep nobody waiting.
     """
-    port, log, memory = crowd
+    port, log, memory, _ = crowd
     assert asked(port, b"/run", QUESTION) == GOOD
     before, began = int(memory.read_text().split()[1]), time.monotonic()
     resource = pytest.importorskip("resource")
@@ -119,3 +116,11 @@ def test_three_thousand_connections_are_refused_and_forgotten(crowd):
     for link in idle:
         link.close()
     assert int(memory.read_text().split()[1]) < 1.2 * before
+
+
+def test_the_command_serves_until_it_is_ended(crowd):
+    port, _, _, process = crowd
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=60) as answer:
+        assert b"symtop explore" in answer.read()
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(30) == 0

@@ -7,15 +7,14 @@ import sys
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import symtop
-from symtop.cli.main import main
 from symtop.core import netcdf
 from symtop.model.body import Attitude, RigidBody
 from symtop.model.exact.body_digits import body_digits
 from symtop.report import test_set
 from symtop.run.ensemble.bodies import body_population, scenes_of
+from tests.commands import call
 from tests.model.bodies import PreciseBody
 
 KINDS = ("near-separatrix", "regular", "lagrange")
@@ -134,6 +133,5 @@ def test_a_start_that_is_moved_by_a_rounding_is_another_motion(monkeypatch):
 def test_the_command_refuses_a_folder_that_holds_something(tmp_path):
     (tmp_path / "test-set").mkdir()
     (tmp_path / "test-set" / "mine").touch()
-    done = CliRunner().invoke(main, ["archive", "--test-set", "--results", str(tmp_path)])
-    assert done.exit_code == 2
+    done = call("archive", "--test-set", "--results", tmp_path, code=2)
     assert "the test set needs a folder that is new or empty" in done.stderr

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 import pytest
 
 import symtop
+from symtop.judging.claims import order, subject
 from symtop.judging.findings import About, Finding, Ledger, Measured
 from symtop.report.card import badge, card, figures, write_badge
 
@@ -16,11 +17,21 @@ def midpoint(f, t, y, h):
 
 @pytest.fixture(scope="module")
 def ledger():
-    return symtop.judge(midpoint, quick=True, order=2, symplectic=True)
+    with pytest.MonkeyPatch.context() as shorter:
+        for module, name in ((subject, "LONG"), (subject, "SLOPES"), (order, "DRAWS")):
+            full, quick = getattr(module, name)
+            shorter.setattr(module, name, (full, type(full)(quick / 3)))
+        return symtop.judge(midpoint, quick=True, order=2, symplectic=True)
 
 
 def handmade(*findings, name="mine"):
     return Ledger(name, "spheroid", findings, {}, About(name, "axis", "python", 0.0))
+
+
+NOTHING = handmade(
+    Finding("order", "4", Measured(), "undecided", "no <luck>"),
+    Finding("energy", "", Measured(), "undecided", "it stopped"),
+)
 
 
 def test_the_card_is_one_page_with_two_figures_and_every_verdict(ledger, tmp_path):
@@ -43,14 +54,10 @@ def test_the_energy_of_the_card_is_that_of_the_long_run(ledger):
 
 
 def test_a_card_without_measurements_says_why(tmp_path):
-    nothing = handmade(
-        Finding("order", "4", Measured(), "undecided", "no <luck>"),
-        Finding("energy", "", Measured(), "undecided", "it stopped"),
-    )
-    page = card(nothing, tmp_path / "card.html").read_text(encoding="utf-8")
+    page = card(NOTHING, tmp_path / "card.html").read_text(encoding="utf-8")
     assert "no &lt;luck&gt;" in page
     assert "<luck>" not in page
-    assert [figure.axes[0].texts[0].get_text() for figure in figures(nothing)] == ["no <luck>", "it stopped"]
+    assert [figure.axes[0].texts[0].get_text() for figure in figures(NOTHING)] == ["no <luck>", "it stopped"]
 
 
 def test_the_badge_says_what_is_refuted_or_what_the_method_is(ledger, tmp_path):
@@ -68,6 +75,6 @@ def test_the_badge_says_what_is_refuted_or_what_the_method_is(ledger, tmp_path):
     assert root.get("width").isdigit()
 
 
-def test_a_card_that_cannot_be_written_is_told(ledger, tmp_path):
+def test_a_card_that_cannot_be_written_is_told(tmp_path):
     with pytest.raises(symtop.SymtopError, match="it is a folder"):
-        card(ledger, tmp_path)
+        card(NOTHING, tmp_path)

@@ -35,7 +35,7 @@ def results(tmp_path_factory):
         if name == "speed":
             few = [dataclasses.replace(case, settings={"lengths": (4.0, 8.0), "settings": 5}) for case in few]
         small = dataclasses.replace(study, cases=lambda _, few=few: few)
-        assert runner.run(small, folder, jobs=1, quiet=True, save=style.save)["failures"] == []
+        assert runner.run(small, folder, jobs=1, quiet=True, save=style.sketch)["failures"] == []
     page.write(folder)
     return folder
 

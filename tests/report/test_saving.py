@@ -10,7 +10,7 @@ from symtop.report import style
 
 def drawn() -> Figure:
     """A figure with a layout, a legend, a shared axis and a formula."""
-    figure, axes = style.panels(2, 2, sharex=True)
+    figure, axes = style.panels(1, 2, sharey=True)
     for k, axis in enumerate(axes.flat):
         axis.loglog([1.0, 10.0, 100.0], [1e-3, 1e-5, 10.0 ** -(k + 6)], **style.line("rk4"), label=rf"$x^{k}$")
         axis.set(title=f"panel {k}", ylabel="error")

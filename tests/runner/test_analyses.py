@@ -1,5 +1,6 @@
 """Studies that are concluded in a process of their own, beside the next one: the same files, whatever happens to it."""
 
+import contextlib
 import json
 import os
 import time
@@ -43,9 +44,8 @@ STUDY = Study(NAME, NAME, "Who?", cases, measure, facts)
 
 
 @pytest.fixture
-def script(tmp_path, monkeypatch):
+def script(tmp_path):
     """Writes the study of a name, and returns its file."""
-    monkeypatch.setenv("SYMTOP_TESTS_PARENT", str(os.getpid()))
 
     def written(name):
         file = tmp_path / f"{name}.py"
@@ -57,8 +57,15 @@ def script(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def pool():
-    with Pool(2) as workers:
+    with pytest.MonkeyPatch.context() as environment, Pool(2) as workers:
+        environment.setenv("SYMTOP_TESTS_PARENT", str(os.getpid()))
         yield workers
+
+
+@pytest.fixture
+def shared(pool, monkeypatch):
+    """The command has the workers of this file, and starts none."""
+    monkeypatch.setattr("symtop.runner.pool.Pool", lambda *_: contextlib.nullcontext(pool))
 
 
 def studied(results, *files):
@@ -85,6 +92,7 @@ def test_each_of_several_is_concluded_by_another_process_to_the_same_files(scrip
     assert not leftovers(tmp_path / "together")
 
 
+@pytest.mark.usefixtures("shared")
 def test_a_process_that_is_killed_is_done_without(script, tmp_path):
     code, told = studied(tmp_path / "r", script("killed"), script("second"))
     assert code == 0, told
@@ -119,6 +127,7 @@ def test_a_study_that_is_edited_before_it_is_concluded_is_drawn_again(script, tm
         assert manifest.is_current(tmp_path / "r", name, "made of") is (name == "second")
 
 
+@pytest.mark.usefixtures("shared")
 @pytest.mark.parametrize("bad", ["refused", "silent"])
 def test_what_stops_one_study_does_not_stop_the_others(script, tmp_path, bad):
     """A grid that is refused ends the command after those before it; of findings that fail the next go on."""
@@ -150,7 +159,7 @@ def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
 
 def test_timed_cases_wait_for_the_analysis_of_the_study_before(script, tmp_path, pool):
     done = []
-    future = pool.analyse(time.sleep, 1.0)
+    future = pool.analyse(time.sleep, 0.3)
 
     def measure(_):
         done.append(future.done())

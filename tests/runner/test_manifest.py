@@ -76,10 +76,10 @@ def test_a_dataset_that_is_gone_or_damaged_is_made_again(bring):
         assert netcdf.read_any(bring.dataset).identical(whole)
 
 
-@pytest.mark.parametrize("nonsense", ["", "[]", '{"probe": 1, "rounds": 1}', '{"probe": {}, "rounds": {"files": []}}'])
-def test_a_damaged_manifest_is_not_believed(bring, nonsense):
+def test_a_damaged_manifest_is_not_believed(bring):
     computed, _ = bring()
-    manifest.path_of(bring.folder).write_text(nonsense)
-    again, read = bring()
-    assert (again, read >= computed) == (0, True)
-    assert bring() == (0, 0)
+    for nonsense in ("", "[]", '{"probe": 1, "rounds": 1}', '{"probe": {}, "rounds": {"files": []}}'):
+        manifest.path_of(bring.folder).write_text(nonsense)
+        again, read = bring()
+        assert (again, read >= computed) == (0, True), nonsense
+        assert bring() == (0, 0)

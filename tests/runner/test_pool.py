@@ -6,7 +6,6 @@ import os
 
 import pytest
 
-from symtop.core.parallel import cores
 from symtop.measure import timing
 from symtop.runner import pool as pools, run as runner, store
 from symtop.runner.pool import Pool, Task, in_order
@@ -22,7 +21,7 @@ def cases(quick):
     return [Case("spheroid", ("midpoint", "strang")[k % 2], {"k": k}, k >= 8, f"case-{k}") for k in range(12)]
 
 def measure(case):
-    begin, crew = time.monotonic(), Path(os.environ["CREW"])
+    begin, crew = time.monotonic(), Path(__file__).with_name("crew")
     (crew / str(os.getpid())).touch()
     while not case.timed and len(list(crew.iterdir())) < 2 and time.monotonic() < begin + 60.0:
         time.sleep(0.01)  # until the second worker has begun a case, too
@@ -33,17 +32,17 @@ STUDY = Study("slept", "Slept", "When?", cases, measure)
 """
 
 
-@pytest.fixture
-def study(tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def pool():
+    with Pool(2) as workers:
+        yield workers
+
+
+def study(folder, some="range(12)"):
     """Eight ordinary cases and four timed ones, or what `some` of them are."""
-    monkeypatch.setenv("CREW", str(tmp_path / "crew"))
-    (tmp_path / "crew").mkdir()
-
-    def written(some="range(12)"):
-        (tmp_path / "slept.py").write_text(SCRIPT.replace("range(12)", some))
-        return runner.load(str(tmp_path / "slept.py"))
-
-    return written
+    (folder / "crew").mkdir(parents=True)
+    (folder / "slept.py").write_text(SCRIPT.replace("range(12)", some))
+    return runner.load(str(folder / "slept.py"))
 
 
 def computed(study, results, pool):
@@ -72,14 +71,14 @@ def test_methods_of_one_family_do_not_begin_side_by_side(tmp_path):
     assert in_order([]) == []
 
 
-@pytest.mark.parametrize("ratio", [pools.DISTURBED, 1.01 * pools.DISTURBED])
-def test_a_trial_decides_whether_timed_cases_run_at_once_in_workers_that_are_there(study, tmp_path, monkeypatch, ratio):
+def test_a_trial_decides_whether_timed_cases_run_at_once_in_workers_that_are_there(tmp_path, monkeypatch, pool):
     """After all others; few of them, too: workers have the kernels, this process has not."""
-    sizes = []
-    monkeypatch.setattr(pools, "slowdown", lambda _, size: sizes.append(size) or ratio)
-    side_by_side = ratio <= pools.DISTURBED
-    with Pool(2) as pool:
-        ordinary, timed = computed(study(), tmp_path / "r", pool)
+    for ratio in (pools.DISTURBED, 1.01 * pools.DISTURBED):
+        sizes, side_by_side, folder = [], ratio <= pools.DISTURBED, tmp_path / str(ratio)
+        monkeypatch.setattr(pools, "slowdown", lambda _, size, sizes=sizes, ratio=ratio: sizes.append(size) or ratio)
+        monkeypatch.setattr(pool, "_trials", {})
+        slept = study(folder)
+        ordinary, timed = computed(slept, folder / "r", pool)
         assert (len(ordinary), len(timed)) == (8, 4)
         assert at_once(ordinary) > 0  # the control
         assert max(float(case["end"]) for case in ordinary) <= float(timed[0]["begin"])
@@ -90,8 +89,8 @@ def test_a_trial_decides_whether_timed_cases_run_at_once_in_workers_that_are_the
         for case in timed:
             assert case.attrs["timed_at_once"] == (2 if side_by_side else 1)
             assert case.attrs["timed_slowdown"] == ratio
-        computed(study(), tmp_path / "again", pool)
-    assert sizes == [2]  # once for all studies of a command
+        computed(slept, folder / "again", pool)
+        assert sizes == [2]  # once for all studies of a command
 
 
 def test_where_all_workers_disturb_each_other_half_as_many_may_not(monkeypatch):
@@ -102,19 +101,20 @@ def test_where_all_workers_disturb_each_other_half_as_many_may_not(monkeypatch):
         assert pool.at_once(1) == (1, pytest.approx(math.nan, nan_ok=True))
 
 
-def test_few_cases_are_computed_here_and_timed_ones_need_no_trial(study, tmp_path):
+def test_few_cases_are_computed_here_and_timed_ones_need_no_trial(tmp_path):
     with Pool(1) as pool:
-        _, cases = computed(study("range(8, 12)"), tmp_path / "r", pool)
+        _, cases = computed(study(tmp_path, "range(8, 12)"), tmp_path / "r", pool)
     assert at_once(cases) == 0
     assert crew(cases) == {os.getpid()}
     assert {case.attrs["timed_at_once"] for case in cases} == {1}
     assert all(math.isnan(case.attrs["timed_slowdown"]) for case in cases)
 
 
-def test_the_trial_sees_workers_that_share_a_core(monkeypatch):
-    """With twice as many workers as cores a run takes twice as long."""
-    crowd = 2 * cores()
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system puts no process on a core")
+def test_the_trial_sees_workers_that_share_a_core(monkeypatch, pool):
+    """There a run takes twice as long; the last test of the file, as the workers stay there."""
     monkeypatch.setattr(timing, "TURNS", 3)
-    with Pool(crowd) as pool:
-        pool.open(crowd)
-        assert 1.3 < timing.slowdown(pool.submit, crowd) < math.inf
+    pool.open(2)
+    for worker in {turn.result()[0] for turn in [pool.submit(timing.timed_turn) for _ in range(20)]}:
+        os.sched_setaffinity(worker, {min(os.sched_getaffinity(0))})
+    assert 1.3 < timing.slowdown(pool.submit, 2) < math.inf

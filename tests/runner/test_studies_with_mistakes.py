@@ -147,19 +147,16 @@ def test_what_python_raises_is_kept_as_the_cause(tmp_path):
     assert xr.open_dataset(tmp_path / "results" / "mine.nc").sizes["variant"] == 2
 
 
-@pytest.mark.parametrize(
-    ("page", "says"),
-    [
+def test_a_page_that_is_wrong_is_told_of(tmp_path):
+    for page, says in (
         ("{{ f.wrost | number }}", "page of mine: 'types.SimpleNamespace object' has no attribute 'wrost'"),
         ("# Q\n{{ f.worst | numbr }}", "page of mine, line 2: No filter named 'numbr'"),
         ("{% if f.worst %}", "page of mine, line 1: Unexpected end of template"),
-    ],
-)
-def test_a_page_that_is_wrong_is_told_of(tmp_path, page, says):
-    (tmp_path / "mine.md").write_text(page)
-    code, output = ran(tmp_path, "")
-    assert code == 2, output
-    assert says in output
+    ):
+        (tmp_path / "mine.md").write_text(page)
+        code, output = ran(tmp_path, "")
+        assert code == 2, output
+        assert says in output
     (tmp_path / "mine.md").write_text("# {{ question }}\n\nThe worst is {{ f.worst | number }}.\n\n{{ table('one') }}")
     code, output = ran(tmp_path, "")
     assert code == 0, output

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
-from symtop_studies.factors import facts, figures, plain_numpy
+from symtop_studies.factors import facts, figures, measures, plain_numpy
 from symtop_studies.factors.cells import (
     CALLS,
     COMPILED,
@@ -40,7 +40,9 @@ SHORT = Goal(3.0, 1e-5, LANGUAGES, CALLS)
 @pytest.fixture(scope="module")
 def measured():
     """A small factorial as the study's functions see it: two schemes at one goal, short batches."""
-    data = factorial(SCENE, [DORMAND_PRINCE, "Takahashi-Imada"], [SHORT], 2, 0.001, 2)
+    with pytest.MonkeyPatch.context() as once:
+        once.setattr(measures, "TRIES", 1)
+        data = factorial(SCENE, [DORMAND_PRINCE, "Takahashi-Imada"], [SHORT], 2, 0.001, 2)
     return combine([(Case("spheroid", "together"), data)])
 
 
@@ -129,7 +131,8 @@ def test_languages_of_one_method_have_the_same_setting_and_the_same_work(measure
         np.testing.assert_allclose([float(one["axis"]) for one in trio], float(trio[0]["axis"]), rtol=1e-3)
 
 
-def test_what_is_not_within_the_budget_has_a_reason_and_no_time():
+def test_what_is_not_within_the_budget_has_a_reason_and_no_time(monkeypatch):
+    monkeypatch.setattr(measures, "timed", lambda asked, processes: np.ones((len(asked.runs), processes)))
     goal = Goal(10.0, 1e-7, (NUMPY,), (KERNEL,))
     strang = [cell for cell in cells(["Strang"]) if cell.chart == "axis"]
     settled = settle(SCENE, strang, goal)
@@ -155,6 +158,15 @@ def test_every_time_is_the_median_of_its_processes(measured, rows):
     np.testing.assert_allclose(gap, 0.5 * np.ptp(taken, axis=-1) / np.median(taken, axis=-1))
     assert set(rows["call"]) == set(CALLS)
     assert set(rows["language"][rows["call"] == SOLVE_IVP]) == {SCIPY_PYTHON}
+
+
+def test_a_noisy_time_is_taken_again_and_the_quieter_one_is_kept(monkeypatch):
+    noisy, quiet, worse = [1.0, 1.0, 9.0, 9.0], [2.0, 2.0, 2.1, 2.1], [1.0, 9.0, 9.0, 99.0]
+    asked, taken = [], [np.array([noisy, quiet, noisy]), np.array([quiet, worse])]
+    monkeypatch.setattr(measures, "timed", lambda runs, _: asked.append(runs.runs) or taken.pop(0))
+    times = measures.settled_times(measures.Runs(SCENE, ["a", "b", "c"], 1, 0.001), 4)
+    assert asked == [["a", "b", "c"], ["a", "c"]]
+    assert times.tolist() == [quiet, quiet, noisy]
 
 
 @pytest.mark.parametrize(("share", "busy"), [(0.0, None), (facts.NOISY_SHARE, None), (0.2, True)])
