@@ -120,7 +120,7 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
             if name not in middle:
                 tick.set(weight="bold", fontsize=8.0)
     dark = {"color": "#444444", "lw": 0.0}
-    axes[0, 0].plot([], [], "o", ms=5.0, label=f"median over {len(scenes)} scenes", **dark)
+    axes[0, 0].plot([], [], "o", ms=5.0, label=f"median over up to {len(scenes)} scenes", **dark)
     axes[0, 0].plot([], [], color="#444444", lw=1.2, label="least to largest of the scenes")
     axes[0, 0].plot([], [], "o", ms=5.0, mfc="white", label="open: extrapolated on most scenes", **dark)
     if any(few.values()):
