@@ -203,8 +203,7 @@ def recommend(
     leaves out what does not run on bodies without symmetry, `keeps` ("energy", "momenta") what lets them drift.
 
     Raises SymtopError for arguments that are out of range, and for a `horizon` to which the motion of a body is not
-    known. It runs what it recommends, which takes from 0.1 s to half
-    a minute.
+    known. It runs what it recommends: once the candidates are compiled, from 0.1 s to half a minute.
     """
     scene = scenes.scene(scene, bodies=True)
     quantity = ("attitude" if scene.of_body else "axis") if quantity is None else quantity

@@ -33,8 +33,17 @@ def decades(target: float) -> int:
 
 def worst_tau(data: xr.DataTree, family: str, span: str = "short") -> by.Interval:
     """Tau of the target with the least."""
-    each = [by.tau(data, family, target, span=span) for target in ASKED]
+    return least([by.tau(data, family, target, span=span) for target in ASKED])
+
+
+def least(each: list[by.Interval]) -> by.Interval:
+    """The interval with the least number."""
     return min((one for one in each if not math.isnan(one.value)), key=lambda one: one.value, default=each[0])
+
+
+def tau_words(one: by.Interval) -> str:
+    """Tau and its interval in a table."""
+    return f"tau {number(one.value, 2)} [{number(one.low, 2)}, {number(one.high, 2)}]"
 
 
 def worst_winner(data: xr.DataTree, family: str) -> by.Interval:
@@ -72,6 +81,24 @@ def silent_share(data: xr.DataTree, family: str, chosen: str = "") -> float:
     """Mean share over methods of runs that are wrong without a sign."""
     shares = by.silent_shares(data, family, chosen)
     return float(np.nanmean(shares)) if np.isfinite(shares).any() else math.nan
+
+
+def silent_orders(data: xr.DataTree, family: str) -> tuple[float, float, float]:
+    """The same of methods by order: the least and the most of order 2, and the most of those from order 4 on."""
+    shares = by.silent_shares(data, family)
+    orders = np.array([integrator(name).order or 0 for name in by.fixed_steps(data)])
+    two, four = shares[orders == 2], shares[orders >= 4]
+    if not np.isfinite(two).any() or not np.isfinite(four).any():
+        return (math.nan,) * 3
+    return float(np.nanmin(two)), float(np.nanmax(two)), float(np.nanmax(four))
+
+
+def silent_words(data: xr.DataTree, family: str) -> str:
+    """Shares of runs that are wrong without a sign, in a table."""
+    mean, tops = (percent(silent_share(data, one), 1) for one in (family, SYMMETRIC))
+    low, most, four = silent_orders(data, family)
+    span = f"{100.0 * low:.0f} to {percent(most)}"
+    return f"{mean}, {tops} of tops (order 2: {span}, from 4 on to {percent(four, 1)})"
 
 
 def exponent_gap(data: xr.DataTree, family: str) -> tuple[float, str]:
@@ -132,9 +159,8 @@ def engine_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
                 *(by.factor_verdict(share / before if before else 1.0 + share / by.LEAST, SEVERAL)
                   for share, before in gone)]  # fmt: skip
     tau = worst_engine_tau(data, family)
-    told = f"tau {number(tau.value, 2)} [{number(tau.low, 2)}, {number(tau.high, 2)}]"
     shares = f"{percent(gone[0][0], 0)}, {percent(gone[0][1], 0)} of tops"
-    return f"{told}; lost at once {shares}", by.worst(iter(verdicts))
+    return f"{tau_words(tau)}; lost at once {shares}", by.worst(iter(verdicts))
 
 
 def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
@@ -147,27 +173,28 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
     round_ones = own_steps(data, family, NEEDLE)
     but = f"; without needles {number(round_ones[0], 3)}, up to {number(round_ones[1], 3)}" if family == FREE else ""
     ratio = share / before if before > 0.0 else math.nan
+    own_tau = least([by.own_tau(data, family, target) for target in ASKED])
     return {
-        "ranking": (f"tau {number(tau.value, 2)} [{number(tau.low, 2)}, {number(tau.high, 2)}]",
-                    by.ranking_verdict(tau)),
-        "winner": (f"{number(best.value, 3)} times the best", by.factor_verdict(best.value)),
+        "ranking": (tau_words(tau), by.ranking_verdict(tau)),
+        "own ranking": (f"tau {number(own_tau.value, 2)}", by.ranking_verdict(own_tau)),
+        "winner": (f"costs {number(best.value, 3)} times the best", by.factor_verdict(best.value)),
         "steps": (f"{number(middle, 3)}, up to {number(most, 3)} times", by.factor_verdict(most)),
         "own": (f"{number(own_middle, 3)}, up to {number(own_most, 3)} times{but}", by.factor_verdict(own_most)),
         "first": (f"up to {number(first, 3)} times{', without needles' if family == FREE else ''}",
                   by.factor_verdict(first)),
-        "silent": (f"{percent(share, 1)}, {percent(before, 1)} of tops", by.factor_verdict(ratio, SEVERAL)),
+        "silent": (silent_words(data, family), by.factor_verdict(ratio, SEVERAL)),
         "growth": (f"{within} of {told} exponents within {by.EXPONENT}, all within {number(gap, 2)}",
                    YES if gap <= by.EXPONENT else NO),
-        "order": (f"lower by at most {number(max(order, 0.0), 2)}", YES if order <= by.LOWER else NO),
+        "order": (f"lower by at most {number(max(order, 0.0), 2)}, limit {by.LOWER}", YES if order <= by.LOWER else NO),
         "limit": limit_cell(data, family), "resonances": resonance_cell(data, family),
         "engines": engine_cell(data, family),
     }  # fmt: skip
 
 
 LINES = {
-    "ranking": "ranking of methods by cost", "winner": "the cheapest method, its cost",
-    "own": "safe steps a period, to those of a top",
-    "silent": "wrong without a sign", "growth": "growth of errors with time",  # so far on the front page
+    "ranking": "ranking by cost, kernels for any body", "own ranking": "ranking by the top's own kernels",
+    "own": "safe steps a period, to those of a top", "silent": "wrong without a sign, mean",  # so far: front page
+    "winner": "the cheapest kernel for any body", "growth": "growth of errors with time",
     "first": "safe steps of the cheapest with f(t, y)", "steps": "safe steps, to those of a top as a body",
     "order": "order of a method",
     "limit": "linear limit of the step", "resonances": "steps that resonate below it",
@@ -202,6 +229,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         "long_bodies": data["long"].sizes["member"] if "long" in data.children else None,
         "long_methods": data["long"].sizes["variant"] if "long" in data.children else None,
         "same": by.SAME, "part": by.PART, "level": LEVEL, "double": by.DOUBLE, "several": SEVERAL, "steps": by.STEPS,
+        "lower": by.LOWER,
         "off_bound": float(np.nanmax(about["off_bound"].values)),
         "truth_bound": float(np.nanmedian(about["truth_bound"].values[: len(FAMILIES) - 1])),
     }  # fmt: skip
@@ -214,6 +242,8 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         named[f"ceiling_{decades(target)}_low"] = low
         best = by.winner(data, SYMMETRIC, target)
         named[f"winner_{decades(target)}"] = best and label(best)
+        start = by.winner(data, SYMMETRIC, target, "derivative")
+        named[f"start_{decades(target)}"] = start and label(start)
     for family in OTHERS:
         named |= _of_family(data, family)
     named["silent_0"] = silent_share(data, SYMMETRIC)
@@ -229,6 +259,9 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     each = [by.tau(data, family, target) for family in OTHERS for target in ASKED]
     known = [one for one in each if math.isfinite(one.value) and math.isfinite(one.low)]
     named |= {"taus": len(known), "outside": sum(not one.low <= one.value <= one.high for one in known)}
+    free = [by.step_factors(data, FREE, target) for target in ASKED]
+    named |= {"fixed": len(by.fixed_steps(data)), "free_steps": len({name for one in free for name in one})}
+    named |= dict(zip(("silent_3_low", "silent_3_most", "silent_3_four"), silent_orders(data, "0.3"), strict=True))
     if "engines" in data.children:
         named |= {"engines": data["engines"].sizes["variant"], "engine_bodies": data["engines"].sizes["member"]}
         named |= {f"lost_{key(family)}": by.lost(data, family, 0) for family in FAMILIES}

@@ -10,6 +10,7 @@ import xarray as xr
 from symtop.measure.order import BESIDE
 
 from .measures import (
+    LEAST_SCENES,
     MAIN,
     OTHERS,
     TARGET,
@@ -30,7 +31,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     """How many orders are confirmed, what the named methods and the best of each order pay, how tolerances are met."""
     words = [one.verdict for one in judged(data).values()]
     part, _ = named_variants(data)
-    every = cheapest(data)
+    every = cheapest(data).query("ranked")
     best, second = (first(part) for part in (every, every[every["order"] == 2]))
     spans = every.groupby("order")["work"].agg(lambda works: works.max() / works.min())
     met = {name: values for name, values in ratios(data).items() if values.size}
@@ -39,6 +40,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "scenes": ", ".join(map(str, data["scene"].values)),
         "scene": str(part["scene"].values),
         "target": TARGET,  # rad
+        "least_scenes": LEAST_SCENES,
         "beside": BESIDE,
         "pairs": len(words) or None,  # of a variant and a scene
         **{word: words.count(word) if words else None for word in ("confirmed", "refuted", "undecided")},
@@ -60,19 +62,25 @@ def first(costs: pd.DataFrame) -> tuple[str | None, float | None]:
 
 
 def cheapest(data: xr.Dataset) -> pd.DataFrame:
-    """Force evaluations a nutation a variant with a step pays for `TARGET`, over the scenes; the least first."""
-    works = efficiencies(data, TARGET)
+    """Force evaluations a nutation a variant with a step pays for `TARGET`, over the scenes; the least first.
+
+    A median over fewer than `LEAST_SCENES` scenes is not ranked, and comes last.
+    """
+    works, enough = efficiencies(data, TARGET), min(LEAST_SCENES, data.sizes["scene"])
     rows = []
     for name, label in merged(stepping(data), MAIN).items():
         known = [one.work for (_, variant), one in works.items() if variant == name]
         if known:
-            rows.append([label, declared_order(name), float(np.median(known)), min(known), max(known)])
-    return pd.DataFrame(rows, columns=["variant", "order", "work", "least", "most"]).sort_values("work", kind="stable")
+            work = float(np.median(known)), min(known), max(known), len(known)
+            rows.append([label, declared_order(name), *work, len(known) >= enough])
+    table = pd.DataFrame(rows, columns=["variant", "order", "work", "least", "most", "scenes", "ranked"])
+    return table.astype({"ranked": bool}).sort_values(["ranked", "work"], ascending=[False, True])
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     """What an error costs by variant; every order; every adaptive variant on every scene."""
-    costs = cheapest(data).rename(columns={"work": "force evaluations a nutation, median over scenes"})
+    costs = cheapest(data).drop(columns="ranked")
+    costs = costs.rename(columns={"work": "force evaluations a nutation, median over scenes"})
     ends, rows = fits(data, MAIN, at_end=True), []
     for pair, (word, slopes) in judged(data).items():
         measured = [part for name in (MAIN, *OTHERS) for part in _order(slopes.get(name))]

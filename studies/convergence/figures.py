@@ -14,6 +14,7 @@ from symtop.runner.study import Picture
 
 from .measures import (
     HISTORY_STEPS,
+    LEAST_SCENES,
     MAIN,
     TARGET,
     Efficiency,
@@ -87,15 +88,19 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
     labels, scenes = merged(stepping(data), MAIN), [str(name) for name in data["scene"].values]
     known = {name: [works[one, name] for one in scenes if (one, name) in works] for name in labels}
     middle = {name: float(np.median([one.work for one in part])) for name, part in known.items() if part}
+    few = {name: len(known[name]) < min(LEAST_SCENES, len(scenes)) for name in middle}  # they are not ranked
     groups: dict[int, list[str]] = {}
-    for name in sorted(middle, key=middle.__getitem__):
+    for name in sorted(middle, key=lambda name: (few[name], middle[name])):
         groups.setdefault(declared_order(name) or 0, []).append(name)
     lines = [one for power in sorted(groups)
              for one in (f"order {power}" if power else "no order declared", *groups[power])]  # fmt: skip
     heads = [place for place, one in enumerate(lines) if one not in middle]
     cut = min(heads, key=lambda place: abs(2 * place - len(lines)))
     halves = [half for half in (lines[:cut], lines[cut:]) if half]
-    named = [min(middle, key=middle.__getitem__), *(groups[power][0] for power in sorted(filter(None, groups))[:1])]
+    named = [
+        min(middle, key=lambda name: (few[name], middle[name])),
+        *(groups[power][0] for power in sorted(filter(None, groups))[:1]),
+    ]
     most = max(map(len, halves))
     figure, axes = panels(1, len(halves), height=0.135 * most + 0.3, sharex=True)
     for axis, half in zip(axes[0], halves, strict=True):
@@ -104,7 +109,8 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
                 values, color = [one.work for one in known[name]], look(name).color
                 face = "white" if 2 * sum(one.foreseen for one in known[name]) > len(values) else color
                 axis.plot([min(values), max(values)], [place, place], color=color, lw=1.2)
-                axis.plot(middle[name], place, "o", color=color, mfc=face, ms=5.0)
+                x, mark = (values, "|") if few[name] else (middle[name], "o")
+                axis.plot(x, np.full(np.shape(x), place), mark, color=color, mfc=face, ms=5.0)
             if name in named:
                 axis.annotate(number(middle[name]), (max(values), place), (6, 0), textcoords="offset points",
                               va="center", fontsize=7.5, weight="bold")  # fmt: skip
@@ -114,8 +120,10 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
             if name not in middle:
                 tick.set(weight="bold", fontsize=8.0)
     dark = {"color": "#444444", "lw": 0.0}
-    axes[0, 0].plot([], [], "o", ms=5.0, label=f"median over {len(scenes)} scenes", **dark)
+    axes[0, 0].plot([], [], "o", ms=5.0, label=f"median over up to {len(scenes)} scenes", **dark)
     axes[0, 0].plot([], [], color="#444444", lw=1.2, label="least to largest of the scenes")
     axes[0, 0].plot([], [], "o", ms=5.0, mfc="white", label="open: extrapolated on most scenes", **dark)
+    if any(few.values()):
+        axes[0, 0].plot([], [], "|", ms=5.0, label=f"known on fewer than {LEAST_SCENES} scenes: not ranked", **dark)
     legend_below(figure, axes)
     return Picture("constants", figure)

@@ -21,7 +21,8 @@ from symtop.run.simulation import integrate
 
 MAIN = "axis"  # every chart shows it
 OTHERS = ("attitude", "theta", "energy")
-NAMED = ("midpoint", "trapezoidal", "stormer-verlet", "rk45", "taylor")  # the five that every reader knows
+NAMED = ("midpoint", "trapezoidal", "stormer-verlet", "rk4", "rk45", "dop853", "taylor")  # that every reader knows
+LEAST_SCENES = 3  # of a median that is ranked
 FEW = 9  # variants that a figure has room for
 HISTORY_STEPS, HISTORY_TOLERANCE = 100.0, 1e-6  # a nutation; of their runs for the energy over time
 LARGE = LARGEST_ERROR  # radians: larger errors follow no power of the step

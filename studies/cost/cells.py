@@ -19,7 +19,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from symtop_studies.memoize import of_one_dataset
 
-from symtop.methods.framework.registry import NEEDS
+from symtop.methods.framework.registry import NEEDS, integrator
 from symtop.model.charts import Array
 from symtop.run.ensemble.population import STRATA
 from symtop.run.guard import EXPECTED
@@ -126,14 +126,16 @@ def contest(data: xr.DataTree, cell: Cell, unit: str = SECONDS) -> Contest:
 
 
 @of_one_dataset
-def safest(data: xr.DataTree, cell: Cell) -> tuple[list[Safe], bool]:
-    """The safe choices of a cell, cheapest first, and whether the lead is called."""
+def safest(data: xr.DataTree, cell: Cell, keeping: bool = False) -> tuple[list[Safe], bool]:
+    """The safe choices of a cell, cheapest first, and whether the lead is called; `keeping` energy and momenta."""
     group = data[cell.horizon].to_dataset().isel(scene=0)
     among, known = chosen(data, cell.horizon, cell.tops), prices(data)
     wide = asked_tops(data, cell)
     weights = np.array([float(wide[kinds_of(data, cell.horizon)[among] == place].sum()) for place in range(len(KINDS))])
     ladders = []
     for name in costs(data, cell).names:
+        if keeping and not (integrator(name).conserves or frozenset()) >= {"energy", "p_phi", "p_psi"}:
+            continue
         one = group.sel(variant=name)
         met = one["met_at"].sel(quantity=cell.quantity, target=cell.target).values[: among.size].astype(float)
         settings, fixed = one["setting"].values, str(one["control"].values) == "step_size"
@@ -143,6 +145,19 @@ def safest(data: xr.DataTree, cell: Cell) -> tuple[list[Safe], bool]:
         error = float(known.error[known.names.index(name)])
         ladders.append(Ladder(name, met[among][wide], settings, work * price + call, fixed, error))
     return safe(ladders, known.marked)
+
+
+def reached(data: xr.DataTree, target: float) -> dict[str, Safe]:
+    """By variant the safe choice for a target on natural tops, of all classes; those that reach it."""
+    each = (safest(data, Cell("short", "axis", target, NATURAL, needs))[0] for needs in CLASSES[:-1])
+    return {one.name: one for choices in each for one in choices if np.isfinite(one.seconds)}
+
+
+def fewest(data: xr.DataTree, cell: Cell) -> str | None:
+    """The variant of a cell that needs the fewest force evaluations on the median top."""
+    taken = costs(data, cell, EVALUATIONS)
+    middle = np.median(taken.values, axis=1) if taken.values.size else np.full(1, np.inf)
+    return taken.names[int(np.argmin(middle))] if np.isfinite(middle.min()) else None
 
 
 def asked_tops(data: xr.DataTree, cell: Cell) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from symtop.methods.framework.registry import NEEDS, integrator
 from symtop.report.formats import duration, number
 
 from . import cells, far
-from .cells import CLASSES, EVALUATIONS, Cell
+from .cells import CLASSES, Cell
 from .ladder import KEPT, WRONG
 from .prices import NOISY, PROCESSES, TOLERANCE, prices
 from .ranking import SAFE, TIE
@@ -30,6 +30,11 @@ KNOWN = (
     QUOTED, "dop853-compiled-fixed[axis]", "gauss-4[axis]", "strang[axis]", "takahashi-imada[axis]", "srkn-14-6[axis]",
     "midpoint[angles]", "stormer-verlet[angles]",
 )  # fmt: skip
+HAVE = (  # methods that people have, of the table of their settings
+    "rk4[axis]", "rk45-compiled[axis]", "dop853-compiled[axis]", "strang[axis]", "stormer-verlet[angles]",
+    "midpoint[angles]",
+)  # fmt: skip
+SHORT_RUN, LONG_RUN = 1e3, 1e5  # nutations of a short run of the map at most, and of a long one at least
 AT = 1e-6  # rad, the error at which classes are quoted
 US = 1e6  # microseconds in a second
 
@@ -39,20 +44,15 @@ def decades(target: float) -> int:
     return round(-np.log10(target))
 
 
-def short_name(name: str) -> str:
-    """A variant, without its chart if that is the axis."""
-    return name.removesuffix("[axis]")
-
-
 def titled(name: str) -> str:
-    """The same in a table of classes, with the word for what exists for symmetric bodies alone."""
+    """A variant in a table of classes, with the word for what exists for symmetric bodies alone."""
     method = integrator(name)
-    return short_name(name) + ("" if method.general or method.needs == "this-top" else " (symmetric)")
+    return name + ("" if method.general or method.needs == "this-top" else " (symmetric)")
 
 
 def setting_words(name: str, value: float) -> str:
     """A setting in a table: steps a nutation, or a tolerance."""
-    return f"{value:.3g} steps" if integrator(name).fixed_step else f"tolerance {number(value, 1)}"
+    return f"{number(value, 3)} steps" if integrator(name).fixed_step else f"tolerance {number(value, 1)}"
 
 
 def facts(data: xr.DataTree) -> dict[str, Any]:
@@ -60,7 +60,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     known, group, spans = prices(data), data["short"].to_dataset(), cells.horizons(data)
     return {
         "safe": SAFE, "tie": TIE, "wrong": WRONG, "kept": KEPT, "near": far.TIE, "processes": PROCESSES,
-        "noisy": NOISY, "at": AT,
+        "noisy": NOISY, "at": AT, "short_run": SHORT_RUN, "long_run": LONG_RUN,
         **winners_facts(data), **{f"{part}_{span}": value for span in cells.HORIZONS
                                   for part, value in span_facts(data, span).items()},
         **silent_facts(data), **guard_facts(data), **far_facts(data),
@@ -85,17 +85,19 @@ def span_facts(data: xr.DataTree, span: str) -> dict[str, float | None]:
 
 
 def winners_facts(data: xr.DataTree) -> dict[str, Any]:
-    """The safe choices for any body and of each class, who takes the fewest evaluations, where both protocols agree."""
+    """The safe choices for any body and of each class, where a count of evaluations misleads most, who wins twice."""
     named: dict[str, Any] = {"safe_called": 0}
+    misled: list[tuple[Any, ...]] = []
     for target in cells.targets(data):
         cell, place = Cell("short", "axis", target, NATURAL), decades(target)
-        one, fewest = cells.winner(data, cell), cells.contest(data, cell, EVALUATIONS).first
+        one, fewest = cells.winner(data, cell), cells.fewest(data, cell)
         named["safe_called"] += bool(one["safe"] and one["safe_called"])
         named |= _safe(f"safe_{place}", data, cell)
-        named |= {
-            f"fewest_{place}": fewest and short_name(fewest.name),
-            f"fewest_{place}_share": fewest and fewest.share,
-        }
+        misled += [(counted.seconds / one["safe"].seconds, target, fewest, counted.seconds, *one["safe"][:3:2])
+                   for counted in cells.safest(data, cell)[0] if counted.name == fewest and one["safe"]]  # fmt: skip
+    keys = "misled", "misled_at", "fewest", "fewest_seconds", "instead", "instead_seconds"
+    most = max((row for row in misled if 1.0 < row[0] < np.inf), default=(None,) * len(keys))
+    named |= dict(zip(keys, most, strict=True))
     for needs in CLASSES[:-1]:
         named |= _safe(needs.replace("-", "_"), data, Cell("short", "axis", AT, NATURAL, needs))
     both = [one for one in cells.winners(data) if one["needs"] != "this-top" and one["safe"] and one["hindsight"]]
@@ -106,7 +108,7 @@ def winners_facts(data: xr.DataTree) -> dict[str, Any]:
 
 def _safe(key: str, data: xr.DataTree, cell: Cell) -> dict[str, Any]:
     best = cells.winner(data, cell)["safe"]
-    name = short_name(best.name) if best else NOTHING if cells.costs(data, cell).names else None
+    name = best.name if best else NOTHING if cells.costs(data, cell).names else None
     return {key: name, f"{key}_seconds": best and best.seconds}
 
 
@@ -132,8 +134,9 @@ def guard_facts(data: xr.DataTree) -> dict[str, int]:
 
 
 def far_facts(data: xr.DataTree) -> dict[str, Any]:
-    """The map: who has the most cells, how many were predicted, and what the checks of those say."""
-    names = [f"map_{quantity}{end}" for quantity in far.QUANTITIES for end in ("", "_share")]
+    """The map: who has the most cells, where splittings win, how many were predicted, and what checks of those say."""
+    ends = "", "_share", "_clear", "_short", "_long"
+    names = [f"map_{quantity}{end}" for quantity in far.QUANTITIES for end in ends]
     names += ["map_tops", "predicted", "checks", "checks_held", "checks_longest"]
     names += ["checks_low", "checks_middle", "checks_high"]  # error of a run, measured over predicted
     named: dict[str, Any] = dict.fromkeys(names)
@@ -145,7 +148,12 @@ def far_facts(data: xr.DataTree) -> dict[str, Any]:
         there = panel.winner >= 0
         reached, predicted = reached + int(there.sum()), predicted + int((panel.predicted & there).sum())
         for place, count in Counter(panel.winner[there].tolist()).most_common(1):
-            named |= {f"map_{quantity}": short_name(panel.names[place]), f"map_{quantity}_share": count / there.sum()}
+            named |= {f"map_{quantity}": panel.names[place], f"map_{quantity}_share": count / there.sum()}
+        splits = np.isin(panel.winner, [k for k, name in enumerate(panel.names) if integrator(name).needs == "kicks"])
+        named[f"map_{quantity}_clear"] = float((panel.ratio[there] >= far.TIE).mean()) if there.any() else None
+        for end, part in (("short", panel.horizons <= SHORT_RUN), ("long", panel.horizons >= LONG_RUN)):
+            if there[:, part].any():
+                named[f"map_{quantity}_{end}"] = float(splits[:, part][there[:, part]].mean())
     named |= {"map_tops": data["far"].sizes["member"], "predicted": predicted / reached if reached else None}
     checks = far.checks(data)
     ran = checks.drop_duplicates(["quantity", "target", "horizon"])
@@ -162,7 +170,7 @@ def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
     kinds = [Cell("short", "axis", target, kind) for kind in KINDS[:-1] for target in cells.targets(data)]
     others = [cell for quantity in ("attitude", "energy") for cell in cells.cells(data, quantity)]
     return {
-        "use": use(data), "winners": winners(data, cells.winners(data)),
+        "use": use(data), "have": have(data), "winners": winners(data, cells.winners(data)),
         "kinds": winners(data, [cells.winner(data, cell) for cell in kinds]),
         "quantities": winners(data, [cells.winner(data, cell) for cell in others]),
         "prices": price_list(data), "silent": silent(data), "guard": cells.guard_counts(data), "checks": checked(data),
@@ -170,17 +178,22 @@ def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
 
 
 def use(data: xr.DataTree) -> pd.DataFrame:
-    """The safe choice of each class at each error, over the shorter runs, and what that at `AT` keeps."""
+    """The safe choice of each class at each error, over the shorter runs, and what that at `AT` keeps.
+
+    The second line is of those methods of the first that keep energy and momenta.
+    """
     rows = []
-    for needs in CLASSES[:-1]:
-        line = {"you can supply": NEEDS[needs]}
-        kept = ""
+    lines = [(NEEDS[needs], needs, False) for needs in CLASSES[:-1]]
+    for supplied, needs, keeping in [lines[0], (f"{lines[0][0]}, all constants kept", lines[0][1], True), *lines[1:]]:
+        line, kept = {"you can supply": supplied}, ""
         for target in cells.targets(data):
-            one = cells.winner(data, Cell("short", "axis", target, NATURAL, needs))
-            best, mark = one["safe"], "" if one["safe_called"] else "~ "
-            words = NOTHING if one["asked"] else "not asked"
+            cell = Cell("short", "axis", target, NATURAL, needs)
+            choices, called = cells.safest(data, cell, keeping)
+            best = next((one for one in choices if np.isfinite(one.seconds)), None)
+            words = NOTHING if cells.asked_tops(data, cell).any() else "not asked"
             if best is not None:
-                words = f"{mark}{titled(best.name)}, {setting_words(best.name, best.setting)}, {duration(best.seconds)}"
+                words = f"{'' if called else '~ '}{titled(best.name)}, {setting_words(best.name, best.setting)}, "
+                words += duration(best.seconds)
                 kept = keeps(best.name) if target == AT else kept
             line[f"1e-{decades(target)} rad"] = words
         rows.append(line | {f"keeps, at 1e-{decades(AT)} rad": kept})
@@ -188,11 +201,31 @@ def use(data: xr.DataTree) -> pd.DataFrame:
 
 
 def keeps(name: str) -> str:
-    """Which constants of the motion a method says it keeps, in a table."""
-    words = {claim: declared(integrator(name), claim) for claim in ("energy", "p_phi", "p_psi")}
-    momenta = "momenta" if words["p_phi"] == words["p_psi"] == "kept" else ""
-    energy = {"kept": "energy", "bounded": "energy bounded"}.get(words["energy"], "")
-    return ", ".join(filter(None, (momenta, energy))) or "nothing exactly"
+    """Which constants of the motion a variant keeps, in a table: what it declares, and what is linear in its state.
+
+    A method that uses f alone keeps what is linear: p_phi = L_z, where L is stepped.
+    """
+    method = integrator(name)
+    words = {claim: declared(method, claim) for claim in ("p_phi", "p_psi", "axis_length", "energy")}
+    if method.needs in ("derivative", "expression") and "angles" not in method.charts():
+        words["p_phi"] = "kept"
+    told = {"axis_length": "|e|"}
+    kept = [told.get(claim, claim) for claim, word in words.items() if word == "kept"]
+    return ", ".join(kept + ["energy bounded"] * (words["energy"] == "bounded")) or "nothing exactly"
+
+
+def have(data: xr.DataTree) -> pd.DataFrame:
+    """What methods that people have need for each error: the safe setting, its time, and that over the least."""
+    rows = [{"you have": name} for name in HAVE if name in data["short"]["variant"].values]
+    for target in cells.targets(data)[:3]:
+        known = cells.reached(data, target)
+        best = min((one.seconds for one in known.values() if integrator(one.name).general), default=np.nan)
+        for row in rows:
+            one = known.get(row["you have"])
+            row[f"1e-{decades(target)} rad"] = NOTHING if one is None else (
+                f"{setting_words(one.name, one.setting)}, {duration(one.seconds)}, {number(one.seconds / best)} times"
+            )  # fmt: skip
+    return pd.DataFrame(rows)
 
 
 def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:
@@ -204,13 +237,13 @@ def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:
             **({"quantity": one["quantity"]} if one["quantity"] != "axis" else {}),
             "tops": one["tops"], "needs": one["needs"], "nutations": one["nutations"], "error": one["target"],
             "asked (tops)": one["asked"], "solved (tops)": one["solved"],
-            "safe": short_name(safe.name) if safe else NOTHING if one["asked"] else "not asked",
+            "safe": safe.name if safe else NOTHING if one["asked"] else "not asked",
             "setting": setting_words(safe.name, safe.setting) if safe else "",
         }  # fmt: skip
         row |= {f"{key} (us)": US * value if np.isfinite(value) else np.nan for key, value in
                 zip(("time", "low", "high"), safe[2:5] if safe else (np.nan,) * 3, strict=True)}  # fmt: skip
         row |= {"safe lead": lead(one["safe_called"], safe, marked),
-                "hindsight": short_name(best.name) if best else NOTHING if one["asked"] else "not asked"}  # fmt: skip
+                "hindsight": best.name if best else NOTHING if one["asked"] else "not asked"}  # fmt: skip
         row |= dict(zip(("share", "share low", "share high", "level", "meets"),
                         best[1:6] if best else (np.nan,) * 5, strict=True))  # fmt: skip
         rows.append(row | {"hindsight lead": lead(one["hindsight_called"], best, marked)})
@@ -253,6 +286,5 @@ def checked(data: xr.DataTree) -> pd.DataFrame:
     """The predicted cells of the map that were run, with the ratio of measured to predicted errors."""
     runs = far.checks(data)
     table = runs.groupby(list(runs.columns[:-1]), sort=False)["ratio"].agg(["min", "median", "max"]).reset_index()
-    table[["winner", "next"]] = table[["winner", "next"]].map(short_name)
     return table.rename(columns={"target": "error", "horizon": "nutations", "holds": "meets the error",
                                  "min": "measured / predicted error, least", "max": "most"})  # fmt: skip

@@ -1,7 +1,6 @@
 """The study's figures: seconds against error, run lengths, the phase diagram."""
 
 import math
-import textwrap
 from collections import Counter
 from typing import Any
 
@@ -17,8 +16,7 @@ from symtop.report.style import LEAST_TEXT, few_ticks, grid, panels
 from symtop.runner.study import Picture
 
 from . import cells, far
-from .cells import CLASSES, EVALUATIONS, Cell
-from .facts import short_name
+from .cells import EVALUATIONS, GENERAL, Cell
 from .ranking import run_lengths
 from .tops import NATURAL
 
@@ -29,17 +27,13 @@ FAMILIAR = (  # of figure 1: methods that people know
 )  # fmt: skip
 TOP = "this-top"
 PALEST = "#AAAAAA"  # of methods made for this top
-NAMED = 7  # variants of the run lengths with a label
+NAMED = 9  # variants of the run lengths with a label
 BESIDE = ("rk4[axis]", "strang[axis]", "dop853-compiled-fixed[axis]")  # named in any case
 MARKS, LATEST = 9, 0.995
 HALF = 0.5
 HATCH, LETTER, UNREACHED = "////", 0.62, "#F0F0F0"
 PALE = 0.62  # of white in the colour of a predicted cell
-MOST_NAMES, KEY = 4, 44
-FAMILIES = {
-    "splitting": "splitting", "discrete-lagrangian": "discrete Lagrangian", "runge-kutta": "Runge-Kutta and Gauss",
-    "taylor": "Taylor series", "lie-group": "Lie group",
-}  # fmt: skip
+LEFT = (style.SKY, style.ORANGE, style.VERMILLION, style.YELLOW, style.BLUE, style.LEAF)
 TITLES = {
     "axis": "axis: angle between\nat one time (rad)", "energy": "energy:\nrelative change",
     "shape": "shape: distance\nto the true orbit",
@@ -55,15 +49,11 @@ def pictures(data: xr.DataTree) -> list[Picture]:
 
 def draw_accuracy(data: xr.DataTree) -> Any:
     """Error against the seconds of a safe run: the fastest for any body at each error, and methods that people know."""
-    asked = [Cell("short", "axis", target, NATURAL) for target in cells.targets(data)]
-    firsts = [one.name for cell in asked for one in cells.safest(data, cell)[0][:1]]
-    each = {cell.target: {one.name: one for needs in CLASSES[:-1]
-                          for one in cells.safest(data, cell._replace(needs=needs))[0] if math.isfinite(one.seconds)}
-            for cell in asked}  # fmt: skip
+    each = {target: cells.reached(data, target) for target in cells.targets(data)}
     every = list(dict.fromkeys(name for known in each.values() for name in known))
     figure, axes = panels(1, 1, height=4.0)
     axis, ends = axes[0, 0], []
-    for name in chosen(every, [*FAMILIAR, *firsts], len(FAMILIAR)):
+    for name in chosen(every, [*FAMILIAR, *_safe_names(data)], len(FAMILIAR)):
         points = [(1e6 * known[name].seconds, target, 1e6 * known[name].low, 1e6 * known[name].high)
                   for target, known in each.items() if name in known]  # fmt: skip
         x, y, low, high = np.array(points).T
@@ -71,20 +61,29 @@ def draw_accuracy(data: xr.DataTree) -> Any:
         style_of = style.line(name) | ({"color": PALEST} if own else {})
         axis.plot(x, y, lw=1.0 if own else 1.6, zorder=2 if own else 3, **style_of)
         axis.hlines(y, low, high, color=style_of["color"], lw=3.0, alpha=0.35, zorder=2)
-        ends.append((f"{short_name(name)}{' (made for this top)' * own}", style_of["color"], x, y))
+        ends.append((f"{name}{' (made for this top)' * own}", style_of["color"], x, y))
     axis.set(xscale="log", yscale="log", ylim=(2e-13, 5e-3), ylabel="axis error that 95 % of the tops keep (rad)")
+    axis.set_yticks(list(each), [f"$10^{{{math.log10(target):.0f}}}$" for target in each])
+    axis.yaxis.minorticks_off()
     axis.set_xlabel("time of a safe run: evaluations × price + call (µs)")
     label_lines(axis, ends)
     return figure
+
+
+def _safe_names(data: xr.DataTree) -> list[str]:
+    """The cheapest safe choice for any body at each error, and of those that use f(t, y) alone."""
+    asked = [Cell("short", "axis", target, NATURAL, needs)
+             for needs in (GENERAL, "derivative") for target in cells.targets(data)]  # fmt: skip
+    return list(dict.fromkeys(one.name for cell in asked for one in cells.safest(data, cell)[0][:1]))
 
 
 def draw_run_lengths(data: xr.DataTree) -> Any:
     """The share of natural tops that each variant has solved within so many force evaluations, one panel a target."""
     asked = [Cell("short", "axis", target, NATURAL) for target in cells.targets(data)]
     each = [cells.costs(data, cell, EVALUATIONS) for cell in asked]
-    firsts = [one.name for cell in asked for one in cells.contest(data, cell, EVALUATIONS).standings[:2]]
+    firsts = filter(None, (cells.fewest(data, cell) for cell in asked))
     every = list(dict.fromkeys(name for taken in each for name in taken.names))
-    rows = chosen(every, list(dict.fromkeys([*firsts, *BESIDE]))[:NAMED], NAMED)
+    rows = chosen(every, list(dict.fromkeys([*_safe_names(data), *firsts, *BESIDE]))[:NAMED], NAMED)
     labels = "force evaluations of a run", "share of tops solved"
     figure, axes = grid(len(asked), 2, labels, height=2.3, sharex=True, sharey=True)
     named = [taken.values[taken.names.index(name)] for taken in each for name in rows if name in taken.names]
@@ -96,7 +95,7 @@ def draw_run_lengths(data: xr.DataTree) -> Any:
             share = run_lengths(costs, budgets)
             if name in rows:
                 axis.plot(budgets, share, markevery=(5 * rows.index(name), len(budgets) // MARKS), lw=1.6, zorder=3,
-                          label=short_name(name), **style.line(name))  # fmt: skip
+                          label=name, **style.line(name))  # fmt: skip
             else:
                 axis.plot(budgets, share, color=style.GREY, lw=0.6, alpha=0.4, zorder=1)
         axis.axhline(HALF, color="black", lw=0.8, ls=(0, (1, 2)), zorder=2)
@@ -110,44 +109,37 @@ def draw_run_lengths(data: xr.DataTree) -> Any:
 
 
 def draw_map(data: xr.DataTree) -> Any:
-    """Three panels: the family of the cheapest variant for every allowed error and run length."""
+    """Three panels: the cheapest variant for every allowed error and run length."""
     each = {quantity: far.diagram(data, quantity) for quantity in far.QUANTITIES}
-    won = [Counter(panel.names[k] for k in panel.winner.ravel() if k >= 0) for panel in each.values()]
-    spoken = {names.most_common(1)[0][0] for names in won if names}
-    groups: dict[str, list[str]] = {}
-    for name, _ in sum(won, Counter[str]()).most_common():
-        groups.setdefault(name if name in spoken else integrator(name).family, []).append(name)
-    colors = _colors(groups)
+    won = Counter(panel.names[k] for panel in each.values() for k in panel.winner.ravel() if k >= 0)
+    colors = _colors([name for name, _ in won.most_common()])
     figure, axes = panels(1, len(far.QUANTITIES), height=3.6, sharex=True, sharey=True)
     for axis, (quantity, panel) in zip(axes[0], each.items(), strict=True):
-        _panel(axis, panel, groups, colors)
+        _panel(axis, panel, colors)
         axis.set(title=TITLES[quantity], xlabel="run length (nutations)")
     axes[0][0].set_ylabel("largest error allowed")
-    keys = [Patch(facecolor=colors[name], label=_key(name, rows)) for name, rows in groups.items()]
+    keys = [Patch(facecolor=color, label=name) for name, color in colors.items()]
     keys.append(Patch(facecolor=UNREACHED, edgecolor="#BBBBBB", label="reached by no method"))
-    figure.legend(handles=keys, loc="outside lower center", ncols=2, frameon=False)
+    figure.legend(handles=keys, loc="outside lower center", ncols=3, frameon=False)
     return figure
 
 
-def _colors(groups: dict[str, list[str]]) -> dict[str, Any]:
-    """A colour for each group: of a family the base colour first, then its darkest shade, then the others."""
-    used: Counter[str] = Counter()
-    colors = {}
-    for name in sorted(groups, key=lambda name: "[" not in name):
-        family = integrator(groups[name][0]).family
-        base, *others = (np.array(to_rgb(shade)) for shade in style.SHADES[family])
-        colors[name] = [base, *sorted(others, key=lambda shade: shade.sum())][used[family] % (1 + len(others))]
-        used[family] += 1
+def _colors(names: list[str]) -> dict[str, str]:
+    """A colour for each variant: its own, or one that is left if a variant with more cells has that."""
+    colors: dict[str, str] = {}
+    for name in names:
+        every = [style.look(name).color, *LEFT, *style.SHADES["engine"], *style.SHADES["other"]]
+        colors[name] = next((color for color in every if color not in colors.values()), style.GREY)
     return colors
 
 
-def _panel(axis: Any, panel: far.Diagram, groups: dict[str, list[str]], painted: dict[str, Any]) -> None:
-    """Cells in the colours of groups, paler and hatched where predicted, with names."""
+def _panel(axis: Any, panel: far.Diagram, painted: dict[str, str]) -> None:
+    """Cells in the colours of variants, paler and hatched where predicted, with names."""
     x, y = np.log10(panel.horizons), np.log10(far.TARGETS)
     dx, dy = 0.5 * (x[1] - x[0]), 0.5 * (y[0] - y[1])
     colors = np.full((*panel.winner.shape, 3), to_rgb(UNREACHED))
-    masks = [np.isin(panel.winner, [k for k, row in enumerate(panel.names) if row in rows]) for rows in groups.values()]
-    for mask, color in zip(masks, (painted[name] for name in groups), strict=True):
+    masks = [panel.winner == (panel.names.index(name) if name in panel.names else -2) for name in painted]
+    for mask, color in zip(masks, map(to_rgb, painted.values()), strict=True):
         colors[mask] = color
         colors[mask & panel.predicted] = PALE + (1.0 - PALE) * np.asarray(color)
     axis.imshow(colors, extent=(x[0] - dx, x[-1] + dx, y[-1] - dy, y[0] + dy), aspect="auto", interpolation="none")
@@ -157,21 +149,20 @@ def _panel(axis: Any, panel: far.Diagram, groups: dict[str, list[str]], painted:
     axis.plot(x[level[:, 1]], y[level[:, 0]], ls="none", marker="o", ms=2.4, mfc="white", mec="black", mew=0.3)
     axis.vlines(x[1:] - dx, y[-1] - dy, y[0] + dy, color="white", lw=0.3)
     axis.hlines(y[1:] + dy, x[0] - dx, x[-1] + dx, color="white", lw=0.3)
-    for mask in masks:
-        _names(axis, mask, panel, (x, y))
+    for name, mask in zip(painted, masks, strict=True):
+        _names(axis, mask, split_name(name)[0], (x, y))
     axis.grid(visible=False)
     axis.set_xticks(range(1, 9, 2), [f"$10^{{{k}}}$" for k in range(1, 9, 2)])
     axis.set_yticks(range(-12, -1, 2), [f"$10^{{{k}}}$" for k in range(-12, -1, 2)])
 
 
-def _names(axis: Any, mine: Any, panel: far.Diagram, centres: tuple[Any, Any]) -> None:
-    """The method with the most cells of each region of a family that has room for its name."""
+def _names(axis: Any, mine: Any, label: str, centres: tuple[Any, Any]) -> None:
+    """The name of a method in each of its regions that has room for it."""
     from scipy import ndimage  # takes 0.15 s, which a study with nothing to do need not
 
     regions, count = ndimage.label(mine)
     for place in range(1, count + 1):
         region = regions == place
-        label = split_name(panel.names[Counter(panel.winner[region].tolist()).most_common(1)[0][0]])[0]
         room = ndimage.binary_erosion(region, np.ones((3, 2 * round(LETTER * len(label) / 2) + 1)))
         if not room.any():
             continue
@@ -181,13 +172,3 @@ def _names(axis: Any, mine: Any, panel: far.Diagram, centres: tuple[Any, Any]) -
             centres[0][h], centres[1][t], label, ha="center", va="center", fontsize=LEAST_TEXT + 1, color="#111111",
             bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.9},
         )  # fmt: skip
-
-
-def _key(group: str, variants: list[str]) -> str:
-    """A variant of the title, or a family with those of its variants that are the cheapest in the most cells."""
-    if group in variants:
-        return short_name(group)
-    more = len(variants) - MOST_NAMES
-    others = f" and {more} other{'s' * (more > 1)}" if more > 0 else ""
-    label = f"{FAMILIES.get(group, group)}: {', '.join(map(short_name, variants[:MOST_NAMES]))}{others}"
-    return textwrap.fill(label, KEY, break_on_hyphens=False)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 from symtop_studies.convergence import facts, measures, study
 
 import symtop
@@ -67,6 +68,18 @@ def test_rows_with_the_same_errors_are_drawn_as_one(data):
     assert "strang[attitude]" not in labels
     assert labels["rk4[angles]"] == "rk4[angles]"  # another chart, other errors
     assert labels["rk4[axis]"] == "rk4[axis]"
+
+
+def test_a_median_over_few_scenes_is_not_ranked(data, monkeypatch):
+    scenes = ["goldstein", "spheroid", "loop"]
+    three = xr.concat([data.assign_coords(scene=[name]) for name in scenes], "scene")
+    works = {(scene, "rk4[axis]"): measures.Efficiency(100.0, False) for scene in scenes}
+    works["loop", "strang[axis]"] = measures.Efficiency(1.0, False)
+    monkeypatch.setattr(facts, "efficiencies", lambda *_: works)
+    table = facts.cheapest(three)
+    assert table["variant"].tolist() == ["rk4[axis]", "strang[axis, attitude]"]
+    assert table["ranked"].tolist() == [True, False]
+    assert facts.cheapest(data)["ranked"].all()  # the control: a dataset of one scene has no more
 
 
 def test_the_energy_over_time_is_that_of_the_run_that_it_names():

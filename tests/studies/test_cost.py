@@ -20,6 +20,7 @@ from symtop.measure.verdicts import barriers
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
+from symtop.report.formats import number
 from symtop.report.template import PARTIAL
 from symtop.runner.run import load
 from symtop.runner.study import Case
@@ -472,18 +473,37 @@ def test_facts_and_tables_are_those_of_the_cells(small):
     winners = tables["winners"].query("tops == 'natural'").set_index(["needs", "error"])
     for place, target in ((3, 1e-3), (6, 1e-6)):
         one = cells.winner(small, Cell("short", "axis", target, NATURAL))
-        assert said[f"safe_{place}"] == one["safe"].name.removesuffix("[axis]")
+        assert said[f"safe_{place}"] == one["safe"].name
         assert winners.loc[GENERAL, target]["time (us)"] == pytest.approx(1e6 * one["safe"].seconds)
-    assert said["kicks"] == "takahashi-imada"
+    assert said["kicks"] == "takahashi-imada[axis]"
     assert said["lagrangian"] is None  # there is none among these
     assert said["kicks_seconds"] > 0.0
     assert cells.safest(small, Cell("short", "axis", 1e-12, NATURAL, "kicks"))[0][0].seconds == INF
-    assert tables["use"].iloc[3]["1e-12 rad"] == facts.NOTHING
+    kicks = tables["use"].set_index("you can supply").loc["torque, free motion"]
+    assert kicks["1e-12 rad"] == facts.NOTHING
     assert said["nutations_long"] is None  # nothing was run over a thousand
-    assert "takahashi-imada" not in set(winners.loc[GENERAL]["safe"])  # it exists for symmetric bodies alone
-    assert "takahashi-imada (symmetric)" in tables["use"].iloc[3]["1e-3 rad"]
-    assert tables["use"].iloc[3]["keeps, at 1e-6 rad"] == "momenta, energy bounded"
+    assert "takahashi-imada[axis]" not in set(winners.loc[GENERAL]["safe"])  # it exists for symmetric bodies alone
+    assert "takahashi-imada[axis] (symmetric)" in kicks["1e-3 rad"]
+    assert kicks["keeps, at 1e-6 rad"] == "p_phi, p_psi, energy bounded"
     assert len(tables["prices"]) == 4
+    assert tables["have"]["you have"].tolist() == ["rk4[axis]"]
+    rk4 = cells.reached(small, 1e-3)["rk4[axis]"]
+    best = cells.winner(small, Cell("short", "axis", 1e-3, NATURAL))["safe"]
+    assert tables["have"]["1e-3 rad"][0].endswith(f" {number(rk4.seconds / best.seconds)} times")
+
+
+def test_what_is_kept_is_declared_or_linear_in_the_state():
+    kept = {
+        "rk4[axis]": "p_phi", "rk4[angles]": "nothing exactly", "rkmk-se3-4[axis]": "p_psi, |e|",
+        "gauss-8[axis]": "p_phi, p_psi, |e|, energy", "takahashi-imada[axis]": "p_phi, p_psi, energy bounded",
+    }  # fmt: skip
+    assert {name: facts.keeps(name) for name in kept} == kept
+
+
+def test_only_methods_that_keep_energy_and_momenta_answer_who_must_keep_them(data):
+    cell = Cell("short", "axis", 1e-3, NATURAL, "derivative")
+    every, keeping = ({one.name for one in cells.safest(data, cell, only)[0]} for only in (False, True))
+    assert keeping == {name for name in every if name.startswith("gauss-")} < every
 
 
 def test_a_share_of_silent_runs_is_that_of_its_kind(small):
@@ -496,5 +516,5 @@ def test_a_share_of_silent_runs_is_that_of_its_kind(small):
 
 
 def test_the_page_says_what_was_measured(small, tmp_path):
-    text = checked("cost", small, tmp_path, elsewhere={"use"})
+    text = checked("cost", small, tmp_path, elsewhere={"use", "have"})
     assert PARTIAL in text  # there are no long runs
