@@ -174,7 +174,9 @@ def ours(scene: Scene, tell: Callable[[str], None]) -> list[tuple[Peer, list[Poi
                 _, loop = ready(scene, searched[method.name][0], best.setting)
                 rough[target].append((timings([loop.call], batches=5, batch=1e-3)[0].best, method.name))
     for target, row in rough.items():
-        names = [name for _, name in sorted(row)[:CONTENDERS]]
+        names = [name for _, name in sorted(row)]
+        simple = [name for name in names if searched[name][0].method.needs == "derivative"]
+        names = [*names[:CONTENDERS], *simple[:1]]  # a general solver's like is among them
         chosen |= {name: searched[name] for name in names}
         tell(f"{scene.name}, {target:.0e}: {', '.join(names)}")
     return list(chosen.values())

@@ -1,8 +1,10 @@
 """The peers as a study of the report: its question, its figure, its words, and where and when it was measured."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from benchmarks import pages
@@ -32,10 +34,9 @@ def pictures(data: xr.Dataset) -> list[Picture]:
             ratios, color = spans[name][k], SPOKEN if name.startswith(SOLVE_IVP) else OTHER
             axis.plot([min(ratios), max(ratios)], [place, place], color=color, lw=1.2)
             axis.plot(ratios, [place] * len(ratios), "o", color=color, ms=4.0)
-            said = f"{summary.printed(min(ratios))} to {summary.printed(max(ratios))}"
             axis.annotate(
-                said, (1.02, place), xycoords=("axes fraction", "data"), va="center", fontsize=style.LEAST_TEXT,
-                color=style.ink(color), annotation_clip=False,
+                summary.range_of((min(ratios), max(ratios))), (1.02, place), xycoords=("axes fraction", "data"),
+                va="center", fontsize=style.LEAST_TEXT, color=style.ink(color), annotation_clip=False,
             )  # fmt: skip
         axis.axvline(1.0, color=style.BLUE, lw=1.6)
         axis.set(xscale="log", xlim=(0.8, 1.5 * farthest), ylim=(len(names) - 0.4, -0.6), title=words)
@@ -52,7 +53,8 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     errors = " and ".join(number(target) for target in JUDGED)
     figure.supxlabel(
         f"A dot: the library's fastest run with an error of at most {errors} rad over {PERIODS:g} nutations of "
-        f"{scenes},\nover symtop's fastest. Public call: what a user types. Inner loop: without set-up and samples.",
+        f"{scenes},\nover symtop's fastest, {', '.join(summary.fastest(data))}. Public call: what a user types. "
+        "Inner loop: without set-up and samples.",
         fontsize=7.5, ha="left", x=0.01,
     )  # fmt: skip
     return [Picture("fronts", figure)]
@@ -60,16 +62,46 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 
 def caption(data: xr.Dataset) -> tuple[str, str]:
     """Caption of the figure, and its text for those who cannot see it."""
-    gains = _gains(data, summary.groups(data))
+    known, said = summary.groups(data), summary.facts(data)
+    gains = _gains(data, known, known.get(OURS, []))
     first = f"SciPy's solve_ivp takes {gains[0]} as long at the left, {gains[1]} at the right. " if gains else ""
+    alone = ", which is made of this top's equations and serves no other body" if said["of_this_top"] else ""
+    apart = ", ".join(
+        f"{name} ({' and '.join(map(_range, spans))})"
+        for name in ENGINES
+        if name in known and all(spans := _spans(data, known, name))
+    )
     words = (
         f"{first}A line is a library, with the chart and the language of its right-hand side where it was "
         "given several; a dot is one scene and one accuracy, at which its fastest method and setting is divided by "
-        "the fastest of symtop's own kernels. Left, the call that a user types; right, the inner loop alone; the same "
-        f"runs at the same settings in both. All on (e, L), but arkode-sprk and the variants [angles] in Euler angles. "
-        "symtop with heyoka is taylor, heyoka's stepper called by symtop."
+        f"the fastest of symtop's own kernels, {said['fastest']}{alone}. {_over_general(data, known, said)}"
+        "Left, the call that a user types; right, the inner loop alone; the same runs at the same settings in both. "
+        "All on (e, L), but arkode-sprk and the variants [angles] in Euler angles. symtop with heyoka is taylor, "
+        "heyoka's stepper called by symtop. "
+        + (f"Not drawn, since they model bodies and take no equations: {apart}. " if apart else "")
+        + f"Measured was symtop {said['version']}."
     )
     return words, "Dot plots of the time of each library over that of symtop, a panel for each call, a line a library."
+
+
+def _over_general(data: xr.Dataset, known: dict[str, list[str]], said: Mapping[str, Any]) -> str:
+    """How libraries stand to those of our methods that need f(t, y) alone; empty if none was timed."""
+    simple = summary.general(data)
+    gains = _gains(data, known, simple)
+    if not gains:
+        return ""
+    timed = np.isfinite(data["axis"].sel(variant=simple)).any(("variant", "setting"))
+    scenes = " and ".join(data["scene"].values.astype(str)[timed.values])
+    sides = zip(("left", "right"), NAMES, strict=True)
+    slower = [f"{names} at the {side}" for side, call in sides if (names := said[f"general_slower_{call}"])]
+    return (
+        f"Over {said['general']}, which needs f(t, y) alone ({scenes}), solve_ivp takes {' and '.join(gains)} as long"
+        f"{'; faster than it are ' if slower else ''}{' and '.join(slower)}. "
+    )
+
+
+def _range(ratios: Sequence[float]) -> str:
+    return f"{summary.range_of((min(ratios), max(ratios)))} times"
 
 
 def _spans(data: xr.Dataset, known: dict[str, list[str]], name: str) -> list[list[float]]:
@@ -85,13 +117,14 @@ def _label(name: str) -> str:
     return f"{first}{mark}{WORDS.get(language, language)}"
 
 
-def _gains(data: xr.Dataset, known: dict[str, list[str]]) -> list[str]:
-    """How many times as long SciPy's solve_ivp takes in both calls, whatever it was given; empty without it."""
-    spans = [_spans(data, known, name) for name in known if name.startswith(SOLVE_IVP)]
+def _gains(data: xr.Dataset, known: dict[str, list[str]], mine: Sequence[str]) -> list[str]:
+    """How many times as long as `mine` SciPy's solve_ivp takes in both calls, whatever it was given; or nothing."""
+    scipys = [name for name in known if name.startswith(SOLVE_IVP)]
+    spans = [[summary.ratios(data, call, mine, known[name]) for call in NAMES] for name in scipys]
     calls = [[ratio for one in spans for ratio in one[k]] for k in range(len(NAMES))]
     if not all(calls):
         return []
-    return [f"{summary.printed(min(each))} to {summary.printed(max(each))} times" for each in calls]
+    return [_range(each) for each in calls]
 
 
 def measured(data: xr.Dataset) -> str:
@@ -109,6 +142,7 @@ STUDY = Study(
     cases=lambda _: [],
     measure=lambda _: xr.Dataset(),
     pictures=pictures,
+    facts=summary.facts,
     timed=True,
 )
 

@@ -3,6 +3,7 @@
 A *group* is what is compared: a package, with its chart and the language of its right-hand side where it has several.
 """
 
+import itertools
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -13,6 +14,7 @@ from benchmarks.kernels import ratio
 from benchmarks.pages import Table
 from benchmarks.peers.measure import HEYOKA, OURS, PERIODS, SHOWN, TARGETS
 from symtop.measure.timing import Timing
+from symtop.methods.framework.registry import methods
 
 JUDGED = TARGETS[1:]  # the accuracies at which a verdict is given
 LEVEL = 1.25  # a ratio nearer to one than this is no difference
@@ -111,13 +113,14 @@ def printed(value: float) -> str:
     return f"{value:.3g}" if value < 100.0 else f"{float(f'{value:.3g}'):,.0f}"
 
 
-def _range(ratios: tuple[float, float] | None) -> str:
+def range_of(ratios: tuple[float, float] | None) -> str:
+    """The least and the largest ratio as they are printed."""
     return "not reached" if ratios is None else f"{printed(ratios[0])} to {printed(ratios[1])}"
 
 
 def verdict(data: xr.Dataset) -> list[str]:
     """Who is ahead in each comparison; what a callback costs."""
-    return [*_wins(data, groups(data)), *_callbacks(data)]
+    return [*_wins(data), *_callbacks(data)]
 
 
 def pairs(data: xr.Dataset) -> list[str]:
@@ -138,41 +141,101 @@ def _both(data: xr.Dataset, known: dict[str, list[str]], name: str) -> str:
     public, inner = (span(data, call, known[OURS], known[name]) for call in NAMES)
     call = "`taylor` in `simulate`" if name == HEYOKA else "a user's `solve_ivp`"
     return (
-        f"{name}: {call} takes {_range(public)} times as long as `simulate` with the best of symtop's own kernels; the "
-        f"inner loop takes {_range(inner)} times as long as the fastest kernel alone."
+        f"{name}: {call} takes {range_of(public)} times as long as `simulate` with the best of symtop's own kernels; "
+        f"the inner loop takes {range_of(inner)} times as long as the fastest kernel alone."
     )
 
 
-def _wins(data: xr.Dataset, known: dict[str, list[str]]) -> list[str]:
-    """In how many places the best of symtop's own kernels is ahead of libraries that are handed equations."""
-    said, rivals = [], [name for name in known if name not in (OURS, HEYOKA, *ENGINES)]
-    places = [(str(scene), target) for scene in data["scene"].values for target in JUDGED]
-    for call, words in NAMES.items():
-        behind: dict[str, int] = {}
-        counts = {"ahead": 0, "level": 0, "behind": 0, "noise": 0}
-        for scene, target in places:
-            mine = best_of(data, call, scene, known.get(OURS, []), target)
-            for name in rivals:
-                theirs = best_of(data, call, scene, known[name], target)
-                if mine is not None and theirs is not None:
-                    word = standing(mine, theirs).word
-                    counts[word] += 1
-                    behind[name] = behind.get(name, 0) + (word == "behind")
-        if sum(counts.values()):
-            faster = [f"{name} in {count} of {len(places)}" for name, count in behind.items() if count]
-            said.append(
-                f"{words.capitalize()}: symtop's own kernels are faster in {counts['ahead']} of {sum(counts.values())} "
-                f"comparisons, level or within the noise in {counts['level'] + counts['noise']}, slower in "
-                f"{counts['behind']}: {', '.join(faster) or 'no library is faster'}."
-            )
+class Score(NamedTuple):
+    """Comparisons with libraries that are handed equations, at every place that both reach."""
+
+    ahead: int
+    level: int  # or not to be told from the noise
+    behind: int
+    slower: dict[str, str]  # than which library, in how many of its comparisons
+
+    @property
+    def compared(self) -> int:
+        """Comparisons that were made."""
+        return self.ahead + self.level + self.behind
+
+
+def general(data: xr.Dataset) -> list[str]:
+    """Our variants that need f(t, y) alone, as a library does; the others know the free motion or this very top."""
+    known = ((row, methods().get(row.partition("[")[0])) for row in groups(data).get(OURS, []))
+    return [row for row, method in known if method is not None and method.needs == "derivative"]
+
+
+def score(data: xr.Dataset, call: str, mine: Sequence[str]) -> Score:
+    """How the fastest of some variants stands."""
+    counts, slower = {"ahead": 0, "level": 0, "behind": 0, "noise": 0}, {}
+    for name, rows in groups(data).items():
+        if name in (OURS, HEYOKA, *ENGINES):
+            continue
+        places = ((str(scene), target) for scene in data["scene"].values for target in JUDGED)
+        pairs = [[best_of(data, call, scene, some, target) for some in (mine, rows)] for scene, target in places]
+        words = [standing(own, theirs).word for own, theirs in pairs if own is not None and theirs is not None]
+        for word in words:
+            counts[word] += 1
+        if "behind" in words:
+            slower[name] = f"{words.count('behind')} of {len(words)}"
+    return Score(counts["ahead"], counts["level"] + counts["noise"], counts["behind"], slower)
+
+
+def _wins(data: xr.Dataset) -> list[str]:
+    """In how many places our fastest is ahead, and how those stand that need no more than a library."""
+    said, simple = [], general(data)
+    kinds = [("symtop's own kernels", groups(data).get(OURS, []))]
+    if simple:
+        kinds.append((f"those of them that need f(t, y) alone ({', '.join(simple)})", simple))
+    for who, rows in kinds:
+        for call, words in NAMES.items():
+            stands = score(data, call, rows)
+            slower = ", ".join(f"{name} is faster in {count}" for name, count in stands.slower.items())
+            if stands.compared:
+                said.append(
+                    f"{words.capitalize()}: {who} are faster in {stands.ahead} of {stands.compared} comparisons, level "
+                    f"or within the noise in {stands.level}, slower in {stands.behind}: "
+                    f"{slower or 'no library is faster'}."
+                )
     return said
+
+
+def fastest(data: xr.Dataset) -> list[str]:
+    """Our variants that are the fastest somewhere."""
+    ours = groups(data).get(OURS, [])
+    places = itertools.product(NAMES, data["scene"].values.astype(str), JUDGED)
+    best = (best_of(data, call, scene, ours, target) for call, scene, target in places)
+    return sorted({one.row for one in best if one is not None})
+
+
+def facts(data: xr.Dataset) -> dict[str, Any]:
+    """Numbers that pages quote."""
+    known, simple, own = groups(data), general(data), fastest(data)
+    needs = [method.needs for row in own if (method := methods().get(row.partition("[")[0])) is not None]
+    said: dict[str, Any] = {
+        "version": data.attrs["symtop_version"], "fastest": _coded(own), "general": _coded(simple),
+        "of_this_top": bool(needs) and set(needs) == {"this-top"},
+    }  # fmt: skip
+    for call in NAMES:
+        said[f"heyoka_{call}"] = range_of(span(data, call, known.get(OURS, []), known.get(HEYOKA, [])))
+        for kind, rows in (("", known.get(OURS, [])), ("general_", simple)):
+            stands = score(data, call, rows)
+            said |= {f"{kind}{key}_{call}": getattr(stands, key) for key in ("ahead", "level", "behind", "compared")}
+            said[f"{kind}slower_{call}"] = ", ".join(f"{name} in {count}" for name, count in stands.slower.items())
+            said[f"{kind}scipy_{call}"] = range_of(span(data, call, rows, known.get("scipy[axis], numba", [])))
+    return said
+
+
+def _coded(rows: Sequence[str]) -> str:
+    return ", ".join(f"`{row}`" for row in rows)
 
 
 def _callbacks(data: xr.Dataset) -> list[str]:
     known = groups(data)
     if not {"cvode", "scikit-sundae"} <= set(known):
         return []
-    times = _range(span(data, "inner", known["cvode"], known["scikit-sundae"]))
+    times = range_of(span(data, "inner", known["cvode"], known["scikit-sundae"]))
     return [
         (
             f"CVODE takes {times} times as long where each call of its right-hand side goes through Python "
@@ -213,7 +276,7 @@ def tables(data: xr.Dataset) -> list[Table]:
     both = []
     for name, rows in known.items():
         one = data.sel(variant=rows[0])
-        public, inner = (_range(span(data, call, ours, rows)) for call in NAMES)
+        public, inner = (range_of(span(data, call, ours, rows)) for call in NAMES)
         if name != OURS:
             both.append([name, str(one["chart"].values), str(one["language"].values), public, inner])
     keys = ("package", "version", "chart", "language", "implementation", "shows", "formulation")

@@ -4,14 +4,17 @@ What the studies write into results/ is not tracked, so that a run of them leave
 taken when what it says changes; a figure that the report no longer shows is removed from it. Tables are in it as far as
 the report shows them: the links to whole ones, which `make studies` writes, are taken out. What pages quote is put
 between their marks: the beginning of the front page in the README, which is the first page of the site, and answers of
-studies at the top of docs/choosing.md and in docs/results.md.
+studies in docs/choosing.md, docs/results.md and docs/about/faq.md. What the benchmarks bench and peers have stored is
+said in docs/results.md by the templates beside this file.
 """
 
+import json
 import re
 import shutil
 import sys
 import textwrap
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 SHOWN = re.compile(r"\]\(figures/([^)]+)\)")
@@ -19,11 +22,13 @@ STORED = re.compile(  # links to what is not tracked
     r" \(\[[^]]+\]\(tables/[^)]+\)\)|; \[CSV\]\(tables/[^)]+\)"
     r"|\[([^]]+)\]\((?:tables/[^)]+|[\w-]+\.nc)\)|<!-- \w+ [\w-]+ -->\n\n"
 )
-QUOTED = {
-    "choosing.md": "Which method is the cheapest at the accuracy I need, with what I have?",
-    "results.md": "What makes",
+QUOTED = {  # of a page: the question, and the beginnings of further paragraphs
+    "choosing.md": ("Which method is the cheapest at the accuracy I need, with what I have?",),
+    "results.md": ("What makes",),
+    "about/faq.md": ("My body is no symmetric top", "**What fell.** "),
 }
 BEGIN, END = "<!-- from the report -->\n", "<!-- to here -->\n"
+STORED_BY = {name: f"<!-- from results/{name}.json -->\n" for name in ("bench", "peers")}
 WIDTH = 118
 
 
@@ -46,12 +51,18 @@ def take(results: Path, snapshot: Path) -> list[str]:
     return names
 
 
-def answer(report: str, question: str) -> str:
-    """The paragraph below the heading that begins with a question. SystemExit if there is none."""
-    page = re.search(rf"^## {re.escape(question)}.*\n\n(.+)$", report, flags=re.MULTILINE)
+def answer(report: str, question: str, *further: str) -> str:
+    """The paragraph below the heading that begins with a question, and further ones. SystemExit if one is missing."""
+    page = re.search(rf"^## {re.escape(question)}.*\n\n((?:(?!## ).*\n)+)", report, flags=re.MULTILINE)
     if page is None:
         sys.exit(f"snapshot: the report has no page with the question {question}")
-    return wrapped(page[1]) + "\n"
+    said = [page[1].partition("\n")[0]]
+    for begin in further:
+        one = re.search(rf"^{re.escape(begin)}(.+)$", page[1], flags=re.MULTILINE)
+        if one is None:
+            sys.exit(f"snapshot: the page with the question {question} has no paragraph {begin.strip()}")
+        said.append(one[1])
+    return "\n\n".join(map(wrapped, said)) + "\n"
 
 
 def wrapped(paragraph: str) -> str:
@@ -70,24 +81,49 @@ def beginning(report: str) -> str:
     return "\n\n".join(map(wrapped, text.split("\n\n"))) + "\n"
 
 
-def quote(said: str, page: str) -> str:
-    """A page with what is said between its two marks. SystemExit if the page has none."""
-    parts = re.split(f"({re.escape(BEGIN)}|{re.escape(END)})", page)
-    if len(parts) != 5 or (parts[1], parts[3]) != (BEGIN, END):
-        sys.exit(f"snapshot: a page must have the lines {BEGIN.strip()} and {END.strip()} once each, in this order")
-    return "".join([*parts[:2], said, *parts[3:]])
+def quote(said: str, page: str, begin: str = BEGIN) -> str:
+    """A page with what is said between two marks. SystemExit if the page has none."""
+    before, *rest = page.split(begin)
+    if len(rest) != 1 or END not in rest[0]:
+        sys.exit(f"snapshot: a page must have the line {begin.strip()} once, and {END.strip()} after it")
+    return f"{before}{begin}{said}{END}{rest[0].partition(END)[2]}"
 
 
 def quoted(report: str) -> dict[str, str]:
     """What pages quote from the report, by their paths."""
-    answers = {f"docs/{page}": answer(report, question) for page, question in QUOTED.items()}
+    answers = {f"docs/{page}": answer(report, *asked) for page, asked in QUOTED.items()}
     return {"README.md": beginning(report), **answers}
 
 
+def benchmark(name: str, results: Path) -> str:
+    """What a template says of the numbers that a benchmark has stored."""
+    from benchmarks import kernels, lanes
+    from symtop.report.template import rendered
+
+    data: dict[str, Any] = json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
+    given = data | {"f": data["facts"]}
+    if name == "bench":
+        explicit = [row for row in data["lanes"]["rows"] if lanes.kind_of(row["name"]) == "explicit"]
+        given |= {
+            "slow": [row for row in data["kernels"] if row["ratio"] > kernels.LIMIT], "limit": kernels.LIMIT,
+            "kernel": {row["name"]: row for row in data["kernels"]},
+            "part": {row["name"]: row["seconds"] for row in data["run"]["parts"]},
+            "one_step": max(data["run"]["one_step"].values()),
+            "many": {row["name"]: row["seconds"] for row in data["ensemble"]},
+            "explicit": sorted(explicit, key=lambda row: row["ratio"]),
+        }  # fmt: skip
+    template = (ROOT / "docs" / "generator" / f"{name}.jinja").read_text(encoding="utf-8")
+    return wrapped(rendered(template, f"{name}.jinja", given).strip()) + "\n"
+
+
 if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT))
     snapshot = ROOT / "docs" / "snapshot"
     names = take(ROOT / "results", snapshot)
     for name, said in quoted((snapshot / "report.md").read_text(encoding="utf-8")).items():
         page = ROOT / name
         page.write_text(quote(said, page.read_text(encoding="utf-8")), encoding="utf-8")
+    page = ROOT / "docs" / "results.md"
+    for name, begin in STORED_BY.items():
+        page.write_text(quote(benchmark(name, ROOT / "results"), page.read_text("utf-8"), begin), encoding="utf-8")
     print(f"snapshot: {len(names)} figures in docs/snapshot")  # noqa: T201

@@ -17,7 +17,7 @@ from .planted import LIES
 
 SYMBOLS = {"confirmed": "✓", "refuted": "✗", "measured": "○", "undecided": "?", "inapplicable": "∅"}
 SAID = {
-    "confirmed": "claim confirmed, yes or no",
+    "confirmed": "declared correctly, yes or no",
     "measured": "measured, not claimed",
     "inapplicable": "does not apply",
 }

@@ -35,7 +35,7 @@ CLOSE = 0.1  # a prediction that is further off, relative, counts as missed
 WHOLE = 0.99  # of the longest run of a scene: a shorter run counts as shortened
 NAMES = {  # of the facts of each group
     HISTORIES: "scenes nutations steps tolerance own variants holding shortened shortest energy_lost "
-    "energy_lost_most energy_lost_worst bounded_runs bounded_as_t lost_runs lost_faster",
+    "energy_drifts energy_lost_most energy_lost_worst bounded_runs bounded_as_t lost_runs lost_faster",
     WINDOWS: "long_steps long_scene moved scattered long_momenta",
     ROUNDINGS: "members walk_least walk_most gain_least gain_most",
     HORIZONS: "lost_short lost_later lost_hits lost_hit_most lost_count",
@@ -73,6 +73,7 @@ def of_histories(histories: xr.Dataset) -> dict[str, Any]:
         "shortened": int((length < WHOLE).sum()),
         "shortest": float(length.min()),  # share of the run length
         "energy_lost": len(lost),
+        "energy_drifts": int((fate["energy"] == "drift").sum()),
         "energy_lost_most": float(lost.max()) if len(lost) else None,
         "energy_lost_worst": str(lost.idxmax()) if len(lost) else None,
         "bounded_runs": phases["bounded"].size or None, "bounded_as_t": int(as_time(phases["bounded"]).sum()),

@@ -24,7 +24,7 @@ TERM, FALLING, POLE = "goldstein", "sleeping-unstable", "bruls-cardona-arnold"  
 WITHOUT, WITH, RIGHT = "no-gyro[axis]", "jolt[axis]", "strang[axis]"  # the gyroscopic term; the last no engine's
 ANGLES, AXIS = "rk4[angles]", "rk4[axis]"
 LADDER = [32.0 * 2.0**k for k in range(10)]  # steps a nutation
-SAMPLES = 301
+SAMPLES, CLOSE = 301, 0.1  # of a run; rad, an error that the engine with the term is asked for
 ENDED = "ended, in the angles"
 LABELS = {WITHOUT: "without the term", WITH: "with the term", RIGHT: "Strang splitting"}
 
@@ -64,11 +64,16 @@ def run_of(data: xr.Dataset, on: str, name: str) -> xr.Dataset | None:
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """How wrong each is: largest errors of the axis (rad) and of the energy (1), and when the run at the pole ended."""
-    known: dict[str, Any] = dict.fromkeys(("steps", "without", "without_energy", "falling", "falling_energy", "ended"))
+    known: dict[str, Any] = dict.fromkeys(
+        ("steps", "without", "without_energy", "needed", "falling", "falling_energy", "ended")
+    )
     if (without := run_of(data, TERM, WITHOUT)) is not None:
         last = without.isel(setting=-1)
-        known |= {"steps": float(last["steps"]), "without": float(np.degrees(last["axis"].max())),  # degrees
+        known |= {"steps": float(last["steps"]), "without": float(last["axis"].max()),  # rad
                   "without_energy": float(last["energy"].max())}  # fmt: skip
+    if (term := run_of(data, TERM, WITH)) is not None:
+        close = term["steps"].values[term["axis"].max("sample").values < CLOSE]
+        known["needed"] = float(close.min()) if close.size else None
     if (falling := run_of(data, FALLING, ANGLES)) is not None:
         known |= {"falling": float(falling["axis"].max()), "falling_energy": float(falling["energy"].max())}
     if (ended := run_of(data, POLE, ANGLES)) is not None:

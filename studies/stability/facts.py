@@ -9,8 +9,8 @@ import xarray as xr
 from symtop.methods.framework.registry import split_name
 
 from .atlas import COMMON, FAST, NEAR, SLOW, families, halved_by_pole, map_of, maps, methods_of
-from .failures import LOST
-from .mechanisms import BARELY, limits, measured, misses, resonant, sampled
+from .failures import LOST, MOST
+from .mechanisms import BARELY, limits, measured, misses, outlasting, resonant, sampled
 from .tables import PERIODS
 
 QUOTED = "stormer-verlet[angles]"  # whose numbers are quoted
@@ -18,8 +18,8 @@ NAMES = (  # of all facts that are measured
     "family", "stepped", "fast_variant", "fast_reach", "slow_variant", "slow_reach", "slow_none", "shortest",
     "quoted_fast", "quoted_fails", "silent", "cells", "settled", "checks", "refuted", "angles", "angles_halved",
     "others", "others_halved", "limited", "limit_least", "limit_variant", "resonant", "turned", "sleep_step",
-    "strang_sleeps", "cayley_sleeps", "sleep_miss", "law_middle", "sampled", "hidden", "small", "one_iteration",
-    "solved",
+    "strang_sleeps", "cayley_sleeps", "sleep_miss", "law_middle", "outlasting", "sampled", "hidden", "small",
+    "one_iteration", "solved",
 )  # fmt: skip
 
 
@@ -27,7 +27,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     """How far methods are accurate and how they fail; what each mechanism does. Steps of maps are in nutations."""
     answers: dict[str, Any] = dict.fromkeys(NAMES)
     answers |= {"periods": PERIODS, "slow": SLOW, "fast": FAST, "near": NEAR, "barely": BARELY, "lost": LOST,
-              "common": COMMON}  # fmt: skip
+              "common": COMMON, "tried": MOST}  # fmt: skip
     if family := next(iter(families(data)), None):
         answers |= atlas_facts(data, family)
     for scene, variable, read in READ:
@@ -94,6 +94,12 @@ def sleeping_facts(part: xr.Dataset) -> dict[str, Any]:
     return answers | {"sleep_miss": max(misses_, default=None)}
 
 
+def separatrix_facts(part: xr.Dataset) -> dict[str, Any]:
+    """By how much the law of the early error misses (1/λ), and whose runs outlast it."""
+    names = ", ".join(f"`{name}`" for name in outlasting(part))
+    return {"law_middle": float(pd.Series(misses(part)).median()), "outlasting": names or None}
+
+
 def sampling_facts(part: xr.Dataset) -> dict[str, Any]:
     """What an energy error sampled once a nutation hides, and the share of the solver in that of the midpoint rule."""
     hidden, ratios = sampled(part)
@@ -109,7 +115,7 @@ def sampling_facts(part: xr.Dataset) -> dict[str, Any]:
 READ = (
     ("grazing", "outcome", pole_facts), ("steady-fast", "third_turn_phase", resonance_facts),
     ("sleeping", "sleeping_threshold", sleeping_facts), ("goldstein", "energy_once", sampling_facts),
-    ("separatrix", "horizon", lambda part: {"law_middle": float(pd.Series(misses(part)).median())}),  # 1/λ
+    ("separatrix", "horizon", separatrix_facts),
 )  # fmt: skip
 
 

@@ -15,7 +15,8 @@ from .measures import BOUND, DIGITS, ERROR, SECONDS, SOURCES, bound_ratios
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """How well each source is known (rad), how many bounds hold, and how many published values are met."""
     bounds, broken, ratio = bound_ratios(data)
-    printed = [one for one in published_values() if one.kind == "printed"]
+    published = published_values()
+    printed = [one for one in published if one.kind == "printed"]
     worst = at_worst(data, ("double, axis", "double, attitude"))
     return {
         "digits": DIGITS,
@@ -27,6 +28,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "integrated": None if worst is None else float(worst),  # rad, Taylor in double at its worst
         "integrated_after": None if worst is None else float(worst["horizon"]),  # s
         "quadruple": largest(data, ("quadruple, attitude",)),  # rad, its distance from the closed form in 45 digits
+        "published": len(published),
         "printed": len(printed),
         "printed_met": sum(one.reproduced for one in printed),
         "printed_trajectory": sum(one.tests == TRAJECTORY for one in printed),

@@ -5,9 +5,10 @@
     p_phi      |p_phi - ref| / max(|p_phi|, |p_psi|)         p_psi      likewise
 
 The energy's scale is `Scene.energy_scale`, the energy of the nutation above the steady precession with the same
-momenta, without the energy of the spin: on `fast` it is 9.2e-5, and the kinetic energy, nearly all spin, 5000. Both
-momenta share one scale because one of them may vanish. Radians and momenta never share a norm. Of a body without
-symmetry the scale of the energy is that of the start, kinetic and |mgl|, and that of p_phi and of the vector L is |L|.
+momenta; V has p_psi^2 / 2 I3 in it, so that the spin drops out: on `fast` it is 9.2e-5, and the kinetic energy, nearly
+all spin, 5000. Both momenta share one scale because one of them may vanish. Radians and momenta never share a norm. Of
+a body without symmetry the scale of the energy is that of the start, kinetic and |mgl|, and that of p_phi and of the
+vector L is |L|.
 
 A trajectory of another program is checked first. A quaternion shows the attitude, the axis and theta; theta, phi and
 psi the same; theta and phi the axis; an axis shows theta. Vectors that are not quite of length one are scaled to it.

@@ -71,7 +71,7 @@ def sweep(
         axis_bound ...                                 the least error that the reference can judge
         steps, force_evaluations, newton_iterations    work
         step_size, tolerance                           what was set; NaN where the method has no such setting
-        chart                                          of the run, over scene and integrator
+        chart                                          of the run, over scene and variant
         seconds, seconds_spread                        if `timed`: least run time, s, and its spread, as in `compare`
         outcome, message                               "ok", or how the run ended; "not_run" where a method has fewer
                                                        settings; "raised", with the message, if it raised an exception

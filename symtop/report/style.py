@@ -71,7 +71,7 @@ _LOOKS = {  # of methods that people know, in one colour with fixed steps and th
     "rk45-compiled": Look(VERMILLION, "s"), "rk45": Look(VERMILLION, "D"), "tsit5-fixed": Look(NAVY, "P"),
     "tsit5": Look(NAVY, "X"), "vern9-fixed": Look(PLUM, "s"), "vern9": Look(PLUM, "d"),
     "dop853-compiled": Look(BROWN, "v"), "dop853-compiled-fixed": Look(BROWN, "^"), "dop853": Look(BROWN, "o"),
-    "gauss-4": Look(ORANGE, "^"), "gauss-8": Look(PURPLE, ">"), "lsoda": Look(REDS[1], "s"),
+    "gauss-4": Look(PURPLE, "^"), "gauss-8": Look(PURPLE, ">"), "lsoda": Look(REDS[1], "s"),
     "radau": Look(REDS[2], "v"), "taylor": Look(BLACK, "*", 6.0), "series": Look(BLACKS[1], "D"),
     "exact": Look(GREY, "x"),
 }  # fmt: skip

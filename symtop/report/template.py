@@ -23,7 +23,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from symtop.core.errors import SymtopError
-from symtop.methods.framework.registry import integrators
+from symtop.methods.framework.registry import engines, methods
 from symtop.report import formats
 from symtop.report.formats import table
 
@@ -55,7 +55,7 @@ def front(template: str, studies: Sequence[Findings], results: Path, pages: Mapp
     """A page on all studies: `fact("STUDY.NAME")` is a fact or None, figures and tables are named ``STUDY-NAME``."""
     facts = {f"{study['study']}.{name}": value for study in studies for name, value in study["facts"].items()}
     titles = {study["title"]: pages.get(study["study"], "").partition("](")[2] for study in studies}
-    given = {"pages": Links(pages), "fact": facts.get, "methods": len(integrators())}
+    given = {"pages": Links(pages), "fact": facts.get, "methods": len(methods()), "maps": len(engines())}
     given["listed"] = [f"[{title}]({address}" for title, address in titles.items() if address]
     text = rendered(template, "front page", given | _names(studies, results, whole=True))
     return without_gaps(text).strip() + "\n"

@@ -97,10 +97,15 @@ def test_what_is_quoted_is_put_between_the_marks_of_a_page():
     assert made == f"# P\n\n{taker.BEGIN}{said}{taker.END}\nrest\n"
     assert taker.quote(said, made) == made
     for bad in ("no marks\n", f"{taker.END}{taker.BEGIN}"):
-        with pytest.raises(SystemExit, match="once each, in this order"):
+        with pytest.raises(SystemExit, match="once, and <!-- to here --> after it"):
             taker.quote(said, bad)
     with pytest.raises(SystemExit, match="no page with the question Who"):
         taker.answer(REPORT, "Who?")
+    assert taker.answer(REPORT, "Which is it?", "All: ").endswith(
+        "1e-6`.\n\n[table](tables/a-b.csv), [CSV](tables/c.csv).\n"
+    )
+    with pytest.raises(SystemExit, match=r"no paragraph More"):  # which another page has
+        taker.answer(REPORT, "Which is it?", "More")
 
 
 def test_the_readme_has_the_beginning_of_the_front_page():
@@ -114,6 +119,16 @@ def test_what_pages_quote_is_what_the_stored_report_says():
     for name, said in _taker().quoted(report).items():
         page = (ROOT / name).read_text(encoding="utf-8")
         assert _taker().quote(said, page) == page, name
+
+
+@pytest.mark.parametrize("name", ["bench", "peers"])
+def test_what_a_page_says_of_a_benchmark_is_what_that_has_stored(name, tmp_path):
+    taker, page = _taker(), (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+    said = taker.benchmark(name, ROOT / "results")
+    assert taker.quote(said, page, taker.STORED_BY[name]) == page
+    stored = (ROOT / "results" / f"{name}.json").read_text(encoding="utf-8")
+    (tmp_path / f"{name}.json").write_text(stored.replace("0.3.0", "9.9.9").replace('"version": "0', '"version": "9'))
+    assert taker.benchmark(name, tmp_path) != said
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is no checkout")

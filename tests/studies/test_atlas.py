@@ -274,6 +274,7 @@ def test_runs_that_outlast_the_law_of_the_separatrix_are_not_counted():
     }
     part = xr.Dataset(columns, coords={"variant": ["rk4[axis]", "gauss-4[axis]"]})
     assert mechanisms.outlasting(part) == ["gauss-4[axis]"]
+    assert facts.separatrix_facts(part)["outlasting"] == "`gauss-4[axis]`"
     assert mechanisms.misses(part) == pytest.approx([0.5, 0.2])
     part["horizon"][0, 1] = math.nan
     assert mechanisms.misses(part) == pytest.approx([0.5])
@@ -318,7 +319,7 @@ def measured():
 def test_facts_are_those_of_the_mechanisms(measured):
     answers = facts.facts(measured)
     assert answers.keys() >= set(facts.NAMES)
-    assert {name for name in facts.NAMES if answers[name] is None} == {"cayley_sleeps"}
+    assert {name for name in facts.NAMES if answers[name] is None} == {"cayley_sleeps", "outlasting"}
     lost = mechanisms.resonant(measured.sel(scene="steady-fast"))
     assert lost["stormer-verlet[angles]"] == pytest.approx(math.sqrt(3.0), abs=1e-4)
     assert lost["midpoint[angles]"] == pytest.approx(2.0 * math.sqrt(3.0), abs=1e-4)
