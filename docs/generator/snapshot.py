@@ -27,6 +27,7 @@ QUOTED = {  # of a page: the question, and the beginnings of further paragraphs
     "results.md": ("What makes",),
     "about/faq.md": ("My body is no symmetric top", "**What fell.** "),
 }
+HAVE = "You have one of these?"  # the title of a table of the front page
 BEGIN, END = "<!-- from the report -->\n", "<!-- to here -->\n"
 STORED_BY = {name: f"<!-- from results/{name}.json -->\n" for name in ("bench", "peers")}
 WIDTH = 118
@@ -74,6 +75,12 @@ def wrapped(paragraph: str) -> str:
     )
 
 
+def titled(report: str, title: str) -> str:
+    """The table with a bold title, and the paragraph below it; nothing if the report has none."""
+    found = re.search(rf"^\*\*{re.escape(title)}.*\n\n(?:\|.*\n)+\n.+$", report, flags=re.MULTILINE)
+    return "\n" + "\n\n".join(map(wrapped, found[0].split("\n\n"))) + "\n" if found else ""
+
+
 def beginning(report: str) -> str:
     """The front page from its first figure to what will go wrong, figures where the README finds them."""
     text = re.split(r"(?:## |\*\*)What will go wrong", report.partition("\n\n")[2].partition("\n\n")[2])[0].strip()
@@ -92,6 +99,7 @@ def quote(said: str, page: str, begin: str = BEGIN) -> str:
 def quoted(report: str) -> dict[str, str]:
     """What pages quote from the report, by their paths."""
     answers = {f"docs/{page}": answer(report, *asked) for page, asked in QUOTED.items()}
+    answers["docs/choosing.md"] += titled(report, HAVE)
     return {"README.md": beginning(report), **answers}
 
 
