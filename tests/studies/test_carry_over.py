@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.stats import kendalltau
-from symtop_studies.carry_over import comparison as by
+from symtop_studies.carry_over import comparison as by, facts
 from symtop_studies.carry_over.bodies import FAMILIES, FREE, SYMMETRIC, Bodies, as_tops, bodies_of, run_level
 from symtop_studies.carry_over.measures import ASYMPTOTE, observed_order, own_table, table, verdicts
 from symtop_studies.cost.ladder import LEVELS, Climb, setting_of
@@ -209,6 +209,7 @@ def test_planted_factors_of_steps_and_of_silent_runs_are_found():
             assert [*found.values()] == pytest.approx([factor] * 3)
             assert [*by.step_factors(data, "0.1", target).values()] == pytest.approx([1.0] * 3)
         assert by.silent(data, "rk4[body]", FREE) == pytest.approx(0.05 * factor)
+        assert facts.silent_orders(data, FREE) == pytest.approx((0.05 * factor,) * 3)  # strang; rk4 and gauss-4
         assert by.silent(data, "rk4[body]", "0.3", "regular") == pytest.approx(0.05)
         assert np.isnan(by.silent(data, "rk4[body]", "0.3", "chaotic"))
         assert by.winner(data, FREE, 1e-6) == "gauss-4[body]"
