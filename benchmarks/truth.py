@@ -1,16 +1,19 @@
 """The closed form: set-up and one sample, by the arithmetic of its constants, a sample among many, and many tops.
 
+Beside it stand the two kernels of the free motion of a body without symmetry, its constants and one sample among many.
+
 Set-up and one sample are timed call by call, each on a top of its own, so that the median and the slow end are those of
 single forms. Samples among many, the constants of one top among many and a long reference are timed in batches.
 """
 
 import time
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from symtop.measure.timing import timings
-from symtop.model.exact import closed_form
+from symtop.model.exact import closed_form, free_body
 from symtop.model.exact.closed_form import ClosedForm, ClosedForms
 from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import sleeping, spinning, steady
@@ -81,6 +84,21 @@ def measure() -> list[Row]:
     return rows + _of_many()
 
 
+def _free() -> dict[str, tuple[Callable[[], object], int]]:
+    """Calls of the kernels of the free body, on random bodies of which no two moments are nearly equal."""
+    for kernel in (free_body._build, free_body._fill):
+        kernel.compile()
+    build, fill, random = free_body._build.compiled, free_body._fill.compiled, np.random.default_rng(2)
+    shares = random.uniform(0.2, 1.0, (COUNT, 3))  # of the mass along each axis, squared
+    moments, momenta = shares.sum(axis=1, keepdims=True) - shares, random.normal(size=(COUNT, 3))
+    rows = [free_body.checked_body(one, (1, 0, 0, 0), L) for one, L in zip(moments, momenta, strict=True)]
+    constants, times, out = np.zeros(free_body.SIZE), np.linspace(0.0, 1e3, MANY), np.empty((MANY, 7))
+    return {
+        "constants of a free body": (lambda: [build(row, constants) for row in rows], COUNT),
+        "one sample of a free body among many": (lambda: fill(constants, times, out), MANY),
+    }
+
+
 def _of_many() -> list[Row]:
     """The forms of many tops at once, for each of them, and a reference that has been asked for before."""
     numbers = np.array([flat(*pair) for pair in _tops("double-double", COUNT)])
@@ -89,6 +107,7 @@ def _of_many() -> list[Row]:
         "constants of one top among many": (lambda: ClosedForms(numbers), COUNT),
         "one sample of one top among many, axis": (lambda: forms.axis(times), COUNT * times.size),
         "reference of spheroid at 1001 times to 1e5": (lambda: reference("spheroid", FAR), 1),
+        **_free(),
     }
     taken = timings([call for call, _ in calls.values()], batches=BATCHES)
     return [

@@ -180,7 +180,8 @@ class _Trial(NamedTuple):
         return self.seconds * settings.at_accuracy(self.met.integrator, ratio)
 
     def words(self) -> str:
-        return f"{self.met.integrator.name} with {self.met.integrator.setting(self.met.setting).label}"
+        control = (self.met.integrator.control or "nothing").replace("_", " ")
+        return f"{self.met.integrator.name} with {control} {self.met.setting:.4g}"
 
 
 def recommend(

@@ -65,7 +65,7 @@ class Point(NamedTuple):
 def accuracy(scene: Scene, method: Integrator, setting: float) -> Point:
     """One run with samples, judged."""
     chart, horizon = method.chart_for("axis"), PERIODS * scene.nutation_period
-    plan, _ = make_plan(scene, method, **method.setting(setting).kwargs(), horizon=horizon, samples=SAMPLES)
+    plan, _ = make_plan(scene, method, **method.given(setting), horizon=horizon, samples=SAMPLES)
     solve: Any = method.solvers[chart]
     run = None
     begun = time.process_time()
@@ -130,7 +130,7 @@ def worth_timing(points: Sequence[Point], targets: Sequence[float] = TARGETS) ->
 def ready(scene: Scene, peer: Peer, setting: float) -> tuple[Callable[[], Any], Inner]:
     """Both calls of a solver at a setting, from the start to the horizon."""
     method, horizon = peer.method, PERIODS * scene.nutation_period
-    given = method.setting(setting).kwargs()
+    given = method.given(setting)
     sampled, _ = make_plan(scene, method, **given, horizon=horizon, samples=SHOWN)
     bare, _ = make_plan(scene, method, **given, horizon=horizon, samples=2)
     library = method.solvers[peer.chart]

@@ -110,7 +110,7 @@ def taylor_in_angles() -> Integrator:
 
 def caller(scene: Scene, cell: Cell, call: str, setting: float, horizon: float) -> Callable[[], object] | None:
     """A function of no arguments that makes one run; None for a call that the method does not have."""
-    method, control = cell.method, cell.method.setting(setting).kwargs()
+    method, control = cell.method, cell.method.given(setting)
     if call == SIMULATE:
         return lambda: simulate(scene, method, horizon=horizon, samples=SAMPLES, **control)
     if call == KERNEL:

@@ -26,7 +26,7 @@ SAMPLES = 12_001  # of a run
 def long_energy(scene: Scene, name: str, setting: float, horizon: float) -> xr.Dataset:
     """Largest relative energy error so far of one variant, at times from `FIRST` to `horizon`; dimension ``long``."""
     method = integrator(name)
-    control = method.setting(setting).kwargs()
+    control = method.given(setting)
     run = integrate(scene, method, observe="nutation", samples=SAMPLES, horizon=horizon, **control)
     largest = np.fmax.accumulate(np.abs(residuals(scene, run)["energy"]))
     times = np.geomspace(FIRST, horizon, TIMES)

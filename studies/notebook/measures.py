@@ -43,7 +43,7 @@ def residual_history(scene: Scene, name: str, setting: float, samples: int = SAM
 
     `setting` is a step size in seconds or a tolerance, whichever the integrator takes.
     """
-    control = integrator(name).setting(setting).kwargs()
+    control = integrator(name).given(setting)
     run = integrate(scene, name, observe="nutation", samples=samples, **control)
     columns: dict[str, Any] = {"outcome": run.outcome, "sample_time": ("sample", run.time)}
     for constant, values in residuals(scene, run).items():

@@ -44,14 +44,12 @@ NAMES = {  # what the shell completes: the module and its function
 }  # fmt: skip
 BODY, PERIODS = "body", 20.0  # the scene of the options of a body, and its horizon
 SILENT = ("explore",)  # commands that work until they are ended
-PLUGINS = "symtop.plugins"  # in the context of a command: plug-ins were given
 
 
 def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]) -> None:
     if files and not ctx.resilient_parsing:  # as shell completion parses
         from symtop.run import plugins
 
-        ctx.meta[PLUGINS] = True
         for file in files:
             if ctx.info_name == "claims":  # a file that ends its process is told of
                 from symtop.judging.remote import tried

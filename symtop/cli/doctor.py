@@ -196,7 +196,7 @@ def _run(name: str) -> str:
             reference(SCENE, run["time"].values)
             return ""
         variant = integrator(name)
-        setting = variant.setting(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance)).kwargs()
+        setting = variant.given(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance))
         observe = "attitude" if variant.charts() == ("angles",) else variant.charts()[0]
         options: dict[str, Any] = {**setting, "observe": observe, "horizon": span, "samples": 2}
         simulate(SCENE, name, **options)

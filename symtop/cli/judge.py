@@ -22,7 +22,7 @@ FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "sh
 @click.option("--chart", default="axis", show_default=True, help="What a state is: axis, attitude or angles.")
 @click.option(
     "--scene", default="spheroid", show_default=True, shell_complete=completing("all scenes"),
-    help="The top; of a trajectory, a body, too.",
+    help="The top, or a body without symmetry.",
 )  # fmt: skip
 @click.option("--order", type=int, help="Claim an order.")
 @click.option("--symplectic/--not-symplectic", default=None, help="Claim that the step is symplectic, or not.")
@@ -69,6 +69,7 @@ def judge(
     symtop judge "./my_engine --top" --form program --quick
     symtop judge run.csv --scene spheroid --conserves p_phi
     symtop judge brick.csv --scene check-case-2
+    symtop judge my.py:step --form rotation --scene tennis-racket
     """
     from symtop.judging import findings
     from symtop.judging.judge_step import judge as judged

@@ -78,7 +78,7 @@ class Setup:
     @property
     def arguments(self) -> dict[str, Any]:
         """The arguments of `simulate` beside the scene, the method and the guard."""
-        control = {} if self.setting is None else self.method.setting(self.setting).kwargs()
+        control = {} if self.setting is None else self.method.given(self.setting)
         return control | {"observe": "attitude", "samples": self.samples, "budget": self.budget}
 
 

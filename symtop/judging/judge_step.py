@@ -47,7 +47,7 @@ from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import checked, completed, errors, refuse_other_scene, sampled
 from symtop.methods.framework.registry import ENERGY_ERRORS, Integrator
 from symtop.model.body import rotated
-from symtop.model.charts import CHARTS, body_energy, space_energy
+from symtop.model.charts import BODY, CHARTS, body_energy, space_energy
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.reference.truth import reference
 from symtop.run.trajectory import Trajectory
@@ -94,7 +94,9 @@ def judge(
     errors, drift and laws of growth are found.
 
     `chart` says what y is: "axis" (e, L), shape (6,); "attitude" (q, L), shape (7,); "angles" (theta, phi, psi and
-    their rates), shape (6,), in radians and the units of the scene's top. Claims that are not made are measured all
+    their rates), shape (6,), in radians and the units of the scene's top. A scene of a body without symmetry is for a
+    trajectory and for the forms ode, with y = (q, M), M in body axes, rotation and scipy; of a step it shows the order,
+    the energy and the momentum. Claims that are not made are measured all
     the same. `conserves` holds names such as "p_phi", "energy"; `energy` is "kept" or "bounded". The step runs in a
     process of its own: one that hangs or crashes costs a verdict and says so. `quick` makes shorter runs. It is
     also tried at starts, times and steps that are drawn at random; `seed`, which the findings name, draws the same
@@ -110,7 +112,7 @@ def judge(
         raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {shown(energy)}", "energy")
     file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES)
     states = form is None and (file or isinstance(target, (xr.Dataset, Mapping)))
-    chosen, listen = find_scene(scene, bodies=states), tell or (lambda _: None)
+    chosen, listen = find_scene(scene, bodies=True), tell or (lambda _: None)
     for name, flag in (("adaptive", adaptive), ("autonomous", autonomous), ("quick", quick)):
         boolean(name, flag)
     drawn = secrets.randbelow(SEEDS) if seed is None else whole("seed", seed, 0, SEEDS)
@@ -127,6 +129,11 @@ def judge(
         for finding in findings:
             listen(finding)
         return Ledger(about.name, chosen.name, tuple(findings), {}, about)
+    if chosen.of_body:
+        if {symplectic, symmetric, explicit} != {None} or kept - {"energy"}:
+            words = "order and what becomes of energy and momentum; claim the rest on a top"
+            raise SymtopError(f"a step on {chosen.name}, a RigidBody, shows its {words}")
+        chart = BODY
     implied = {"time": not autonomous, "energy": energy is None and "energy" not in kept, "order": order is None}
     heartbeat.reset(quick=quick)
     began, findings = time.monotonic(), []
@@ -135,7 +142,7 @@ def judge(
         process.allow(OPENING)
         try:
             stepper = Remote(process)
-            method = integrator(stepper, **claims)
+            method = integrator(stepper, BODY if chosen.of_body else "", **claims)
             seconds = seconds_a_step(stepper, chosen) if method.fixed_step else 0.0
         except SymtopError as error:
             raise SymtopError(f"it cannot be judged: {error}") if process.lost else error from None

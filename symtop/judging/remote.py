@@ -27,8 +27,8 @@ import numpy as np
 from symtop.core.errors import SymtopError, words_of
 from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat
 from symtop.judging.adapters.python_step import MATRIX, REDUCED, ROTATION
+from symtop.methods.framework import equations
 from symtop.methods.framework.calling import OWN, solve
-from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array, Plan, Run
 from symtop.methods.framework.registry import Integrator
 from symtop.model.top import Angles, SymmetricTop
@@ -205,7 +205,7 @@ class Remote(Stepper):
 
     def __init__(self, process: Process) -> None:
         self.process, facts = process, process.call("about")
-        self.form = FORMS.get(facts["kind"]) or FORMULATIONS[facts["chart"]]
+        self.form = FORMS.get(facts["kind"]) or equations.FORMS[facts["chart"]]
         self.adaptive = functools.partial(_run, process, "adaptive") if facts["adaptive"] else None
         for name in FACTS:
             setattr(self, name, facts[name])

@@ -82,7 +82,7 @@ def error_row(
     `budget` is that of `simulate`.
     """
     control: dict[str, Any] = {"horizon": horizon, "samples": enough_samples(scene, horizon), "observe": observe}
-    run = integrate(scene, method, budget=budget, **control | method.setting(setting).kwargs())
+    run = integrate(scene, method, budget=budget, **control | method.given(setting))
     truth = reference(scene, run.time, precision="closed-form")
     shown, failed = errors_against(scene, run, truth), run.outcome != "ok"
     row: dict[str, float | str] = {name: getattr(run, name) for name in COUNTS}

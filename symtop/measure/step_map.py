@@ -150,7 +150,7 @@ def one_step(method: Integrator, chart: str, scene: Scene, h: float) -> StepMap:
 
 def generic_start(scene: Scene) -> Angles:
     """A point of the scene's true motion where nothing is special: no turning point, no phase of zero."""
-    if not math.isfinite(scene.nutation_period):
+    if scene.of_body or not math.isfinite(scene.nutation_period):
         start: Angles = scene.start
         return start
     return Angles(*map(float, closed_form(scene)(0.3711 * scene.nutation_period)))

@@ -184,7 +184,7 @@ def _cell(
     else:
         settings = [math.nan]
     for value in settings:
-        make_plan(scene, method, **method.setting(value).kwargs(), horizon=until, samples=enough_samples(scene, until))
+        make_plan(scene, method, **method.given(value), horizon=until, samples=enough_samples(scene, until))
     made_of = _code().reasons("sweep", error_row, scene, method) | code_hash.packages()
     question = (settings, until, observe, "timed") if timed else (settings, until, observe)
     digest = code_hash.digest(made_of | {"settings": repr(question)})
@@ -205,7 +205,7 @@ def error_row_or_message(
         return error_row(scene, method, setting, horizon, observe, budget=budget) | {"message": ""}
     except SymtopError as error:
         blank = blank_row(method) | {"outcome": RAISED, "message": str(error)}
-        return blank | method.setting(setting).kwargs()
+        return blank | method.given(setting)
 
 
 def _time(cells: list[_Cell], done: dict[str, xr.Dataset]) -> bool:

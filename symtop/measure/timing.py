@@ -129,7 +129,7 @@ def bare_run(
     budget: float | None = None,
 ) -> Callable[[], Run]:  # fmt: skip
     """A call of one of a method's solvers, start to horizon, with nothing around it."""
-    control = method.setting(setting).kwargs()
+    control = method.given(setting)
     plan, _ = make_plan(scene, method, **control, horizon=horizon, samples=samples, budget=budget)
     solve = method.solvers[chart]
     return lambda: solve(scene.top, scene.start, plan)

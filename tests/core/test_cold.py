@@ -21,6 +21,7 @@ import studies
 import symtop
 from symtop.core import jit
 from symtop.core.jit import compile_kernel
+from symtop.methods.framework import loop
 from symtop.methods.framework.loop import Loop
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -87,6 +88,16 @@ def test_every_kernel_is_kept_on_disk():
     unkept = {"__name__": "prompt"}
     exec("def typed(x): return x", unkept)  # the control: a function without a file
     assert not isinstance(compile_kernel(unkept["typed"])._cache, jit._Cache)
+
+
+def test_a_loop_makes_a_kernel_when_it_is_used(monkeypatch):
+    """Loading a hundred methods would hash all their kernels otherwise, in every process."""
+    made = []
+    monkeypatch.setattr(loop, "compile_kernel", lambda part: made.append(part) or part)
+    family = loop.kernel_loop(loop.no_carry, loop.no_carry, loop.no_carry)
+    assert not made
+    assert family.march is family.march is made[0]
+    assert len(made) == 1
 
 
 def test_garbage_is_collected_again_after_a_kernel_is_compiled_or_refused():

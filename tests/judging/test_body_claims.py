@@ -2,6 +2,8 @@
 
 import dataclasses
 import json
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -11,6 +13,7 @@ from symtop.judging.findings import Ledger
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import body_scenes
 from tests.commands import call
+from tests.judging.blind import right
 
 FREE, HEAVY = (body_scenes()[name] for name in ("check-case-2", "heavy-brick"))
 
@@ -37,9 +40,37 @@ def test_false_claims_on_a_body_are_refuted() -> None:
     lie = dataclasses.replace(rk4, name="lie", family="splitting", order=3, symplectic=True)
     assert said(lie, FREE).refuted == ["energy", "momentum"]  # order 4 where 3 is claimed is no false claim
     assert said(dataclasses.replace(rk4, name="higher", order=5), HEAVY).refuted == ["order"]
-    ledger = said(symtop.integrator("no-gyro"), FREE)
-    assert ledger["order"].verdict == "undecided"
+    assert said(symtop.integrator("no-gyro"), FREE)["order"].measured.kind == "wrong limit"
     assert said(symtop.integrator("stormer-verlet"), FREE)["energy"].verdict == "undecided"
+
+
+def rotation_swapped(q: Any, w: Any, h: float, inertia: Any, torque: Any) -> Any:
+    """The first two moments are exchanged, which are the same of a top."""
+    return right.rotation_lie_midpoint(q, w, h, inertia[[1, 0, 2]], torque)
+
+
+@pytest.mark.parametrize(("step", "order", "refuted"), [
+    (right.rotation_rk4, 4, []), (right.rotation_lie_midpoint, 2, []), (rotation_swapped, 2, ["order"]),
+    (right.rotation_strang, 2, ["order"]), (right.rk4, 4, []),
+])  # fmt: skip
+def test_a_step_of_ones_own_is_judged_on_a_body(step: Callable[..., Any], order: int, refuted: list[str],
+                                                only: Callable[..., None]) -> None:  # fmt: skip
+    """One that turns by the rates of other moments is wrong, as is an exact motion that symmetric bodies alone have."""
+    only("order")
+    form = "rotation" if "rotation" in step.__name__ else "ode"
+    ledger = symtop.judge(step, form=form, scene=HEAVY, order=order, quick=True)
+    assert ledger.refuted == refuted
+    assert ledger["order"].verdict == ("refuted" if refuted else "confirmed")
+    assert refuted == [] or ledger["order"].measured.kind == "wrong limit"
+
+
+@pytest.mark.parametrize(("asked", "words"), [
+    ({"form": "separable"}, "form must be ode, rotation, scipy, not separable"),
+    ({"symplectic": True}, "claim the rest on a top"), ({"conserves": ["p_psi"]}, "claim the rest on a top"),
+])  # fmt: skip
+def test_what_a_step_on_a_body_cannot_show_is_refused(asked: dict[str, Any], words: str) -> None:
+    with pytest.raises(symtop.SymtopError, match=words):
+        symtop.judge(right.rk4, scene=FREE, quick=True, **asked)
 
 
 def test_the_command_judges_on_a_body() -> None:

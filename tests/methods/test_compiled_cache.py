@@ -58,7 +58,7 @@ every = [f"{one.name}[{chart}]" for one in symtop.integrators().values() if one.
          for chart in one.charts()]
 for k in range(count):
     one = symtop.integrator(every[k * (len(every) - 1) // (count - 1)])
-    setting = one.setting(0.02 if one.fixed_step else 1e-7).kwargs()
+    setting = one.given(0.02 if one.fixed_step else 1e-7)
     runs = [symtop.simulate("spheroid", one, **setting, samples=30, guard=False)]
     if k % 3 == 0:
         runs.append(symtop.ensemble(["spheroid", "goldstein"] * 20, one, **setting, horizon=3.0, threads=1, quiet=True))

@@ -131,7 +131,7 @@ def test_adaptive_methods_follow_their_tolerance_in_every_chart(name, chart):
 @pytest.mark.parametrize("name", ["rk4", *ADAPTIVE])
 def test_p_phi_stays_where_it_is_linear_in_the_state_and_is_lost_in_angles(name):
     scene = symtop.scene("spheroid")
-    control = integrator(name).setting(0.02 if name == "rk4" else 1e-5).kwargs()
+    control = integrator(name).given(0.02 if name == "rk4" else 1e-5)
     change = {}
     for chart in FORMULATIONS:
         run = symtop.simulate(scene, f"{name}[{chart}]", **control, horizon=8.0, samples=81, guard=False)

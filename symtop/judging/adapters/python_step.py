@@ -1,7 +1,8 @@
 """Steps in Python: functions of a state in a chart, of a rigid body or of the nutation, and classes of SciPy's kind.
 
 *ode*, ``step(f, t, y, h) -> y`` for y' = f(t, y): y and what f returns are NumPy arrays of shape (6,), (e, L) on the
-axis or (theta, phi, psi and their rates) in angles, or (7,), (q, L) on the attitude. h may be negative. A step that
+axis or (theta, phi, psi and their rates) in angles, or (7,), (q, L) on the attitude, and on a body without symmetry
+(q, M) with the momentum in body axes (`symtop.methods.framework.body`). h may be negative. A step that
 changes its input in place, and returns it, works.
 
 *rotation*, ``step(q, w, h, inertia, torque) -> q, w`` for a rigid body, as engines integrate it, in the body frame:
@@ -9,9 +10,10 @@ changes its input in place, and returns it, works.
     q' = q (0, w) / 2,        inertia w' = (inertia w) x w + torque(q)
 
 q = (w, x, y, z) turns body vectors into space vectors, w is the angular velocity, inertia holds the three principal
-moments (I1, I1, I3) about the pivot, and torque(q) is that of gravity. L in space is R(q) inertia w, R(q) with q at
-length one; a q that loses its length shows it as an axis that is not a unit vector. A step that returns a matrix of
-shape (3, 3) in place of q is given R, body to space, and torque(R); one that ceases to be a rotation shows it likewise.
+moments about the pivot, (I1, I1, I3) of a top, and torque(q) is that of gravity. L in space is R(q) inertia w, R(q)
+with q at length one; a q that loses its length shows it as an axis that is not a unit vector. A step that returns a
+matrix of shape (3, 3) in place of q is given R, body to space, and torque(R); one that ceases to be a rotation shows it
+likewise.
 
 *separable*, ``step(state, h, dT, dV) -> state`` for the nutation alone, whose Hamiltonian separates:
 
@@ -39,12 +41,13 @@ from scipy.spatial.transform import Rotation
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat, label_of, repeat
 from symtop.methods.framework.angles import chart_outcome, on_angles
-from symtop.methods.framework.equations import FORMULATIONS, Formulation
+from symtop.methods.framework.body import torque as torque_of
+from symtop.methods.framework.equations import FORMS, FORMULATIONS, Formulation
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.space import on_attitude
 from symtop.methods.library.scipy_ivp import solver as solver_of
-from symtop.model.body import rotated, vertical
-from symtop.model.charts import space_momenta
+from symtop.model.body import RigidBody, rotated, vertical
+from symtop.model.charts import BODY, space_momenta
 from symtop.model.top import Angles, SymmetricTop, effective_force
 
 Field = Callable[[float, Array], Array]
@@ -71,7 +74,7 @@ class Equations:
     """y' = f(t, y) of a chart on arrays, and how often it was called."""
 
     def __init__(self, chart: str, par: Any) -> None:
-        self.field, self.par, self.calls = FORMULATIONS[chart].field, par, 0
+        self.field, self.par, self.calls = FORMS[chart].field, par, 0
 
     def __call__(self, _: float, y: Any) -> Array:
         """y' at any time."""
@@ -115,7 +118,7 @@ class PythonStep(FunctionStep):
 
     def __init__(self, function: Callable[..., Any], chart: str, name: str = "") -> None:
         super().__init__(function, name)
-        self.chart, self.form = chart, FORMULATIONS[chart]
+        self.chart, self.form = chart, FORMS[chart]
 
     def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
         """The state at the marks."""
@@ -171,35 +174,45 @@ class ScipySolver(PythonStep):
 
 
 class Body(NamedTuple):
-    """What a rigid body on a pivot is: principal moments (3,), and its weight times the height of its centre."""
+    """What a rigid body on a pivot is: its principal moments (3,), and its weight times where its centre is."""
 
     inertia: Array
-    mgl: float
+    c1: float
+    c2: float
+    c3: float
+    of_top: bool
 
 
-def _body_of(top: SymmetricTop, at: Angles) -> tuple[Body, tuple[float, ...]]:
-    """The body and the state (q, w) of a start."""
+def _body_of(top: Any, at: Any) -> tuple[Body, tuple[float, ...]]:
+    """The body and the state (q, w) of a start, of a top or of a body without symmetry."""
+    if isinstance(top, RigidBody):
+        x, y, z = top.centre
+        body = Body(np.array(top.moments), top.mgl * x, top.mgl * y, top.mgl * z, of_top=False)
+        return body, (*at.quaternion, *at.omega_body)
     q, momentum = np.split(np.array(on_attitude(top, at)[1]), [4])
     inertia = np.array([top.I1, top.I1, top.I3])
-    return Body(inertia, top.mgl), (*q.tolist(), *(rotated(q * CONJUGATE, momentum) / inertia).tolist())
+    rates = rotated(q * CONJUGATE, momentum) / inertia
+    return Body(inertia, 0.0, 0.0, top.mgl, of_top=True), (*q.tolist(), *rates.tolist())
 
 
 def _body_shown(body: Body, _times: Array, states: Array) -> Array:
-    """States (q, L) of states (q, w)."""
+    """States (q, L) of states (q, w); (q, M) with the momentum in body axes of a body without symmetry."""
+    momentum, lengths = body.inertia * states[:, 4:], np.linalg.norm(states[:, :4], axis=1, keepdims=True)
     with np.errstate(all="ignore"):
-        turn = states[:, :4] / np.linalg.norm(states[:, :4], axis=1, keepdims=True)
-        return np.concatenate([states[:, :4], rotated(turn, body.inertia * states[:, 4:])], axis=1)
+        momentum = rotated(states[:, :4] / lengths, momentum) if body.of_top else momentum
+    return np.concatenate([states[:, :4], momentum], axis=1)
 
 
 def _body_momenta(body: Body, states: Array) -> tuple[Array, Array]:
-    p_phi, p_psi = space_momenta("attitude", _body_shown(body, states[:, 0], states))
+    shown = _body_shown(body, states[:, 0], states)
+    p_phi, p_psi = space_momenta("attitude", shown) if body.of_top else FORMS[BODY].momenta(None, shown)
     return p_phi, p_psi
 
 
 ROTATION = FORMULATIONS["attitude"]._replace(prepare=_body_of, present=_body_shown, momenta=_body_momenta)
 
 
-def _matrix_of(top: SymmetricTop, at: Angles) -> tuple[Body, tuple[float, ...]]:
+def _matrix_of(top: Any, at: Any) -> tuple[Body, tuple[float, ...]]:
     """The body and the state (R, w) of a start, R row by row."""
     body, state = _body_of(top, at)
     return body, (*rotated(state[:4], np.eye(3)).T.ravel().tolist(), *state[4:])
@@ -249,8 +262,8 @@ class RotationStep(FunctionStep):
             nonlocal calls
             calls += 1
             at = np.asarray(q, dtype=float)
-            x, y, _ = at[2] if shape == (3, 3) else np.array(vertical(*at.tolist())) / (float(at @ at) or math.nan)
-            return np.array([par.mgl * y, -par.mgl * x, 0.0])
+            up = at[2] if shape == (3, 3) else np.array(vertical(*at.tolist())) / (float(at @ at) or math.nan)
+            return np.array(torque_of(par, *up.tolist()))
 
         def once(_: float, y: Array) -> Array:
             q = y[:-3].reshape(shape)

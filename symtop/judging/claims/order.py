@@ -76,6 +76,7 @@ UNEVEN, WAVES = 0.6, 0.7  # a, and waves of the clock in a nutation
 BEGIN = 0.23  # of a nutation: t0
 CLEAR = 1e-9  # noise of the h^1 term: a step that is rounded to single precision leaves 1e-8
 CONVERGES, ROUNDED, FALLS = "converges", 1e-10, (1e4, 10.0)  # an error that falls to a tenth over four decades
+STAYS, FEWEST = 0.5, 3  # an error that falls by less over the last decade of steps, of so many runs, does not fall
 ABOVE, FINEST_RUNS, SPREAD = 10.0, 5, 10.0  # errors beyond so many bounds, of so many runs, fall as h^p to this factor
 
 
@@ -143,14 +144,23 @@ def _lower(sizes: Array, misses: Array, power: int, short: float) -> tuple[float
 
 
 def on_body(subject: Subject) -> list[Finding]:
-    """The finding on a body without symmetry: the slope of attitude errors alone.
+    """The finding on a body without symmetry: the slope of attitude errors, or that they stay however small the step.
 
     A method may be of higher order on one body than on others, as Fasso's is: that refutes nothing.
     """
     claim, scene = subject.method.order, subject.scene
-    fitted = measured_order(subject.method, scene, quick=subject.quick, main="attitude")
+    fitted = measured_order(subject.method, scene, quick=subject.quick, finest=subject.finest, main="attitude")
     fit, verdict, why = fitted.main, order_verdict(claim, fitted.main), f"attitude {fitted.main} on {scene.name}"
     if not fitted.measured:
+        last = fitted.step_size <= 10.0 * np.min(fitted.step_size)
+        wrong, most = (
+            float(np.min(fitted.error[last])),
+            float(np.max(fitted.error[last])),
+        )  # NaN where a run ended early
+        if np.count_nonzero(last) >= FEWEST and wrong > max(STAYS * most, ABOVE * np.max(fitted.bound), TRUE_LIMIT):
+            why = f"however small its step, it goes to a motion that is wrong by {wrong:.1e} rad on {scene.name}"
+            verdict = "measured" if claim is None else "refuted"
+            return [Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)]
         return [undecided("order", yes_no(claim), fit.reason)]
     if verdict == "refuted" and fit.slope - fit.interval > (claim or 0) + CLEARLY:
         verdict, why = "measured", f"{why}: here the error falls with a higher power"
@@ -219,7 +229,7 @@ def measured_order(
         tried.append(Order(chosen.name, *columns, fits[main], fits))
         if tried[-1].measured:
             return tried[-1]
-    return tried[0]
+    return tried[-1 if scene.of_body else 0]
 
 
 def _by_steps(subject: Subject) -> Finding:

@@ -188,7 +188,7 @@ def passages(method: Integrator) -> list[Passage]:
         if method.fixed_step:
             settings = [POLE.horizon / (POLE_STEPS * finer) for finer in (1.0, 2.0)]
         options: dict[str, Any] = {"samples": 201, "observe": "attitude" if chart == "attitude" else "axis"}
-        controls = [options | method.setting(setting).kwargs() for setting in settings]
+        controls = [options | method.given(setting) for setting in settings]
         runs = [simulate(POLE, method.variant(chart), guard=False, **control) for control in controls]
         ends = {str(run.attrs["outcome"]) for run in runs} - {"ok"}
         rows.append(Passage(chart, max(ends, default="ok"), *(float(errors(run)["axis"].max()) for run in runs)))

@@ -26,11 +26,12 @@ from symtop.judging.findings import yes_no
 from symtop.measure.conservation import CONSTANTS as MOTION
 from symtop.measure.step_map import drawn, generic_start
 from symtop.methods.framework.registry import ENGINE, Integrator
-from symtop.model.charts import CHARTS
+from symtop.model.charts import BODY, CHARTS
 from symtop.model.scenes import Scene
 from symtop.run.plugins import execute, python_file
 
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
+ON_BODY = ("ode", "rotation", "scipy")  # the forms of a step that are judged on a body without symmetry
 ARGUMENTS = {"ode": "(f, t, y, h)", "separable": "(state, h, dT, dV)", "rotation": "(q, w, h, inertia, torque)"}
 LIBRARIES = (".so", ".dylib", ".dll")
 CONSTANTS = (*MOTION, "axis_length")
@@ -67,8 +68,8 @@ class Subject:
 
     @property
     def kind(self) -> str:
-        """A bare "step", or a registered "integrator", or one on a "body" without symmetry."""
-        return "step" if self.stepper else "body" if self.scene.of_body else "integrator"
+        """Whatever steps a "body" without symmetry; on a top a bare "step" or a registered "integrator"."""
+        return "body" if self.scene.of_body else "step" if self.stepper else "integrator"
 
     @property
     def in_plane(self) -> bool:
@@ -177,10 +178,12 @@ def declared(method: Integrator, claim: str) -> str:
 
 def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = False) -> Stepper:
     """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else."""
-    one_of("chart", chart, CHARTS)
+    one_of("chart", chart, (*CHARTS, BODY))
     path, _, symbol = str(target).partition(":")
     shared = isinstance(target, (str, Path)) and path.endswith(LIBRARIES)
     kind = one_of("form", ("shared" if shared else "ode") if form is None else form, FORMS)
+    if chart == BODY and (kind not in ON_BODY or is_solver(target)):
+        raise SymtopError(f"on a body without symmetry form must be {', '.join(ON_BODY)}, not {kind}", "form")
     if kind == "program":
         return Program(str(target), chart)
     if kind == "shared":

@@ -95,12 +95,21 @@ class Loop:
     """
 
     begin: Callable[..., Any]
-    prepare: Callable[..., Any]
-    march: Callable[..., Any]
+    parts: tuple[Callable[..., Any], Callable[..., Any]]  # `prepare` and `march` as they are written
     whole: Callable[..., Callable[..., tuple[int, int, int]]]
     lanes: Callable[[Any], Lanes | None]
     blocks: Callable[..., Blocks]
     plain: Callable[[], "Loop"]  # the same kernel with sums that are not compensated
+
+    @cached_property  # (few processes need them, and all parts of a hundred loops would be hashed in each: 1 s)
+    def prepare(self) -> Callable[..., Any]:
+        """The state as the kernel steps it and its carry, of (par, rule, state, h)."""
+        return compile_kernel(self.parts[0])  # type: ignore[no-any-return]
+
+    @cached_property
+    def march(self) -> Callable[..., Any]:
+        """A stretch of the run."""
+        return compile_kernel(self.parts[1])  # type: ignore[no-any-return]
 
     def __call__(self, par: Any, rule: Any, state: tuple[float, ...], h: float, marks: Marks) -> March:
         """From the start to the last mark."""
@@ -206,8 +215,7 @@ def kernel_loop(  # noqa: C901  (one loop, read in one piece)
     def plain() -> Loop:
         return kernel_loop(begin, increment, observe, enter, present, accumulate_plainly)
 
-    alone = compile_kernel(prepare), compile_kernel(marching(as_it_steps))
-    return Loop(begin, *alone, whole, lanes, blocks, plain)
+    return Loop(begin, (prepare, marching(as_it_steps)), whole, lanes, blocks, plain)
 
 
 Prepare = Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]

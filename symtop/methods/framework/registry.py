@@ -19,7 +19,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,22 +71,6 @@ def split_name(name: str) -> tuple[str, str]:
     """The method and the chart in the name of a variant, ``rk4[axis]``; the chart is empty in any other name."""
     match = _VARIANT.fullmatch(name) if isinstance(name, str) else None
     return (match[1], match[2]) if match else (name, "")
-
-
-class Setting(NamedTuple):
-    """A value of an integrator's control: a step, a tolerance, or NaN where there is nothing to set."""
-
-    control: str | None  # step_size, tolerance or None
-    value: float
-
-    def kwargs(self) -> dict[str, float]:
-        """The argument of `simulate` that it stands for."""
-        return {} if self.control is None else {self.control: self.value}
-
-    @property
-    def label(self) -> str:
-        """What a sentence calls it."""
-        return f"{(self.control or 'nothing').replace('_', ' ')} {self.value:.4g}"
 
 
 @dataclass(frozen=True)
@@ -186,9 +170,9 @@ class Integrator:
         """Is a tolerance what a user sets?"""
         return self.control == "tolerance"
 
-    def setting(self, value: float) -> Setting:
-        """A value of what a user sets."""
-        return Setting(self.control, value)
+    def given(self, value: float) -> dict[str, float]:
+        """The argument of `simulate` that sets a step or a tolerance; none where there is nothing to set."""
+        return {} if self.control is None else {self.control: value}
 
     def charts(self) -> tuple[str, ...]:
         """The charts of the top that this integrator works in; a solver of `body` is for bodies without symmetry."""
