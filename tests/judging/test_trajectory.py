@@ -202,8 +202,6 @@ def test_a_conjugate_attitude_of_a_body_is_refused_although_it_starts_right(tmp_
         file.write_text(content, encoding="utf-8")
         with pytest.raises(symtop.SymtopError, match=words):
             symtop.judge(str(file), scene="check-case-2")
-    with pytest.raises(symtop.SymtopError, match="scene must be one of a SymmetricTop here, not check-case-2"):
-        symtop.judge("my.py:step", scene="check-case-2")
 
 
 def test_rates_of_a_top_are_its_momentum():
