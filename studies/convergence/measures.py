@@ -169,14 +169,18 @@ TARGET = 1e-6  # rad, the axis error at which costs are compared
 
 
 def named_variants(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
-    """The named methods on the first scene, without a chart that another covers, and their labels.
+    """The named methods on the first scene, on the axis if they step it, and their labels.
 
-    Where there are few variants, or none of these methods, all of them are named.
+    Where there are few variants, or none of these methods, all are named, without a chart that another covers.
     """
     every = list(map(str, data["variant"].values))
-    named = [name for name in every if split_name(name)[0] in NAMED]
-    named = every if len(every) <= FEW or not named else named
-    names = [name for name in named if name.replace("[attitude]", "[axis]") not in named or "[attitude]" not in name]
+    names = [name for name in every if split_name(name)[0] in NAMED]
+    if len(every) <= FEW or not names:
+        names = [
+            name for name in every if name.replace("[attitude]", "[axis]") not in every or "[attitude]" not in name
+        ]
+    else:
+        names = [name for name in names if name.endswith("[axis]") or f"{split_name(name)[0]}[axis]" not in names]
     return data.sel(variant=names).isel(scene=0), merged(data.sel(variant=names), MAIN)
 
 

@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -27,11 +28,12 @@ FAMILIAR = (  # of figure 1: methods that people know
 )  # fmt: skip
 TOP = "this-top"
 PALEST = "#AAAAAA"  # of methods made for this top
-NAMED = 9  # variants of the run lengths with a label
+NAMED = 7  # variants of the run lengths with a label
 BESIDE = ("rk4[axis]", "strang[axis]", "dop853-compiled-fixed[axis]")  # named in any case
 MARKS, LATEST = 9, 0.995
 HALF = 0.5
 HATCH, LETTER, UNREACHED = "////", 0.62, "#F0F0F0"
+MOST_KEYS, REST = 6, "#555555"  # methods without room for their name inside that have a key, and the colour of others
 PALE = 0.62  # of white in the colour of a predicted cell
 LEFT = (style.SKY, style.ORANGE, style.VERMILLION, style.YELLOW, style.BLUE, style.LEAF)
 TITLES = {
@@ -112,13 +114,18 @@ def draw_map(data: xr.DataTree) -> Any:
     """Three panels: the cheapest variant for every allowed error and run length."""
     each = {quantity: far.diagram(data, quantity) for quantity in far.QUANTITIES}
     won = Counter(panel.names[k] for panel in each.values() for k in panel.winner.ravel() if k >= 0)
-    colors = _colors([name for name, _ in won.most_common()])
+    inside = {name for panel in each.values() for name in panel.names
+              if any(_places(panel.winner == panel.names.index(name), split_name(name)[0]))}  # fmt: skip
+    below = [name for name, _ in won.most_common() if name not in inside]
+    named = [name for name, _ in won.most_common() if name not in below[MOST_KEYS:]]
+    colors = _colors(named) | dict.fromkeys(below[MOST_KEYS:], REST)
     figure, axes = panels(1, len(far.QUANTITIES), height=3.6, sharex=True, sharey=True)
     for axis, (quantity, panel) in zip(axes[0], each.items(), strict=True):
         _panel(axis, panel, colors)
         axis.set(title=TITLES[quantity], xlabel="run length (nutations)")
     axes[0][0].set_ylabel("largest error allowed")
-    keys = [Patch(facecolor=color, label=name) for name, color in colors.items()]
+    keys = [Patch(facecolor=colors[name], label=name) for name in below[:MOST_KEYS]]
+    keys += [Patch(facecolor=REST, label="another method")] if below[MOST_KEYS:] else []
     keys.append(Patch(facecolor=UNREACHED, edgecolor="#BBBBBB", label="reached by no method"))
     figure.legend(handles=keys, loc="outside lower center", ncols=3, frameon=False)
     return figure
@@ -156,18 +163,22 @@ def _panel(axis: Any, panel: far.Diagram, painted: dict[str, str]) -> None:
     axis.set_yticks(range(-12, -1, 2), [f"$10^{{{k}}}$" for k in range(-12, -1, 2)])
 
 
-def _names(axis: Any, mine: Any, label: str, centres: tuple[Any, Any]) -> None:
-    """The name of a method in each of its regions that has room for it."""
+def _places(mine: Any, label: str) -> Iterator[tuple[int, int]]:
+    """The middle cell of each region of a method that has room for its name."""
     from scipy import ndimage  # takes 0.15 s, which a study with nothing to do need not
 
     regions, count = ndimage.label(mine)
     for place in range(1, count + 1):
         region = regions == place
-        room = ndimage.binary_erosion(region, np.ones((3, 2 * round(LETTER * len(label) / 2) + 1)))
-        if not room.any():
-            continue
-        places = np.argwhere(room)
-        t, h = places[np.argmin(((places - np.argwhere(region).mean(axis=0)) ** 2).sum(axis=1))]
+        places = np.argwhere(ndimage.binary_erosion(region, np.ones((3, 2 * round(LETTER * len(label) / 2) + 1))))
+        if places.size:
+            t, h = places[np.argmin(((places - np.argwhere(region).mean(axis=0)) ** 2).sum(axis=1))]
+            yield int(t), int(h)
+
+
+def _names(axis: Any, mine: Any, label: str, centres: tuple[Any, Any]) -> None:
+    """The name of a method in each of its regions that has room for it."""
+    for t, h in _places(mine, label):
         axis.text(
             centres[0][h], centres[1][t], label, ha="center", va="center", fontsize=LEAST_TEXT + 1, color="#111111",
             bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.9},

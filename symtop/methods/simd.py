@@ -8,13 +8,14 @@ the result does not hang on the processor.
 `Components` writes the same operations on four scalars each, to the same bits: inside a loop over many members LLVM
 makes vectors of the members, and a component that nobody reads is not computed.
 
-A kernel in plain Python steps two runs at once on tuples of `TWO`, two doubles in one register: +, - and * of such act
-on both, to the bits of each alone.
+A kernel in plain Python steps two runs at once on tuples of `two()`, two doubles in one register: +, - and * of such
+act on both, to the bits of each alone.
 
 `times` and `with_item` take a row that is an array, or a tuple, if it is short: LLVM unrolls a loop over a tuple up to
 about 16 elements and copies the tuple in each pass beyond.
 """
 
+import functools
 import operator
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -155,7 +156,7 @@ def _of_both(name: str) -> Any:
         def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
             return getattr(builder, name)(*(_paired(builder, one, one) for one in arguments))
 
-        return TWO(a, b), emit
+        return two()(a, b), emit
 
     return operation
 
@@ -168,36 +169,41 @@ class _Two(types.Type):  # type: ignore[misc]
         self.operations = tuple(map(_of_both, ("fadd", "fsub", "fmul")))
 
 
-TWO = _Two()
+@functools.cache
+def two() -> Any:
+    """The one `_Two`; a call, so that no kernel's hash hangs on the number that numba gives a type in this process."""
+    return _Two()
+
+
 register_model(_Two)(lambda manager, kind: models.PrimitiveModel(manager, kind, _PAIR))
 
 
 def _overload(operation: Any, emitted: Any) -> None:
     def chosen(a: Any, b: Any) -> Any:
-        return (lambda a, b: emitted(a, b)) if TWO in (a, b) else None  # noqa: PLW0108  (numba takes functions of Python)
+        return (lambda a, b: emitted(a, b)) if two() in (a, b) else None  # noqa: PLW0108  (numba takes functions of Python)
 
     overload(operation, jit_options=INLINED, strict=False)(chosen)
 
 
-for _operation, _emitted in zip((operator.add, operator.sub, operator.mul), TWO.operations, strict=True):
+for _operation, _emitted in zip((operator.add, operator.sub, operator.mul), two().operations, strict=True):
     _overload(_operation, _emitted)
-overload(operator.neg, jit_options=INLINED)(lambda a: (lambda a: -1.0 * a) if a is TWO else None)
+overload(operator.neg, jit_options=INLINED)(lambda a: (lambda a: -1.0 * a) if a is two() else None)
 
 
 @intrinsic
 def side_by_side(typing, first, second):  # type: ignore[no-untyped-def]
-    """A tuple of `TWO` of two tuples of doubles."""
+    """A tuple of `two()` of two tuples of doubles."""
 
     def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         numbers = zip(*(unpack_tuple(builder, one) for one in arguments), strict=True)
         return context.make_tuple(builder, signature.return_type, [_paired(builder, *two) for two in numbers])
 
-    return types.UniTuple(TWO, len(first))(first, second), emit
+    return types.UniTuple(two(), len(first))(first, second), emit
 
 
 @intrinsic
 def apart(typing, both):  # type: ignore[no-untyped-def]
-    """The two tuples of doubles that a tuple of `TWO` is made of."""
+    """The two tuples of doubles that a tuple of `two()` is made of."""
     one = types.UniTuple(types.float64, len(both))
 
     def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
@@ -219,7 +225,7 @@ def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
     def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         result, rows, numbers, step = arguments
         factors = [(j, builder.fmul(step, builder.extract_value(numbers, j))) for j in used]
-        as_place = _paired if place.dtype is TWO else lambda _, one, __: one
+        as_place = _paired if place.dtype is two() else lambda _, one, __: one
         for m in range(len(place)):
             total = builder.extract_value(result, m)
             for j, factor in factors:

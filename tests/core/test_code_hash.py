@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numba
 import pytest
+from numba import types
 
 import symtop
 from symtop.core import code_hash, files, jit
@@ -250,6 +251,18 @@ def test_the_walk_of_a_kernel_takes_less_than_a_loop_in_python_and_a_walk_of_fou
     turns = [(lambda: walk(1)), (lambda: sum(k * k for k in range(20_000))), (lambda: walk(4))]
     one, loop, four = map(min, zip(*([first_call(turn) for turn in turns] for _ in range(20)), strict=True))
     assert one < loop < four
+
+
+def test_no_method_hangs_on_how_many_types_numba_has_made():
+    """numba numbers its types by process; a hash with such a number would make every case stale in another one."""
+
+    class Kind(types.Type):
+        """The control: a type that is held by value."""
+
+    reached = jit.code().reached("methods", symtop.integrators())
+    assert any("symtop/methods/simd.py" in part.file for part in reached)
+    assert not any("'_code'" in part.values for part in reached)
+    assert any("'_code'" in part.values for part in jit.code().reached("kind", Kind("of a test")))
 
 
 def test_the_cache_keeps_what_was_used_last(tmp_path):
