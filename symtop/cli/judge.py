@@ -110,13 +110,16 @@ def _draw_beside(target: str, scene: str, file: str | None, quiet: bool, options
         from symtop.judging.adapters.adapter import integrator
         from symtop.judging.claims.subject import open_target
         from symtop.judging.comparison import compare, ranked
+        from symtop.model.charts import BODY
+        from symtop.model.scenes import scene as find_scene
         from symtop.report.plot import draw_compare
 
-        stepper = open_target(target, options["form"], options["chart"], adaptive=options["adaptive"])
-        if stepper.chart not in CHARTS:
+        on = find_scene(scene, bodies=True)
+        stepper = open_target(target, options["form"], options["chart"], on=on, adaptive=options["adaptive"])
+        if stepper.chart not in (*CHARTS, BODY):
             raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
         methods = [integrator(stepper, order=options["order"]), *BESIDE]
-        data = compare(scene, methods, cost="evaluations", nutations=NUTATIONS, budget=MOST_BESIDE, quiet=True)
+        data = compare(on, methods, cost="evaluations", nutations=NUTATIONS, budget=MOST_BESIDE, quiet=True)
         draw_compare(data, file)
     most, errors = ranked(data)
     if not quiet and errors:

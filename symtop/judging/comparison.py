@@ -43,9 +43,9 @@ def compare(
 
     `methods` are names, variants such as ``rk4[axis]`` or records; a method without a chart runs in the smallest one
     that shows the `quantity` (axis, attitude, theta, energy, p_phi or p_psi). A function, a class, ``FILE.py:NAME``, a
-    library or a command is a step in the chart of the axis, as `judge` takes it. Runs go to the `horizon`, the scene's
-    own by default, or over so many `nutations`. With the `cost` "evaluations" nothing is timed. `budget` is the most
-    force evaluations of a run, by default 3e6, for plain Python 5e4.
+    library or a command is a step in the chart of the axis, or of a body, as `judge` takes it. Runs go to the
+    `horizon`, the scene's own by default, or over so many `nutations`. With the `cost` "evaluations" nothing is timed.
+    `budget` is the most force evaluations of a run, by default 3e6, for plain Python 5e4.
 
     Dimensions ``variant``, ``setting`` (coarse to fine), ``target`` (1e-3, 1e-6, 1e-9, 1e-12). Variables: those of
     `sweep`, errors and work of every run, and
@@ -70,7 +70,7 @@ def compare(
     until = horizon if nutations is None else positive("nutations", nutations) * chosen.nutation_period
     end = chosen.horizon if until is None else horizon_of(until)
     most = None if budget is None else positive("budget", budget)
-    records = [find(one) for one in listed(methods)]
+    records = [find(one, chosen) for one in listed(methods)]
     variants = [one.variant(chart_of(one, chosen.observes, settings.observed(quantity))) for one in records]
     names = [one.name for one in variants]
     if not names or len(set(names)) < len(names):
@@ -122,13 +122,13 @@ def compare(
     )  # fmt: skip
 
 
-def find(method: Any) -> Integrator:
-    """A method by its name, its record, or as what `judge` takes: a step in the chart of the axis."""
+def find(method: Any, on: Scene) -> Integrator:
+    """A method by its name, its record, or as what `judge` takes: a step in the chart of the axis, or of a body."""
     if isinstance(method, Integrator):
         return method
     if isinstance(method, str) and not (set(method) & set("/ ") or ".py" in method):
         return find_integrator(method)
-    return adapted(open_target(method, None, "axis"))
+    return adapted(open_target(method, None, "axis", on=on))
 
 
 def _runs(
@@ -144,7 +144,8 @@ def _runs(
             rows[setting] = error_row_or_message(scene, method, setting, horizon, observe, limit)
             rows[setting]["setting_value"] = setting
         error, work = (float(rows[setting][name]) for name in (quantity, "force_evaluations"))
-        return error if math.isfinite(error) else math.inf, work if math.isfinite(work) else 0.0
+        steps = horizon / setting if method.fixed_step else 0.0  # a step costs time even where no force is evaluated
+        return error if math.isfinite(error) else math.inf, max(work, steps) if math.isfinite(work) else steps
 
     if method.control is None:
         error, _ = run(math.nan)

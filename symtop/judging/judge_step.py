@@ -47,7 +47,7 @@ from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import checked, completed, errors, refuse_other_scene, sampled
 from symtop.methods.framework.registry import ENERGY_ERRORS, Integrator
 from symtop.model.body import rotated
-from symtop.model.charts import BODY, CHARTS, body_energy, space_energy
+from symtop.model.charts import CHARTS, body_energy, space_energy
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.reference.truth import reference
 from symtop.run.trajectory import Trajectory
@@ -96,11 +96,11 @@ def judge(
     `chart` says what y is: "axis" (e, L), shape (6,); "attitude" (q, L), shape (7,); "angles" (theta, phi, psi and
     their rates), shape (6,), in radians and the units of the scene's top. A scene of a body without symmetry is for a
     trajectory and for the forms ode, with y = (q, M), M in body axes, rotation and scipy; of a step it shows the order,
-    the energy and the momentum. Claims that are not made are measured all
-    the same. `conserves` holds names such as "p_phi", "energy"; `energy` is "kept" or "bounded". The step runs in a
-    process of its own: one that hangs or crashes costs a verdict and says so. `quick` makes shorter runs. It is
-    also tried at starts, times and steps that are drawn at random; `seed`, which the findings name, draws the same
-    again. `autonomous` says that it was written for y' = f(y), whatever f is called with.
+    the energy and the momentum. Claims that are not made are measured all the same. `conserves` holds names such as
+    "p_phi", "energy"; `energy` is "kept" or "bounded". The step runs in a process of its own: one that hangs or crashes
+    costs a verdict and says so. `quick` makes shorter runs. On a top it is also tried at starts, times and steps that
+    are drawn at random; `seed`, which the findings name, draws the same again. `autonomous` says that it was written
+    for y' = f(y), whatever f is called with.
     `tell` is handed what is judged and then each finding, as they are made.
 
     Returns a `Ledger`: ``ledger["order"]`` is a finding, ``print(ledger)`` shows all of them,
@@ -129,20 +129,18 @@ def judge(
         for finding in findings:
             listen(finding)
         return Ledger(about.name, chosen.name, tuple(findings), {}, about)
-    if chosen.of_body:
-        if {symplectic, symmetric, explicit} != {None} or kept - {"energy"}:
-            words = "order and what becomes of energy and momentum; claim the rest on a top"
-            raise SymtopError(f"a step on {chosen.name}, a RigidBody, shows its {words}")
-        chart = BODY
+    if chosen.of_body and ({symplectic, symmetric, explicit} != {None} or kept - {"energy"}):
+        words = "order and what becomes of energy and momentum; claim the rest on a top"
+        raise SymtopError(f"a step on {chosen.name}, a RigidBody, shows its {words}")
     implied = {"time": not autonomous, "energy": energy is None and "energy" not in kept, "order": order is None}
     heartbeat.reset(quick=quick)
     began, findings = time.monotonic(), []
-    load = functools.partial(open_target, target, form, chart, adaptive=adaptive)
+    load = functools.partial(open_target, target, form, chart, on=chosen, adaptive=adaptive)
     with Process(lambda: table_of(load)) as process:
         process.allow(OPENING)
         try:
             stepper = Remote(process)
-            method = integrator(stepper, BODY if chosen.of_body else "", **claims)
+            method = integrator(stepper, **claims)
             seconds = seconds_a_step(stepper, chosen) if method.fixed_step else 0.0
         except SymtopError as error:
             raise SymtopError(f"it cannot be judged: {error}") if process.lost else error from None

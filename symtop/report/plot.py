@@ -139,7 +139,7 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
             options = line(variant) | ({"ls": LINES[number % len(LINES)]} if data.sizes["scene"] > 1 else {})
             label = titled(cell.assign_coords(variant=variant))
             label = label if data.sizes["scene"] == 1 else f"{label} on {scene}"
-            across, errors = cell[x].values, np.maximum(cell[quantity].values, SMALLEST)
+            across, errors = cell[x].where(cell[x] > 0).values, np.maximum(cell[quantity].values, SMALLEST)
             good = np.flatnonzero(np.isfinite(across) & np.isfinite(errors))
             good = good if compared else good[np.argsort(across[good])]  # which goes from coarse to fine, time or not
             ax.plot(across[good], errors[good], lw=1.4, label=label, **options)
@@ -147,7 +147,8 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
             ax.scatter(failed, np.full(failed.size, 0.985), 22.0, options["color"], marker="x", lw=1.0, **edge)
             last = good[np.argmin(errors[good])] if good.size else 0
             place = (across[last], errors[last]) if good.size else (np.nanmax(data[x].values, initial=1e-300), np.pi)
-            fails = failed_setting(cell).partition(",")[0]
+            none = "" if np.isfinite(across).any() else f"no {x.replace('_', ' ')}"
+            fails = failed_setting(cell).partition(",")[0] or none
             ends[f"{label}: {fails}" if fails else label] = (*map(float, place), options["color"])
     ax.set_ylim(bottom=0.1 * level)
     if compared:

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -77,3 +78,15 @@ def test_the_command_judges_on_a_body() -> None:
     done = call("claims", "strang", "--scene", "check-case-2", "--quick", "--json")
     findings = {one["claim"]: one["verdict"] for one in json.loads(done.stdout)}
     assert findings == {"order": "confirmed", "energy": "confirmed", "momentum": "confirmed"}
+
+
+def test_a_step_is_drawn_beside_methods_on_a_body(tmp_path: Path) -> None:
+    """As in `judge --figure`, and in `compare`, which both take it in the chart of a body."""
+    (tmp_path / "my.py").write_text("def step(q, w, h, inertia, torque):\n    return q, w\n", encoding="utf-8")
+    words = f"judge {tmp_path / 'my.py'} --form rotation --scene heavy-brick --quick --figure {tmp_path / 'a.png'}"
+    assert "my[body] none" in call(*words.split()).output  # it stands still and asks for no force
+    assert (tmp_path / "a.png").stat().st_size > 0
+    data = symtop.compare(HEAVY, [right.rk4, "rk4"], cost="evaluations", nutations=1.0, budget=4000, quiet=True)
+    assert data["variant"].values.tolist() == ["step[body]", "rk4[body]"]
+    one, other = (data["error"].sel(variant=name).min() for name in data["variant"].values)
+    assert one == pytest.approx(other, rel=0.5)

@@ -148,9 +148,9 @@ class AdapterSolver:
         return end
 
 
-def integrator(stepper: Stepper, chart: str = "", **claims: Any) -> Integrator:
-    """The record of a stepper with the claims that are made for it; `chart` is the one that it shows, if another."""
-    chart = chart or ("angles" if stepper.chart == "nutation" else stepper.chart)
+def integrator(stepper: Stepper, **claims: Any) -> Integrator:
+    """The record of a stepper with the claims that are made for it."""
+    chart = "angles" if stepper.chart == "nutation" else stepper.chart
     solvers = {chart: stepper.adaptive or AdapterSolver(stepper)}
     claims |= {"control": "tolerance" if stepper.adaptive else "step_size", "implementation": stepper.implementation}
     return Integrator(stepper.name, "other", "given through an adapter", solvers, **claims)

@@ -2,8 +2,8 @@
 
 *ode*, ``step(f, t, y, h) -> y`` for y' = f(t, y): y and what f returns are NumPy arrays of shape (6,), (e, L) on the
 axis or (theta, phi, psi and their rates) in angles, or (7,), (q, L) on the attitude, and on a body without symmetry
-(q, M) with the momentum in body axes (`symtop.methods.framework.body`). h may be negative. A step that
-changes its input in place, and returns it, works.
+(q, M) with the momentum in body axes (`symtop.methods.framework.body`). h may be negative. A step that changes its
+input in place, and returns it, works.
 
 *rotation*, ``step(q, w, h, inertia, torque) -> q, w`` for a rigid body, as engines integrate it, in the body frame:
 
@@ -240,10 +240,11 @@ MATRIX = ROTATION._replace(
 class RotationStep(FunctionStep):
     """A stepper around the function of a rigid body; the torques that it asks for are its force evaluations."""
 
-    chart, form = "attitude", ROTATION
+    form = ROTATION
 
-    def __init__(self, function: Callable[..., Any], name: str = "") -> None:
+    def __init__(self, function: Callable[..., Any], name: str = "", chart: str = "attitude") -> None:
         super().__init__(function, name)
+        self.chart = chart  # or `BODY`, of a body without symmetry
         self.of_matrix = ""  # what it raises if it is given one, until it has made a step
         probe = np.eye(3), np.array([0.1, 0.2, 0.3]), PROBE, np.array([1.0, 1.0, 0.5]), lambda _: np.zeros(3)
         try:

@@ -152,12 +152,9 @@ def on_body(subject: Subject) -> list[Finding]:
     fitted = measured_order(subject.method, scene, quick=subject.quick, finest=subject.finest, main="attitude")
     fit, verdict, why = fitted.main, order_verdict(claim, fitted.main), f"attitude {fitted.main} on {scene.name}"
     if not fitted.measured:
-        last = fitted.step_size <= 10.0 * np.min(fitted.step_size)
-        wrong, most = (
-            float(np.min(fitted.error[last])),
-            float(np.max(fitted.error[last])),
-        )  # NaN where a run ended early
-        if np.count_nonzero(last) >= FEWEST and wrong > max(STAYS * most, ABOVE * np.max(fitted.bound), TRUE_LIMIT):
+        error = fitted.error[fitted.step_size <= 10.0 * np.min(fitted.step_size)]
+        wrong = float(np.min(error))  # NaN, which is above nothing, where a run ended early
+        if error.size >= FEWEST and wrong > max(STAYS * np.max(error), ABOVE * np.max(fitted.bound), TRUE_LIMIT):
             why = f"however small its step, it goes to a motion that is wrong by {wrong:.1e} rad on {scene.name}"
             verdict = "measured" if claim is None else "refuted"
             return [Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)]

@@ -176,9 +176,14 @@ def declared(method: Integrator, claim: str) -> str:
     return yes_no(getattr(method, "order" if claim == "time" else claim, None))
 
 
-def open_target(target: Any, form: str | None, chart: str, *, adaptive: bool = False) -> Stepper:
-    """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else."""
-    one_of("chart", chart, (*CHARTS, BODY))
+def open_target(
+    target: Any, form: str | None, chart: str, *, on: Scene | None = None, adaptive: bool = False
+) -> Stepper:  # fmt: skip
+    """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else.
+
+    On the scene of a body without symmetry it steps the chart of bodies, whatever `chart` says.
+    """
+    chart = BODY if on is not None and on.of_body else one_of("chart", chart, CHARTS)
     path, _, symbol = str(target).partition(":")
     shared = isinstance(target, (str, Path)) and path.endswith(LIBRARIES)
     kind = one_of("form", ("shared" if shared else "ode") if form is None else form, FORMS)
@@ -212,7 +217,9 @@ def _python_step(thing: Any, name: str, chart: str, kind: str, *, adaptive: bool
         return BatchStep(thing, chart, kind, name)
     if kind == "ode":
         return PythonStep(thing, chart, name)
-    return RotationStep(thing, name) if kind == "rotation" else SeparableStep(thing, name)
+    if kind == "rotation":
+        return RotationStep(thing, name, BODY if chart == BODY else "attitude")
+    return SeparableStep(thing, name)
 
 
 def _thing(target: Any) -> tuple[Any, str]:

@@ -101,7 +101,7 @@ class Loop:
     blocks: Callable[..., Blocks]
     plain: Callable[[], "Loop"]  # the same kernel with sums that are not compensated
 
-    @cached_property  # (few processes need them, and all parts of a hundred loops would be hashed in each: 1 s)
+    @cached_property  # few processes need it, and each would hash the parts of a hundred loops
     def prepare(self) -> Callable[..., Any]:
         """The state as the kernel steps it and its carry, of (par, rule, state, h)."""
         return compile_kernel(self.parts[0])  # type: ignore[no-any-return]
