@@ -174,8 +174,9 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "times": count, "loud": loud, "noisy": NOISY, "usual_spread": every["spread"].median(),
         "samples": SAMPLES, "near": LEAST, "near_share": (every["axis"] >= LEAST * every["target"]).mean(),
     }  # fmt: skip
-    bars = waterfall(part, call_first=True)
-    answers |= {f"first_{factor}": bars["times faster"][bars["factor"] == factor].max() for factor in FACTORS}
+    for name, call_first in (("late", False), ("first", True)):
+        bars = waterfall(part, call_first=call_first)
+        answers |= {f"{name}_{factor}": bars["times faster"][bars["factor"] == factor].max() for factor in FACTORS}
     answers |= _ends(part, bars)
     for name, column in (("user", "times, as called"), ("author", "times, kernels")):
         answers |= {f"{name}_least": beside[column].min(), f"{name}_most": beside[column].max()}
