@@ -396,9 +396,8 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
         end = sentence(expected.outcome, expected.reached, plan.horizon, second)
         return Trouble(f"expect the run to be {end}")
     if method.adaptive:
-        advice = (
-            f"try tolerance {max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance):.1g}"
-        )
+        tolerance = max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance)
+        advice = f"try tolerance {tolerance:.1g}"
         if expected.unstable >= expected.axis_error:
             return Trouble(f"{size}: the motion is unstable, and a change of its start grows large; {advice}")
         return Trouble(f"{size}: errors add up over {plan.horizon / marks.period:.3g} {period}s; {advice}")

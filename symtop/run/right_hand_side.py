@@ -106,11 +106,8 @@ def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
     """The solution by DOP853, a function of the time, and how long it is."""
     from scipy.integrate import DOP853, OdeSolution  # 0.2 s
 
-    solver, times, parts = (
-        DOP853(_finite(f), t, y, t + end, rtol=FINE, atol=FINE * float(np.abs(y).max())),
-        [t],
-        list[Any](),
-    )
+    solver = DOP853(_finite(f), t, y, t + end, rtol=FINE, atol=FINE * float(np.abs(y).max()))
+    times, parts = [t], list[Any]()
     while solver.status == "running" and len(parts) < WATCHED and solver.step() is None:
         times.append(solver.t)
         parts.append(solver.dense_output())
@@ -163,10 +160,8 @@ def _outlook(
         why = f"f has rates of {fastest:.1g}, the motion of {frequency:.1g}; take an implicit method, such as radau"
     elif ended or np.linalg.norm(run_piece(moved)[1] - states, axis=1).max() > OWN * since**2 * MOVED * extent:
         better = min(better, 0.3 * setting)
-        cause, why = (
-            "instability",
-            f"it multiplies a small change more than the motion does; try a {kind} of {better:.1g}",
-        )
+        cause = "instability"
+        why = f"it multiplies a small change more than the motion does; try a {kind} of {better:.1g}"
     elif total > UNSTABLE * growth.at(0.5 * end):
         lost = total * EPSILON * extent > accuracy
         cause, better = "instability", math.nan if lost else better
@@ -175,6 +170,5 @@ def _outlook(
         )
     elif float(error.max()) < 10.0 * FINE * float(np.abs(true).max()):
         cause, better, why = "rounding", math.nan, f"rounding adds up, and no {kind} helps"
-    return Outlook(
-        expected, better, cause, total, f"{method}: expect an error of {expected:.1g} by t = {t + end:.4g}: {why}"
-    )
+    sentence = f"{method}: expect an error of {expected:.1g} by t = {t + end:.4g}: {why}"
+    return Outlook(expected, better, cause, total, sentence)

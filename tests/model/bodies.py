@@ -89,10 +89,8 @@ class PreciseBody:
         a, self.b, self.gamma = alpha / gamma, beta / gamma, gamma
         self.A1, self.A3 = mp.sqrt(m1**2 + self.b * m2**2), mp.sqrt(m3**2 + a * m2**2)
         self.A2, self.nu = self.s * self.A1 / mp.sqrt(self.b), a / self.b
-        self.k2, k1 = (
-            self.nu * (self.A1 / self.A3) ** 2,
-            self.s * gap * rates[0] * rates[1] * rates[2] / (beta * self.A3**2),
-        )
+        self.k2 = self.nu * (self.A1 / self.A3) ** 2
+        k1 = self.s * gap * rates[0] * rates[1] * rates[2] / (beta * self.A3**2)
         self.kc = mp.sqrt(k1)
         self.rate = mp.sqrt(beta * gamma) * self.A3
         self.K = mp.pi / (2 * mp.agm(1, self.kc)) if k1 else None

@@ -183,11 +183,8 @@ def test_many_samples_are_worth_compiling(monkeypatch):
 def test_the_exact_separatrix_climbs_for_ever(rate):
     """theta = 4 atan tanh(g t/2), g = sqrt(abs(mgl)/I1), in double and in 40 digits; a pole is passed at time 0."""
     top, start = SymmetricTop(4.0, 2.5, -4.0), Angles(0.0, 0.3, 0.2, rate, 0.7, -0.7)
-    form, precise, times = (
-        ClosedForm(top, start),
-        PreciseForm(top, start),
-        np.array([-30.0, -1.0, 0.0, 1e-9, 0.5, 3.0, 40.0]),
-    )
+    form, precise = ClosedForm(top, start), PreciseForm(top, start)
+    times = np.array([-30.0, -1.0, 0.0, 1e-9, 0.5, 3.0, 40.0])
     motion, axis = form(times), form.axis(times)
     assert precise.climbs
     assert form.nutation_period == precise.nutation_period == math.inf

@@ -266,11 +266,8 @@ def test_a_body_of_ones_own_on_the_command_line() -> None:
     stored = json.loads(call("scenes", "body", "--json", *options).stdout)[0]
     assert stored["top"]["centre"] == list(body.centre)
     assert float(stored["nutation period"]) == pytest.approx(body.nutation_period(at), rel=1e-5)
-    ran = ["run", "body", "rk4", "--step-size", "0.05", "--horizon", "20", "--json"]
-    own, named = (
-        json.loads(call(*words, *more).stdout)
-        for words, more in ((ran, options), ([*ran[:1], "heavy-brick", *ran[2:]], []))
-    )
+    run = ["rk4", "--step-size", "0.05", "--horizon", "20", "--json"]
+    own, named = (json.loads(call("run", *words).stdout) for words in (["body", *run, *options], ["heavy-brick", *run]))
     assert own["errors"] == named["errors"]
 
 

@@ -149,9 +149,7 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
         positions.append(at.k)
         return at, rows
 
-    monkeypatch.setattr(
-        longrun._Checkpoint, "resumed", noting
-    )  # the loop itself is part of what a checkpoint is told by
+    monkeypatch.setattr(longrun._Checkpoint, "resumed", noting)  # a checkpoint holds a hash of the loop itself
     resumed = long_run(SCENE, "midpoint", steps=steps, step_size=H, checkpoint=file, quiet=True)
     assert reached in positions  # it did go on from there
     assert not file.exists()

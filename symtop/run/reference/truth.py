@@ -218,7 +218,8 @@ def _by_integration(scene: Scene, times: Array, precision: str) -> tuple[xr.Data
     if distinct.size > MOST_CACHED:
         data = _integration(scene, distinct, precision)
     else:
-        data = cached(_cache_path(scene, distinct, precision), lambda: _integration(scene, distinct, precision), 5)
+        path = place(_integration, scene.top, scene.start, precision, CHECKS, DIGITS, SAFETY, data=distinct.tobytes())
+        data = cached(path, lambda: _integration(scene, distinct, precision), 5)
     if not np.array_equal(times, distinct):
         data = data.isel(time=order)
     words = {
@@ -242,10 +243,6 @@ def conditioned(scene: Scene, horizon: float) -> str:
         known = "nothing is known of the axis but from these very doubles"
         return f"at least {change}; {anew} {factor * EPSILON:.2g} rad or more: {known}"
     return f"{change}; {anew} {factor * EPSILON:.1g} rad" if factor > ILL else change
-
-
-def _cache_path(scene: Scene, times: Array, precision: str) -> Path:
-    return place(_integration, scene.top, scene.start, precision, CHECKS, DIGITS, SAFETY, data=times.tobytes())
 
 
 def _dataset(scene: Scene, times: Array, columns: dict[str, Array], bounds: dict[str, Array]) -> xr.Dataset:
