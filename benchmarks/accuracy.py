@@ -24,7 +24,7 @@ from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.exact.digits import PreciseForm, precise_constants
 from symtop.model.top import Angles, SymmetricTop, flat
 
-DIGITS, SEED, EACH = 50, 25, 385
+DIGITS, SEED, EACH, PIECE = 50, 25, 385, 11
 NUTATIONS = (1.0371, 1000.37, 1000000.37)
 QUANTITIES = ("theta", "phi", "psi", "axis")  # rad; of phi and psi what exceeds the last digit
 CONSTANTS = (
@@ -121,11 +121,11 @@ def examine(kind: str, count: int, first: int) -> Examined:
     return Examined(motion, constants, arithmetic, broken)
 
 
-def _pieces(each: int, piece: int = 11) -> Iterator[tuple[str, int, int]]:
+def _pieces(each: int) -> Iterator[tuple[str, int, int]]:
     """The work in pieces of a second: family, count, number of the first."""
-    for first in range(0, each, piece):
+    for first in range(0, each, PIECE):
         for kind in REGIMES:
-            yield kind, min(piece, each - first), first
+            yield kind, min(PIECE, each - first), first
 
 
 def measure(each: int = EACH, jobs: int = 2, *, said: bool = False) -> Examined:

@@ -49,7 +49,7 @@ def attitude_error(precise: PreciseForm, state: np.ndarray, h: float, steps: int
     return float(charts.attitude_distance(state[:4], truth))
 
 
-def of_scenes(nutations: tuple[int, ...] = NUTATIONS) -> Iterator[str]:
+def of_scenes() -> Iterator[str]:
     """A line for each scene and step."""
     method = symtop.integrator(METHOD)
     for name, scene in symtop.scenes().items():
@@ -58,7 +58,7 @@ def of_scenes(nutations: tuple[int, ...] = NUTATIONS) -> Iterator[str]:
         precise = PreciseForm(scene.top, scene.start, digits=DIGITS)
         for steps in STEPS:
             h = scene.nutation_period / steps
-            marks = [round(count * steps) or 1 for count in nutations]
+            marks = [round(count * steps) or 1 for count in NUTATIONS]
             states = method.solvers["attitude"](scene.top, scene.start, Plan.steps(h, marks)).states
             errors = (attitude_error(precise, state, h, mark) for state, mark in zip(states, marks, strict=True))
             yield f"{name:<22}{steps:7.2f} steps a nutation" + "".join(f"{error:10.0e}" for error in errors)
@@ -143,14 +143,14 @@ def constants_of(steps: float, marks: np.ndarray, loop: Loop | None = None) -> n
     return np.array(kept) - 1.0
 
 
-def walkers(marks: np.ndarray, loop: Loop | None = None, count: int = WALKERS) -> np.ndarray:
-    """`constants_of` for steps a little apart, shape (count, 4, marks)."""
-    return np.array([constants_of(WALK_STEPS + k * math.pi / 1e4, marks, loop) for k in range(count)])
+def walkers(marks: np.ndarray, loop: Loop | None = None) -> np.ndarray:
+    """`constants_of` for steps a little apart, shape (`WALKERS`, 4, marks)."""
+    return np.array([constants_of(WALK_STEPS + k * math.pi / 1e4, marks, loop) for k in range(WALKERS)])
 
 
-def of_constants(most: int = WALK) -> Iterator[str]:
+def of_constants() -> Iterator[str]:
     """rms errors of the constants of all walkers, and their mean over its standard error: beyond 3 it is a drift."""
-    for words, steps, loop in (("sums of two doubles", most, None), ("sums of one", most // 100, forgetful())):
+    for words, steps, loop in (("sums of two doubles", WALK, None), ("sums of one", WALK // 100, forgetful())):
         marks = np.unique(np.geomspace(steps / 1e4, steps, 9).astype(np.int64))
         errors = walkers(marks, loop)
         spread, mean = np.sqrt((errors**2).mean(axis=0)), errors.mean(axis=0)

@@ -182,10 +182,10 @@ def winner(data: xr.DataTree, family: str, target: float, needs: str = ANY, span
 
 
 @of_one_dataset
-def transferred(data: xr.DataTree, family: str, target: float, needs: str = ANY, span: str = "short") -> Interval:
+def transferred(data: xr.DataTree, family: str, target: float, needs: str = ANY) -> Interval:
     """The cost of the winner at epsilon = 0 over the least of its class on each body: median, and of 95 % the ends."""
-    best = winner(data, SYMMETRIC, target, needs, span)
-    table = costs(data, family, target, span=span)
+    best = winner(data, SYMMETRIC, target, needs)
+    table = costs(data, family, target)
     rows, bodies = of_class(table, needs), judged_bodies(table)
     if best is None or not bodies.size:
         return Interval(*(float("nan"),) * 3)

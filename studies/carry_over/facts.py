@@ -77,9 +77,9 @@ def first_steps(data: xr.DataTree, family: str) -> float:
     return max((factors[name] for name, factors in each if name in factors), default=math.nan)
 
 
-def silent_share(data: xr.DataTree, family: str, stratum: str = "") -> float:
+def silent_share(data: xr.DataTree, family: str) -> float:
     """Mean share over methods of runs that are wrong without a sign."""
-    shares = by.silent_shares(data, family, stratum)
+    shares = by.silent_shares(data, family)
     return float(np.nanmean(shares)) if np.isfinite(shares).any() else math.nan
 
 

@@ -48,25 +48,25 @@ def by_kind(entries: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """How many claims have each verdict, how many lies are caught, and how many steps the long runs have."""
     data, false = parts(data)
-    told = caught(false)
+    refuted = caught(false)
     entries, bodies = by_kind(ledger(data))
     count, on_body = Counter(entries["verdict"]), Counter(bodies["verdict"])
-    made = data["steps_run"].sel(scene=SCENE).to_series()
-    made = made[made > 0].astype(int)
+    steps = data["steps_run"].sel(scene=SCENE).to_series()
+    steps = steps[steps > 0].astype(int)
     undecided = Counter(entries["claim"][entries["verdict"] == "undecided"].map(claim_name))
     ((open_claim, open_most),) = undecided.most_common(1) or [(None, None)]
-    ((usual, usual_runs),) = Counter(made).most_common(1) or [(None, None)]
+    ((usual, usual_runs),) = Counter(steps).most_common(1) or [(None, None)]
     return {
         "integrators": entries["integrator"].nunique() or None,
         "scene": SCENE,
         "declared": count["confirmed"] + count["refuted"] or None,  # and judged
         "held": count["confirmed"],
         **{word: count[word] for word in ("refuted", "undecided")},
-        "planted": len(told) or None,  # integrators that make a false claim
-        "caught": int(told.sum()),
+        "planted": len(refuted) or None,  # integrators that make a false claim
+        "caught": int(refuted.sum()),
         "open_claim": open_claim,  # that most of the undecided findings are on
         "open_most": open_most,
-        "runs": len(made) or None,
+        "runs": len(steps) or None,
         "usual": usual,  # steps of a long run
         "usual_runs": usual_runs,
         "free": FREE,

@@ -43,7 +43,7 @@ def pictures(data: xr.Dataset) -> Iterator[Picture]:
         yield draw_ledger(entries, caught(false))
 
 
-def draw_ledger(entries: pd.DataFrame, told: pd.Series) -> Picture:
+def draw_ledger(entries: pd.DataFrame, lies: pd.Series) -> Picture:
     """One row a claim, one column a family of methods: how many of its methods have each verdict.
 
     The last column has the planted false claims, and how many of them are refuted.
@@ -56,28 +56,28 @@ def draw_ledger(entries: pd.DataFrame, told: pd.Series) -> Picture:
     for column, family in enumerate(names):
         for line, claim in enumerate(CLAIMS):
             count = counts[family].get(claim, pd.Series(dtype=int))
-            left, there = column - 0.5, [word for word in FIRST if word in count]
-            for word in there:  # as wide as its share of the methods
+            left, words = column - 0.5, [word for word in FIRST if word in count]
+            for word in words:  # as wide as its share of the methods
                 width = count[word] / count.sum()
                 axis.add_patch(Rectangle((left, line - 0.5), width, 1.0, facecolor=COLORS[word], lw=0.0))
                 left += width
             axis.add_patch(Rectangle((column - 0.5, line - 0.5), 1.0, 1.0, fill=False, edgecolor="white", lw=1.5))
             axis.text(
-                column, line, " ".join(f"{count[word]}{SYMBOLS[word]}" for word in there), ha="center", va="center",
-                fontsize=style.LEAST_TEXT, fontweight="bold" if "refuted" in there else "normal",
+                column, line, " ".join(f"{count[word]}{SYMBOLS[word]}" for word in words), ha="center", va="center",
+                fontsize=style.LEAST_TEXT, fontweight="bold" if "refuted" in words else "normal",
             )  # fmt: skip
     right = len(names) + 0.25
-    for claim, refuted in told.groupby(told.index.map(LIES)):
+    for claim, refuted in lies.groupby(lies.index.map(LIES)):
         line, color = CLAIMS.index(claim), CAUGHT if refuted.all() else COLORS["refuted"]
         axis.add_patch(Rectangle((right - 0.5, line - 0.5), 1.0, 1.0, facecolor=color, edgecolor="white", lw=1.5))
         axis.text(
             right, line, f"{refuted.sum()} of {len(refuted)}", ha="center", va="center", fontsize=style.LEAST_TEXT
         )
-    axis.set(xlim=(-0.5, (right if len(told) else len(names) - 1) + 0.5), ylim=(len(CLAIMS) - 0.5, -0.5))
+    axis.set(xlim=(-0.5, (right if len(lies) else len(names) - 1) + 0.5), ylim=(len(CLAIMS) - 0.5, -0.5))
     axis.set_yticks(range(len(CLAIMS)), [ROWS.get(claim, claim_name(claim)) for claim in CLAIMS])
     heads = [f"{TITLES.get(name, name)}\n({sizes[name]})".replace("-", "\n") for name in names]
-    places = [*range(len(names)), right] if len(told) else range(len(names))
-    heads += ["false claims,\nplanted:\ncaught"][: len(told)]
+    places = [*range(len(names)), right] if len(lies) else range(len(names))
+    heads += ["false claims,\nplanted:\ncaught"][: len(lies)]
     axis.set_xticks(places, heads)
     axis.tick_params(length=0, bottom=False, labelbottom=False, labeltop=True)
     axis.grid(visible=False)

@@ -90,61 +90,65 @@ def chosen(data: xr.DataTree, horizon: str, tops: str) -> NDArray[np.bool_]:
     return np.isin(kinds_of(data, horizon), [KINDS.index(kind) for kind in POPULATIONS.get(tops, (tops,))])
 
 
-def of_class(needs: str, general: bool, wanted: str) -> bool:
+def on_tops(values: xr.DataArray, mask: NDArray[np.bool_]) -> Array:
+    """Values (variants, tops) of a horizon on some of its tops."""
+    return np.asarray(values.transpose("variant", "member").values[:, : mask.size][:, mask])
+
+
+def of_class(needs: str, general: bool, name: str) -> bool:
     """Does a method with these traits take part in the contests of a class?"""
-    return needs == wanted or (wanted == GENERAL and general and needs != "")
+    return needs == name or (name == GENERAL and general and needs != "")
 
 
 @of_one_dataset
 def costs(data: xr.DataTree, cell: Cell, unit: str = SECONDS) -> Costs:
-    """Costs of the variants of a class that show a cell's quantity, on the tops that are asked."""
+    """Costs of the variants of a class that show a cell's quantity, on the tops of the cell."""
     group = data[cell.horizon].to_dataset()[["cost", "met_at", "needs", "general", "control"]].isel(scene=0)
     traits = zip(group["needs"].values, group["general"].values > 0.0, strict=True)
-    part = [of_class(str(needs), bool(general), cell.needs) for needs, general in traits]
-    asked = group.sel(quantity=cell.quantity, target=cell.target).isel(variant=np.flatnonzero(part))
-    among = chosen(data, cell.horizon, cell.tops)
-    values = asked["cost"].transpose("variant", "member").values[:, : among.size][:, among].astype(float)
+    rows_of_class = [of_class(str(needs), bool(general), cell.needs) for needs, general in traits]
+    part = group.sel(quantity=cell.quantity, target=cell.target).isel(variant=np.flatnonzero(rows_of_class))
+    mask = chosen(data, cell.horizon, cell.tops)
+    values = on_tops(part["cost"], mask).astype(float)
     rows, tops = ~np.isnan(values).all(axis=1), ~np.isnan(values).all(axis=0)
-    names = [str(name) for name in asked["variant"].values[rows]]
+    names = [str(name) for name in part["variant"].values[rows]]
     values = np.where(np.isnan(values), np.inf, values)[np.ix_(rows, tops)]
     if unit == EVALUATIONS:
         return Costs(names, values, np.zeros(len(names)))
-    met = asked["met_at"].transpose("variant", "member").values[:, : among.size][:, among][np.ix_(rows, tops)]
-    fixed = asked["control"].values[rows] == "step_size"
-    known = prices(data)
+    met = on_tops(part["met_at"], mask)[np.ix_(rows, tops)]
+    fixed = part["control"].values[rows] == "step_size"
+    tariff = prices(data)
     for row, name in enumerate(names):
-        price, call = known.at(name, np.full(met.shape[1], np.nan) if fixed[row] else met[row])
+        price, call = tariff.at(name, np.full(met.shape[1], np.nan) if fixed[row] else met[row])
         values[row] = values[row] * price + call
-    return Costs(names, values, known.error[[known.names.index(name) for name in names]])
+    return Costs(names, values, tariff.error[[tariff.names.index(name) for name in names]])
 
 
 @of_one_dataset
-def contest(data: xr.DataTree, cell: Cell, unit: str = SECONDS) -> Contest:
+def contest(data: xr.DataTree, cell: Cell) -> Contest:
     """The contest of a cell in hindsight."""
-    taken = costs(data, cell, unit)
-    return hindsight(taken.names, taken.values, taken.errors, prices(data).marked if unit == SECONDS else ())
+    return hindsight(*costs(data, cell), prices(data).marked)
 
 
 @of_one_dataset
 def safest(data: xr.DataTree, cell: Cell, keeping: bool = False) -> tuple[list[Safe], bool]:
     """The safe choices of a cell, cheapest first, and whether the lead is called; `keeping` energy and momenta."""
     group = data[cell.horizon].to_dataset().isel(scene=0)
-    among, known = chosen(data, cell.horizon, cell.tops), prices(data)
+    mask, tariff = chosen(data, cell.horizon, cell.tops), prices(data)
     wide = asked_tops(data, cell)
-    weights = np.array([float(wide[kinds_of(data, cell.horizon)[among] == place].sum()) for place in range(len(KINDS))])
+    weights = np.array([float(wide[kinds_of(data, cell.horizon)[mask] == place].sum()) for place in range(len(KINDS))])
     ladders = []
     for name in costs(data, cell).names:
         if keeping and not (integrator(name).conserves or frozenset()) >= {"energy", "p_phi", "p_psi"}:
             continue
         one = group.sel(variant=name)
-        met = one["met_at"].sel(quantity=cell.quantity, target=cell.target).values[: among.size].astype(float)
+        met = one["met_at"].sel(quantity=cell.quantity, target=cell.target).values[: mask.size].astype(float)
         settings, fixed = one["setting"].values, str(one["control"].values) == "step_size"
-        price, call = known.at(name, np.full(settings.size, np.nan) if fixed else settings)
+        price, call = tariff.at(name, np.full(settings.size, np.nan) if fixed else settings)
         work = one["work"].transpose("level", "kind").values
         work = (np.where(weights > 0.0, work, 0.0) * weights).sum(axis=1) / max(weights.sum(), 1.0)
-        error = float(known.error[known.names.index(name)])
-        ladders.append(Ladder(name, met[among][wide], settings, work * price + call, fixed, error))
-    return safe(ladders, known.marked)
+        error = float(tariff.error[tariff.names.index(name)])
+        ladders.append(Ladder(name, met[mask][wide], settings, work * price + call, fixed, error))
+    return safe(ladders, tariff.marked)
 
 
 def reached(data: xr.DataTree, target: float) -> dict[str, Safe]:
@@ -155,17 +159,16 @@ def reached(data: xr.DataTree, target: float) -> dict[str, Safe]:
 
 def fewest(data: xr.DataTree, cell: Cell) -> str | None:
     """The variant of a cell that needs the fewest force evaluations on the median top."""
-    taken = costs(data, cell, EVALUATIONS)
-    middle = np.median(taken.values, axis=1) if taken.values.size else np.full(1, np.inf)
-    return taken.names[int(np.argmin(middle))] if np.isfinite(middle.min()) else None
+    table = costs(data, cell, EVALUATIONS)
+    middle = np.median(table.values, axis=1) if table.values.size else np.full(1, np.inf)
+    return table.names[int(np.argmin(middle))] if np.isfinite(middle.min()) else None
 
 
 def asked_tops(data: xr.DataTree, cell: Cell) -> NDArray[np.bool_]:
     """Which tops of a cell are asked: those of whose variants some was."""
     group = data[cell.horizon].to_dataset()["cost"].isel(scene=0).sel(quantity=cell.quantity, target=cell.target)
-    among = chosen(data, cell.horizon, cell.tops)
-    values = group.transpose("variant", "member").values[:, : among.size][:, among]
-    return np.asarray(~np.isnan(values).all(axis=0))
+    mask = chosen(data, cell.horizon, cell.tops)
+    return np.asarray(~np.isnan(on_tops(group, mask)).all(axis=0))
 
 
 def contenders(data: xr.DataTree) -> list[str]:
@@ -180,13 +183,13 @@ def contenders(data: xr.DataTree) -> list[str]:
         for target in targets(data):
             for tops in POPULATIONS:
                 for needs in CLASSES[:-1] if quantity == "axis" else (GENERAL,):
-                    taken = costs(data, Cell("short", quantity, target, tops, needs))
-                    best = taken.values.min(axis=0, initial=np.inf)
-                    alone = (quantity == "attitude") & (chart.sel(variant=taken.names).values == "attitude")
+                    table = costs(data, Cell("short", quantity, target, tops, needs))
+                    best = table.values.min(axis=0, initial=np.inf)
+                    alone = (quantity == "attitude") & (chart.sel(variant=table.names).values == "attitude")
                     most = np.where(alone, CLOSER, WITHIN)[:, np.newaxis] * best
-                    near = (taken.values <= most) & np.isfinite(taken.values)
+                    near = (table.values <= most) & np.isfinite(table.values)
                     enough = near.sum(axis=1) > OFTEN * max(best.size, 1)
-                    names |= {name for name, one in zip(taken.names, enough, strict=True) if one}
+                    names |= {name for name, one in zip(table.names, enough, strict=True) if one}
     return [str(name) for name in data["short"]["variant"].values if str(name) in names]
 
 
@@ -237,10 +240,10 @@ class Health(NamedTuple):
 def health(data: xr.DataTree, name: str) -> Health:
     """Wrong runs, silent failures and tops that were dropped."""
     group = data["short"].to_dataset().isel(scene=0).sel(variant=name)
-    there = np.isfinite(group["setting"].values)
+    levels = np.isfinite(group["setting"].values)
     drawn = group["drawn"].values
-    runs, wrong, silent = (group[key].transpose("level", "kind").values[there] for key in ("runs", "wrong", "silent"))
-    return Health(group["setting"].values[there], drawn, wrong, silent,
+    runs, wrong, silent = (group[key].transpose("level", "kind").values[levels] for key in ("runs", "wrong", "silent"))
+    return Health(group["setting"].values[levels], drawn, wrong, silent,
                   drawn - runs)  # fmt: skip
 
 

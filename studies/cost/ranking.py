@@ -55,10 +55,10 @@ def cost_to_reach(work: Array, errors: Array, targets: Sequence[float]) -> Array
     return costs
 
 
-def wins(costs: Array, tie: float = TIE) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def wins(costs: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Of costs (variants, n): where a variant wins beyond ties, and where it is level with the cheapest or wins."""
     with np.errstate(invalid="ignore"):
-        level = costs < tie * np.min(costs, axis=0, initial=np.inf)
+        level = costs < TIE * np.min(costs, axis=0, initial=np.inf)
     return level & (level.sum(axis=0) == 1), level
 
 

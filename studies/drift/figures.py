@@ -58,8 +58,8 @@ def _residuals(histories: xr.Dataset) -> Picture:
     for axis in axes[-1]:
         axis.set_xlabel("time (s)")
     few_ticks(*axes.flat)
-    told = "markers: the largest in a span of time\ndots: single samples"  # where every panel of p_phi is empty
-    axes[1, 0].text(0.98, 0.45, told, transform=axes[1, 0].transAxes, ha="right", va="center", **NOTE)
+    note = "markers: the largest in a span of time\ndots: single samples"  # where every panel of p_phi is empty
+    axes[1, 0].text(0.98, 0.45, note, transform=axes[1, 0].transAxes, ha="right", va="center", **NOTE)
     legend_below(figure, axes)
     return Picture("residuals", figure)
 

@@ -28,7 +28,7 @@ STEPS_A_NUTATION = 118.02  # of every discrete method; no whole number, so that 
 MIDPOINT = "midpoint[angles]"
 MODIFIED = (MIDPOINT, "stormer-verlet[angles]")  # variants whose modified energy is stored
 ALPHA = 1.6  # of the second scene, as the notebook prints it
-SAMPLES = 301
+SAMPLES, PATH_SAMPLES = 301, 1201
 
 
 def discrete_methods() -> list[str]:
@@ -38,13 +38,13 @@ def discrete_methods() -> list[str]:
     ]
 
 
-def residual_history(scene: Scene, name: str, setting: float, samples: int = SAMPLES) -> xr.Dataset:
+def residual_history(scene: Scene, name: str, setting: float) -> xr.Dataset:
     """Energy, momenta and their relative residuals of one integrator over the scene's horizon; dimension ``sample``.
 
     `setting` is a step size in seconds or a tolerance, whichever the integrator takes.
     """
     control = integrator(name).given(setting)
-    run = integrate(scene, name, observe="nutation", samples=samples, **control)
+    run = integrate(scene, name, observe="nutation", samples=SAMPLES, **control)
     columns: dict[str, Any] = {"outcome": run.outcome, "sample_time": ("sample", run.time)}
     for constant, values in residuals(scene, run).items():
         columns[constant] = ("sample", getattr(run, constant))
@@ -53,9 +53,9 @@ def residual_history(scene: Scene, name: str, setting: float, samples: int = SAM
     return xr.Dataset(columns)
 
 
-def notebook_path(scene: Scene, samples: int = 1201) -> xr.Dataset:
+def notebook_path(scene: Scene) -> xr.Dataset:
     """theta, theta' and phi by the notebook's solver on its six variables, and the truth; dimension ``path``."""
-    times = np.linspace(0.0, scene.horizon, samples)
+    times = np.linspace(0.0, scene.horizon, PATH_SAMPLES)
     hard = integrated(hard_way(scene), six_variables(scene), times, "LSODA", SOLVER_TOLERANCE)
     truth = closed_form(scene)(times)
     solver = {"hard_theta": hard[1], "hard_phi": hard[0], "hard_theta_dot": hard[4]}
@@ -64,9 +64,9 @@ def notebook_path(scene: Scene, samples: int = 1201) -> xr.Dataset:
     return xr.Dataset({name: ("path", values) for name, values in columns.items()})
 
 
-def both_derivations(scene: Scene, samples: int = SAMPLES) -> xr.Dataset:
+def both_derivations(scene: Scene) -> xr.Dataset:
     """The two derivations integrated at 1e-13, their distance, and the two energies; dimension ``both``."""
-    times, six = np.linspace(0.0, scene.horizon, samples), six_variables(scene)
+    times, six = np.linspace(0.0, scene.horizon, SAMPLES), six_variables(scene)
     hard = integrated(hard_way(scene), six, times, "DOP853", 1e-13)
     easy = integrated(easy_way(scene), (*six[:3], six[4]), times, "DOP853", 1e-13)
     truth = closed_form(scene)(times)

@@ -21,9 +21,9 @@ def shown(data: xr.Dataset) -> xr.Dataset:
     return data.sel(scene=SHOWN if SHOWN in data["scene"].values else data["scene"].values[0]).isel(nutations=0)
 
 
-def cost(cell: xr.Dataset, target: float, unit: str = "seconds", quantity: str = "axis") -> float:
-    """The least cost of a run of a variant whose error is at most the target, between settings as a power; or inf."""
-    error, paid = cell[quantity].values, cell[unit].values
+def cost(cell: xr.Dataset, target: float, unit: str = "seconds") -> float:
+    """The least cost of a run whose axis error is at most the target, between settings as a power; or inf."""
+    error, paid = cell["axis"].values, cell[unit].values
     good = np.isfinite(error) & np.isfinite(paid) & (error > 0.0)
     error, paid = np.log(error[good]), np.log(paid[good])
     answers = [math.inf]

@@ -105,13 +105,13 @@ class Horizon(NamedTuple):
     broken: float  # 1 if the run ended before it passed `LOST`, else 0
 
 
-def separatrix_horizon(method: Integrator, scene: Scene, setting: float, longest: float = LONGEST) -> Horizon:
+def separatrix_horizon(method: Integrator, scene: Scene, setting: float) -> Horizon:
     """When the axis error passes `LOST`; `setting` is the step in units of 1/g, or the tolerance."""
     g = math.sqrt(scene.top.mgl / scene.top.I1)
     if method.fixed_step:
-        plan = Plan.steps(setting / g, np.unique(np.linspace(0, round(longest / setting), 1601).astype(np.int64)))
+        plan = Plan.steps(setting / g, np.unique(np.linspace(0, round(LONGEST / setting), 1601).astype(np.int64)))
     else:
-        plan = Plan.until(np.linspace(0.0, longest, 1601) / g, setting)
+        plan = Plan.until(np.linspace(0.0, LONGEST, 1601) / g, setting)
     times = plan.times
     outcome, seen = _run(method, scene, scene.start, plan)
     error = charts.axis_distance(seen.axis, closed_form(scene).axis(times))
