@@ -33,19 +33,19 @@ class Writer:
     """
 
     def __init__(
-        self, images: Mapping[str, Mapping[str, Any]], markers: Callable[[str, str], str], *taken: str
+        self, images: Mapping[str, Mapping[str, Any]], markers: Callable[[str, str], str], *reserved: str
     ) -> None:
-        self.images, self.markers, self.anchors = images, markers, {*taken}  # what links may lead to, each once
+        self.images, self.markers, self.anchors = images, markers, {*reserved}  # what links may lead to, each once
         self._shown = 0  # figures so far: the first ones, of the front page, are loaded at once
         self._parser = MarkdownIt("commonmark", {"html": False}).enable("table")
 
     def __call__(self, text: str) -> str:
         """A text in Markdown as HTML."""
-        made, end = [], 0
+        parts, end = [], 0
         for piece in PIECES.finditer(text):
-            made += [self._markdown(text[end : piece.start()]), self._piece(piece)]
+            parts += [self._markdown(text[end : piece.start()]), self._piece(piece)]
             end = piece.end()
-        return "\n".join(filter(None, [*made, self._markdown(text[end:])]))
+        return "\n".join(filter(None, [*parts, self._markdown(text[end:])]))
 
     def anchor(self, name: str) -> str:
         """A name for a thing on the page, with a number behind it if it was given before."""
@@ -63,7 +63,7 @@ class Writer:
         return f'<div class="formulas">{shown}</div>'
 
     def _markdown(self, text: str) -> str:
-        blocks, title, made = _blocks(self._parser.parse(text)), "", []
+        blocks, title, parts = _blocks(self._parser.parse(text)), "", []
         while blocks:
             block = blocks.pop(0)
             kind = block[0].type
@@ -74,15 +74,15 @@ class Writer:
                 below = blocks[0] if blocks else block
                 captioned = below[0].type == "paragraph_open" and not _only(below[1], "image")
                 caption = blocks.pop(0)[1:2] if captioned else []
-                made.append(self._figure(block[1].children[0], caption))  # type: ignore[index]
+                parts.append(self._figure(block[1].children[0], caption))  # type: ignore[index]
             elif kind == "table_open":
-                made.append(self._table(block, title))
+                parts.append(self._table(block, title))
             elif kind == "heading_open":
-                made.append(self._heading(block))
+                parts.append(self._heading(block))
             else:
-                made.append(self._rendered(block))
+                parts.append(self._rendered(block))
             title = bold
-        return "\n".join(made)
+        return "\n".join(parts)
 
     def _rendered(self, tokens: Sequence[Token]) -> str:
         return str(self._parser.renderer.render(tokens, self._parser.options, {}))

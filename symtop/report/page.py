@@ -77,14 +77,14 @@ def gather(results: Path) -> list[dict[str, Any]]:
             continue
         shipped = runner.file_beside(name, "page.md") if name in studies else None
         try:
-            kept = {"measured": findings.get("measured", ""), "dataset": f"{name}.nc"}
-            kept["dataset"] *= (results / f"{name}.nc").is_file()
+            about = {"measured": findings.get("measured", ""), "dataset": f"{name}.nc"}
+            about["dataset"] *= (results / f"{name}.nc").is_file()
             missing = [f"figures/{one['file']}" for one in findings["pictures"]]
             missing += [f"tables/{one['file']}" for one in findings["tables"]]
             for file in (file for file in missing if not (results / file).is_file()):
                 raise FileNotFoundError(f"{file} is missing")
             page = findings["page"] if shipped is None else shipped.read_text(encoding="utf-8")
-            gathered.append({**findings, **kept, "page": page})
+            gathered.append({**findings, **about, "page": page})
         except (OSError, KeyError, TypeError) as error:
             command = f"make {name}" if name in others else f"symtop study {name}"
             raise SymtopError(

@@ -95,8 +95,8 @@ def look(name: str) -> Look:
     dash = DASHES.get(family, "-")
     if name in _LOOKS:
         return _LOOKS[name]._replace(dash=dash)
-    taken = {one[:2] for one in _LOOKS.values()}
-    free = [Look(shade, marker) for marker in _MARKERS for shade in SHADES[family] if (shade, marker) not in taken]
+    pairs = {one[:2] for one in _LOOKS.values()}
+    free = [Look(shade, marker) for marker in _MARKERS for shade in SHADES[family] if (shade, marker) not in pairs]
     alike = [one for one, method in registered.items() if method.family == family and one not in _LOOKS]
     place = alike.index(name) if name in alike else zlib.crc32(name.encode())
     return free[place % len(free)]._replace(dash=dash)

@@ -113,19 +113,19 @@ def without_gaps(text: str) -> str:
 def _known(block: str) -> str:
     listed = re.match(r"[-*] |\d+[.)] ", block)
     parts = re.split(r"\n(?=[-*] |\d+[.)] )" if listed else r"(?<=[.?]) |(?<=[.?]\*\*) ", block)
-    kept = [part for part in parts if GAP not in part]
-    return "" if all(re.fullmatch(r"\*\*[^*]+\*\*", part) for part in kept) else ("\n" if listed else " ").join(kept)
+    whole = [part for part in parts if GAP not in part]
+    return "" if all(re.fullmatch(r"\*\*[^*]+\*\*", part) for part in whole) else ("\n" if listed else " ").join(whole)
 
 
 def _passing(filter_: Callable[..., str]) -> Callable[..., str | None]:
     """A format as a filter of templates: None, which was not measured, passes, and a name that is not there fails."""
     from jinja2 import Undefined
 
-    def passed(value: Any, *options: Any, **named: Any) -> str | None:
+    def apply(value: Any, *options: Any, **keywords: Any) -> str | None:
         value = str(value) if isinstance(value, Undefined) else value
-        return None if value is None else filter_(value, *options, **named)
+        return None if value is None else filter_(value, *options, **keywords)
 
-    return passed
+    return apply
 
 
 def _unwrapped(block: str) -> str:
