@@ -52,9 +52,9 @@ def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]
 
         for file in files:
             if ctx.info_name == "claims":  # a file that ends its process is told of
-                from symtop.judging.remote import tried
+                from symtop.judging.remote import try_separately
 
-                tried(lambda file=file: len(plugins.load(file)), f"plugin {Path(file).name}")  # type: ignore[misc]
+                try_separately(lambda file=file: len(plugins.load(file)), f"plugin {Path(file).name}")  # type: ignore[misc]
             if not plugins.load(file):
                 warn(f"{Path(file).name} registers no integrator and no scene (symtop.register, symtop.register_scene)")
 

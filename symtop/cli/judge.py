@@ -148,7 +148,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
     symtop claims --plugin my_methods.py
     """
     with ticking("loading"):
-        from symtop.judging.judge_step import apart
+        from symtop.judging.judge_step import judge_separately
         from symtop.methods.framework import registry
         from symtop.model import scenes
 
@@ -157,7 +157,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
     refuted, entries = False, []
     for name in names or added or registry.integrators():
         with ticking(f"measuring {name}"):
-            ledger = apart(registry.integrator(name), chosen, quick=quick)
+            ledger = judge_separately(registry.integrator(name), chosen, quick=quick)
         verdicts = {finding.verdict for finding in ledger.findings}
         refuted |= "refuted" in verdicts or not verdicts & {"confirmed", "measured"}
         if as_json:

@@ -72,8 +72,8 @@ class Setup:
         """The number of samples: 60 a nutation, within what a page can draw."""
         period = self.scene.nutation_period
         resolved = np.isfinite(period) and period > 0.0
-        wanted = SAMPLES_A_NUTATION * self.scene.horizon / period if resolved else FEWEST_SAMPLES
-        return round(min(max(wanted, FEWEST_SAMPLES), MOST_SAMPLES))
+        samples = SAMPLES_A_NUTATION * self.scene.horizon / period if resolved else FEWEST_SAMPLES
+        return round(min(max(samples, FEWEST_SAMPLES), MOST_SAMPLES))
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -165,7 +165,7 @@ def answer(chosen: Setup) -> dict[str, Any]:
     began = time.perf_counter()
     warnings: list[str] = []
     run = integrate(chosen.scene, chosen.method, **chosen.arguments, guard=warnings.append)
-    ran = time.perf_counter()
+    end = time.perf_counter()
     times, scene, attitude = run.time, chosen.scene, run.quaternion
     period = float(np.nan_to_num(scene.nutation_period, posinf=0.0))
     if scene.of_body:
@@ -200,7 +200,7 @@ def answer(chosen: Setup) -> dict[str, Any]:
         "steps": int(run.steps),
         "force_evaluations": int(run.force_evaluations),
         "period": period,
-        "run_ms": 1e3 * (ran - began),
+        "run_ms": 1e3 * (end - began),
         "all_ms": 1e3 * (time.perf_counter() - began),
         "largest": largest,
         "arrays": coded,
@@ -322,14 +322,14 @@ def inclination(chosen: Setup, friction: float) -> dict[str, Any]:
     dense = np.union1d(times, np.linspace(0.0, scene.horizon, chosen.samples))
     exact = theta_before_pole(scene, torque, dense, MOST_TOP_EVALUATIONS)
     known = np.searchsorted(dense, times) < exact.size
-    off = np.degrees(np.abs(theta[known] - exact[np.searchsorted(dense, times[known])]))
+    error = np.degrees(np.abs(theta[known] - exact[np.searchsorted(dense, times[known])]))
     ended = [f"midpoint: {OUTCOMES[run.outcome].replace('_', ' ')} at t = {run.steps * h:.3g} s"] if run.outcome else []
     if exact.size < dense.size:
         ended.append(
             f"the exact motion comes within {NEAR} rad of a pole at t = {dense[exact.size]:.3g} s and ends there"
         )
     of_exact = {"exact_time": dense[: exact.size], "exact": np.degrees(exact)}
-    largest = {"midpoint": float(np.nanmax(off))}
+    largest = {"midpoint": float(np.nanmax(error))}
     return _curves(largest, "; ".join(ended), time=times, midpoint=np.degrees(theta), **of_exact)
 
 

@@ -50,8 +50,8 @@ ACTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any], str]] = {
     "/netcdf": (answers.setup, _netcdf, "application/x-netcdf"),
     "/script": (answers.setup, lambda chosen: answers.script(chosen).encode(), "text/x-python; charset=utf-8"),
     "/cost": (cost.question, cost.chart, JSON),
-    "/oscillator": (answers.damped, lambda asked: answers.oscillator(*asked), JSON),
-    "/damped-top": (answers.damped_top, lambda asked: answers.inclination(*asked), JSON),
+    "/oscillator": (answers.damped, lambda values: answers.oscillator(*values), JSON),
+    "/damped-top": (answers.damped_top, lambda values: answers.inclination(*values), JSON),
     "/map": (answers.grid, lambda grid: answers.outcome_map(*grid), JSON),
 }
 _at_work = threading.BoundedSemaphore(cores())  # of 200 runs that take turns in the interpreter 42 took over a minute
@@ -62,15 +62,15 @@ class Server(ThreadingHTTPServer):
 
     request_queue_size = MOST_WAITING
     daemon_threads = True
-    told = 0.0  # when the last refusal was reported
+    report_time = 0.0  # when the last refusal was reported
 
     def process_request(self, request: Any, client_address: Any) -> None:
         """Give the connection a thread, or refuse it (503) and say so, at most once a second."""
         if threading.active_count() <= MOST_OPEN:
             super().process_request(request, client_address)
             return
-        if time.monotonic() - self.told > 1.0:
-            self.told = time.monotonic()
+        if time.monotonic() - self.report_time > 1.0:
+            self.report_time = time.monotonic()
             sys.stderr.write(f"symtop: {MOST_OPEN} connections are open, and others are refused (503)\n")
         with contextlib.suppress(OSError):
             request.settimeout(0.0)
@@ -139,8 +139,8 @@ class Handler(BaseHTTPRequestHandler):
             self._refuse(415, "a question must be JSON")
             return
         try:
-            given = self.headers.get("Content-Length", "0")
-            length = whole("the length of a question", int(given) if given.isdecimal() else given, 0)
+            header = self.headers.get("Content-Length", "0")
+            length = whole("the length of a question", int(header) if header.isdecimal() else header, 0)
             if length > LONGEST_BODY:
                 self._refuse(413, f"a question must be at most {LONGEST_BODY} bytes, not {length}")
                 return

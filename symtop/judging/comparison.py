@@ -76,7 +76,7 @@ def compare(
     if not names or len(set(names)) < len(names):
         raise SymtopError(f"methods must be one or more, each once, not {names!r}", "methods")
 
-    def tried(method: Integrator) -> tuple[list[dict[str, Any]], list[str]]:
+    def runs_of(method: Integrator) -> tuple[list[dict[str, Any]], list[str]]:
         limit = BUDGET[method.implementation] * min(method.speed, 1.0) if most is None else most
         return _runs(chosen, method, end, limit, quantity)
 
@@ -86,7 +86,7 @@ def compare(
         kernels = [one for one in variants if one.implementation == "compiled"]
         files.expected[0] = len(kernels) + (0 if closed_form.load() else files.CLOSED_FORM)
         post(f"running {len(names)} methods")
-        for one in in_threads(tried, variants, min(cores(), len(variants))):
+        for one in in_threads(runs_of, variants, min(cores(), len(variants))):
             results.append(one)
             bar.update()
             post(f"{len(results)} of {len(names)} methods have run")
@@ -149,8 +149,8 @@ def _runs(
 
     if method.control is None:
         error, _ = run(math.nan)
-        met = ["met" if error <= target else "nothing can be set" for target in settings.TARGETS]
-        return list(rows.values()), met
+        answers = ["met" if error <= target else "nothing can be set" for target in settings.TARGETS]
+        return list(rows.values()), answers
     ends, power = settings.limits(scene, method, horizon, quantity), float(method.order or 2)
     power = power if method.fixed_step else 1.0
     first = settings.TARGETS[0]

@@ -98,8 +98,8 @@ class StudyCases:
                     self.failures.append(result.message)
                     bar.set_postfix_str(f"{len(self.failures)} failed", refresh=False)
                 self.computed += result.state == "computed"
-                done = self.computed + len(self.failures) - before
-                post(f"{self.study.name}: {done} of {len(tasks)} cases")
+                count = self.computed + len(self.failures) - before
+                post(f"{self.study.name}: {count} of {len(tasks)} cases")
                 bar.update()
 
             pool.run(self.study, tasks, on_result)
@@ -145,9 +145,9 @@ def status(
 def other_settings(case: Case, stored: list[Path]) -> list[str]:
     """How the settings of a case differ from the nearest that were computed on its scene with its integrator."""
     alike = [path for path in stored if store.identity_of(path).rpartition("--")[0] == case.label]
-    wanted = json.loads(json.dumps(dict(case.settings)))
+    settings = json.loads(json.dumps(dict(case.settings)))
     differing = [
-        [f"setting {name}" for name in sorted({*old, *wanted}) if old.get(name, "") != wanted.get(name, "")]
+        [f"setting {name}" for name in sorted({*old, *settings}) if old.get(name, "") != settings.get(name, "")]
         for old in (_attribute(path, "settings") for path in alike)
     ]
     return min(differing, key=len, default=["never computed"])
@@ -171,8 +171,8 @@ def check(
     # in the order of their digests, so that a sample is one of all parts of the grid
     stored = sorted(cases.data.items(), key=lambda item: store.digest_of(item[0]))
     chosen = {path.name: data for path, data in stored[: None if everything else SAMPLE]}
-    with tempfile.TemporaryDirectory(prefix="symtop-check-") as elsewhere:
-        again = StudyCases(study, Path(elsewhere).resolve())
+    with tempfile.TemporaryDirectory(prefix="symtop-check-") as folder:
+        again = StudyCases(study, Path(folder).resolve())
         missing = again.add(case for path, case in cases.cases.items() if path.name in chosen)
         again.compute(missing, pool, study.limit, fresh=False, quiet=True)
         again.read(missing)

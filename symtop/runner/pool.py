@@ -189,8 +189,8 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             elif local or (len(chosen) < WORTH_WORKERS and not self.size):
 
                 def here(task: Task) -> Future[Result]:
-                    (done := Future[Result]()).set_result(execute_case(task, study))
-                    return done
+                    (future := Future[Result]()).set_result(execute_case(task, study))
+                    return future
 
                 _drain([task._replace(timed=(1, math.nan) if timed else None) for task in chosen], here, 1, on_result)
             else:
@@ -198,25 +198,25 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
 
     def _in_workers(self, tasks: list[Task], on_result: OnResult, *, timed: bool) -> None:
         """Compute tasks in workers; one whose worker dies is computed once more, with nobody beside it."""
-        left, died = {task.path: task for task in tasks}, dict[Path, Task]()
+        remaining, died = {task.path: task for task in tasks}, dict[Path, Task]()
         fruitless = 0
 
         def settle(task: Task, result: Result) -> None:
             nonlocal fruitless
             fruitless = 0
-            del left[task.path]
+            del remaining[task.path]
             if result.state == "died" and not alone:
                 died[task.path] = task
             else:
                 on_result(task, failed(task, ENDED) if result.state == "died" else result)
 
         for alone in (False, True):
-            while left:
-                self.open(min(self.jobs, len(left)))
-                together = self.at_once(min(self.size, len(left))) if timed else None
+            while remaining:
+                self.open(min(self.jobs, len(remaining)))
+                together = self.at_once(min(self.size, len(remaining))) if timed else None
                 width = 1 if alone else AHEAD * self.size if together is None else together[0]
                 try:
-                    ahead = [task._replace(timed=together) for task in left.values()]
+                    ahead = [task._replace(timed=together) for task in remaining.values()]
                     _drain(ahead, lambda task: self.submit(execute_case, task, limit=task.limit + GRACE), width, settle)
                 except BrokenExecutor:
                     self.close_workers()
@@ -225,7 +225,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
                         raise SymtopError(
                             "the worker processes end before they begin; try --jobs 1 or look at the free memory"
                         ) from None
-            left.update(died)
+            remaining.update(died)
 
     def at_once(self, width: int) -> tuple[int, float]:
         """How many timed cases may run at once, one for each worker if a trial shows no disturbance, or half, ...

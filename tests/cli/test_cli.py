@@ -21,10 +21,10 @@ def test_run_prints_the_errors_and_writes_the_dataset(tmp_path):
     words = ("run", "spheroid", "midpoint", "--step-size", 0.01, "--output", tmp_path / "run.nc")
     assert "angle between axes" in call(*words).output
     assert netcdf.read(tmp_path / "run.nc").attrs["integrator"] == "midpoint"
-    told = numbers(call(*words, "--json").stdout)
-    assert told["steps"] == 800
-    assert 1e-3 < told["errors"]["axis"]["largest"] < 2e-2
-    assert told["errors"]["p_psi"]["largest"] < 1e-14
+    report = numbers(call(*words, "--json").stdout)
+    assert report["steps"] == 800
+    assert 1e-3 < report["errors"]["axis"]["largest"] < 2e-2
+    assert report["errors"]["p_psi"]["largest"] < 1e-14
 
 
 def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):
@@ -97,11 +97,11 @@ def test_a_refusal_names_the_argument_its_value_and_what_is_allowed(words, parts
 
 
 def test_a_plugin_that_registers_nothing_is_told_of(tmp_path):
-    for text, told in (("x = 1\n", True), (ANOTHER_NAME, False), (REPLACED, False)):
+    for text, expected in (("x = 1\n", True), (ANOTHER_NAME, False), (REPLACED, False)):
         plugin = tmp_path / f"plugin_{len(text)}.py"
         plugin.write_text(text, encoding="utf-8")
         done = call("scenes", "--plugin", plugin)
-        assert (f"{plugin.name} registers no integrator and no scene" in done.output) is told
+        assert (f"{plugin.name} registers no integrator and no scene" in done.output) is expected
 
 
 ANOTHER_NAME = """import dataclasses
@@ -139,7 +139,7 @@ def test_a_folder_is_no_output_and_nothing_is_computed_for_it(words, computes, t
     [
         (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
         (["recommend", "spheroid", "--accuracy", "1e-3"], "symtop.advise.recommend"),
-        (["claims", "strang", "--quick"], "symtop.judging.judge_step.apart"),
+        (["claims", "strang", "--quick"], "symtop.judging.judge_step.judge_separately"),
     ],
 )
 def test_ctrl_c_is_neither_a_failed_case_nor_bad_input(words, called, monkeypatch):
@@ -202,7 +202,7 @@ def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("begun", "offered"),
+    ("line", "completion"),
     [
         ("symtop run sph", "spheroid"),
         ("symtop run tennis", "tennis-racket"),
@@ -212,11 +212,11 @@ def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_pa
         ("symtop integrators strang[att", "strang[attitude]"),
     ],
 )
-def test_the_shell_completes_names(begun, offered):
-    words = begun.split()
-    told = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": begun, "COMP_CWORD": str(len(words) - 1)}
-    done = CliRunner().invoke(main, prog_name="symtop", env=told)
-    assert f"plain,{offered}" in done.output
+def test_the_shell_completes_names(line, completion):
+    words = line.split()
+    environment = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+    done = CliRunner().invoke(main, prog_name="symtop", env=environment)
+    assert f"plain,{completion}" in done.output
 
 
 ENDING = """

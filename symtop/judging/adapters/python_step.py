@@ -147,30 +147,30 @@ class ScipySolver(PythonStep):
         end, size = t + (int(marks[-1]) + 2) * h, abs(h)
         with heartbeat.call(h):
             options = {"max_step": size, "first_step": size}
-            made: Any = self.function(f, t, y, end, **options, rtol=ANY, atol=ANY)
-            if hasattr(made, "newton_tol") or hasattr(made, "kappa"):
-                made = self.function(f, t, y, end, **options, rtol=LOOSE, atol=LOOSE)
+            solver: Any = self.function(f, t, y, end, **options, rtol=ANY, atol=ANY)
+            if hasattr(solver, "newton_tol") or hasattr(solver, "kappa"):
+                solver = self.function(f, t, y, end, **options, rtol=LOOSE, atol=LOOSE)
                 for name in ("newton_tol", "kappa", "tiny_err"):
-                    setattr(made, name, SOLVED / LOOSE)
+                    setattr(solver, name, SOLVED / LOOSE)
 
         def once(k: int, y: Array) -> Array:
-            if made.status != "running" or not np.isfinite(y).all():
+            if solver.status != "running" or not np.isfinite(y).all():
                 return np.full(y.shape, np.nan)
             with heartbeat.call(h):
-                made.step()
-            if abs(made.t - (t + (k + 1) * h)) > SAME * size * (k + 1):
+                solver.step()
+            if abs(solver.t - (t + (k + 1) * h)) > SAME * size * (k + 1):
                 raise SymtopError(
                     f"{self.name} must make steps of max_step = first_step = {size:.3g} where the tolerance accepts "
-                    f"any error, and made one of {made.t - t - k * h:.3g}"
+                    f"any error, and made one of {solver.t - t - k * h:.3g}"
                 )
-            return state_like(y, made.y, "a solver")
+            return state_like(y, solver.y, "a solver")
 
         with contextlib.ExitStack() as undo:  # Newton's iteration goes on until it is solved
             for module in {sys.modules.get(one.__module__) for one in self.function.__mro__}:  # type: ignore[attr-defined]
                 if hasattr(module, NEWTON):
                     undo.callback(setattr, module, NEWTON, getattr(module, NEWTON))
                     setattr(module, NEWTON, MOST_NEWTON)
-            return repeat(once, state_like(y, made.y, "a solver"), marks)
+            return repeat(once, state_like(y, solver.y, "a solver"), marks)
 
 
 class Body(NamedTuple):

@@ -168,8 +168,8 @@ def _terms(series: Series) -> Measured:
     """The order that a series shows, or the least that it can be."""
     text, term = f"{series.order} or more", series.order + 1
     if series.is_exact:
-        off = f"{series.defect[term]:.1g} +- {series.noise[term]:.0g} of it"
-        text = f"{series.order}: in one step the term in h^{term} is the first that is wrong, by {off}"
+        miss = f"{series.defect[term]:.1g} +- {series.noise[term]:.0g} of it"
+        text = f"{series.order}: in one step the term in h^{term} is the first that is wrong, by {miss}"
     return Measured("by a term", series.order, text=text)
 
 
@@ -215,7 +215,7 @@ def measured_order(
         runs += [(find_scene(FALLBACK), nutations) for nutations in LONGER]
     count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # steps that are chosen scatter
     most = FINEST[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
-    tried: list[Order] = []
+    orders: list[Order] = []
     for chosen, nutations in runs:
         horizon = nutations * chosen.time_scale()
         settings = ladder(method, chosen, horizon, count, most)
@@ -223,10 +223,10 @@ def measured_order(
         step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
         fits = {name: order_fit(chosen, method, table, name, horizon) for name in (main, "theta", "energy")}
         columns = table["tolerance"].values, step, table[main].values, table[f"{main}_bound"].values
-        tried.append(Order(chosen.name, *columns, fits[main], fits))
-        if tried[-1].measured:
-            return tried[-1]
-    return tried[-1 if scene.of_body else 0]
+        orders.append(Order(chosen.name, *columns, fits[main], fits))
+        if orders[-1].measured:
+            return orders[-1]
+    return orders[-1 if scene.of_body else 0]
 
 
 def _by_steps(subject: Subject) -> Finding:

@@ -141,12 +141,12 @@ def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
 
     first, steps = min(seconds(1)[0], seconds(1)[0]), 1
     while True:
-        taken, finite = seconds(4 * steps)
+        cost, finite = seconds(4 * steps)
         steps *= 4 if finite else 1
-        if not finite or taken - first > max(ENOUGH, first) or steps > 1e7:  # a start's cost scatters as much as it is
-            taken = min(seconds(steps)[0] for _ in range(3))  # others may have been at work
+        if not finite or cost - first > max(ENOUGH, first) or steps > 1e7:  # a start's cost scatters as much as it is
+            cost = min(seconds(steps)[0] for _ in range(3))  # others may have been at work
             # the start alone may have been disturbed; a process that waited before is told of its waiting later
-            return max(taken - first * finite, 0.5 * taken, LEAST * steps) / steps
+            return max(cost - first * finite, 0.5 * cost, LEAST * steps) / steps
 
 
 def declared(method: Integrator, claim: str) -> str:
