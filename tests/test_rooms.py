@@ -9,10 +9,13 @@ import ast
 import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.util import resolve_name
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
+from scipy.sparse.csgraph import connected_components
 
 ROOT = Path(__file__).resolve().parents[1]
 ORDER = (  # from the ground up
@@ -77,8 +80,7 @@ def _arrows(node: ast.AST, package: str, known: set[str], *, typing: bool = Fals
         if isinstance(child, ast.Import):
             yield from (Arrow(alias.name, child.lineno, typing) for alias in child.names)
         elif isinstance(child, ast.ImportFrom):
-            above = package.split(".")[: package.count(".") + 2 - child.level] if child.level else []
-            source = ".".join([*above, *([child.module] if child.module else [])])
+            source = resolve_name("." * child.level + (child.module or ""), package)
             for alias in child.names:
                 inner = f"{source}.{alias.name}"
                 yield Arrow(inner if inner in known else source, child.lineno, typing)
@@ -105,23 +107,12 @@ def upward(modules: dict[str, Module]) -> list[str]:
 
 def circles(modules: dict[str, Module]) -> list[str]:
     """Sets of files that import each other, directly or through others; TYPE_CHECKING imports aside."""
-    graph = {
-        name: {arrow.target for arrow in module.arrows if not arrow.typing} & modules.keys() - {name}
-        for name, module in modules.items()
-    }
-    reached: dict[str, set[str]] = {}
-    for name, targets in graph.items():
-        ahead, seen = set(targets), set[str]()
-        while ahead:
-            seen |= ahead
-            ahead = set().union(*(graph[step] for step in ahead)) - seen
-        reached[name] = seen
-    groups = {
-        tuple(sorted(other for other in reached[name] if name in reached[other]))
-        for name in graph
-        if name in reached[name]
-    }
-    return [" <-> ".join(group) for group in sorted(groups)]
+    names = sorted(modules)
+    targets = [{arrow.target for arrow in modules[name].arrows if not arrow.typing} for name in names]
+    imports = np.array([[name in some for name in names] for some in targets])
+    _, groups = connected_components(imports, connection="strong")
+    members = [[name for name, one in zip(names, groups, strict=True) if one == group] for group in set(groups)]
+    return sorted(" <-> ".join(some) for some in members if len(some) > 1)
 
 
 def strangers(modules: dict[str, Module]) -> list[str]:

@@ -27,12 +27,12 @@ def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path):
     assert "in vector registers (lanes)" in done.output
     assert f"written to {figure}" in done.output
     tops = symtop.population(50, seed=3)
-    wanted = symtop.ensemble(tops, "strang", per_nutation=30, nutations=2, samples=21, quiet=True)
+    expected = symtop.ensemble(tops, "strang", per_nutation=30, nutations=2, samples=21, quiet=True)
     with xr.open_dataset(path) as data:
-        assert data.load()[list(wanted.data_vars)].identical(wanted)
+        assert data.load()[list(expected.data_vars)].identical(expected)
         np.testing.assert_array_equal(data["I1"].values, tops["I1"].values)
         np.testing.assert_array_equal(data["start_theta_dot"].values, tops["theta_dot"].values)
-        largest = symtop.errors(wanted, tops)["axis"].max("time").values
+        largest = symtop.errors(expected, tops)["axis"].max("time").values
         np.testing.assert_allclose(data["axis_error"].values, largest, rtol=1e-6, atol=1e-14)
         assert data["axis_error"].attrs["long_name"].startswith("angle between axes")
     with Image.open(figure) as picture:
@@ -64,13 +64,13 @@ def test_bodies_are_run_compared_written_and_drawn(tmp_path):
     done = call(*kind, "strang", *STEPS, "--samples", 21, "-o", path, "--figure", figure)
     assert "strang on 12 bodies: 12 reached the horizon" in done.output
     assert "angle between attitudes (rad)" in done.output
-    drawn = symtop.body_population(12, seed=3, kind="heavy", epsilon=0.1)
-    wanted = symtop.ensemble(drawn, "strang", per_nutation=30, nutations=2, samples=21, quiet=True)
+    bodies = symtop.body_population(12, seed=3, kind="heavy", epsilon=0.1)
+    expected = symtop.ensemble(bodies, "strang", per_nutation=30, nutations=2, samples=21, quiet=True)
     data = netcdf.read(path)
-    assert data[list(wanted.data_vars)].drop_attrs().identical(wanted.drop_attrs())
-    np.testing.assert_array_equal(data["I2"], drawn["I2"])
-    np.testing.assert_array_equal(data["start_omega_body"], drawn["omega_body"])
-    wrong = symtop.errors(wanted, drawn)
+    assert data[list(expected.data_vars)].drop_attrs().identical(expected.drop_attrs())
+    np.testing.assert_array_equal(data["I2"], bodies["I2"])
+    np.testing.assert_array_equal(data["start_omega_body"], bodies["omega_body"])
+    wrong = symtop.errors(expected, bodies)
     np.testing.assert_array_equal(data["attitude_error"], wrong["attitude"].max("time"))
     np.testing.assert_allclose(data["energy_error"], wrong["energy"].max("time"), rtol=1e-6, atol=1e-15)
     with Image.open(figure) as picture:

@@ -110,26 +110,6 @@ def test_figures_come_in_three_kinds_and_are_the_same_again(tmp_path):
     assert files[2].read_bytes() == files[3].read_bytes()
 
 
-def test_a_cold_kernel_is_announced_once(monkeypatch):
-    import numpy as np
-
-    from symtop.core import jit
-
-    heard = []
-    monkeypatch.setattr(jit, "on_cold", [lambda: heard.append(1)])
-
-    def kernel(x):
-        return x + float(np.pi) * COLD
-
-    assert jit.compile_kernel(kernel)(0.0) > 0.0
-    assert heard == [1]
-    assert jit.compile_kernel(kernel)(0.0) > 0.0  # from the disk
-    assert heard == [1]
-
-
-COLD = time.time()  # a constant that no kernel on disk was compiled with
-
-
 WORDS = (
     "run spheroid midpoint --step-size 0.01", "ensemble strang --members 20 --per-nutation 50 --nutations 2",
     "study convergence --quick --status --results no-such-folder",
@@ -143,9 +123,9 @@ for words in {WORDS}:
 
 def test_nothing_wraps_on_a_terminal_and_a_list_is_there_within_two_seconds():
     listed, several = recorded(["integrators"]), recorded([], code=SEVERAL)
-    for recording, longest, said in ((listed, 2.0, ["strang"]), (several, 60.0, ["on spheroid", "20 ", "convergence"])):
+    for recording, longest, text in ((listed, 2.0, ["strang"]), (several, 60.0, ["on spheroid", "20 ", "convergence"])):
         assert recording.code == 0, recording.text
-        assert all(word in recording.text for word in said)
+        assert all(word in recording.text for word in text)
         assert recording.widest <= 80
         assert recording.silence < longest
 
@@ -190,18 +170,18 @@ def test_the_clock_goes_on_while_somebody_holds_the_lock_of_python(tmp_path):
 def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
     from symtop.core import progress
 
-    drawn = []
+    refreshes = []
     monkeypatch.setattr(progress, "BEAT", 0.01)
     monkeypatch.setattr(progress, "is_terminal", lambda _: True)
-    monkeypatch.setattr("tqdm.tqdm.refresh", lambda *_, **__: drawn.append(1))
+    monkeypatch.setattr("tqdm.tqdm.refresh", lambda *_, **__: refreshes.append(1))
     with progress.progress_bar("a bar"):
         time.sleep(0.1)
-    count = len(drawn)
+    count = len(refreshes)
     assert count >= 3
     time.sleep(0.05)
     with progress.progress_bar("a bar", quiet=True):
         time.sleep(0.05)
-    assert len(drawn) == count
+    assert len(refreshes) == count
 
 
 def test_a_recording_hears_a_silence_and_sees_what_wraps(tmp_path):

@@ -14,8 +14,7 @@ from tests.commands import call
 
 
 def printed(*words, columns=80):
-    done = call(*words, COLUMNS=str(columns))
-    return done.output
+    return call(*words, COLUMNS=str(columns)).output
 
 
 @pytest.mark.parametrize(

@@ -37,12 +37,12 @@ def test_every_fact_and_table_of_the_report_follows_from_a_stored_dataset(quick_
     """Nothing is said that the dataset on disk does not say again; `seconds` aside, nothing else is asked."""
     for name in runner.names():
         study, stored = runner.load(name), netcdf.read_any(quick_results / f"{name}.nc")
-        said = json.loads((quick_results / f"{name}.json").read_text(encoding="utf-8"))
-        again = runner.findings_of(study, stored, tmp_path, None, failures=[], cases=said["cases"])
-        assert json.loads(json.dumps(again["facts"])) == said["facts"], name
-        assert any(type(value) in (int, float) for value in said["facts"].values()), name
-        assert again["tables"] == said["tables"], name
-        for table in said["tables"]:
+        findings = json.loads((quick_results / f"{name}.json").read_text(encoding="utf-8"))
+        again = runner.findings_of(study, stored, tmp_path, None, failures=[], cases=findings["cases"])
+        assert json.loads(json.dumps(again["facts"])) == findings["facts"], name
+        assert any(type(value) in (int, float) for value in findings["facts"].values()), name
+        assert again["tables"] == findings["tables"], name
+        for table in findings["tables"]:
             file = f"tables/{table['file']}"
             assert (tmp_path / file).read_bytes() == (quick_results / file).read_bytes(), file
 
@@ -79,8 +79,8 @@ def test_fresh_computes_everything_and_the_files_are_the_same_to_the_byte(tmp_pa
     before = bytes_of()
     done = probe(tmp_path, "--fresh", "--json")
     assert done.exit_code == 0
-    (said,) = json.loads(done.output)
-    assert said["computed"] == said["cases"] == 4
+    (summary,) = json.loads(done.output)
+    assert summary["computed"] == summary["cases"] == 4
     assert before == bytes_of()
 
 
@@ -168,8 +168,8 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path, clean_registr
     cases.append(dataclasses.replace(cases[0], integrator="unlucky[angles]"))
     small = dataclasses.replace(whole, cases=lambda quick: cases)
     symtop.register(unlucky)
-    found = runner.run(small, tmp_path, quick=True, quiet=True)
-    assert found["failures"] == [
+    findings = runner.run(small, tmp_path, quick=True, quiet=True)
+    assert findings["failures"] == [
         "unlucky[angles] on goldstein failed: integrator unlucky[angles] failed: RuntimeError: no luck"
     ]
     assert list(netcdf.read(tmp_path / "stability.nc")["variant"].values) == ["midpoint[angles]"]
