@@ -169,14 +169,6 @@ def verdict(rows: list[Row]) -> list[str]:
     return said
 
 
-def lines(rows: list[Row]) -> list[str]:
-    """As text."""
-    shown = table(rows)
-    widths = [max(map(len, column)) for column in zip(shown.header, *shown.rows, strict=True)]
-    return [
-        shown.title, *("  ".join(map(str.ljust, row, widths)) for row in (shown.header, *shown.rows)), *verdict(rows)
-    ]  # fmt: skip
-
-
 if __name__ == "__main__":
-    print("\n".join(lines(measure())))
+    rows = measure()
+    print("\n".join([table(rows).text, *verdict(rows)]))
