@@ -245,9 +245,9 @@ def recommend(
 def _needs(choice: Collection[str]) -> tuple[str, ...]:
     """Names of `NEEDS`, by these or by words: a word that completes no need stands for all that have it."""
     parts = {name: set(COMMA.split(words)) for name, words in NEEDS.items()}
-    known = dict.fromkeys([*NEEDS, *sorted(set().union(*parts.values()))])
+    terms = dict.fromkeys([*NEEDS, *sorted(set().union(*parts.values()))])
     words = {
-        one_of("needs", word, known) for word in COMMA.split(", ".join(str(one).strip() for one in choice)) if choice
+        one_of("needs", word, terms) for word in COMMA.split(", ".join(str(one).strip() for one in choice)) if choice
     }
     whole = [name for name in NEEDS if name in words or parts[name] <= words]
     rest = words.difference(NEEDS, *(parts[name] for name in whole))
@@ -502,16 +502,16 @@ def _lines(question: _Question, method: Integrator, setting: float | None) -> di
     """The command and the Python line that make the recommended run; no command for a scene that has no name here."""
     scene, _, _, horizon = question[:4]
     name, whole = method.name, horizon == scene.horizon
-    known = scenes.all_scenes().get(scene.name) == scene
-    shown, control = f'"{name}"' if "[" in name else name, str(method.control)
+    in_catalogue = scenes.all_scenes().get(scene.name) == scene
+    label, control = f'"{name}"' if "[" in name else name, str(method.control)
     option = "" if setting is None else f" --{control.replace('_', '-')} {float(setting)!r}"
     until = "" if whole else f" --horizon {horizon!r}"
     files = "".join(f" --plugin {shlex.quote(file)}" for file in loaded())
-    command = f"symtop run {scene.name} {shown}{option}{until}{files}"
-    of, until = f'"{scene.name}"' if known else "scene", "" if whole else f", horizon={horizon!r}"
+    command = f"symtop run {scene.name} {label}{option}{until}{files}"
+    of, until = f'"{scene.name}"' if in_catalogue else "scene", "" if whole else f", horizon={horizon!r}"
     option = "" if setting is None else f", {control}={float(setting)!r}"
     python = f'symtop.simulate({of}, "{name}"{option}{until})'
-    return {"command": command if known else "", "python": python}
+    return {"command": command if in_catalogue else "", "python": python}
 
 
 def _exact_seconds(question: _Question) -> float:

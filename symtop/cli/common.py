@@ -113,15 +113,15 @@ def body_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(command)
     def with_body(**settings: Any) -> None:
-        given = {name: value for name in OF_BODY if (value := settings.pop(name)) is not None}
+        numbers = {name: value for name in OF_BODY if (value := settings.pop(name)) is not None}
         scene = "scene" if "scene" in settings else "name"
-        if given:
-            if "body" not in given or settings[scene] != BODY:
-                options = ", ".join(f"--{name}" for name in given)
+        if numbers:
+            if "body" not in numbers or settings[scene] != BODY:
+                options = ", ".join(f"--{name}" for name in numbers)
                 raise SymtopError(
                     f"{options} must come with --body I1,I2,I3 on the scene {BODY}, not {settings[scene]}"
                 )
-            settings[scene] = _own_body(given)
+            settings[scene] = _own_body(numbers)
         command(**settings)
 
     for name, (count, metavar, words) in reversed(OF_BODY.items()):
@@ -129,12 +129,12 @@ def body_options(command: Callable[..., None]) -> Callable[..., None]:
     return with_body
 
 
-def _own_body(given: dict[str, Any]) -> "Scene":
+def _own_body(numbers: dict[str, Any]) -> "Scene":
     from symtop.model import body, scenes
 
-    top = body.RigidBody(*given["body"], *given.get("mgl", ()))
-    top = dataclasses.replace(top, centre=given.get("centre", top.centre))
-    start = body.Attitude(given.get("attitude", (1.0, 0.0, 0.0, 0.0)), given.get("rates", (0.0, 0.0, 0.0)))
+    top = body.RigidBody(*numbers["body"], *numbers.get("mgl", ()))
+    top = dataclasses.replace(top, centre=numbers.get("centre", top.centre))
+    start = body.Attitude(numbers.get("attitude", (1.0, 0.0, 0.0, 0.0)), numbers.get("rates", (0.0, 0.0, 0.0)))
     period = top.nutation_period(start)
     if not math.isfinite(period):
         raise SymtopError("--body without a weight needs --rates: it does not move")

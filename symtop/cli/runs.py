@@ -80,15 +80,15 @@ def run(
         data = simulate(scene, integrator, guard={"on": True, "off": False}.get(guard, guard), **settings)
         if output is not None:
             netcdf.write(data, output)
-        chosen = scenes.scene(scene, bodies=True)
-        truth = reference(chosen, data["time"].values, precision="closed-form")
+        problem = scenes.scene(scene, bodies=True)
+        truth = reference(problem, data["time"].values, precision="closed-form")
         error = errors(data)
-        verdict = judgement(chosen, data, error["attitude" if chosen.of_body else "axis"].values)
+        verdict = judgement(problem, data, error["attitude" if problem.of_body else "axis"].values)
         if figure is not None:
             from symtop.report.plot import draw_run
 
-            draw_run(chosen, data, truth, error, figure)
-    words = QUANTITIES | OF_BODY if chosen.of_body else QUANTITIES
+            draw_run(problem, data, truth, error, figure)
+    words = QUANTITIES | OF_BODY if problem.of_body else QUANTITIES
     series = {name: error[name].dropna("time").values for name in words if name in error}
     largest = {name: {"largest": values.max(), "last": values[-1]} for name, values in series.items() if values.size}
     facts = data.attrs
@@ -99,7 +99,7 @@ def run(
     else:
         method, actual, nominal = facts["integrator"], facts["step_size"], settings["step_size"]
         variant = method if method.endswith("]") else f"{method}[{facts['chart']}]"
-        say(f"{variant} on {chosen.name}: {facts['outcome_message']}")
+        say(f"{variant} on {problem.name}: {facts['outcome_message']}")
         other = nominal is not None and abs(actual / nominal - 1.0) > SAME
         of = f" of {actual:.6g}, for a whole number of them fills the horizon" if other else ""
         say(f"{facts['steps']} steps{of}, {facts['force_evaluations']} force evaluations")
@@ -164,8 +164,8 @@ def long(
         from symtop.run.guard import MOST_STEPS
         from symtop.run.long_run import OF_BODY, PER_NUTATION, QUANTITIES, long_run
 
-    chosen = scenes.scene(scene, bodies=True)
-    period, step_size = chosen.nutation_period, common.step_of(scene, settings)
+    problem = scenes.scene(scene, bodies=True)
+    period, step_size = problem.nutation_period, common.step_of(scene, settings)
     if step_size is None and period == math.inf:
         raise SymtopError(f"{scene} has no nutation to take a step from: give --step-size")
     h = period / PER_NUTATION if step_size is None else step_size
@@ -181,7 +181,7 @@ def long(
     if data.sizes["window"]:
         rows = []
         steps_made = data["steps"].values
-        for name in (OF_BODY if chosen.of_body else QUANTITIES)[:-1]:  # but for theta
+        for name in (OF_BODY if problem.of_body else QUANTITIES)[:-1]:  # but for theta
             least, most, mean = (data[f"{name}_{kind}"].values for kind in ("least", "largest", "mean"))
             sizes = np.maximum.accumulate(np.maximum(np.abs(least), np.abs(most)))
             fit = power_law(steps_made, sizes, steps_made > steps_made[-1] / 10.0**DECADES)
@@ -255,14 +255,14 @@ def ensemble(
     except KeyboardInterrupt:
         warn("interrupted" + ("" if output is None else "; what was run is kept: the same command resumes"))
         sys.exit(130)
-    few, shown = (part.isel(member=slice(0, most)) for part in (sample, data))
+    few, results = (part.isel(member=slice(0, most)) for part in (sample, data))
     outcomes, steps = Counter(data["outcome"].values.tolist()), int(data["steps"].sum())
     with ticking("comparing with the true motion"):
-        wrong = {name: member_errors(few, shown, name) for name in compared}
+        wrong = {name: member_errors(few, results, name) for name in compared}
         if figure is not None:
             from symtop.report.plot import draw_ensemble
 
-            draw_ensemble(shown, wrong, figure)
+            draw_ensemble(results, wrong, figure)
         own = {name: largest(values) for name, values in wrong.items()}
         worst = {name: spread(values[:, None])[:, 0].tolist() for name, values in own.items()}
     data.close()

@@ -33,8 +33,8 @@ _at_work = threading.Lock()
 
 def question(fields: Mapping[str, Any]) -> list[Setup]:
     """The run that a page shows and, if it names a `second` method, the one beside it. SymtopError as `setup`."""
-    chosen, other = setup(fields), str(fields.get("second") or "")
-    return [chosen, setup({**fields, "integrator": other})] if other else [chosen]
+    first, other = setup(fields), str(fields.get("second") or "")
+    return [first, setup({**fields, "integrator": other})] if other else [first]
 
 
 def _variants(setups: list[Setup]) -> dict[str, Integrator]:

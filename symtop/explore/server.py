@@ -38,9 +38,9 @@ LONGEST_BODY = 65_536  # bytes of a POST request
 POLICY = "default-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 
 
-def _netcdf(chosen: answers.Setup) -> bytes:
+def _netcdf(config: answers.Setup) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        return netcdf.write(answers.dataset(chosen, str), Path(folder) / "explored.nc").read_bytes()
+        return netcdf.write(answers.dataset(config, str), Path(folder) / "explored.nc").read_bytes()
 
 
 # What reads the question, what answers it in JSON, or in bytes of the type that follows.
@@ -48,7 +48,7 @@ JSON = "application/json"
 ACTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any], str]] = {
     "/run": (answers.setup, answers.answer, JSON),
     "/netcdf": (answers.setup, _netcdf, "application/x-netcdf"),
-    "/script": (answers.setup, lambda chosen: answers.script(chosen).encode(), "text/x-python; charset=utf-8"),
+    "/script": (answers.setup, lambda config: answers.script(config).encode(), "text/x-python; charset=utf-8"),
     "/cost": (cost.question, cost.chart, JSON),
     "/oscillator": (answers.damped, lambda values: answers.oscillator(*values), JSON),
     "/damped-top": (answers.damped_top, lambda values: answers.inclination(*values), JSON),
@@ -149,12 +149,12 @@ class Handler(BaseHTTPRequestHandler):
                 question = json.loads(self.rfile.read(length))
             except (ValueError, RecursionError) as error:
                 raise SymtopError(f"a question must be JSON: {error}") from None
-            chosen = read(question)
+            config = read(question)
             with _at_work:
                 if self._has_left():
                     self.close_connection = True
                     return
-                answer = action(chosen)
+                answer = action(config)
         except SymtopError as error:
             # The page shows the sentence in place of a run, as an ordinary answer; a file cannot be replaced by it.
             self._refuse(200 if self.place not in ("/netcdf", "/script") else 400, str(error))

@@ -182,8 +182,8 @@ def heading(about: About, scene: str) -> str:
     """What is judged."""
     cost = f", {pace(about.seconds_a_step)} a step" if about.seconds_a_step else ""
     chart = f" in the {about.chart} chart" if about.chart else ""
-    drawn = f", seed {about.seed}" if about.seed else ""
-    return f"{about.name}{chart} on {scene}{cost}{drawn}\n"
+    seed = f", seed {about.seed}" if about.seed else ""
+    return f"{about.name}{chart} on {scene}{cost}{seed}\n"
 
 
 def line(finding: Finding, width: int = WIDTH) -> str:

@@ -112,7 +112,7 @@ def judge(
         raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {shown(energy)}", "energy")
     file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES)
     states = form is None and (file or isinstance(target, (xr.Dataset, Mapping)))
-    chosen, listen = find_scene(scene, bodies=True), tell or (lambda _: None)
+    problem, listen = find_scene(scene, bodies=True), tell or (lambda _: None)
     for name, flag in (("adaptive", adaptive), ("autonomous", autonomous), ("quick", quick)):
         boolean(name, flag)
     seed = secrets.randbelow(SEEDS) if seed is None else whole("seed", seed, 0, SEEDS)
@@ -123,36 +123,36 @@ def judge(
     if states:
         if set(structure.values()) != {None}:
             raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
-        findings = of_trajectory(target, chosen, names, energy)
+        findings = of_trajectory(target, problem, names, energy)
         about = About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory")
         listen(about)
         for finding in findings:
             listen(finding)
-        return Ledger(about.name, chosen.name, tuple(findings), {}, about)
-    if chosen.of_body and ({symplectic, symmetric, explicit} != {None} or names - {"energy"}):
+        return Ledger(about.name, problem.name, tuple(findings), {}, about)
+    if problem.of_body and ({symplectic, symmetric, explicit} != {None} or names - {"energy"}):
         words = "order and what becomes of energy and momentum; claim the rest on a top"
-        raise SymtopError(f"a step on {chosen.name}, a RigidBody, shows its {words}")
+        raise SymtopError(f"a step on {problem.name}, a RigidBody, shows its {words}")
     implied = {"time": not autonomous, "energy": energy is None and "energy" not in names, "order": order is None}
     heartbeat.reset(quick=quick)
     began, findings = time.monotonic(), []
-    load = functools.partial(open_target, target, form, chart, on=chosen, adaptive=adaptive)
+    load = functools.partial(open_target, target, form, chart, on=problem, adaptive=adaptive)
     with Process(lambda: table_of(load)) as process:
         process.allow(OPENING)
         try:
             stepper = Remote(process)
             method = integrator(stepper, **claims)
-            seconds = seconds_a_step(stepper, chosen) if method.fixed_step else 0.0
+            seconds = seconds_a_step(stepper, problem) if method.fixed_step else 0.0
         except SymtopError as error:
             raise SymtopError(f"it cannot be judged: {error}") if process.lost else error from None
-        subject = Subject(method, chosen, quick, stepper, seconds, seed, autonomous)
+        subject = Subject(method, problem, quick, stepper, seconds, seed, autonomous)
         facts = stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step
-        about = About(*facts, seed, chosen.time_scale())
+        about = About(*facts, seed, problem.time_scale())
         listen(about)
         for finding in _findings(subject, process, began, QUICK_VERDICT if quick else VERDICT):
             listen(finding)
             findings.append(finding)
     follow = frozenset(name for name, follows in implied.items() if follows)
-    return Ledger(about.name, chosen.name, tuple(findings), subject.traces, about, follow)
+    return Ledger(about.name, problem.name, tuple(findings), subject.traces, about, follow)
 
 
 def _no_solver(*_: Any) -> Any:
@@ -170,10 +170,10 @@ def read(target: Any) -> dict[str, Any]:
         reason = getattr(error, "strerror", None) or "it is no text, or empty"
         raise SymtopError(f"the trajectory {path} cannot be read: {reason}") from None
     names = head.lstrip("# ").split()
-    known = (*SCALARS, *(part for parts in VECTORS.values() for part in parts))
-    if not set(names) <= set(known) or "time" not in names or len(set(names)) < len(names):
+    fields = (*SCALARS, *(part for parts in VECTORS.values() for part in parts))
+    if not set(names) <= set(fields) or "time" not in names or len(set(names)) < len(names):
         raise SymtopError(
-            f"{path.name} must begin with a line of names, time and of {', '.join(known[1:])}, not {head[:60]!r}"
+            f"{path.name} must begin with a line of names, time and of {', '.join(fields[1:])}, not {head[:60]!r}"
         )
     try:
         columns = dict(zip(names, np.loadtxt(lines or [""] * 2, ndmin=2, unpack=True), strict=True))
@@ -210,18 +210,18 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
     time = deviation["time"].values
     if rates is not None and scene.of_body:
         deviation = deviation.assign({name: ("time", values) for name, values in _of_rates(scene, time, rates).items()})
-    shown = [_error(name, scene, time, deviation) for name in OF_STATES if name in deviation]
+    findings = [_error(name, scene, time, deviation) for name in OF_STATES if name in deviation]
     own = _from_states(scene, states)
     for name in (*CONSTANTS, *sorted({*conserves} - {*CONSTANTS})):
         values = own.get(name, columns.get(name))
         declared = energy if name == "energy" and energy else "kept" if name in conserves else ""
         if values is not None:
-            shown.append(_constant(name, declared, time, np.asarray(values, float), scene))
+            findings.append(_constant(name, declared, time, np.asarray(values, float), scene))
         elif declared:
             remedy = f"; it would with {name}, or with the angular momentum beside the axis"
             remedy = remedy if name in CONSTANTS else ", as its axes are scaled to length one"
-            shown.append(undecided(name, declared, f"the trajectory shows no {name}{remedy}"))
-    return shown
+            findings.append(undecided(name, declared, f"the trajectory shows no {name}{remedy}"))
+    return findings
 
 
 def _of_rates(scene: Scene, time: np.ndarray, rates: np.ndarray) -> dict[str, np.ndarray]:

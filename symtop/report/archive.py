@@ -152,43 +152,43 @@ def printed(number: Any, digits: int = DIGITS) -> str:
     return str(nstr(number, digits, min_fixed=0, max_fixed=0, strip_zeros=False))
 
 
-def states_csv(chosen: Iterable[Scene]) -> str:
+def states_csv(entries: Iterable[Scene]) -> str:
     """The states as CSV: scene, time, and `COLUMNS` with 30 digits each."""
     lines = [
         [scene.name, repr(time), *map(printed, state)]
-        for scene in chosen
+        for scene in entries
         for time, state in zip(times_of(scene), precise(scene), strict=True)
     ]
     return str(pd.DataFrame(lines, columns=["scene", "time", *COLUMNS]).to_csv(index=False))
 
 
-def scenes_csv(chosen: Iterable[Scene]) -> str:
+def scenes_csv(entries: Iterable[Scene]) -> str:
     """Tops and starts as CSV, every number with the 17 digits that name its double; angles in radians."""
     header = ["scene", *NUMBERS, "horizon", "nutation_period", "units", "purpose"]
     lines = [
         [scene.name, *map(repr, (*flat(scene.top, scene.start), scene.horizon, scene.nutation_period)),
          scene.units or "any consistent", scene.purpose]
-        for scene in chosen
+        for scene in entries
     ]  # fmt: skip
     return str(pd.DataFrame(lines, columns=header).to_csv(index=False))
 
 
-def states(chosen: Sequence[Scene]) -> xr.Dataset:
+def states(entries: Sequence[Scene]) -> xr.Dataset:
     """The states as pairs of doubles: dimensions scene, sample, component and part.
 
     A value is ``NAME + NAME_lo``, which is good to 31 digits; I1, I3, mgl and the start ``NAME_0`` depend on scene.
     """
-    exact = np.array([precise(scene) for scene in chosen], dtype=object)
+    exact = np.array([precise(scene) for scene in entries], dtype=object)
     values = exact.astype(float)
     both = ("scene", "sample")
-    variables: dict[str, Any] = {"time": (both, [times_of(scene) for scene in chosen])}
+    variables: dict[str, Any] = {"time": (both, [times_of(scene) for scene in entries])}
     for ending, numbers in (("", values), ("_lo", (exact - values).astype(float))):
         variables |= {f"{name}{ending}": (both, numbers[..., k]) for k, name in enumerate(ANGLES)}
         variables[f"axis{ending}"] = ((*both, "component"), numbers[..., 6:9])
         variables[f"quaternion{ending}"] = ((*both, "part"), numbers[..., 9:])
-    for name, column in zip(NUMBERS, zip(*(flat(one.top, one.start) for one in chosen), strict=True), strict=True):
+    for name, column in zip(NUMBERS, zip(*(flat(one.top, one.start) for one in entries), strict=True), strict=True):
         variables[f"{name}_0" if name in ANGLES else name] = ("scene", list(column))
-    names = [scene.name for scene in chosen]
+    names = [scene.name for scene in entries]
     coordinates = {"scene": names, "component": ["x", "y", "z"], "part": ["w", "x", "y", "z"]}
     data = netcdf.describe(columns.described(xr.Dataset(variables, coordinates)), TITLE)
     for name in (*ANGLES, "axis", "quaternion"):

@@ -42,9 +42,9 @@ def times_of(scene: Scene) -> list[float]:
     return even_times(PERIODS * scene.nutation_period, TIMES)
 
 
-def write(folder: str | Path, chosen: Sequence[Scene] | None = None) -> Path:
-    """Write the test set into a folder, which must be new or empty; a minute. `chosen` are other problems."""
-    path, scenes = file_path("folder", folder), list(chosen or problems())
+def write(folder: str | Path, scenes: Sequence[Scene] | None = None) -> Path:
+    """Write the test set into a folder, which must be new or empty; a minute. `scenes` are other problems."""
+    path, scenes = file_path("folder", folder), list(scenes or problems())
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise SymtopError(f"the test set needs a folder that is new or empty, not {str(folder)!r}")
     motions = list[Digits]()

@@ -170,18 +170,18 @@ def check(
     cases = StudyCases.stored(study, results, quick=quick, full=full)
     # in the order of their digests, so that a sample is one of all parts of the grid
     stored = sorted(cases.data.items(), key=lambda item: store.digest_of(item[0]))
-    chosen = {path.name: data for path, data in stored[: None if everything else SAMPLE]}
+    sample = {path.name: data for path, data in stored[: None if everything else SAMPLE]}
     with tempfile.TemporaryDirectory(prefix="symtop-check-") as folder:
         again = StudyCases(study, Path(folder).resolve())
-        missing = again.add(case for path, case in cases.cases.items() if path.name in chosen)
+        missing = again.add(case for path, case in cases.cases.items() if path.name in sample)
         again.compute(missing, pool, study.limit, fresh=False, quiet=True)
         again.read(missing)
     differing = again.failures
     for path, data in again.data.items():
         label = f"{again.cases[path].integrator} on {again.cases[path].scene}"
-        differing += [f"{label}: {text}" for text in differences(chosen[path.name], data)]
+        differing += [f"{label}: {text}" for text in differences(sample[path.name], data)]
     whole = results / f"{study.name}.nc"
     if whole.is_file() and len(stored) == len(cases.cases):
         pair = differences(netcdf.read_any(whole), cases.combined(), attributes=False)
         differing += [f"{whole.name}: {text}" for text in pair]
-    return {"study": study.name, "stored": len(stored), "compared": len(chosen), "differences": differing}
+    return {"study": study.name, "stored": len(stored), "compared": len(sample), "differences": differing}

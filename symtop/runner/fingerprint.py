@@ -32,8 +32,8 @@ def uses(study: Study, case: Case) -> list[str]:
     """Names of the integrators that a case runs, the closed form among them, which others are measured by."""
     with failing(study.name, "uses"):
         names = {*(case.integrators if study.uses is None else study.uses(case)), REFERENCE}
-    known = integrators().keys()
-    return sorted(known if EVERY in names else {split_name(name)[0] for name in names} & known)
+    registry = integrators().keys()
+    return sorted(registry if EVERY in names else {split_name(name)[0] for name in names} & registry)
 
 
 def settings_key(study: Study, case: Case) -> str:

@@ -179,22 +179,22 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         Timed cases run one at a time, or one on each core where a trial shows that they do not disturb each other.
         """
         for timed in (False, True):
-            chosen = in_order([task for task in tasks if study.is_timed(task.case) == timed])
-            if chosen and timed:
+            part = in_order([task for task in tasks if study.is_timed(task.case) == timed])
+            if part and timed:
                 wait(self._analyses)
-            local = any(plugins.is_local(name) for task in chosen for name in (task.case.scene, *task.case.integrators))
+            local = any(plugins.is_local(name) for task in part for name in (task.case.scene, *task.case.integrators))
             if self.client is not None and not timed and not local:
                 submit = partial(self.client.get_executor(pure=False).submit, execute_case)
-                _drain(chosen, submit, cluster.width(self.client), on_result)
-            elif local or (len(chosen) < WORTH_WORKERS and not self.size):
+                _drain(part, submit, cluster.width(self.client), on_result)
+            elif local or (len(part) < WORTH_WORKERS and not self.size):
 
                 def here(task: Task) -> Future[Result]:
                     (future := Future[Result]()).set_result(execute_case(task, study))
                     return future
 
-                _drain([task._replace(timed=(1, math.nan) if timed else None) for task in chosen], here, 1, on_result)
+                _drain([task._replace(timed=(1, math.nan) if timed else None) for task in part], here, 1, on_result)
             else:
-                self._in_workers(chosen, on_result, timed=timed)
+                self._in_workers(part, on_result, timed=timed)
 
     def _in_workers(self, tasks: list[Task], on_result: OnResult, *, timed: bool) -> None:
         """Compute tasks in workers; one whose worker dies is computed once more, with nobody beside it."""
@@ -276,10 +276,10 @@ def begin_worker(parent: int) -> None:
 
 def in_order(tasks: Sequence[Task]) -> list[Task]:
     """The first case of every family of methods, then the second, ...: methods of a family share kernels to compile."""
-    known, count = integrators(), Counter[str]()
+    methods, count = integrators(), Counter[str]()
 
     def rank(task: Task) -> int:
-        method = known.get(split_name(task.case.integrator)[0])
+        method = methods.get(split_name(task.case.integrator)[0])
         family = task.case.integrator if method is None else method.family
         count[family] += 1
         return count[family]

@@ -177,7 +177,7 @@ class Study:
         """
         methods = {*names, REFERENCE}
 
-        def chosen(cases: list[Case]) -> list[Case]:
+        def select(cases: list[Case]) -> list[Case]:
             return [
                 case
                 for case in self._listed("cases", lambda: cases)
@@ -185,7 +185,7 @@ class Study:
             ]
 
         def first(quick: bool) -> list[Case]:
-            cases = chosen(self.cases(quick))
+            cases = select(self.cases(quick))
             alone = all({*case.integrators} <= {REFERENCE} for case in cases)
             if not cases or (alone and REFERENCE not in names):
                 raise StudyError(f"study {self.name} has no case of {', '.join(names)}")
@@ -203,9 +203,9 @@ class Study:
 
             return answer and answered
 
-        full, later = self.full, self.follow_up
+        full, follow_up = self.full, self.follow_up
         answers = {name: able(getattr(self, name)) for name in ("facts", "pictures", "tables", "charts")}
         return replace(
-            self, cases=first, full=full and (lambda: chosen(full())),
-            follow_up=later and (lambda data: chosen(later(data))), **answers,
+            self, cases=first, full=full and (lambda: select(full())),
+            follow_up=follow_up and (lambda data: select(follow_up(data))), **answers,
         )  # fmt: skip

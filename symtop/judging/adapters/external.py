@@ -151,8 +151,8 @@ def _states(answer: bytes, rows: int, size: int, name: str) -> Array:
     try:
         values = np.array(answer.decode("ascii").replace(",", " ").split(), dtype=float)
     except ValueError:
-        shown = answer[:40].decode(errors="replace").strip()
-        raise SymtopError(f"{name} must write numbers, as text or as raw doubles, not {shown!r}") from None
+        excerpt = answer[:40].decode(errors="replace").strip()
+        raise SymtopError(f"{name} must write numbers, as text or as raw doubles, not {excerpt!r}") from None
     if values.size != rows * size:
         must = f"{rows} states of {size} numbers (the start and one every stride steps), {rows * size} in all"
         raise SymtopError(f"{name} must write {must}, not {values.size}")
@@ -209,8 +209,8 @@ def _once(step: Callable[..., Any], t: float, batch: Any, h: float, seconds: flo
         after = step(t, batch, h)
     if tuple(getattr(after, "shape", ())) != tuple(batch.shape):
         shape = getattr(after, "shape", None)
-        given = type(after).__name__ if shape is None else f"shape {tuple(shape)}"
-        raise SymtopError(f"step must return a batch of states, shape {tuple(batch.shape)}, not {given}")
+        form = type(after).__name__ if shape is None else f"shape {tuple(shape)}"
+        raise SymtopError(f"step must return a batch of states, shape {tuple(batch.shape)}, not {form}")
     return after
 
 

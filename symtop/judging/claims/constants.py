@@ -177,7 +177,7 @@ def long_run(
             share = QUICK_SHARE if quick else 1.0
             limit = share * EVALUATIONS[method.implementation] / cost if most is None else most
             steps = max(min(QUICK_STEPS if quick else STEPS, limit) * method.speed, PILOT)
-        shown, run, plan = _run(method, scene, inside, steps, step, SAMPLES)
+        trajectory, run, plan = _run(method, scene, inside, steps, step, SAMPLES)
         if run.outcome == "ok" or not method.fixed_step:
             break
         if quick and most is not None:
@@ -187,14 +187,14 @@ def long_run(
     reported = None
     plain = isinstance(method.solvers[inside], AdapterSolver)
     if not (plain or scene.of_body):  # else its momenta are those of its states
-        reported = _reported(method, scene, chart, shown, (run, plan))
+        reported = _reported(method, scene, chart, trajectory, (run, plan))
         if method.fixed_step:
             reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
-    changes, every_step, blown_up = constants(scene, shown), constants(scene, pilot), math.nan
+    changes, every_step, blown_up = constants(scene, trajectory), constants(scene, pilot), math.nan
     if (beyond := blows_up(scene, changes["energy"])).size:
         blown_up = float(plan.times[beyond[0]])
-        shown, run, plan = _run(method, scene, inside, blown_up / step, step, SAMPLES)
-        changes = constants(scene, shown)
+        trajectory, run, plan = _run(method, scene, inside, blown_up / step, step, SAMPLES)
+        changes = constants(scene, trajectory)
     count, grains = max(run.steps, 1), {"energy": scene.energy_grain}
     by_name = {
         name: change_of(plan.times, changes[name], every_step[name], count, grains.get(name, 1.0), plain=plain)
@@ -238,13 +238,13 @@ def _contradiction(
 
 
 def _reported(
-    method: Integrator, scene: Scene, chart: str, shown: Trajectory, long: tuple[Run, Plan]
+    method: Integrator, scene: Scene, chart: str, trajectory: Trajectory, long: tuple[Run, Plan]
 ) -> Difference | None:
     """How far the reported momenta are from those of the states, over the long run."""
     run, plan = long
     if chart == "angles":
         return from_increments(method, scene, plan) if method.fixed_step else None
-    gaps = {name: np.abs(getattr(run, name) - getattr(shown, name)) for name in ("p_phi", "p_psi")}
+    gaps = {name: np.abs(getattr(run, name) - getattr(trajectory, name)) for name in ("p_phi", "p_psi")}
     size, name = max((float(np.max(gap[np.isfinite(gap)], initial=0.0)), name) for name, gap in gaps.items())
     return Difference(name, size / scene.momentum_scale, REPORTED, f"of the larger momentum in {run.steps} steps")
 

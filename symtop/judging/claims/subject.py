@@ -209,8 +209,8 @@ def _python_step(thing: Any, name: str, chart: str, kind: str, *, adaptive: bool
         inspect.signature(thing).bind(*arguments.split(","))
     except TypeError:
         hint = "; a rotation, q = (w, x, y, z), takes (q, w, h, inertia, torque): form rotation" * (kind == "ode")
-        given = f"{inspect.signature(thing)}{hint}"
-        raise SymtopError(f"a step of the form {kind} must take {arguments}, not {given}") from None
+        signature = f"{inspect.signature(thing)}{hint}"
+        raise SymtopError(f"a step of the form {kind} must take {arguments}, not {signature}") from None
     except ValueError:  # built in, without a signature
         pass
     if kind in ("torch", "jax"):
@@ -236,7 +236,7 @@ def _thing(target: Any) -> tuple[Any, str]:
         module = execute(f"symtop_judged_{Path(file).stem}", file)
     thing = getattr(module, name or "step", None)
     if not (callable(thing) or is_solver(thing)):
-        known = [key for key, value in vars(module).items() if callable(value) and not key.startswith("_")]
-        hint = f"it has {', '.join(known[:8])}" if known else "it has no function"
+        functions = [key for key, value in vars(module).items() if callable(value) and not key.startswith("_")]
+        hint = f"it has {', '.join(functions[:8])}" if functions else "it has no function"
         raise SymtopError(f"{file.name} must have a function {name or 'step'!r}; {hint}")
     return thing, f"{file.stem}-{name}" if name else file.stem
