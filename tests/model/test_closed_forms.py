@@ -96,9 +96,9 @@ def test_a_member_without_a_form_fails_alone():
     assert "must meet a pole or miss it by 1e-145" in forms.refused[1]
     assert forms.arithmetic[1] == ""
     assert np.isnan(forms.nutation_period[1])
-    for seen in (forms.state(TIMES), forms.axis(TIMES), forms(TIMES).phi):
-        assert np.isnan(seen[1]).all()
-        assert np.isfinite(seen[[0, 2]]).all()
+    for values in (forms.state(TIMES), forms.axis(TIMES), forms(TIMES).phi):
+        assert np.isnan(values[1]).all()
+        assert np.isfinite(values[[0, 2]]).all()
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import contextlib
 import functools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -173,13 +173,15 @@ class Job:
     continuous: bool = True  # are angles; otherwise modulo a turn where that takes the closed form (`Turns`)
     first: int = 0  # number of the first member
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __getstate__(self) -> dict[str, Any]:
         """For workers elsewhere, which know integrators by their names; one that they do not know goes as it is."""
-        values = {part.name: getattr(self, part.name) for part in fields(self)}
         with contextlib.suppress(SymtopError):
             if find_integrator(self.method.name) == self.method:
-                values["method"] = self.method.name
-        return _received, (values,)
+                return vars(self) | {"method": self.method.name}
+        return vars(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, method=find_integrator(state["method"]))
 
     @property
     def execution(self) -> str:
@@ -344,11 +346,6 @@ class Later(BackendArray):
         layers: Any = indexing  # whose types know no array but NumPy's
         data = layers.MemoryCachedArray(layers.CopyOnWriteArray(layers.LazilyIndexedArray(self)))
         return xr.Variable(("member", "time"), data)
-
-
-def _received(values: dict[str, Any]) -> Job:
-    """A job as it was before it was sent."""
-    return Job(**values | {"method": find_integrator(values["method"])})
 
 
 def together(numbers: Array) -> Any:

@@ -166,11 +166,11 @@ def _shown(variables: Iterable[str] | None, chart: str) -> tuple[str, ...]:
         return SHOWN[chart]
     if isinstance(variables, str) or not isinstance(variables, Iterable):
         raise SymtopError(f"variables must be a list of names, not {variables!r}", "variables")
-    wanted, known = list(variables), SHOWN[chart]
-    for name in wanted:
-        if name not in known:
-            raise SymtopError(f"variables in the {chart} chart are {', '.join(known)}, not {name!r}", "variables")
-    return tuple(name for name in known if name in wanted)
+    names, possible = list(variables), SHOWN[chart]
+    for name in names:
+        if name not in possible:
+            raise SymtopError(f"variables in the {chart} chart are {', '.join(possible)}, not {name!r}", "variables")
+    return tuple(name for name in possible if name in names)
 
 
 def _check_memory(n: int, samples: int, shown: tuple[str, ...]) -> None:
@@ -183,27 +183,27 @@ def _check_memory(n: int, samples: int, shown: tuple[str, ...]) -> None:
 
 
 def _job(
-    members: Members, method: Integrator, chart: str, given: dict[str, Any], tolerance: object, samples: int,
+    members: Members, method: Integrator, chart: str, settings: dict[str, Any], tolerance: object, samples: int,
     budget: float | None, shown: tuple[str, ...],
 ) -> Job:  # fmt: skip
     """The job of an integrator, from settings that are checked here."""
     for one, other in (("step_size", "per_nutation"), ("horizon", "nutations")):
-        if one in given and other in given:
+        if one in settings and other in settings:
             raise SymtopError(f"give {one} or {other}, not both", one, other)
-    control = "per_nutation" if "per_nutation" in given else "step_size"
-    check_control(method, given.get(control), tolerance, control)
-    if method.fixed_step and control not in given:
+    control = "per_nutation" if "per_nutation" in settings else "step_size"
+    check_control(method, settings.get(control), tolerance, control)
+    if method.fixed_step and control not in settings:
         words = "has a fixed step and needs step_size or per_nutation"
         raise SymtopError(f"{method.name} {words}", "step_size", "per_nutation")
     numbers, names, n = members.numbers, members.names, len(members.numbers)
-    period = nutation_periods(numbers) if "per_nutation" in given or "nutations" in given else None
+    period = nutation_periods(numbers) if "per_nutation" in settings or "nutations" in settings else None
     for i in np.flatnonzero(~np.isfinite(period))[:1] if period is not None else ():
         words = f"per_nutation and nutations count nutation periods, and that of {called(names, i)} is endless"
         raise SymtopError(words, "per_nutation", "nutations")
-    horizon = _horizons(members, given, period)
+    horizon = _horizons(members, settings, period)
     steps = bounds = None
     if method.fixed_step:
-        step = for_each(control, given[control], n, names)
+        step = for_each(control, settings[control], n, names)
         step = step if period is None or control == "step_size" else _parts(period, step, horizon, names)
         steps = _steps(step, horizon, budget or MOST_STEPS, names)
     elif method.adaptive:
@@ -212,20 +212,20 @@ def _job(
     return Job(method, chart, numbers, horizon, steps, bounds, samples, budget, shown, period, names)
 
 
-def _horizons(members: Members, given: dict[str, Any], period: Array | None) -> Array:
+def _horizons(members: Members, settings: dict[str, Any], period: Array | None) -> Array:
     """The horizon of each member: given, so many periods, or its own."""
     horizon, names, n = members.horizon, members.names, len(members.numbers)
-    if "horizon" in given:
-        horizon = for_each("horizon", given["horizon"], n, names)
-    elif period is not None and "nutations" in given:
+    if "horizon" in settings:
+        horizon = for_each("horizon", settings["horizon"], n, names)
+    elif period is not None and "nutations" in settings:
         with np.errstate(over="ignore"):  # an infinite horizon is refused below
-            horizon = for_each("nutations", given["nutations"], n, names) * period
+            horizon = for_each("nutations", settings["nutations"], n, names) * period
     if horizon is None:
         words = "give horizon or nutations: these members have no horizon of their own"
         raise SymtopError(words, "horizon", "nutations")
     horizon_of(float(horizon.min()))
     for i in np.flatnonzero(horizon > LONGEST_TIME)[:1]:
-        if "nutations" in given:
+        if "nutations" in settings:
             words = f"they take {called(names, i)} beyond a time of {LONGEST_TIME:g}"
             raise SymtopError(f"nutations must be fewer: {words}", "nutations")
         words = f"not {horizon[i]!s} as of {called(names, i)}"
@@ -321,19 +321,23 @@ class Stream:
 
     def finish(self, chunks: list[slice]) -> xr.Dataset:
         """Put the chunks together; the dataset reads from the file what it is asked for."""
-        with self._writing(), netcdf.one_thread, netcdf.replacing(self.path) as partial:
+        with netcdf.one_thread, netcdf.replacing(self.path) as partial:
             first = self._columns(chunks[0])
             shared = all(same_times(self._columns(chunk, "time")["time"], first["time"][0]) for chunk in chunks)
             labels = {name: values[: chunks[0].stop] for name, values in self.labels.items()}
             pattern = netcdf.describe(as_dataset(first, labels, shared=shared), **self.attributes)
-            with contextlib.closing(netCDF4.Dataset(partial, "w")) as file:
-                _lay_out(file, pattern, self.n)
-                for chunk in chunks:
-                    columns = self._columns(chunk) | {name: values[chunk] for name, values in self.labels.items()}
-                    if shared:
-                        del columns["time"]
-                    for name, values in columns.items():
-                        file[name][chunk] = values.astype(object) if values.dtype.kind == "U" else values
+            try:
+                with contextlib.closing(netCDF4.Dataset(partial, "w")) as file:
+                    _lay_out(file, pattern, self.n)
+                    for chunk in chunks:
+                        columns = self._columns(chunk) | {name: values[chunk] for name, values in self.labels.items()}
+                        if shared:
+                            del columns["time"]
+                        for name, values in columns.items():
+                            file[name][chunk] = values.astype(object) if values.dtype.kind == "U" else values
+            except RuntimeError as error:  # the netCDF library's own word for a disk that is full
+                words = f"What was computed is in {self.folder}, and the same call goes on from there"
+                raise SymtopError(f"cannot write {self.path}: {error}; is the disk full? {words}") from error
         self.forget(chunks)
         return xr.open_dataset(self.path, engine="netcdf4")
 
@@ -343,15 +347,6 @@ class Stream:
             file.unlink(missing_ok=True)
         with contextlib.suppress(OSError):  # something of somebody else's is in it
             self.folder.rmdir()
-
-    @contextlib.contextmanager
-    def _writing(self) -> Iterator[None]:
-        """The netCDF library has an error of its own for a disk that is full."""
-        try:
-            yield
-        except RuntimeError as error:
-            words = f"What was computed is in {self.folder}, and the same call goes on from there"
-            raise SymtopError(f"cannot write {self.path}: {error}; is the disk full? {words}") from error
 
     def _part(self, chunk: slice) -> Path:
         return self.folder / f"{chunk.start}-{chunk.stop}.npz"
