@@ -21,9 +21,9 @@ ROOT = Path(__file__).resolve().parents[1]
 
 def call(*words: object, code: int | None = 0, **environment: str) -> Result:
     """Run a command in this process; it must end with that exit code, or with any if that is None."""
-    done = CliRunner().invoke(main, [str(word) for word in words], env=environment)
-    assert code is None or done.exit_code == code, done.output
-    return done
+    result = CliRunner().invoke(main, [str(word) for word in words], env=environment)
+    assert code is None or result.exit_code == code, result.output
+    return result
 
 
 def answer(*words: object) -> tuple[int, str]:
@@ -38,9 +38,9 @@ def printed_by(code: str, *words: object, cwd: Path | None = None, **environment
     """What a new process of Python prints that runs some code, without an error."""
     settings = {**os.environ, **{name: str(value) for name, value in environment.items()}}
     command = [sys.executable, "-c", code, *map(str, words)]
-    done = subprocess.run(command, cwd=cwd, env=settings, capture_output=True, text=True, timeout=600, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    result = subprocess.run(command, cwd=cwd, env=settings, capture_output=True, text=True, timeout=600, check=False)
+    assert result.returncode == 0, result.stderr
+    return result.stdout
 
 
 def symtop(*words: object, cwd: Path | None = None, **environment: object) -> subprocess.Popen:

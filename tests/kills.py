@@ -49,7 +49,7 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
     _through(command, calm)
     count = lost = most = rounds = 0
     bar = tqdm(total=kills, desc="kills", disable=None)  # on a terminal
-    done: dict[Path, tuple[int, int]] = {}  # finished cases: the identity of their file and when it was written
+    cases_before: dict[Path, tuple[int, int]] = {}  # finished cases: the identity of their file and when it was written
     while count < kills:
         before, start = _locks(results), time.time()
         process = symtop(*command, results, PROBE_PAUSE=0.2)
@@ -68,15 +68,15 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
         time.sleep(1.5)  # workers whose parent was killed have ended by then
         files = {path: path.stat() for path in results.rglob("cases/*/*.npz")}
         now = {path: (about.st_ino, about.st_mtime_ns) for path, about in files.items()}
-        assert done.items() <= now.items()  # not one was written a second time
+        assert cases_before.items() <= now.items()  # not one was written a second time
         cost = sum(lock.stat().st_mtime >= start for lock in _locks(results))
         assert cost <= 2  # what a kill costs: one case a worker
-        lost, most, done = lost + cost, max(most, cost), now
+        lost, most, cases_before = lost + cost, max(most, cost), now
         if process.returncode == 0:
             assert_same(results, calm)
             rounds += 1
             shutil.rmtree(results)
-            done = {}
+            cases_before = {}
     bar.close()
     _through(command, results)
     assert_same(results, calm)

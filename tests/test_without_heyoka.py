@@ -33,9 +33,9 @@ def hidden(tmp_path):
 
 def test_taylor_alone_is_missing_and_refused_and_a_run_a_certificate_in_40_digits_and_advice_need_none(hidden):
     """All in one process, as each start takes two seconds."""
-    done = hidden(python=COMMANDS)
-    assert done.returncode == 0, done.stderr
-    report = json.loads(done.stdout)
+    result = hidden(python=COMMANDS)
+    assert result.returncode == 0, result.stderr
+    report = json.loads(result.stdout)
     assert report["spec"] is None
     (refused,) = report["refused"].splitlines()
     assert "taylor needs the package heyoka" in refused
@@ -52,8 +52,8 @@ def test_taylor_alone_is_missing_and_refused_and_a_run_a_certificate_in_40_digit
 @pytest.mark.slow
 def test_every_study_runs(hidden, tmp_path):
     """On coarse grids; three minutes."""
-    done = hidden("study", "--all", "--quick", "--results", "here")
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    result = hidden("study", "--all", "--quick", "--results", "here")
+    assert result.returncode == 0, result.stdout[-3000:] + result.stderr[-3000:]
     names = {path.stem for path in (tmp_path / "here" / "quick").glob("*.nc")}
     assert {"truth", "convergence", "cost", "drift", "stability", "reduction", "claims"} <= names
     assert hidden("report", "--results", "here/quick").returncode == 0

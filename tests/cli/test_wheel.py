@@ -17,11 +17,11 @@ TRAP = "raise SystemExit('a study of the working directory was run')\n"
 
 def run(*command, **settings):
     """What a command prints."""
-    done = subprocess.run(
+    result = subprocess.run(
         list(map(str, command)), capture_output=True, text=True, timeout=1200, check=False, **settings
     )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout
 
 
 @pytest.mark.slow

@@ -86,16 +86,16 @@ def default_handlers():
     ],
 )
 def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, hearing, kind, default_handlers):
-    done = []
+    events = []
     with hearing(), pytest.raises(kind):  # noqa: PT012 (the moment at which it is raised is what is tested)
         with deferred():
             with deferred():
                 signal.raise_signal(number)
                 signal.raise_signal(number)
-                done.append("inner")
-            done.append("outer")
-        done.append("after")
-    assert done == ["inner", "outer"]
+                events.append("inner")
+            events.append("outer")
+        events.append("after")
+    assert events == ["inner", "outer"]
 
 
 def test_handlers_are_left_as_they_were_and_threads_are_left_alone():

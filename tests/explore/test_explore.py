@@ -298,8 +298,8 @@ def test_nothing_on_the_page_comes_from_elsewhere():
 
 def test_a_bad_port_is_refused(site):
     for port in (site.server_address[1], 70_000):
-        done = call("explore", "--no-browser", "--port", port, code=2)
-        assert "port must be" in done.output
+        result = call("explore", "--no-browser", "--port", port, code=2)
+        assert "port must be" in result.output
 
 
 PLOT = "document.querySelector('#plot-{}').toDataURL()"

@@ -88,9 +88,9 @@ def test_a_separable_step_makes_the_steps_of_the_splitting_that_it_is():
     ).isel(time=-1)
     stepper = SeparableStep(verlet)
     par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
-    done = stepper.march(SPHEROID.top, par, np.array(state), 0.004, np.array([200]))
-    np.testing.assert_allclose(done.states[0], [float(ours["theta"]), float(ours["p_theta"])], rtol=1e-12)
-    assert done.evaluations == 400
+    run = stepper.march(SPHEROID.top, par, np.array(state), 0.004, np.array([200]))
+    np.testing.assert_allclose(run.states[0], [float(ours["theta"]), float(ours["p_theta"])], rtol=1e-12)
+    assert run.evaluations == 400
 
 
 def test_a_separable_step_is_judged_in_the_plane(only):

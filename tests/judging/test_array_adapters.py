@@ -31,12 +31,12 @@ def needs(package):
 def judge(*arguments):
     """The exit code, and the findings by claim, or what is said of the refusal."""
     command = [sys.executable, "-m", "symtop.cli", "judge", *map(str, arguments), "--quick", "--json"]
-    done = subprocess.run(
+    result = subprocess.run(
         command, capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": str(ROOT)}
     )
-    if done.returncode == 2:
-        return 2, done.stderr
-    return done.returncode, {one["claim"]: one for one in json.loads(done.stdout)}
+    if result.returncode == 2:
+        return 2, result.stderr
+    return result.returncode, {one["claim"]: one for one in json.loads(result.stdout)}
 
 
 @pytest.mark.parametrize("chart", ["axis", "attitude"])
@@ -67,11 +67,11 @@ def test_a_solver_in_a_session_that_has_imported_jax(tmp_path):
         SOLVERS + "ledger = symtop.judge(midpoint, order=2, quick=True)\nprint(ledger['order'].verdict)\n"
         "import jax\nprint(jax.config.jax_enable_x64)\n"
     )
-    done = subprocess.run(
+    result = subprocess.run(
         [sys.executable, str(tmp_path / "session.py")], capture_output=True, text=True, check=True,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
     )  # fmt: skip
-    assert done.stdout.split() == ["confirmed", "False"]
+    assert result.stdout.split() == ["confirmed", "False"]
 
 
 BATCHES = """

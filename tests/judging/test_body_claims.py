@@ -75,8 +75,8 @@ def test_what_a_step_on_a_body_cannot_show_is_refused(claims: dict[str, Any], wo
 
 
 def test_the_command_judges_on_a_body() -> None:
-    done = call("claims", "strang", "--scene", "check-case-2", "--quick", "--json")
-    findings = {one["claim"]: one["verdict"] for one in json.loads(done.stdout)}
+    result = call("claims", "strang", "--scene", "check-case-2", "--quick", "--json")
+    findings = {one["claim"]: one["verdict"] for one in json.loads(result.stdout)}
     assert findings == {"order": "confirmed", "energy": "confirmed", "momentum": "confirmed"}
 
 

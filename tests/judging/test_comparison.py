@@ -166,12 +166,12 @@ def test_a_horizon_beyond_the_budget_is_not_run():
 def test_the_command_prints_a_line_for_each_variant(tmp_path):
     words = ["spheroid", "midpoint", "rk4", "--nutations", "1", "--cost", "evaluations", "--budget", "1e4"]
     figure, output = tmp_path / "c.png", tmp_path / "c.nc"
-    done = call("compare", *words, "--figure", figure, "--output", output)
-    lines = {line.split()[0]: line for line in done.stdout.splitlines() if line}
+    result = call("compare", *words, "--figure", figure, "--output", output)
+    lines = {line.split()[0]: line for line in result.stdout.splitlines() if line}
     assert "not: budget" in lines["midpoint[angles]"]
     assert "not: " not in lines["rk4[axis]"]
     assert any(
-        line.startswith("midpoint[angles]: ") and "its least error was" in line for line in done.stdout.splitlines()
+        line.startswith("midpoint[angles]: ") and "its least error was" in line for line in result.stdout.splitlines()
     )
     assert figure.stat().st_size > 1000
     stored = netcdf.read(output)
@@ -182,7 +182,7 @@ def test_the_command_prints_a_line_for_each_variant(tmp_path):
     }  # fmt: skip
     assert runs["rk4[axis]", 1e-6]["force_evaluations"] == least(stored, 1e-6)["rk4[axis]"]
     assert [report[name] for name in ("scene", "cost")] == ["spheroid", "evaluations"]
-    assert done.stdout.startswith("spheroid to t = 1.18017 s (1 nutations): ")
+    assert result.stdout.startswith("spheroid to t = 1.18017 s (1 nutations): ")
     for bad in (["rk5"], [], ["rk4", "--figure", "c.doc"]):
         call("compare", "spheroid", *bad, code=2)
 

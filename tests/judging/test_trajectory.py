@@ -94,15 +94,15 @@ def test_a_claim_that_the_samples_do_not_show_is_undecided_and_not_lost(table, t
     whole = symtop.judge(columns | {"momentum": table[:, 4:]}, conserves=claims, energy="bounded")
     assert (whole["p_phi"].verdict, whole["energy"].verdict) == ("confirmed", "refuted")
     file.write_text(text(table[:, :4], "time,ex,ey,ez"), encoding="utf-8")
-    done = call("judge", file, "--conserves", "p_phi", "--energy", "kept")  # nothing is refuted
-    assert "Claims: 2 undecided." in done.output
-    assert "the trajectory shows no energy" in " ".join(done.output.split())
+    result = call("judge", file, "--conserves", "p_phi", "--energy", "kept")  # nothing is refuted
+    assert "Claims: 2 undecided." in result.output
+    assert "the trajectory shows no energy" in " ".join(result.output.split())
 
 
 def test_an_unknown_claim_about_a_trajectory_is_refused_and_one_that_a_ledger_has_not(table, tmp_path):
     (tmp_path / "run.csv").write_text(text(table), encoding="utf-8")
-    done = call("judge", tmp_path / "run.csv", "--conserves", "p_phi,enrgy", code=2)
-    assert "'enrgy' is unknown; did you mean energy" in done.output
+    result = call("judge", tmp_path / "run.csv", "--conserves", "p_phi,enrgy", code=2)
+    assert "'enrgy' is unknown; did you mean energy" in result.output
     columns = {"time": table[:, 0], "axis": table[:, 1:4]}
     with pytest.raises(symtop.SymtopError, match="conserves must be a set of names, not 'p_phi'"):
         symtop.judge(columns, conserves="p_phi")
@@ -125,8 +125,8 @@ def test_the_true_motion_keeps_everything():
 def test_the_command_takes_a_file(table, tmp_path):
     file = tmp_path / "run.csv"
     file.write_text(text(table), encoding="utf-8")
-    done = call("judge", file, "--energy", "kept", "--json", code=1)
-    assert {row["claim"]: row["verdict"] for row in json.loads(done.output)}["energy"] == "refuted"
+    result = call("judge", file, "--energy", "kept", "--json", code=1)
+    assert {row["claim"]: row["verdict"] for row in json.loads(result.output)}["energy"] == "refuted"
     assert "a card shows a method" in call("judge", file, "--card", tmp_path / "card.html", code=2).output
 
 
@@ -190,8 +190,8 @@ def test_a_conjugate_attitude_of_a_body_is_refused_although_it_starts_right(tmp_
     file, wrong = tmp_path / "run.csv", of_body("check-case-2")
     wrong[:, 1:5] *= CONJUGATE
     file.write_text(text(wrong, OF_BODY), encoding="utf-8")
-    done = call("judge", file, "--scene", "check-case-2", code=2)
-    assert "its sample at t = 0.2 is the true one if it is read as from space to body" in done.stderr
+    result = call("judge", file, "--scene", "check-case-2", code=2)
+    assert "its sample at t = 0.2 is the true one if it is read as from space to body" in result.stderr
     axis, late = text(wrong[:, [0, 5, 6, 7]], "time,wx,wy,wz"), np.copy(wrong[:, :5])
     for content, words in [
         (axis, "one of axis, quaternion, theta"),

@@ -39,9 +39,9 @@ def read(file):
 def checked(folder, mine, reference="states-17.csv"):
     """Of each problem the largest errors of attitude and momentum and the number beyond the bound."""
     words = [sys.executable, str(folder / "check.py"), str(mine), str(folder / reference)]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
-    rows = [line.split() for line in done.stdout.splitlines()]
-    return {row[0]: (float(row[2]), float(row[5]), int(row[6])) for row in rows}, done.stdout
+    result = subprocess.run(words, capture_output=True, text=True, check=True)
+    rows = [line.split() for line in result.stdout.splitlines()]
+    return {row[0]: (float(row[2]), float(row[5]), int(row[6])) for row in rows}, result.stdout
 
 
 def own_file(path, scenes, times, change=lambda body: body):
@@ -85,8 +85,8 @@ def test_a_sign_in_the_inertia_is_found_by_both_checkers(bodies, tmp_path):
     subprocess.run([compiler, str(folder / "check.c"), "-o", str(tmp_path / "check"), "-lm"], check=True)
     for mine, answer in ((wrong, shown), (folder / "states-17.csv", None)):
         words = [str(tmp_path / "check"), str(mine), str(folder / "states-17.csv")]
-        done = subprocess.run(words, capture_output=True, text=True, check=True).stdout
-        assert done == answer if answer else done.count(" 0 beyond the bound") == len(scenes)
+        result = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+        assert result == answer if answer else result.count(" 0 beyond the bound") == len(scenes)
 
 
 def test_the_digits_are_those_of_other_ways(bodies):
@@ -133,5 +133,5 @@ def test_a_start_that_is_moved_by_a_rounding_is_another_motion(monkeypatch):
 def test_the_command_refuses_a_folder_that_holds_something(tmp_path):
     (tmp_path / "test-set").mkdir()
     (tmp_path / "test-set" / "mine").touch()
-    done = call("archive", "--test-set", "--results", tmp_path, code=2)
-    assert "the test set needs a folder that is new or empty" in done.stderr
+    result = call("archive", "--test-set", "--results", tmp_path, code=2)
+    assert "the test set needs a folder that is new or empty" in result.stderr

@@ -157,11 +157,11 @@ def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
 
 
 def test_timed_cases_wait_for_the_analysis_of_the_study_before(script, tmp_path, pool):
-    done = []
+    states = []
     future = pool.analyse(time.sleep, 0.3)
 
     def measure(_):
-        done.append(future.done())
+        states.append(future.done())
         return xr.Dataset()
 
     for timed in (False, True):
@@ -169,4 +169,4 @@ def test_timed_cases_wait_for_the_analysis_of_the_study_before(script, tmp_path,
         symtop.register_scene(replace(symtop.scene("spheroid"), name=f"here-{timed}"))  # cases of this process
         here = replace(study, cases=lambda _, name=f"here-{timed}": [Case(name, "midpoint")])
         runner.start(here, tmp_path / "r", pool, quiet=True)
-    assert done == [False, True]
+    assert states == [False, True]

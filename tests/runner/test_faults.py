@@ -86,12 +86,12 @@ def test_a_real_limit_on_the_size_of_files(tmp_path):
     code += "from symtop.cli.main import main; sys.argv[0] = 'symtop'; main()"
     words = ["study", str(PROBE), "--results", str(tmp_path / "small")]
 
-    done = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=240, check=False
     )
-    assert done.returncode == 2, done.stderr
-    assert done.stderr.startswith("symtop: cannot write")
-    assert "Traceback" not in done.stderr
+    assert result.returncode == 2, result.stderr
+    assert result.stderr.startswith("symtop: cannot write")
+    assert "Traceback" not in result.stderr
     assert not list((tmp_path / "small").rglob("*.npz"))
     assert not leftovers(tmp_path / "small")
 
@@ -403,12 +403,12 @@ def test_paths_that_are_not_ascii(tmp_path):
 def test_no_terminal_and_closed_streams(tmp_path, closed):
 
     words = f"{sys.executable} -m symtop.cli study {PROBE} --results {tmp_path / 'r'} --jobs 2"
-    done = subprocess.run(
+    result = subprocess.run(
         ["/bin/sh", "-c", words + "".join(f" {n}>&-" if n != "0" else " 0<&-" for n in closed)],
         timeout=240,
         check=False,
     )
-    assert done.returncode == 0
+    assert result.returncode == 0
     assert len(contents(tmp_path / "r")) == 13
 
 

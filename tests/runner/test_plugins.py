@@ -68,6 +68,6 @@ def test_functions_count_wherever_they_stand_and_however_they_were_imported(tmp_
     ],
 )  # fmt: skip
 def test_a_mistake_in_a_plugin_is_told_with_its_name_and_as_no_option_of_the_command(mistake, message, tmp_path):
-    done = call("integrators", "--plugin", write(tmp_path, plug=f"import symtop\n{mistake}\n"), code=2)
-    assert done.output.startswith(f"symtop: {message}")
-    assert done.output.count("\n") == 1
+    result = call("integrators", "--plugin", write(tmp_path, plug=f"import symtop\n{mistake}\n"), code=2)
+    assert result.output.startswith(f"symtop: {message}")
+    assert result.output.count("\n") == 1
