@@ -248,8 +248,4 @@ def separated(method: Integrator, process: Process) -> Integrator:
 
 def solvers_of(method: Integrator) -> Table:
     """A method's solvers by their charts, whose runs are checked before they are sent."""
-    return {chart: functools.partial(_solved, method, chart) for chart in method.solvers}
-
-
-def _solved(*args: Any) -> dict[str, Any]:
-    return solve(*args)._asdict()
+    return {chart: lambda *args, chart=chart: solve(method, chart, *args)._asdict() for chart in method.solvers}

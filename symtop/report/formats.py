@@ -47,6 +47,11 @@ def duration(seconds: float, digits: int = 2) -> str:
     return number(seconds / size, digits, unit)
 
 
+def microseconds(seconds: float, digits: int = 2) -> str:
+    """A time, given in seconds, in microseconds."""
+    return number(seconds * 1e6, digits, "µs")
+
+
 def code(name: str) -> str:
     """A name as it is typed."""
     return f"`{name}`"
@@ -64,7 +69,7 @@ def cell(value: Any, digits: int = 3) -> str:
     return str(value)
 
 
-FILTERS = (number, count, percent, power, fixed, duration, code, cell)
+FILTERS = (number, count, percent, power, fixed, duration, microseconds, code, cell)
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
