@@ -25,6 +25,7 @@ import numpy as np
 import symtop
 from benchmarks.pages import Table
 from symtop.core.parallel import cores
+from symtop.measure.timing import timings
 from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.loop import FixedStep
 from symtop.model.charts import View
@@ -147,16 +148,10 @@ def calls() -> list[Call]:
         def alone(name: str = method) -> object:
             return symtop.simulate(scene, name, step_size=h, horizon=STEPS * h, samples=2, observe="axis", guard=False)
 
-        timed: list[Callable[[], object]] = [lambda: together(*SHORT), lambda: together(*LONG), alone]
-        best = [np.inf] * len(timed)
-        for _ in range(ALL_ROUNDS):
-            for k, call in enumerate(timed):
-                begun = time.perf_counter()
-                call()
-                best[k] = min(best[k], time.perf_counter() - begun)
+        each = timings([lambda: together(*SHORT), lambda: together(*LONG), alone], ALL_ROUNDS, batch=0.0)
         few, many = SHORT[0] * SHORT[1], LONG[0] * LONG[1]
-        short, long = best[0] / CALLED, best[1] / CALLED
-        rows.append(Call(method, short - few * (long - short) / (many - few), long / many, best[2] / STEPS))
+        short, long = (timing.best / CALLED for timing in each[:2])
+        rows.append(Call(method, short - few * (long - short) / (many - few), long / many, each[2].best / STEPS))
     return rows
 
 

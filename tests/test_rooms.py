@@ -108,11 +108,13 @@ def upward(modules: dict[str, Module]) -> list[str]:
 def circles(modules: dict[str, Module]) -> list[str]:
     """Sets of files that import each other, directly or through others; TYPE_CHECKING imports aside."""
     names = sorted(modules)
-    targets = [{arrow.target for arrow in modules[name].arrows if not arrow.typing} for name in names]
-    imports = np.array([[name in some for name in names] for some in targets])
-    _, groups = connected_components(imports, connection="strong")
-    members = [[name for name, one in zip(names, groups, strict=True) if one == group] for group in set(groups)]
-    return sorted(" <-> ".join(some) for some in members if len(some) > 1)
+    graph = np.zeros((len(names), len(names)), dtype=bool)
+    for place, name in enumerate(names):
+        targets = {arrow.target for arrow in modules[name].arrows if not arrow.typing}
+        graph[place] = [other in targets for other in names]
+    count, group = connected_components(graph, connection="strong")
+    sets = ([name for name, one in zip(names, group, strict=True) if one == k] for k in range(count))
+    return sorted(" <-> ".join(members) for members in sets if len(members) > 1)
 
 
 def strangers(modules: dict[str, Module]) -> list[str]:

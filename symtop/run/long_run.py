@@ -224,11 +224,10 @@ def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensate
 
 def leaves(carry: Any) -> list[float]:
     """The floats in a kernel's carry: tuples of tuples, or one array."""
-    if isinstance(carry, np.ndarray):
-        return [float(value) for value in carry.ravel()]
     if isinstance(carry, tuple):
         return [value for part in carry for value in leaves(part)]
-    return [float(carry)]
+    values: list[float] = np.ravel(carry).astype(float).tolist()
+    return values
 
 
 def regrown(carry: Any, values: Iterator[float]) -> Any:
@@ -260,10 +259,8 @@ class _Checkpoint:
         if data.attrs.get("identity") != self.identity:
             words = "belongs to another run or version; remove it or name another file"
             raise SymtopError(f"checkpoint {self.file} {words}", "checkpoint")
-        values = iter([float(value) for value in data["position"].values])
-        state, low, carry = regrown(start[:3], values)
-        at = Position(state, low, carry, int(data["steps_done"]))
-        return at, [[float(value) for value in row] for row in data["rows"].values]
+        state, low, carry = regrown(start[:3], iter(data["position"].values.tolist()))
+        return Position(state, low, carry, int(data["steps_done"])), data["rows"].values.tolist()
 
     def _read(self, file: Path) -> xr.Dataset | None:
         """What is in the file; None of a damaged one of the cache, from which nothing can go on."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.model.scenes import _Scenes, closed_form, grazing, sleeping, spinning, steady
+from symtop.model.scenes import Catalogue, closed_form, grazing, sleeping, spinning, steady
 
 
 def test_the_scenes_are_a_dict_that_a_notebook_shows_as_a_table():
@@ -20,7 +20,7 @@ def test_the_scenes_are_a_dict_that_a_notebook_shows_as_a_table():
 def test_what_users_write_is_escaped_and_whole():
     purpose = "a < b & <script>, and a sentence that is longer than the fifty characters a table has by default"
     scene = symtop.Scene("mine", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0), 1.0, purpose)
-    html = _Scenes({"mine": scene})._repr_html_()
+    html = Catalogue({"mine": scene})._repr_html_()
     assert "a &lt; b &amp; &lt;script&gt;, and a sentence that is longer than the fifty characters" in html
     assert "<script>" not in html
 

@@ -44,16 +44,6 @@ def test_the_charts_agree_on_the_momentum_of_the_nutation_and_on_the_energy_with
         assert np.ptp(constant) < 1e-7
 
 
-@pytest.mark.parametrize("chart", CHARTS)
-def test_a_stack_of_runs_is_read_as_its_runs(chart):
-    one = shown(chart)
-    both = View(
-        chart, TOP, np.stack([one.states, one.states[::-1]]), *(np.stack([p, p[::-1]]) for p in (one.p_phi, one.p_psi))
-    )
-    for name in ("axis", "theta", "p_theta", "energy"):
-        np.testing.assert_array_equal(getattr(both, name)[1], getattr(one, name)[::-1])
-
-
 def test_momenta_are_read_in_the_precision_of_the_states():
     states = shown("attitude").states.astype(np.longdouble)
     p_phi, p_psi = space_momenta("attitude", states)

@@ -81,7 +81,7 @@ def test_the_guard_watches_two_motions_in_the_time_of_one():
         solver(body.top, body.start, plan)
 
     def both():
-        watched.known.clear()
+        watched.growths.clear()
         watched.growth(watched.scene.horizon)
 
     one, two, twice = (timing.best for timing in timings([alone, both, lambda: (alone(), alone())], 40, 2e-3))

@@ -91,8 +91,8 @@ def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -
         times[rows] = marks[rows] * h[rows, None]
 
     lay_out(np.arange(n), dithered=False)
-    judged = np.isfinite(period) & (horizon > 2.0 * period)
-    rows = np.flatnonzero(judged if steps is None else judged & (steps >= samples))  # others show every step
+    long_enough = np.isfinite(period) & (horizon > 2.0 * period)
+    rows = np.flatnonzero(long_enough if steps is None else long_enough & (steps >= samples))  # others show every step
     lay_out(rows[unseen(times[rows], period[rows, None]) >= WIDEST_GAP], dithered=True)
     times[np.arange(samples) >= plan.counts[:, None]] = np.nan
     return plan
@@ -167,7 +167,7 @@ class Job:
     tolerance: Array | None
     samples: int
     budget: float | None
-    shown: tuple[str, ...]  # of `SHOWN`
+    observables: tuple[str, ...]  # of `SHOWN`
     period: Array | None = None  # of nutation, where it is known
     names: Any = None  # what members are called (n,), where they have labels
     continuous: bool = True  # are angles; otherwise modulo a turn where that takes the closed form (`Turns`)
@@ -291,14 +291,14 @@ class Job:
 
     def _observables(self, view: View, times: Array) -> dict[str, Array]:
         """Of what a `Trajectory` shows of one run, what is asked for, of all."""
-        columns = {name: getattr(view, name) for name in self.shown}
+        columns = {name: getattr(view, name) for name in self.observables}
         turned = self.turned if self.continuous else ()
         return columns | Turns(self.numbers, times, {name: columns[name] for name in turned}).of(slice(None))
 
     @property
     def turned(self) -> tuple[str, ...]:
         """The angles that are shown and that the chart knows modulo a turn."""
-        return tuple(name for name in ("phi", "psi") if name in self.shown and self.chart in ("axis", "attitude"))
+        return tuple(name for name in ("phi", "psi") if name in self.observables and self.chart in ("axis", "attitude"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -112,7 +112,7 @@ def _checked_bodies(numbers: Array, names: NDArray[Any] | None) -> Array:
             top, start = from_flat(row)
             numbers[i] = replace(top).flat(replace(start))  # which checks what they hold
         except SymtopError as error:
-            raise SymtopError(f"{called(names, i)}: {error}") from None
+            raise SymtopError(f"{member_name(names, i)}: {error}") from None
     return numbers
 
 
@@ -142,7 +142,7 @@ def _plain(index: Any) -> NDArray[Any]:
     return values if values.dtype.kind in "iuf" else np.array([str(label) for label in values])
 
 
-def called(names: NDArray[Any] | None, i: int) -> str:
+def member_name(names: NDArray[Any] | None, i: int) -> str:
     """A member in a sentence: by its label where it has one, otherwise by its number."""
     return f"member {i if names is None else names[i]}"
 
@@ -175,5 +175,5 @@ def for_each(name: str, value: object, n: int, names: NDArray[Any] | None = None
     row = array.astype(float)
     bad = np.flatnonzero(~(np.isfinite(row) & (row > 0.0)))
     if bad.size:
-        positive(f"{name} of {called(names, bad[0])}", row[bad[0]])
+        positive(f"{name} of {member_name(names, bad[0])}", row[bad[0]])
     return row
