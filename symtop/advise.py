@@ -155,15 +155,15 @@ class _Question(NamedTuple):
 
     def allows(self, method: Integrator) -> bool:
         """Is a method what the user can use, before its error is known?"""
-        kept = all(declared(method, claim) in ("kept", "bounded") for claim in KEPT.get(self.keeps or "", ()))
+        conserving = all(declared(method, claim) in ("kept", "bounded") for claim in KEPT.get(self.keeps or "", ()))
         fixed = self.step is None and self.max_step == self.pace == math.inf
-        return kept and (fixed or method.fixed_step) and (not self.general or BODY in _solvers(method))
+        return conserving and (fixed or method.fixed_step) and (not self.general or BODY in _solvers(method))
 
 
 class _Trial(NamedTuple):
     """A candidate with its setting, the error expected at the horizon, and the wall time of the whole run."""
 
-    met: settings.Met
+    run: settings.Met
     error: float
     seconds: float
     confidence: str  # a key of CONFIDENCE
@@ -172,16 +172,16 @@ class _Trial(NamedTuple):
     @property
     def a_step(self) -> float:
         """Seconds of a step; infinite for a method that has none."""
-        return self.seconds * self.met.setting / self.horizon if self.met.integrator.fixed_step else math.inf
+        return self.seconds * self.run.setting / self.horizon if self.run.integrator.fixed_step else math.inf
 
     def cost(self, question: _Question) -> float:
         """Seconds at the very accuracy; those of the run itself where the step is the user's."""
         ratio = 1.0 if question.step is not None else self.error / question.accuracy
-        return self.seconds * settings.at_accuracy(self.met.integrator, ratio)
+        return self.seconds * settings.at_accuracy(self.run.integrator, ratio)
 
     def words(self) -> str:
-        control = (self.met.integrator.control or "nothing").replace("_", " ")
-        return f"{self.met.integrator.name} with {control} {self.met.setting:.4g}"
+        control = (self.run.integrator.control or "nothing").replace("_", " ")
+        return f"{self.run.integrator.name} with {control} {self.run.setting:.4g}"
 
 
 def recommend(
@@ -221,8 +221,8 @@ def recommend(
         raise SymtopError(f"step_size must be {words}", "step_size")
     longest = math.inf if max_step is None else positive("max_step", max_step)
     pace = math.inf if time_a_step is None else positive("time_a_step", time_a_step)
-    kept = None if keeps is None else one_of("keeps", keeps, [*KEPT][: 1 if scene.of_body else None])
-    limits = step, longest, boolean("general", general), kept, pace
+    keeps = None if keeps is None else one_of("keeps", keeps, [*KEPT][: 1 if scene.of_body else None])
+    limits = step, longest, boolean("general", general), keeps, pace
     question = _Question(scene, accuracy, quantity, horizon, allowed, *limits)
     if accuracy < limit:
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
@@ -236,18 +236,18 @@ def recommend(
     own = [one.name for one in integrators().values() if one.implementation == "python" and not is_built_in(one.name)]
     if own:
         fails["Not tried, as only compiled methods are timed"] = own
-    missed = [f"{name} {error:.2e}" for name, error in sorted(search.missed.items(), key=lambda one: one[1])]
-    fails = {MISSES_AT_STEP: missed} | fails if missed else fails
+    errors = [f"{name} {error:.2e}" for name, error in sorted(search.errors_at_step.items(), key=lambda one: one[1])]
+    fails = {MISSES_AT_STEP: errors} | fails if errors else fails
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
     return _advice(question, ranked, sentences, source, beside)
 
 
-def _needs(given: Collection[str]) -> tuple[str, ...]:
+def _needs(choice: Collection[str]) -> tuple[str, ...]:
     """Names of `NEEDS`, by these or by words: a word that completes no need stands for all that have it."""
     parts = {name: set(COMMA.split(words)) for name, words in NEEDS.items()}
-    known = dict.fromkeys([*NEEDS, *sorted(set().union(*parts.values()))])
+    terms = dict.fromkeys([*NEEDS, *sorted(set().union(*parts.values()))])
     words = {
-        one_of("needs", word, known) for word in COMMA.split(", ".join(str(one).strip() for one in given)) if given
+        one_of("needs", word, terms) for word in COMMA.split(", ".join(str(one).strip() for one in choice)) if choice
     }
     whole = [name for name in NEEDS if name in words or parts[name] <= words]
     rest = words.difference(NEEDS, *(parts[name] for name in whole))
@@ -261,10 +261,10 @@ class _Search:
         self.question, self.names, self.menu = question, names, menu
         self.trials: list[_Trial] = []  # the fastest first
         self.fails: dict[str, list[str]] = {}  # names of methods by why they are no answer
-        self.missed: dict[str, float] = {}  # errors of those that run with the user's step
+        self.errors_at_step: dict[str, float] = {}  # errors of those that run with the user's step
         of_top = [] if question.needs else [name for name in names if integrator(name).needs in THIS_TOP]
         self._try(names)
-        costs = {name: one.cost(question) for one in self.trials if (name := one.met.integrator.name) in menu}
+        costs = {name: one.cost(question) for one in self.trials if (name := one.run.integrator.name) in menu}
         first, second, *_ = [*costs.values(), math.inf, math.inf]
         if menu and (len(costs) < AGREED or menu.index(next(iter(costs))) >= AGREED or second < TIED * first):
             self._try(menu[FEW : FEW + 1])
@@ -286,14 +286,14 @@ class _Search:
         return _timed(self.question, self._confirmed(self._of_top, 1), self.fails)
 
     def _names(self) -> list[str]:
-        return [one.met.integrator.name for one in self.trials]
+        return [one.run.integrator.name for one in self.trials]
 
     def _try(self, names: Collection[str]) -> None:
         """Those of high order first: they are the cheapest at most accuracies, and their cost ends other searches."""
         files.expected[0] = math.ceil(KERNELS * len(names))
         for number, method in enumerate(sorted(map(integrator, names), key=lambda method: -(method.order or 0)), 1):
             post(f"trying method {number} of {len(names)}")
-            rivals = (one.met.evaluations for one in self.trials if one.met.integrator.needs not in THIS_TOP)
+            rivals = (one.run.evaluations for one in self.trials if one.run.integrator.needs not in THIS_TOP)
             patience = max(TOO_DEAR * min(rivals, default=math.inf), CHEAP)
             self._sort_in(_try(self.question, method, patience), self.trials, method)
         timed = _timed(self.question, self.trials, self.fails)
@@ -302,11 +302,11 @@ class _Search:
     def _confirmed(self, names: Sequence[str], most: int) -> list[_Trial]:
         """Of the trials with these names, so many of the first, or as many as it takes to have one, run to the end."""
         ranked: list[_Trial] = []
-        trials = [one for one in self.trials if one.met.integrator.name in names]
+        trials = [one for one in self.trials if one.run.integrator.name in names]
         costs = [one.cost(self.question) for one in trials]
-        for number, tried in enumerate(trials):
+        for number, trial in enumerate(trials):
             if number < most or not ranked or costs[number] <= LEVEL * costs[0]:
-                self._sort_in(_confirm(self.question, tried), ranked, tried.met.integrator)
+                self._sort_in(_confirm(self.question, trial), ranked, trial.run.integrator)
         return ranked
 
     def _sort_in(self, trial: "_Trial | str | float", trials: list[_Trial], method: Integrator) -> None:
@@ -316,7 +316,7 @@ class _Search:
         elif isinstance(trial, str):
             self.fails.setdefault(trial, []).append(method.name)
         else:
-            self.missed[method.name] = trial
+            self.errors_at_step[method.name] = trial
 
 
 def _everyone(question: _Question) -> list[str]:
@@ -375,37 +375,37 @@ def _try(question: _Question, method: Integrator, patience: float) -> "_Trial | 
     period = scene.nutation_period
     short = min(horizon, settings.SHORT * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** settings.growth(method, quantity)
-    met = settings.search(
+    run = settings.search(
         scene, method, accuracy * law, quantity, short, patience=patience, longest=question.max_step
     )  # fmt: skip
-    if isinstance(met, str):
-        dear = met == settings.BUDGET and patience < settings.MOST_EVALUATIONS[method.implementation]
-        return f"Not within {TOO_DEAR:g} times the work of the best" if dear else met
-    if method.fixed_step and horizon / met.setting > MOST_STEPS:
+    if isinstance(run, str):
+        dear = run == settings.BUDGET and patience < settings.MOST_EVALUATIONS[method.implementation]
+        return f"Not within {TOO_DEAR:g} times the work of the best" if dear else run
+    if method.fixed_step and horizon / run.setting > MOST_STEPS:
         return f"Would need more than {MOST_STEPS:.0e} steps"
-    return _Trial(met, met.error / law, math.nan, "extrapolated", horizon)
+    return _Trial(run, run.error / law, math.nan, "extrapolated", horizon)
 
 
 def _at_step(question: _Question, method: Integrator, step: float) -> "_Trial | str | float":
     """A run to the horizon with the step that the user has, or its error if that is too large, or why it failed."""
     scene, accuracy, quantity, horizon = question[:4]
     try:
-        met = settings.attempt(scene, method, step, horizon, quantity)
+        run = settings.attempt(scene, method, step, horizon, quantity)
     except SymtopError as error:  # a start at a pole, for a method in the angles chart
         return f"Not run, as {error}"
-    if not met.error <= accuracy:
-        return met.error if math.isfinite(met.error) else "No run ends well at this step"
-    confidence = "checked" if met.error + met.bound <= accuracy else "at the reference's limit"
-    return _Trial(met, met.error, math.nan, confidence, horizon)
+    if not run.error <= accuracy:
+        return run.error if math.isfinite(run.error) else "No run ends well at this step"
+    confidence = "checked" if run.error + run.bound <= accuracy else "at the reference's limit"
+    return _Trial(run, run.error, math.nan, confidence, horizon)
 
 
 def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]], rounds: int = 5) -> list[_Trial]:
     """The trials by their times, measured against each other; steps that take too long fail."""
-    mets = [one.met for one in trials]
-    times = settings.seconds(question.scene, mets, question.quantity, question.horizon, rounds)
+    runs = [one.run for one in trials]
+    times = settings.seconds(question.scene, runs, question.quantity, question.horizon, rounds)
     pairs = zip(trials, times, strict=True)
     timed = sorted((one._replace(seconds=time) for one, time in pairs), key=lambda one: one.seconds)
-    slow = [one.met.integrator.name for one in timed if one.a_step > question.pace]
+    slow = [one.run.integrator.name for one in timed if one.a_step > question.pace]
     if slow:
         fails[f"A step takes over {question.pace:g} s"] = slow
     return [one for one in timed if one.a_step <= question.pace]
@@ -416,19 +416,19 @@ def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
         return trial
-    short = trial.met
+    short = trial.run
     if short.evaluations * horizon / short.horizon > settings.MOST_EVALUATIONS[short.integrator.implementation]:
-        met = settings.rounded(scene, short, accuracy * short.error / (trial.error or 1.0), quantity)
-        return trial._replace(met=met, error=trial.error * met.error / (short.error or 1.0))
+        run = settings.rounded(scene, short, accuracy * short.error / (trial.error or 1.0), quantity)
+        return trial._replace(run=run, error=trial.error * run.error / (short.error or 1.0))
     best = settings.search(
         scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting, least=CLOSE,
         longest=question.max_step,
     )  # fmt: skip
     if isinstance(best, str):
         return f"Good enough over a short run but not to the end ({best[0].lower()}{best[1:]})"
-    met = settings.rounded(scene, best, MARGIN * accuracy, quantity)
-    confidence = "checked" if met.error + met.bound <= accuracy else "at the reference's limit"
-    return _Trial(met, met.error, math.nan, confidence, horizon)
+    run = settings.rounded(scene, best, MARGIN * accuracy, quantity)
+    confidence = "checked" if run.error + run.bound <= accuracy else "at the reference's limit"
+    return _Trial(run, run.error, math.nan, confidence, horizon)
 
 
 def _advice(
@@ -442,21 +442,21 @@ def _advice(
         without = _without_steps(question, math.nan)
         return question.advice(reason=reason, beside=_beside(beside), closed_form=without, fails=fails)
     best = ranked[0]
-    name, fixed = best.met.integrator.name, best.met.integrator.fixed_step
+    name, fixed = best.run.integrator.name, best.run.integrator.fixed_step
     worth = f"error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
-    if need := best.met.integrator.needs:
+    if need := best.run.integrator.needs:
         worth += f"; it needs {NEEDS[need]} ({need})"
     if fixed:
-        count = scene.time_scale(horizon) / best.met.setting
+        count = scene.time_scale(horizon) / best.run.setting
         worth += f"; steps are {count:.3g} a {scene.period_word}, {1e6 * best.a_step:.2g} us each"
     runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
-    setting = {str(best.met.integrator.control): best.met.setting}
+    setting = {str(best.run.integrator.control): best.run.setting}
     return question.advice(
         integrator=name, expected_error=best.error, seconds=best.seconds, confidence=best.confidence, fails=fails,
-        reason=f"{best.words()} meets {goal}: {worth}; {source}.{_carries(question, best.met.integrator)}",
+        reason=f"{best.words()} meets {goal}: {worth}; {source}.{_carries(question, best.run.integrator)}",
         runner_up="".join(runners), beside=_beside(beside, best.seconds),
         closed_form=_without_steps(question, best.seconds), **setting,
-        **_lines(question, best.met.integrator, best.met.setting),
+        **_lines(question, best.run.integrator, best.run.setting),
     )  # fmt: skip
 
 
@@ -502,16 +502,16 @@ def _lines(question: _Question, method: Integrator, setting: float | None) -> di
     """The command and the Python line that make the recommended run; no command for a scene that has no name here."""
     scene, _, _, horizon = question[:4]
     name, whole = method.name, horizon == scene.horizon
-    known = scenes.all_scenes().get(scene.name) == scene
-    shown, control = f'"{name}"' if "[" in name else name, str(method.control)
+    in_catalogue = scenes.all_scenes().get(scene.name) == scene
+    label, control = f'"{name}"' if "[" in name else name, str(method.control)
     option = "" if setting is None else f" --{control.replace('_', '-')} {float(setting)!r}"
     until = "" if whole else f" --horizon {horizon!r}"
     files = "".join(f" --plugin {shlex.quote(file)}" for file in loaded())
-    command = f"symtop run {scene.name} {shown}{option}{until}{files}"
-    of, until = f'"{scene.name}"' if known else "scene", "" if whole else f", horizon={horizon!r}"
+    command = f"symtop run {scene.name} {label}{option}{until}{files}"
+    of, until = f'"{scene.name}"' if in_catalogue else "scene", "" if whole else f", horizon={horizon!r}"
     option = "" if setting is None else f", {control}={float(setting)!r}"
     python = f'symtop.simulate({of}, "{name}"{option}{until})'
-    return {"command": command if known else "", "python": python}
+    return {"command": command if in_catalogue else "", "python": python}
 
 
 def _exact_seconds(question: _Question) -> float:
@@ -530,12 +530,12 @@ def _without_steps(question: _Question, best: float) -> str:
     error = f", with an error below {limit:.1g}" if math.isfinite(limit) else ""
     if not closed_form.load():  # to compile it takes 10 s, and its time interpreted says nothing
         return f"The closed form, integrator exact, takes no step{error}."
-    taken = _exact_seconds(question)
-    if not best > taken:
-        more = f", {taken / best:.2g} times that" if math.isfinite(best) else ""
-        return f"The closed form, integrator exact, takes {taken * 1e6:.2g} us{more}{error}, and no step."
+    seconds = _exact_seconds(question)
+    if not best > seconds:
+        more = f", {seconds / best:.2g} times that" if math.isfinite(best) else ""
+        return f"The closed form, integrator exact, takes {seconds * 1e6:.2g} us{more}{error}, and no step."
     return (
-        f"The fastest way is no integrator: the closed form (exact) takes {taken * 1e6:.2g} us, {best / taken:.2g}"
+        f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us, {best / seconds:.2g}"
         f" times less{error}. The integrators are compared for what they do where there is no closed form."
     )
 
@@ -563,7 +563,7 @@ class EngineAdvice:
         run = f"step {self.step_size:g}{self.unit}, to t = {self.horizon:g}{self.unit}"
         lines = [
             f"{self.engine} on {self.scene}, {run}: the axis is off by",
-            *(f"    {_off(value)}  {name} ({maps[name]})" for name, value in self.errors.items()),
+            *(f"    {_error_text(value)}  {name} ({maps[name]})" for name, value in self.errors.items()),
         ]
         near = self.errors[self.best] <= WORST
         if self.best != default and near:
@@ -576,15 +576,15 @@ class EngineAdvice:
             )
         if self.advice is None:
             return "\n".join(lines)
-        if (wanted := self.advice.accuracy) != self.errors[self.best]:
-            serving = ", ".join(name for name, value in self.errors.items() if value <= wanted) or "none"
-            return "\n".join([*lines, f"Settings within {wanted:g} rad at this step: {serving}.", str(self.advice)])
+        if (accuracy := self.advice.accuracy) != self.errors[self.best]:
+            serving = ", ".join(name for name, value in self.errors.items() if value <= accuracy) or "none"
+            return "\n".join([*lines, f"Settings within {accuracy:g} rad at this step: {serving}.", str(self.advice)])
         much = f"{self.gain:.3g} times fewer" if self.gain >= 1.0 else f"{1.0 / self.gain:.3g} times more"
         lines.append(f"As near as {self.best} with {much} force evaluations: {self.advice.reason}")
         return "\n".join(lines)
 
 
-def _off(error: float) -> str:
+def _error_text(error: float) -> str:
     """An axis error of an engine's map, or that its run ended early."""
     return f"{error:.2e} rad" if error < math.pi else "ended early "
 
@@ -612,16 +612,16 @@ def i_use(
     if h >= end:
         raise SymtopError(f"step_size must be below the horizon {end:g}, not {h:g}", "step_size")
     runs = {name: settings.attempt(start, integrator(one), h, end, "axis") for name, one in maps[engine].items()}
-    off = {name: min(run.error, math.pi) for name, run in runs.items()}
-    best = min(off, key=lambda name: off[name])
-    error = off[best]
+    errors = {name: min(run.error, math.pi) for name, run in runs.items()}
+    best = min(errors, key=lambda name: errors[name])
+    error = errors[best]
     if accuracy is not None:
         limits["step_size"] = step_size
     elif limits.get("quantity") not in (None, "axis"):
         raise SymtopError(f"quantity must be axis where there is no accuracy, not {limits['quantity']!r}", "quantity")
     target = error if accuracy is None else accuracy
-    sought = accuracy is not None or error <= WORST
-    advice = recommend(start, accuracy=target, horizon=end, **limits) if sought else None
+    has_target = accuracy is not None or error <= WORST
+    advice = recommend(start, accuracy=target, horizon=end, **limits) if has_target else None
     gain = math.nan
     if advice is not None and advice.integrator is not None:
         setting = advice.step_size or advice.tolerance or math.nan
@@ -629,4 +629,4 @@ def i_use(
         gain = runs[best].evaluations / needed.evaluations
     elif accuracy is None:
         advice = None
-    return EngineAdvice(start.name, engine, h, end, off, best, gain, advice, start.second)
+    return EngineAdvice(start.name, engine, h, end, errors, best, gain, advice, start.second)

@@ -37,8 +37,8 @@ PATIENCE = 30.0  # seconds; a first start on a busy machine takes five
 def executable() -> str:
     """The browser on this machine; a test that needs one is skipped where there is none."""
     for name in NAMES:
-        if found := shutil.which(name):
-            return found
+        if path := shutil.which(name):
+            return path
     pytest.skip(f"no browser on this machine ({', '.join(NAMES)}); on Debian: apt-get install chromium")
 
 
@@ -173,18 +173,18 @@ class Browser:
 
     def open(self, address: str) -> None:
         """Go to an address and wait until the page has loaded."""
-        found = self._send("Page.navigate", url=address)
-        if "errorText" in found:
-            raise BrowserError(f"{address}: {found['errorText']}")
+        answer = self._send("Page.navigate", url=address)
+        if "errorText" in answer:
+            raise BrowserError(f"{address}: {answer['errorText']}")
         self.wait_for("document.readyState === 'complete' && location.href !== 'about:blank'")
 
     def evaluate(self, expression: str) -> Any:
         """The value of a JavaScript expression; a promise is awaited."""
-        found = self._send("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
-        if "exceptionDetails" in found:
-            details = found["exceptionDetails"]
+        answer = self._send("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in answer:
+            details = answer["exceptionDetails"]
             raise BrowserError(details.get("exception", {}).get("description") or details["text"])
-        return found["result"].get("value")
+        return answer["result"].get("value")
 
     def wait_for(self, condition: str, patience: float = PATIENCE) -> Any:
         """Wait until a JavaScript expression is true, and return it."""
@@ -220,8 +220,8 @@ class Browser:
 
     def pdf(self, path: Path) -> Path:
         """Print the page."""
-        found = self._send("Page.printToPDF", printBackground=False, preferCSSPageSize=True)
-        path.write_bytes(base64.b64decode(found["data"]))
+        answer = self._send("Page.printToPDF", printBackground=False, preferCSSPageSize=True)
+        path.write_bytes(base64.b64decode(answer["data"]))
         return path
 
     def drag(self, selector: str, right: float = 0.0, down: float = 0.0, at: tuple[float, float] = (0.5, 0.5)) -> None:
@@ -236,8 +236,8 @@ class Browser:
         """Save what is in the window, or the whole page, as a PNG."""
         size = self._send("Page.getLayoutMetrics")["cssContentSize"] if whole else {}
         clip = {"clip": {"x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1}} if size else {}
-        found = self._send("Page.captureScreenshot", format="png", captureBeyondViewport=whole, **clip)
-        path.write_bytes(base64.b64decode(found["data"]))
+        answer = self._send("Page.captureScreenshot", format="png", captureBeyondViewport=whole, **clip)
+        path.write_bytes(base64.b64decode(answer["data"]))
         return path
 
     def outside(self) -> list[str]:

@@ -21,18 +21,26 @@ ROOT = Path(__file__).resolve().parents[1]
 
 def call(*words: object, code: int | None = 0, **environment: str) -> Result:
     """Run a command in this process; it must end with that exit code, or with any if that is None."""
-    done = CliRunner().invoke(main, [str(word) for word in words], env=environment)
-    assert code is None or done.exit_code == code, done.output
-    return done
+    result = CliRunner().invoke(main, [str(word) for word in words], env=environment)
+    assert code is None or result.exit_code == code, result.output
+    return result
+
+
+def answer(*words: object) -> tuple[int, str]:
+    """Exit code and output of a command in this process, which raises nothing and prints no traceback."""
+    result = call(*words, code=None)
+    assert "Traceback" not in result.output, result.output
+    assert result.exception is None or isinstance(result.exception, SystemExit), repr(result.exception)
+    return result.exit_code, result.output
 
 
 def printed_by(code: str, *words: object, cwd: Path | None = None, **environment: object) -> str:
     """What a new process of Python prints that runs some code, without an error."""
     settings = {**os.environ, **{name: str(value) for name, value in environment.items()}}
     command = [sys.executable, "-c", code, *map(str, words)]
-    done = subprocess.run(command, cwd=cwd, env=settings, capture_output=True, text=True, timeout=600, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    result = subprocess.run(command, cwd=cwd, env=settings, capture_output=True, text=True, timeout=600, check=False)
+    assert result.returncode == 0, result.stderr
+    return result.stdout
 
 
 def symtop(*words: object, cwd: Path | None = None, **environment: object) -> subprocess.Popen:
@@ -85,14 +93,14 @@ def ended(process: subprocess.Popen, seconds: float = 240.0) -> tuple[int, str, 
 
 def contents(results: Path, *, provenance: bool = False) -> dict[str, xr.Dataset]:
     """Every dataset of a results folder by its place in it, of cases as well, without attributes of provenance."""
-    found = {}
+    datasets = {}
     for path in sorted([*results.rglob("*.nc"), *results.rglob("cases/*/*.npz")]):
         data = netcdf.read(path) if path.suffix == ".nc" else store.load_case(path)
         assert data is not None, path
-        found[str(path.relative_to(results))] = data.drop_attrs().assign_attrs(
+        datasets[str(path.relative_to(results))] = data.drop_attrs().assign_attrs(
             {key: value for key, value in data.attrs.items() if provenance or key not in netcdf.provenance()}
         )
-    return found
+    return datasets
 
 
 def same(one: Path, other: Path) -> int:

@@ -77,11 +77,11 @@ def processes_with_dask():
 def _registered_for_a_while():
     registry.integrators()  # the built-in ones are registered first
     stores = (registry._registry, scenes._added, plugins._loaded)
-    before = [kept.copy() for kept in stores]
+    before = [store.copy() for store in stores]
     yield
-    for kept, entries in zip(stores, before, strict=True):
-        kept.clear()
-        kept.update(entries)
+    for store, entries in zip(stores, before, strict=True):
+        store.clear()
+        store.update(entries)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -133,10 +133,10 @@ def random_scenes(count: int, seed: int) -> list[Scene]:
     """Ordinary tops in ordinary motion, away from the poles."""
     draw = random.Random(seed)
     ranges = (0.4, 2.6), (-math.pi, math.pi), (-math.pi, math.pi), (-1.0, 1.0), (-2.0, 2.0), (-6.0, 6.0)
-    drawn = []
+    sample = []
     for k in range(count):
         I1 = draw.uniform(0.3, 4.0)
         top = SymmetricTop(I1, draw.uniform(0.2, 1.9) * I1, draw.uniform(-3.0, 6.0))
         start = Angles(*(draw.uniform(*between) for between in ranges))
-        drawn.append(Scene(f"random-{k}", top, start, 5.0))
-    return drawn
+        sample.append(Scene(f"random-{k}", top, start, 5.0))
+    return sample

@@ -49,12 +49,12 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
     _through(command, calm)
     count = lost = most = rounds = 0
     bar = tqdm(total=kills, desc="kills", disable=None)  # on a terminal
-    done: dict[Path, tuple[int, int]] = {}  # finished cases: the identity of their file and when it was written
+    cases_before: dict[Path, tuple[int, int]] = {}  # finished cases: the identity of their file and when it was written
     while count < kills:
-        before, start = _begun(results), time.time()
+        before, start = _locks(results), time.time()
         process = symtop(*command, results, PROBE_PAUSE=0.2)
         if draw.random() < 0.9:  # the others come while it is still starting
-            while process.poll() is None and not _begun(results) - before:
+            while process.poll() is None and not _locks(results) - before:
                 time.sleep(0.02)
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(draw.uniform(0.0, longest))
@@ -63,20 +63,20 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
             (os.kill if alone else os.killpg)(process.pid, signal.SIGKILL)
             count += 1
             bar.update()
-        _, said = process.communicate()
-        assert process.returncode in (0, -signal.SIGKILL), said
+        _, errors = process.communicate()
+        assert process.returncode in (0, -signal.SIGKILL), errors
         time.sleep(1.5)  # workers whose parent was killed have ended by then
         files = {path: path.stat() for path in results.rglob("cases/*/*.npz")}
         now = {path: (about.st_ino, about.st_mtime_ns) for path, about in files.items()}
-        assert done.items() <= now.items()  # not one was written a second time
-        begun = sum(lock.stat().st_mtime >= start for lock in _begun(results))
-        assert begun <= 2  # what a kill costs: one case a worker
-        lost, most, done = lost + begun, max(most, begun), now
+        assert cases_before.items() <= now.items()  # not one was written a second time
+        cost = sum(lock.stat().st_mtime >= start for lock in _locks(results))
+        assert cost <= 2  # what a kill costs: one case a worker
+        lost, most, cases_before = lost + cost, max(most, cost), now
         if process.returncode == 0:
             assert_same(results, calm)
             rounds += 1
             shutil.rmtree(results)
-            done = {}
+            cases_before = {}
     bar.close()
     _through(command, results)
     assert_same(results, calm)
@@ -90,7 +90,7 @@ def _through(command: list[object], results: Path) -> None:
     assert code == 0, err
 
 
-def _begun(results: Path) -> set[Path]:
+def _locks(results: Path) -> set[Path]:
     """The locks of cases; a study that is being concluded, beside the cases of the next, has one in another folder."""
     return set(results.rglob("cases/*/.*.lock"))
 
@@ -111,7 +111,7 @@ def assert_same(results: Path, calm: Path) -> None:
             differing[f"{study.name}: {case.label}"] = differences(ours, theirs)
         groups = {case.group for case in fixed} - {case.group for case in cases if case.timed}
         differing[str(path)] = differences(*(_of_groups(file, groups) for file in files))
-    assert not any(differing.values()), {name: said for name, said in differing.items() if said}
+    assert not any(differing.values()), {name: errors for name, errors in differing.items() if errors}
 
 
 def _of_groups(path: Path, groups: set[str]) -> xr.Dataset | xr.DataTree:

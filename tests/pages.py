@@ -31,23 +31,23 @@ class Block(NamedTuple):
     @property
     def file(self) -> str:
         """The name that a block of Python is saved under, or ""."""
-        named = re.match(r"# ([\w-]+\.py)\n", self.code)
-        return named.group(1) if named and self.language == "python" else ""
+        match = re.match(r"# ([\w-]+\.py)\n", self.code)
+        return match.group(1) if match and self.language == "python" else ""
 
 
 def pages() -> list[Path]:
     """The README and all pages in Markdown of the site that somebody wrote."""
-    made = {ROOT / "docs" / "_build", ROOT / "docs" / "snapshot"}
-    written = (path for path in sorted((ROOT / "docs").rglob("*.md")) if not made & set(path.parents))
-    return [ROOT / "README.md", *written]
+    generated = {ROOT / "docs" / "_build", ROOT / "docs" / "snapshot"}
+    files = (path for path in sorted((ROOT / "docs").rglob("*.md")) if not generated & set(path.parents))
+    return [ROOT / "README.md", *files]
 
 
 def blocks(text: str) -> list[Block]:
     """The blocks of a page in order; directives of the site, whose language stands in braces, are none."""
-    found = []
+    result = []
     for fence in FENCE.finditer(text):
         language, *words = fence["info"].split() or [""]
         if not language.startswith("{"):
             assert words in ([], ["slow"]), fence["info"]
-            found.append(Block(language, bool(words), fence["code"]))
-    return found
+            result.append(Block(language, bool(words), fence["code"]))
+    return result

@@ -16,8 +16,8 @@ def measured_order(
     settings = chosen.nutation_period / np.geomspace(*steps, 10)
     table = error_table(chosen, method, list(settings), nutations * chosen.nutation_period, observe=quantity)
     error = table[quantity].values
-    judged = np.isfinite(error) & (error > 10.0 * table[f"{quantity}_bound"].values) & (error < 1e-2)
-    return power_law(table["step_size"].values, error, judged)
+    valid = np.isfinite(error) & (error > 10.0 * table[f"{quantity}_bound"].values) & (error < 1e-2)
+    return power_law(table["step_size"].values, error, valid)
 
 
 def assert_order(

@@ -19,16 +19,16 @@ def checked(name: str, data: object, folder: Path, elsewhere: Collection[str] = 
     """
     study, page = runner.load(name), runner.file_beside(name, "page.md")
     assert page is not None
-    found = runner.findings_of(
+    findings = runner.findings_of(
         study, data, folder, lambda figure, _: plt.close(figure), failures=[], cases=1, page=page
     )
-    there = {one["name"] for kind in ("pictures", "tables") for one in found[kind]}
-    absent = set(re.findall(r"has\(\"([\w-]+)\"\)", found["page"])) - there
-    assert {first or linked for first, linked in NAMED.findall(found["page"])} - absent == there - {*elsewhere}, (
+    there = {one["name"] for kind in ("pictures", "tables") for one in findings[kind]}
+    absent = set(re.findall(r"has\(\"([\w-]+)\"\)", findings["page"])) - there
+    assert {first or linked for first, linked in NAMED.findall(findings["page"])} - absent == there - {*elsewhere}, (
         "figures and tables of the template and of the study differ"
     )
-    text = template.filled(found, folder)
-    empty = {**found, "facts": dict.fromkeys(found["facts"]), "pictures": [], "tables": []}
+    text = template.filled(findings, folder)
+    empty = {**findings, "facts": dict.fromkeys(findings["facts"]), "pictures": [], "tables": []}
     for one in (text, template.filled(empty, folder)):
         assert not re.search(r"\b(None|nan|inf)\b", one), one
         assert "{{" not in one

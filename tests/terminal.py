@@ -49,7 +49,7 @@ def recorded(words: list[str], limit: float = 300.0, code: str | None = None, **
         stderr=theirs, env={**os.environ, **shape, **environment},
     )  # fmt: skip
     os.close(theirs)
-    said, silence, drawings = b"", 0.0, []
+    output, silence, drawings = b"", 0.0, []
     while time.monotonic() - began < limit:
         if not select.select([ours], [], [], 0.05)[0]:
             if process.poll() is not None:
@@ -60,9 +60,9 @@ def recorded(words: list[str], limit: float = 300.0, code: str | None = None, **
         except OSError:  # the other end was closed
             break
         now = time.monotonic()
-        silence, last, said = max(silence, now - last), now, said + part
+        silence, last, output = max(silence, now - last), now, output + part
         drawings.append((now - began, part.decode(errors="replace")))
     os.close(ours)
     process.kill() if time.monotonic() - began >= limit else None
     ended = process.wait()
-    return Recording(said.decode(errors="replace"), ended, max(silence, time.monotonic() - last), drawings)
+    return Recording(output.decode(errors="replace"), ended, max(silence, time.monotonic() - last), drawings)

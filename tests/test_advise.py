@@ -51,8 +51,8 @@ def test_a_method_that_cannot_start_at_a_pole_is_left_out(monkeypatch):
     advice = symtop.recommend(scene, accuracy=1e-6)
     assert advice.confidence == "checked"
     assert measured(scene, advice) <= 1e-6
-    (said,) = (words for words in advice.fails if words.startswith("Not run, as theta must lie inside"))
-    assert "rk4[angles]" in said
+    (sentence,) = (words for words in advice.fails if words.startswith("Not run, as theta must lie inside"))
+    assert "rk4[angles]" in sentence
     tilted = symtop.recommend(symtop.Scene("tilted", top, symtop.Angles(0.5, psi_dot=9.0), 5.0), accuracy=1e-6)
     assert not any(words.startswith("Not run") for words in tilted.fails)
 
@@ -90,8 +90,8 @@ def test_an_error_grows_over_horizons_as_the_traits_promise(name, quantity):
 )
 def test_a_search_says_why_it_found_nothing(name, accuracy, patience, why):
     scene, method = symtop.scene("spheroid"), symtop.integrator(name)
-    missed = settings.search(scene, method, accuracy, "axis", 5.0, None, patience)
-    assert missed == why
+    reason = settings.search(scene, method, accuracy, "axis", 5.0, None, patience)
+    assert reason == why
 
 
 def test_an_accuracy_beyond_pi_is_one_of_what_is_no_angle(monkeypatch):
@@ -108,22 +108,22 @@ def test_an_accuracy_beyond_pi_is_one_of_what_is_no_angle(monkeypatch):
 def test_the_advised_lines_are_the_run_that_was_checked(horizon, monkeypatch):
     """The same step and horizon to the last digit in the command, in Python and in the run whose error is told."""
     few(monkeypatch, 1)
-    ran, real = [], settings.attempt
-    monkeypatch.setattr(settings, "attempt", lambda *given: ran.append(given) or real(*given))
+    calls, real = [], settings.attempt
+    monkeypatch.setattr(settings, "attempt", lambda *arguments: calls.append(arguments) or real(*arguments))
     advice = symtop.recommend("spheroid", accuracy=1e-3, horizon=horizon)
     assert advice.confidence == "checked"
     assert float(f"{advice.step_size:.5g}") == advice.step_size
     _, words = advice.command.split(" strang ")
-    given = dict(zip((parts := words.split())[::2], map(float, parts[1::2]), strict=True))
-    assert given == {"--step-size": advice.step_size, "--horizon": horizon}
+    arguments = dict(zip((parts := words.split())[::2], map(float, parts[1::2]), strict=True))
+    assert arguments == {"--step-size": advice.step_size, "--horizon": horizon}
     assert advice.python.endswith(f"step_size={advice.step_size!r}, horizon={horizon!r})")
-    error = {given[2]: real(*given).error for given in ran if given[3] == horizon}
+    error = {arguments[2]: real(*arguments).error for arguments in calls if arguments[3] == horizon}
     assert error[advice.step_size] == advice.expected_error
     assert str(advice).splitlines()[-2:] == [f"Run it: {advice.command}", f"In Python: {advice.python}"]
     run = eval(advice.python, {"symtop": symtop})  # a line that is printed to be run
     assert float(symtop.errors(run)["axis"].max()) <= 1e-3
-    told = json.loads(call(*advice.command.split()[1:], "--json").stdout)
-    assert told["errors"]["axis"]["largest"] <= 1e-3
+    report = json.loads(call(*advice.command.split()[1:], "--json").stdout)
+    assert report["errors"]["axis"]["largest"] <= 1e-3
     scene = symtop.scene("spheroid")
     own = symtop.Scene("spheroid", scene.top, scene.start, horizon=30.0)  # no scene of the catalogue has this name
     assert symtop.recommend(own, accuracy=1e-3).command == ""
@@ -182,20 +182,20 @@ def test_the_answer_does_not_depend_on_the_working_directory(tmp_path, monkeypat
 
 
 def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it(monkeypatch):
-    tried, real = [], advise._try
-    monkeypatch.setattr(advise, "_try", lambda *given: tried.append(given[1].name) or real(*given))
+    names, real = [], advise._try
+    monkeypatch.setattr(advise, "_try", lambda *arguments: names.append(arguments[1].name) or real(*arguments))
     scene = symtop.scene("goldstein")
     menu = ["vern9-fixed[axis]", "gauss-6[axis]", "rk4[axis]", "strang[axis]", "cayley[axis]", "srkn-14-6[axis]"]
     monkeypatch.setattr(advise, "_menu", lambda question: ["series[axis]"] if question.needs else menu)
     advice = symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
-    assert sorted(tried) == sorted([*menu[:5], "series[axis]"])
+    assert sorted(names) == sorted([*menu[:5], "series[axis]"])
     assert advice.integrator == "vern9-fixed[axis]"
     assert "tried the 5 methods" in advice.reason
-    tried.clear()
+    names.clear()
     menu[:5] = menu[4::-1]  # the fastest is the last of five
     symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
-    assert sorted(tried) == sorted([*menu, "series[axis]"])
-    tried.clear()
+    assert sorted(names) == sorted([*menu, "series[axis]"])
+    names.clear()
     menu[:] = ["stormer-verlet", "strang[axis]", "midpoint", "trapezoidal", "cayley[axis]", "kahan[axis]"]
     everyone = {*menu, "vern9-fixed[axis]", "srkn-14-6[axis]"}  # of many more: each takes its kernel and its trials
     monkeypatch.setattr(advise, "_everyone", lambda _: sorted(everyone))
@@ -203,7 +203,7 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     advice = symtop.recommend(scene, accuracy=1e-11, horizon=30.0)  # where none of the menu gets
     assert advice.confidence == "checked"
     assert advice.integrator not in menu
-    assert {*tried} - {"series[axis]"} == everyone
+    assert {*names} - {"series[axis]"} == everyone
 
 
 def test_the_table_names_methods_for_every_class_and_none_where_a_user_limits_steps():
@@ -261,18 +261,18 @@ def random_scene(rng, number):
 @pytest.mark.slow
 def test_thirty_random_tops():
     """At least 97 % of 90 recommendations meet the accuracy, and none that was called checked misses it."""
-    rng, met = random.Random(11), []
+    rng, successes = random.Random(11), []
     for number in range(30):
         scene = random_scene(rng, number)
         for accuracy in (1e-3, 1e-6, 1e-9):
             advice = symtop.recommend(scene, accuracy=accuracy)
             if advice.integrator is None:
-                met.append(False)
+                successes.append(False)
                 continue
             good = measured(scene, advice) <= accuracy
             assert good or advice.confidence != "checked", advice
-            met.append(good)
-    assert np.mean(met) >= 0.97
+            successes.append(good)
+    assert np.mean(successes) >= 0.97
 
 
 def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
@@ -286,7 +286,7 @@ def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
         symtop.recommend("spheroid", accuracy=1e-6, needs=["luck"])
     words = {("torque",): "kicks group", ("torque", " free motion"): "kicks", ("inertia, torque",): "group", (): "",
              ("f(t", " y)", "group"): "derivative group", ("kicks", "a Lagrangian"): "lagrangian kicks"}  # fmt: skip
-    assert {given: " ".join(advise._needs(given)) for given in words} == words
+    assert {choice: " ".join(advise._needs(choice)) for choice in words} == words
     assert [advise._needs([words]) for words in NEEDS.values()] == [(name,) for name in NEEDS]
 
 
@@ -295,10 +295,10 @@ def test_what_is_made_for_this_top_is_named_beside_the_answer():
     assert symtop.integrator(advice.integrator).needs not in ("this-top", "solution")
     assert advice.beside.startswith("Made for this top: series")
     assert advice.beside in str(advice)
-    asked = symtop.recommend("spheroid", accuracy=1e-6, horizon=8.0, needs="this-top")
-    assert symtop.integrator(asked.integrator).needs == "this-top"
-    assert asked.beside == ""
-    assert "It does not carry over to a body without symmetry" in asked.reason
+    own = symtop.recommend("spheroid", accuracy=1e-6, horizon=8.0, needs="this-top")
+    assert symtop.integrator(own.integrator).needs == "this-top"
+    assert own.beside == ""
+    assert "It does not carry over to a body without symmetry" in own.reason
 
 
 def test_at_the_step_that_a_user_has_it_says_what_is_good_enough(monkeypatch):
@@ -311,8 +311,8 @@ def test_at_the_step_that_a_user_has_it_says_what_is_good_enough(monkeypatch):
     assert advice.step_size == step
     assert measured(scene, advice) <= 1e-4
     assert f"steps are {scene.nutation_period / step:.3g} a nutation" in advice.reason
-    missed = next(words for words in advice.fails if words.startswith("Not accurate enough at this step"))
-    names = dict(words.split() for words in missed.partition(": ")[2].rstrip(".").split(", "))
+    line = next(words for words in advice.fails if words.startswith("Not accurate enough at this step"))
+    names = dict(words.split() for words in line.partition(": ")[2].rstrip(".").split(", "))
     assert "midpoint" in names
     assert [*names.values()] == sorted(names.values(), key=float)
     for name in [*names][:4]:
@@ -339,8 +339,8 @@ def test_limits_leave_out_what_a_user_cannot_use():
     assert formula().integrator == "kahan[axis]"  # which is nowhere run on a body
     assert "body" in symtop.integrator(str(formula(general=True).integrator).partition("[")[0]).solvers
     for keeps in ("energy", None):  # without it the advice is a method that lets the energy drift
-        kept = ask(accuracy=1e-3, needs="derivative", keeps=keeps, step_size=0.002)
-        run = symtop.simulate(scene, kept.integrator, step_size=0.002, horizon=800.0, guard=False)
+        choice = ask(accuracy=1e-3, needs="derivative", keeps=keeps, step_size=0.002)
+        run = symtop.simulate(scene, choice.integrator, step_size=0.002, horizon=800.0, guard=False)
         early, late = (symtop.errors(run)["energy"].values[part].max() for part in (slice(1, 50), slice(-50, None)))
         assert bool(late < 3.0 * early + 1e-14) is (keeps is not None)
     slow = ask(accuracy=1e-3, needs="kicks", step_size=0.002, time_a_step=1e-12)

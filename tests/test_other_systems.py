@@ -42,10 +42,10 @@ print(json.dumps({"there": there, "first": first, "again": again, "judged": judg
 
 def test_a_study_in_workers_is_resumed_a_long_run_ends_and_somebodys_step_is_judged(tmp_path):
     """Commands in one process, as each start takes two seconds."""
-    done = customized(tmp_path, POORER)(python=COMMANDS)
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    assert told["there"] == [None, False, False]
-    assert (told["first"], told["again"]) == (12, 1)
+    result = customized(tmp_path, POORER)(python=COMMANDS)
+    assert result.returncode == 0, result.stderr
+    report = json.loads(result.stdout)
+    assert report["there"] == [None, False, False]
+    assert (report["first"], report["again"]) == (12, 1)
     assert not (tmp_path / "run.nc").exists()  # the checkpoint
-    assert "order" in told["judged"]
+    assert "order" in report["judged"]

@@ -15,8 +15,8 @@ CONDA = {"matplotlib": "matplotlib-base", "heyoka": "heyoka.py", "netcdf4": "net
 
 def _needs(lines: list[str]) -> dict[str, str]:
     """Least versions by name."""
-    found = (re.match(r"([A-Za-z0-9._-]+?)\s*>=\s*([0-9.]+|\$\{\{ \w+ \}\})", line) for line in lines)
-    return {one[1].lower(): one[2] for one in found if one}
+    matches = (re.match(r"([A-Za-z0-9._-]+?)\s*>=\s*([0-9.]+|\$\{\{ \w+ \}\})", line) for line in lines)
+    return {one[1].lower(): one[2] for one in matches if one}
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import ast
 import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.util import resolve_name
 from pathlib import Path
 from typing import NamedTuple
 
@@ -79,8 +80,7 @@ def _arrows(node: ast.AST, package: str, known: set[str], *, typing: bool = Fals
         if isinstance(child, ast.Import):
             yield from (Arrow(alias.name, child.lineno, typing) for alias in child.names)
         elif isinstance(child, ast.ImportFrom):
-            above = package.split(".")[: package.count(".") + 2 - child.level] if child.level else []
-            source = ".".join([*above, *([child.module] if child.module else [])])
+            source = resolve_name("." * child.level + (child.module or ""), package)
             for alias in child.names:
                 inner = f"{source}.{alias.name}"
                 yield Arrow(inner if inner in known else source, child.lineno, typing)

@@ -55,9 +55,9 @@ def checked(tmp_path_factory):
     places = ["--config-file", os.devnull, "--cache-dir", str(ROOT / ".mypy_cache"), "good.py", "bad.py"]
     words = [sys.executable, "-m", "mypy", *options, *places]
     home = {**os.environ, "MYPYPATH": str(ROOT)}
-    done = subprocess.run(words, cwd=folder, env=home, capture_output=True, text=True, timeout=300, check=False)
-    assert done.stdout, done.stderr
-    return {name: [one for one in done.stdout.splitlines() if one.startswith(name)] for name in ("good", "bad")}
+    result = subprocess.run(words, cwd=folder, env=home, capture_output=True, text=True, timeout=300, check=False)
+    assert result.stdout, result.stderr
+    return {name: [one for one in result.stdout.splitlines() if one.startswith(name)] for name in ("good", "bad")}
 
 
 def test_a_script_is_typed_throughout(checked):

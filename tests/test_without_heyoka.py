@@ -33,17 +33,17 @@ def hidden(tmp_path):
 
 def test_taylor_alone_is_missing_and_refused_and_a_run_a_certificate_in_40_digits_and_advice_need_none(hidden):
     """All in one process, as each start takes two seconds."""
-    done = hidden(python=COMMANDS)
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    assert told["spec"] is None
-    (refused,) = told["refused"].splitlines()
+    result = hidden(python=COMMANDS)
+    assert result.returncode == 0, result.stderr
+    report = json.loads(result.stdout)
+    assert report["spec"] is None
+    (refused,) = report["refused"].splitlines()
     assert "taylor needs the package heyoka" in refused
-    assert 1e-9 < told["error"] < 1e-4
-    assert told["bound"] < 1e-12
-    assert told["advice"]["integrator"]
-    assert not told["advice"]["integrator"].startswith("taylor")
-    without, with_it = set(told["known"]), set(symtop.integrators())
+    assert 1e-9 < report["error"] < 1e-4
+    assert report["bound"] < 1e-12
+    assert report["advice"]["integrator"]
+    assert not report["advice"]["integrator"].startswith("taylor")
+    without, with_it = set(report["known"]), set(symtop.integrators())
     assert not without - with_it
     missing = {"taylor"} if importlib.util.find_spec("heyoka") else set()  # without it both lists are the same
     assert {name.split("-")[0] for name in with_it - without} == missing
@@ -52,8 +52,8 @@ def test_taylor_alone_is_missing_and_refused_and_a_run_a_certificate_in_40_digit
 @pytest.mark.slow
 def test_every_study_runs(hidden, tmp_path):
     """On coarse grids; three minutes."""
-    done = hidden("study", "--all", "--quick", "--results", "here")
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    result = hidden("study", "--all", "--quick", "--results", "here")
+    assert result.returncode == 0, result.stdout[-3000:] + result.stderr[-3000:]
     names = {path.stem for path in (tmp_path / "here" / "quick").glob("*.nc")}
     assert {"truth", "convergence", "cost", "drift", "stability", "reduction", "claims"} <= names
     assert hidden("report", "--results", "here/quick").returncode == 0

@@ -52,9 +52,9 @@ def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]
 
         for file in files:
             if ctx.info_name == "claims":  # a file that ends its process is told of
-                from symtop.judging.remote import tried
+                from symtop.judging.remote import try_separately
 
-                tried(lambda file=file: len(plugins.load(file)), f"plugin {Path(file).name}")  # type: ignore[misc]
+                try_separately(lambda file=file: len(plugins.load(file)), f"plugin {Path(file).name}")  # type: ignore[misc]
             if not plugins.load(file):
                 warn(f"{Path(file).name} registers no integrator and no scene (symtop.register, symtop.register_scene)")
 
@@ -113,15 +113,15 @@ def body_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(command)
     def with_body(**settings: Any) -> None:
-        given = {name: value for name in OF_BODY if (value := settings.pop(name)) is not None}
+        numbers = {name: value for name in OF_BODY if (value := settings.pop(name)) is not None}
         scene = "scene" if "scene" in settings else "name"
-        if given:
-            if "body" not in given or settings[scene] != BODY:
-                options = ", ".join(f"--{name}" for name in given)
+        if numbers:
+            if "body" not in numbers or settings[scene] != BODY:
+                options = ", ".join(f"--{name}" for name in numbers)
                 raise SymtopError(
                     f"{options} must come with --body I1,I2,I3 on the scene {BODY}, not {settings[scene]}"
                 )
-            settings[scene] = _own_body(given)
+            settings[scene] = _own_body(numbers)
         command(**settings)
 
     for name, (count, metavar, words) in reversed(OF_BODY.items()):
@@ -129,12 +129,12 @@ def body_options(command: Callable[..., None]) -> Callable[..., None]:
     return with_body
 
 
-def _own_body(given: dict[str, Any]) -> "Scene":
+def _own_body(numbers: dict[str, Any]) -> "Scene":
     from symtop.model import body, scenes
 
-    top = body.RigidBody(*given["body"], *given.get("mgl", ()))
-    top = dataclasses.replace(top, centre=given.get("centre", top.centre))
-    start = body.Attitude(given.get("attitude", (1.0, 0.0, 0.0, 0.0)), given.get("rates", (0.0, 0.0, 0.0)))
+    top = body.RigidBody(*numbers["body"], *numbers.get("mgl", ()))
+    top = dataclasses.replace(top, centre=numbers.get("centre", top.centre))
+    start = body.Attitude(numbers.get("attitude", (1.0, 0.0, 0.0, 0.0)), numbers.get("rates", (0.0, 0.0, 0.0)))
     period = top.nutation_period(start)
     if not math.isfinite(period):
         raise SymtopError("--body without a weight needs --rates: it does not move")

@@ -151,9 +151,10 @@ def _self_check(_: Path) -> list[Finding]:
     wrong = "numbers computed here cannot be trusted: reinstall the pinned packages (constraints.txt) and try again"
     began = time.perf_counter()
     values = published_values()
-    missed = [f"{value.source}, {value.quantity}" for value in values if not value.reproduced]
-    result = f"{len(values) - len(missed)} of {len(values)} reproduced{': not ' + '; '.join(missed) if missed else ''}"
-    findings = [Finding("published values", result, not missed, wrong)]
+    failures = [f"{value.source}, {value.quantity}" for value in values if not value.reproduced]
+    missing = f": not {'; '.join(failures)}" if failures else ""
+    result = f"{len(values) - len(failures)} of {len(values)} reproduced{missing}"
+    findings = [Finding("published values", result, not failures, wrong)]
     exact = simulate("spheroid", "exact", samples=41)
     for name, step, allowed in (("midpoint", 1e-3, MIDPOINT_GAP), ("taylor", None, TAYLOR_GAP)):
         if name == "taylor" and importlib.util.find_spec("heyoka") is None:

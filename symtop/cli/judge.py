@@ -152,20 +152,20 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
     symtop claims --plugin my_methods.py
     """
     with ticking("loading"):
-        from symtop.judging.judge_step import apart
+        from symtop.judging.judge_step import judge_separately
         from symtop.methods.framework import registry
         from symtop.model import scenes
 
-        chosen = scenes.scene(scene, bodies=True)
+        problem = scenes.scene(scene, bodies=True)
         added = [name for name in registry.integrators() if not registry.is_built_in(name)]
     refuted, entries = False, []
     for name in names or added or registry.integrators():
         with ticking(f"measuring {name}"):
-            ledger = apart(registry.integrator(name), chosen, quick=quick)
+            ledger = judge_separately(registry.integrator(name), problem, quick=quick)
         verdicts = {finding.verdict for finding in ledger.findings}
         refuted |= "refuted" in verdicts or not verdicts & {"confirmed", "measured"}
         if as_json:
-            about = {"integrator": ledger.integrator, "scene": chosen.name}
+            about = {"integrator": ledger.integrator, "scene": problem.name}
             entries += [{**about, **finding.plain()} for finding in ledger.findings]
         else:
             say("\n".join(finding.sentence(ledger.integrator) for finding in ledger.findings))

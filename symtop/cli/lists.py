@@ -139,13 +139,13 @@ def scenes(name: Any, wide: bool, as_json: bool) -> None:
     from symtop.model import scenes as catalogue
 
     listed = list(catalogue.all_scenes().values())
-    chosen = [catalogue.scene(name, bodies=True)] if name is not None else listed
-    records: list[Record] = [scene.record() for scene in chosen]
+    entries = [catalogue.scene(name, bodies=True)] if name is not None else listed
+    records: list[Record] = [scene.record() for scene in entries]
     keys = {"name": "name", "horizon": "horizon", "nutation": "nutation period", "purpose": "purpose"}
     short: list[Record] = [{column: record[key] for column, key in keys.items()} for record in records]
     times = "horizon: the time a run covers; nutation: one period of it, of a body its natural period."
     note = f"{times} One in full: symtop scenes NAME."
-    one = None if name is None else _numbers(chosen[0])
+    one = None if name is None else _numbers(entries[0])
     _print(records, short, note, one, _scene_page, wide=wide, as_json=as_json)
 
 

@@ -80,15 +80,15 @@ def run(
         data = simulate(scene, integrator, guard={"on": True, "off": False}.get(guard, guard), **settings)
         if output is not None:
             netcdf.write(data, output)
-        chosen = scenes.scene(scene, bodies=True)
-        truth = reference(chosen, data["time"].values, precision="closed-form")
+        problem = scenes.scene(scene, bodies=True)
+        truth = reference(problem, data["time"].values, precision="closed-form")
         error = errors(data)
-        verdict = judgement(chosen, data, error["attitude" if chosen.of_body else "axis"].values)
+        verdict = judgement(problem, data, error["attitude" if problem.of_body else "axis"].values)
         if figure is not None:
             from symtop.report.plot import draw_run
 
-            draw_run(chosen, data, truth, error, figure)
-    words = QUANTITIES | OF_BODY if chosen.of_body else QUANTITIES
+            draw_run(problem, data, truth, error, figure)
+    words = QUANTITIES | OF_BODY if problem.of_body else QUANTITIES
     series = {name: error[name].dropna("time").values for name in words if name in error}
     largest = {name: {"largest": values.max(), "last": values[-1]} for name, values in series.items() if values.size}
     facts = data.attrs
@@ -97,11 +97,11 @@ def run(
         of_run = {name: facts[name] for name in names}
         click.echo(as_text({**of_run, "judgement": verdict._asdict(), "errors": largest}))
     else:
-        method, used, wanted = facts["integrator"], facts["step_size"], settings["step_size"]
+        method, actual, nominal = facts["integrator"], facts["step_size"], settings["step_size"]
         variant = method if method.endswith("]") else f"{method}[{facts['chart']}]"
-        say(f"{variant} on {chosen.name}: {facts['outcome_message']}")
-        other = wanted is not None and abs(used / wanted - 1.0) > SAME
-        of = f" of {used:.6g}, for a whole number of them fills the horizon" if other else ""
+        say(f"{variant} on {problem.name}: {facts['outcome_message']}")
+        other = nominal is not None and abs(actual / nominal - 1.0) > SAME
+        of = f" of {actual:.6g}, for a whole number of them fills the horizon" if other else ""
         say(f"{facts['steps']} steps{of}, {facts['force_evaluations']} force evaluations")
         if facts["sampling"] == "dithered":
             say("samples are not evenly spaced, so that they show all phases of the nutation")
@@ -123,11 +123,11 @@ def estimate(steps: float, run: Callable[[int], object]) -> None:
         return
     with ticking("timing some steps"):
         run(FEWEST)  # which compiles
-        few, fixed, spent = FEWEST, first_call(partial(run, FEWEST)), 0.0
-        while spent < LONG_ENOUGH and few * MANY < steps:
+        few, fixed, seconds = FEWEST, first_call(partial(run, FEWEST)), 0.0
+        while seconds < LONG_ENOUGH and few * MANY < steps:
             few *= 4
-            spent = first_call(partial(run, few)) - fixed  # what a run takes whatever its steps does not count
-    took = spent * steps / (few - FEWEST)
+            seconds = first_call(partial(run, few)) - fixed  # what a run takes whatever its steps does not count
+    took = seconds * steps / (few - FEWEST)
     post("running")  # no longer compiling
     if took > 10.0:
         warn(f"{steps:.3g} steps take about {f'{took:.2g} s' if took < 100.0 else f'{took / 60.0:.2g} min'}")
@@ -164,8 +164,8 @@ def long(
         from symtop.run.guard import MOST_STEPS
         from symtop.run.long_run import OF_BODY, PER_NUTATION, QUANTITIES, long_run
 
-    chosen = scenes.scene(scene, bodies=True)
-    period, step_size = chosen.nutation_period, common.step_of(scene, settings)
+    problem = scenes.scene(scene, bodies=True)
+    period, step_size = problem.nutation_period, common.step_of(scene, settings)
     if step_size is None and period == math.inf:
         raise SymtopError(f"{scene} has no nutation to take a step from: give --step-size")
     h = period / PER_NUTATION if step_size is None else step_size
@@ -181,11 +181,11 @@ def long(
     if data.sizes["window"]:
         rows = []
         steps_made = data["steps"].values
-        for name in (OF_BODY if chosen.of_body else QUANTITIES)[:-1]:  # but for theta
+        for name in (OF_BODY if problem.of_body else QUANTITIES)[:-1]:  # but for theta
             least, most, mean = (data[f"{name}_{kind}"].values for kind in ("least", "largest", "mean"))
             sizes = np.maximum.accumulate(np.maximum(np.abs(least), np.abs(most)))
-            grown = power_law(steps_made, sizes, steps_made > steps_made[-1] / 10.0**DECADES)
-            grows = f"t^({grown})" if math.isfinite(grown.slope) else ""
+            fit = power_law(steps_made, sizes, steps_made > steps_made[-1] / 10.0**DECADES)
+            grows = f"t^({fit})" if math.isfinite(fit.slope) else ""
             words = "|L|" if name == "momentum" else name
             rows.append([words, *(f"{float(value):+.3e}" for value in (least.min(), most.max(), mean[-1])), grows])
         click.echo(table(["change since the start", "least", "largest", "last window's mean", "grows as"], rows))
@@ -242,7 +242,7 @@ def ensemble(
         whole("members", members, 1, random_bodies.MOST if bodies else math.inf)  # which is n in Python
         check_memory("members", members)
         draw = partial(random_bodies.body_population, epsilon=epsilon) if bodies else population
-        drawn = draw(members, seed=seed, kind=kind)
+        sample = draw(members, seed=seed, kind=kind)
     words = QUANTITIES[noun]
     compared = [name for name in words if variables is None or SHOWN_BY[name] in variables]
     if figure is not None and not compared:
@@ -251,23 +251,23 @@ def ensemble(
     files.expected[0] = KERNELS
     post(f"running {members} {noun}")
     try:
-        data = runs.ensemble(drawn, integrator, variables=variables, path=output, **settings)
+        data = runs.ensemble(sample, integrator, variables=variables, path=output, **settings)
     except KeyboardInterrupt:
         warn("interrupted" + ("" if output is None else "; what was run is kept: the same command resumes"))
         sys.exit(130)
-    few, shown = (part.isel(member=slice(0, most)) for part in (drawn, data))
+    few, results = (part.isel(member=slice(0, most)) for part in (sample, data))
     outcomes, steps = Counter(data["outcome"].values.tolist()), int(data["steps"].sum())
     with ticking("comparing with the true motion"):
-        wrong = {name: member_errors(few, shown, name) for name in compared}
+        wrong = {name: member_errors(few, results, name) for name in compared}
         if figure is not None:
             from symtop.report.plot import draw_ensemble
 
-            draw_ensemble(shown, wrong, figure)
+            draw_ensemble(results, wrong, figure)
         own = {name: largest(values) for name, values in wrong.items()}
         worst = {name: spread(values[:, None])[:, 0].tolist() for name, values in own.items()}
     data.close()
     if output is not None:
-        _add_members(output, drawn, own, words)
+        _add_members(output, sample, own, words)
     if as_json:
         errors = {name: dict(zip(map("{:g}".format, LEVELS), row, strict=True)) for name, row in worst.items()}
         click.echo(as_text({"outcomes": outcomes, "steps": steps, "largest_errors": errors}))
@@ -283,15 +283,15 @@ def ensemble(
         sys.exit(3)
 
 
-def _add_members(file: str, drawn: Any, errors: dict[str, Any], words: dict[str, str]) -> None:
+def _add_members(file: str, sample: Any, errors: dict[str, Any], words: dict[str, str]) -> None:
     """Put the members, ``I1`` and ``start_theta``, and the largest ``axis_error`` of each into a file of their runs."""
     import numpy as np
     import xarray as xr
 
-    numbers = {name: column.variable for name, column in drawn.data_vars.items() if column.dtype.kind == "f"}
+    numbers = {name: column.variable for name, column in sample.data_vars.items() if column.dtype.kind == "f"}
     added: dict[str, Any] = {name if name in PARAMETERS else f"start_{name}": one for name, one in numbers.items()}
     for name, values in errors.items():
-        padded = np.pad(values, (0, drawn.sizes["member"] - len(values)), constant_values=math.nan)
+        padded = np.pad(values, (0, sample.sizes["member"] - len(values)), constant_values=math.nan)
         about = {"long_name": f"{words[name]}, largest over the run, infinite after a failure"}
         added[f"{name}_error"] = "member", padded, about
     xr.Dataset(added).to_netcdf(file, mode="a")

@@ -274,5 +274,5 @@ def archive(results: str, output: str | None, *, test_set: bool) -> None:
         return
     from symtop.report.archive import bundle
 
-    made = bundle(Path(results), None if output is None else Path(output))
-    click.echo(f"archive: {made} ({made.stat().st_size / 1e6:.1f} MB)")
+    file = bundle(Path(results), None if output is None else Path(output))
+    click.echo(f"archive: {file} ({file.stat().st_size / 1e6:.1f} MB)")

@@ -268,7 +268,7 @@ class Code:
         if library or function in _by_name or _is_plumbing(file):
             self._note(f"{function.__module__}.{function.__qualname__}")
             if not library and function not in _by_name:
-                self._add_all(held(function))  # a wrapper: what it calls
+                self._add_all(references(function))  # a wrapper: what it calls
         else:
             self._lead_to("function", function.__qualname__, file_label(_path(file)), function)
 
@@ -313,10 +313,10 @@ class Code:
             flags = part.co_flags | (inspect.CO_OPTIMIZED if part.co_flags & inspect.CO_NEWLOCALS else 0)
             counts = part.co_argcount, part.co_kwonlyargcount, flags
             self._note(repr((part.co_names, part.co_freevars, *counts)))
-        self._add_all(held(function))
+        self._add_all(references(function))
         self._add_all(self._also(function))
         file = file_label(_path(function.__code__.co_filename))
-        for name, value in named(function):
+        for name, value in named_globals(function):
             if callable(value) or isinstance(value, ModuleType):
                 self._add(value)
             elif isinstance(value, PLAIN):
@@ -342,7 +342,7 @@ def codes(code: CodeType) -> Iterator[CodeType]:
             yield from codes(constant)
 
 
-def held(function: FunctionType) -> Iterator[object]:
+def references(function: FunctionType) -> Iterator[object]:
     """What a function holds besides its code: defaults and what it closes over."""
     yield from function.__defaults__ or ()
     yield function.__kwdefaults__
@@ -351,7 +351,7 @@ def held(function: FunctionType) -> Iterator[object]:
             yield cell.cell_contents
 
 
-def named(function: FunctionType) -> Iterator[tuple[str, object]]:
+def named_globals(function: FunctionType) -> Iterator[tuple[str, object]]:
     """The globals that a function names and what it imports when it runs, with the attributes of modules among them."""
     inside = list(codes(function.__code__))
     names = sorted({name for code in inside for name in code.co_names})

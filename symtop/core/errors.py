@@ -147,11 +147,11 @@ def label(name: str, value: object) -> str:
 
 def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     """Return `value` if it is one of `allowed`; otherwise name the nearest of them."""
-    known = list(allowed)
-    if isinstance(value, str) and value in known:
+    options = list(allowed)
+    if isinstance(value, str) and value in options:
         return value
-    near = difflib.get_close_matches(value.lower(), known, n=3, cutoff=0.5) if isinstance(value, str) else []
-    names = ", ".join(known[:12]) + " ..." * (len(known) > 12)
+    near = difflib.get_close_matches(value.lower(), options, n=3, cutoff=0.5) if isinstance(value, str) else []
+    names = ", ".join(options[:12]) + " ..." * (len(options) > 12)
     hint = f"did you mean {' or '.join(near)}?" if near else f"known: {names}"
     error = UnknownNameError(f"{name} {shown(value)} is unknown; {hint}", name)
     error.value = value

@@ -49,8 +49,8 @@ on_cold: list[Callable[[], object]] = [_tell]  # called when a kernel is not in 
 
 def cache_root() -> Path:
     """The folder for everything symtop caches: ``$SYMTOP_CACHE`` or ``symtop`` in the user's cache folder."""
-    chosen, caches = os.environ.get("SYMTOP_CACHE"), os.environ.get("XDG_CACHE_HOME")
-    return Path(chosen) if chosen else Path(caches or Path.home() / ".cache") / "symtop"
+    folder, caches = os.environ.get("SYMTOP_CACHE"), os.environ.get("XDG_CACHE_HOME")
+    return Path(folder) if folder else Path(caches or Path.home() / ".cache") / "symtop"
 
 
 def make_private(folder: Path) -> None:

@@ -51,8 +51,8 @@ def read_columns(file: Path | None) -> dict[str, Column]:
         pairs = [flag.split() for flag in flags.split(",") if flag]
         meanings = all(len(pair) == 2 and pair[0].isdigit() for pair in pairs)
         if not (name and long_name and meanings) or name in table:
-            wanted = "a variable that no other line has, its units, those without units, flags, and its long name"
-            raise SymtopError(f"{file}: line {place} must be {wanted}, between tabs, not {line!r}")
+            form = "a variable that no other line has, its units, those without units, flags, and its long name"
+            raise SymtopError(f"{file}: line {place} must be {form}, between tabs, not {line!r}")
         entry = (long_name, *filter(None, (units, without)))
         table[name] = Column(entry, {int(number): word for number, word in pairs})
     return table
@@ -73,8 +73,8 @@ def _git(*arguments: str) -> str:
     command = ["git", "-C", str(ROOT), *arguments]
     with contextlib.suppress(OSError, subprocess.SubprocessError):
         if (ROOT / ".git").exists():  # git would take that of a folder above
-            done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)  # noqa: S603
-            return done.stdout.strip()
+            result = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)  # noqa: S603
+            return result.stdout.strip()
     return ""
 
 
@@ -156,8 +156,8 @@ def replacing(path: str | os.PathLike[str], suffix: str = "") -> Iterator[Path]:
         handle, partial = tempfile.mkstemp(prefix=f".{target.name}.", suffix=f".part{suffix}", dir=target.parent)
         os.close(handle)
         yield Path(partial)
-        with open(partial, "rb") as written:  # noqa: PTH123
-            os.fsync(written.fileno())
+        with open(partial, "rb") as file:  # noqa: PTH123
+            os.fsync(file.fileno())
         Path(partial).chmod(0o644)
         Path(partial).replace(target)
     except OSError as error:
@@ -169,8 +169,8 @@ def replacing(path: str | os.PathLike[str], suffix: str = "") -> Iterator[Path]:
 
 def sweep(path: Path) -> None:
     """Remove the partial files of writers that were killed; call it only while nobody else writes the file."""
-    for left in path.parent.glob(f".{glob.escape(path.name)}.*.part*"):
-        left.unlink(missing_ok=True)
+    for partial in path.parent.glob(f".{glob.escape(path.name)}.*.part*"):
+        partial.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -27,8 +27,8 @@ class OldPaths:
     def find_spec(self, name: str, _path: object = None, _target: object = None) -> ModuleSpec | None:
         """A spec for an old path; None for every other name."""
         package, _, old = name.partition(".")
-        known = package == "symtop" and old in table()
-        return ModuleSpec(name, self, is_package=not table()[old]) if known else None  # type: ignore[arg-type]
+        is_old = package == "symtop" and old in table()
+        return ModuleSpec(name, self, is_package=not table()[old]) if is_old else None  # type: ignore[arg-type]
 
     def create_module(self, _spec: ModuleSpec) -> None:
         """An empty module, as an old package remains."""

@@ -73,19 +73,19 @@ def deferred() -> Iterator[None]:
 
     Where they end the process, they still do. For calls of milliseconds: until one is over, Ctrl-C has no effect.
     """
-    heard: list[int] = []
+    requests: list[int] = []
     numbers = {signal.SIGINT, signal.SIGTERM, HANGUP} if _in_main_thread() else ()
     handlers = {number: signal.getsignal(number) for number in numbers}
     usual = {number: handler for number, handler in handlers.items() if callable(handler)}
     try:
         for number in usual:
-            signal.signal(number, lambda number, _frame: heard.append(number))
+            signal.signal(number, lambda number, _frame: requests.append(number))
         yield
     finally:
         for number, handler in usual.items():
             signal.signal(number, handler)
-        if heard:
-            signal.raise_signal(heard[0])
+        if requests:
+            signal.raise_signal(requests[0])
 
 
 @contextlib.contextmanager

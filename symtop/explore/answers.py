@@ -72,8 +72,8 @@ class Setup:
         """The number of samples: 60 a nutation, within what a page can draw."""
         period = self.scene.nutation_period
         resolved = np.isfinite(period) and period > 0.0
-        wanted = SAMPLES_A_NUTATION * self.scene.horizon / period if resolved else FEWEST_SAMPLES
-        return round(min(max(wanted, FEWEST_SAMPLES), MOST_SAMPLES))
+        samples = SAMPLES_A_NUTATION * self.scene.horizon / period if resolved else FEWEST_SAMPLES
+        return round(min(max(samples, FEWEST_SAMPLES), MOST_SAMPLES))
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -85,22 +85,22 @@ class Setup:
 _budgets: dict[tuple[str, int], float] = {}  # by method and decade of the tolerance: the same for a run and its script
 
 
-def _budget(chosen: Setup) -> float:
+def _budget(config: Setup) -> float:
     """As much work as takes two seconds, from a trial of the run itself, and at most `MOST_WORK`.
 
     The cost of an evaluation differs a thousandfold between methods, and that of a Taylor step also grows as the
     tolerance shrinks: no field of an integrator says as much.
     """
-    tolerance = chosen.setting or 1.0
-    key = chosen.method.name, math.floor(math.log10(tolerance))
-    most = MOST_WORK[chosen.method.implementation]
+    tolerance = config.setting or 1.0
+    key = config.method.name, math.floor(math.log10(tolerance))
+    most = MOST_WORK[config.method.implementation]
     if key in _budgets:
         return _budgets[key]
 
     def trial(work: float) -> tuple[float, bool]:
         before = time.thread_time()  # what other threads do meanwhile does not count
         run = integrate(
-            chosen.scene, chosen.method, tolerance=chosen.setting, observe="attitude", samples=2, budget=work
+            config.scene, config.method, tolerance=config.setting, observe="attitude", samples=2, budget=work
         )
         return time.thread_time() - before, run.outcome == "out_of_budget"
 
@@ -148,12 +148,12 @@ def setup(fields: Mapping[str, Any]) -> Setup:
     return Setup(scene, method, setting)
 
 
-def dataset(chosen: Setup, warn: Callable[[str], object]) -> xr.Dataset:
+def dataset(config: Setup, warn: Callable[[str], object]) -> xr.Dataset:
     """The run as `simulate` returns it; `warn` gets the sentence of the guard, if it has one."""
-    return simulate(chosen.scene, chosen.method, **chosen.arguments, guard=warn)
+    return simulate(config.scene, config.method, **config.arguments, guard=warn)
 
 
-def answer(chosen: Setup) -> dict[str, Any]:
+def answer(config: Setup) -> dict[str, Any]:
     """A run beside the exact motion: attitudes, residuals, errors, and the sentences of the outcome and the guard.
 
     Arrays are base64 of float32, over `time`: ``attitude`` and ``truth`` (w, x, y, z in turn), ``theta``, ``energy``,
@@ -164,9 +164,9 @@ def answer(chosen: Setup) -> dict[str, Any]:
     """
     began = time.perf_counter()
     warnings: list[str] = []
-    run = integrate(chosen.scene, chosen.method, **chosen.arguments, guard=warnings.append)
-    ran = time.perf_counter()
-    times, scene, attitude = run.time, chosen.scene, run.quaternion
+    run = integrate(config.scene, config.method, **config.arguments, guard=warnings.append)
+    end = time.perf_counter()
+    times, scene, attitude = run.time, config.scene, run.quaternion
     period = float(np.nan_to_num(scene.nutation_period, posinf=0.0))
     if scene.of_body:
         true = Trajectory.of_data(reference(scene, times))
@@ -200,7 +200,7 @@ def answer(chosen: Setup) -> dict[str, Any]:
         "steps": int(run.steps),
         "force_evaluations": int(run.force_evaluations),
         "period": period,
-        "run_ms": 1e3 * (ran - began),
+        "run_ms": 1e3 * (end - began),
         "all_ms": 1e3 * (time.perf_counter() - began),
         "largest": largest,
         "arrays": coded,
@@ -231,31 +231,31 @@ def grid(fields: Mapping[str, Any]) -> tuple[Setup, np.ndarray, np.ndarray]:
 
     Raises SymtopError for a method without a step, a range that is empty, and a map of too many steps.
     """
-    chosen = setup(fields)
-    if chosen.scene.of_body:
-        raise SymtopError(f"a map must be of a top, not of {chosen.scene.name}, a body without symmetry")
-    if chosen.method.control != "step_size":
-        raise SymtopError(f"integrator must be one with a step for a map, not {chosen.method.name!r}")
+    config = setup(fields)
+    if config.scene.of_body:
+        raise SymtopError(f"a map must be of a top, not of {config.scene.name}, a body without symmetry")
+    if config.method.control != "step_size":
+        raise SymtopError(f"integrator must be one with a step for a map, not {config.method.name!r}")
     least, most = (positive(name, fields.get(name)) for name in ("step_least", "step_most"))
     low, high = (finite(name, fields.get(name)) for name in ("spin_least", "spin_most"))
     if not (least < most and low < high):
         raise SymtopError(f"the ranges of a map must not be empty, not {least!r} to {most!r} s, {low!r} to {high!r}")
     steps, spins = np.geomspace(least, most, COLUMNS), np.linspace(low, high, ROWS)
-    if (total := ROWS * float(np.sum(chosen.scene.horizon / steps))) > MOST_MAP_STEPS:
+    if (total := ROWS * float(np.sum(config.scene.horizon / steps))) > MOST_MAP_STEPS:
         raise SymtopError(f"a map must have at most {MOST_MAP_STEPS} steps, not {total:.3g}: take a shorter time")
-    return chosen, steps, spins
+    return config, steps, spins
 
 
-def outcome_map(chosen: Setup, steps: np.ndarray, spins: np.ndarray) -> dict[str, Any]:
+def outcome_map(config: Setup, steps: np.ndarray, spins: np.ndarray) -> dict[str, Any]:
     """The map: ``error_rad`` as base64 of float32, row by row from the least spin; NaN where a run ended early."""
     began = time.perf_counter()
-    scene = chosen.scene
+    scene = config.scene
     step, spin = (each.ravel() for each in np.meshgrid(steps, spins))
     start = asdict(scene.start)
     numbers = asdict(scene.top) | start | {"psi_dot": spin}
     members = xr.Dataset({name: ("member", np.broadcast_to(number, step.size)) for name, number in numbers.items()})
     runs = ensemble(
-        members, chosen.method, step_size=step, horizon=scene.horizon, samples=MAP_SAMPLES, variables=["axis"],
+        members, config.method, step_size=step, horizon=scene.horizon, samples=MAP_SAMPLES, variables=["axis"],
         observe="attitude", quiet=True,
     )  # fmt: skip
     worst = np.fmax.reduce(member_errors(members, runs, "axis"), axis=1)
@@ -291,53 +291,53 @@ def oscillator(friction: float, step: float) -> dict[str, Any]:
     }
     times, dense = paths["midpoint"][0], np.linspace(0.0, OSCILLATOR_HORIZON, FEWEST_SAMPLES)
     exact = body.exact(times, 1.0, 0.0)[0]
-    shown = {rule: position for rule, (_, position, _) in paths.items()}
-    largest = {rule: float(np.max(np.abs(position - exact))) for rule, position in shown.items()}
+    positions = {rule: position for rule, (_, position, _) in paths.items()}
+    largest = {rule: float(np.max(np.abs(position - exact))) for rule, position in positions.items()}
     guess = notebook_positions(friction, times[1], 1.0, float(exact[1]), steps)[1]
     of_exact = {"exact_time": dense, "exact": body.exact(dense, 1.0, 0.0)[0]}
-    return _curves(largest, time=times, guess=guess, **of_exact, **shown)
+    return _curves(largest, time=times, guess=guess, **of_exact, **positions)
 
 
 def damped_top(fields: Mapping[str, Any]) -> tuple[Setup, float]:
     """The midpoint rule on the page's top at its step, and the friction. Raises SymtopError as `setup` and `damped`."""
-    chosen = setup({**fields, "integrator": "midpoint"})
+    config = setup({**fields, "integrator": "midpoint"})
     friction = finite("friction", fields.get("friction"), 0.0)
-    if (steps := chosen.scene.horizon / (chosen.setting or 1.0)) > MOST_TOP_STEPS:
+    if (steps := config.scene.horizon / (config.setting or 1.0)) > MOST_TOP_STEPS:
         raise SymtopError(f"the damped top must have at most {MOST_TOP_STEPS} steps, not {steps:.3g}")
-    return chosen, friction
+    return config, friction
 
 
-def inclination(chosen: Setup, friction: float) -> dict[str, Any]:
+def inclination(config: Setup, friction: float) -> dict[str, Any]:
     """Theta in degrees with the torques -b phi'/2 and -b psi' for friction b, as base64 of float32 over ``time``.
 
     ``midpoint`` is the forced discrete Lagrangian, NaN after a failure; ``exact``, over ``exact_time``, ends where the
     axis comes near a pole. `largest` has the largest difference in degrees, `message` says what ended early.
     """
-    scene, torque = chosen.scene, Friction(0.5 * friction, friction)
-    steps = max(1, round(scene.horizon / (chosen.setting or scene.horizon)))
-    h, shown = scene.horizon / steps, np.linspace(0.0, steps, min(chosen.samples, steps + 1))
-    marks = np.unique(np.rint(shown).astype(int))
+    scene, torque = config.scene, Friction(0.5 * friction, friction)
+    steps = max(1, round(scene.horizon / (config.setting or scene.horizon)))
+    h, places = scene.horizon / steps, np.linspace(0.0, steps, min(config.samples, steps + 1))
+    marks = np.unique(np.rint(places).astype(int))
     run = damped_run(scene, torque, "midpoint", h, marks)
     times, theta = marks * h, run.states[:, 0]
-    dense = np.union1d(times, np.linspace(0.0, scene.horizon, chosen.samples))
+    dense = np.union1d(times, np.linspace(0.0, scene.horizon, config.samples))
     exact = theta_before_pole(scene, torque, dense, MOST_TOP_EVALUATIONS)
-    known = np.searchsorted(dense, times) < exact.size
-    off = np.degrees(np.abs(theta[known] - exact[np.searchsorted(dense, times[known])]))
+    valid = np.searchsorted(dense, times) < exact.size
+    error = np.degrees(np.abs(theta[valid] - exact[np.searchsorted(dense, times[valid])]))
     ended = [f"midpoint: {OUTCOMES[run.outcome].replace('_', ' ')} at t = {run.steps * h:.3g} s"] if run.outcome else []
     if exact.size < dense.size:
         ended.append(
             f"the exact motion comes within {NEAR} rad of a pole at t = {dense[exact.size]:.3g} s and ends there"
         )
     of_exact = {"exact_time": dense[: exact.size], "exact": np.degrees(exact)}
-    largest = {"midpoint": float(np.nanmax(off))}
+    largest = {"midpoint": float(np.nanmax(error))}
     return _curves(largest, "; ".join(ended), time=times, midpoint=np.degrees(theta), **of_exact)
 
 
-def script(chosen: Setup) -> str:
+def script(config: Setup) -> str:
     """A Python script that makes the same dataset, to the bit."""
-    scene, name, samples = chosen.scene, chosen.method.name, chosen.samples
-    options = "" if chosen.method.control is None else f", {chosen.method.control}={chosen.setting!r}"
-    options += "" if chosen.budget is None else f", budget={chosen.budget!r}"
+    scene, name, samples = config.scene, config.method.name, config.samples
+    options = "" if config.method.control is None else f", {config.method.control}={config.setting!r}"
+    options += "" if config.budget is None else f", budget={config.budget!r}"
     return f'''"""A run of symtop explore, symtop {__version__}."""
 
 import symtop

@@ -33,14 +33,14 @@ _at_work = threading.Lock()
 
 def question(fields: Mapping[str, Any]) -> list[Setup]:
     """The run that a page shows and, if it names a `second` method, the one beside it. SymtopError as `setup`."""
-    chosen, other = setup(fields), str(fields.get("second") or "")
-    return [chosen, setup({**fields, "integrator": other})] if other else [chosen]
+    first, other = setup(fields), str(fields.get("second") or "")
+    return [first, setup({**fields, "integrator": other})] if other else [first]
 
 
-def _variants(asked: list[Setup]) -> dict[str, Integrator]:
+def _variants(setups: list[Setup]) -> dict[str, Integrator]:
     """Those of the question first, each in the chart that the page shows, by the name of the method."""
-    scene, beside = asked[0].scene, map(integrator, BESIDE)
-    methods = [*(one.method for one in asked), *(one for one in beside if not scene.of_body or BODY in one.solvers)]
+    scene, beside = setups[0].scene, map(integrator, BESIDE)
+    methods = [*(one.method for one in setups), *(one for one in beside if not scene.of_body or BODY in one.solvers)]
     return {one.name: one.variant(chart_of(one, scene.observes, "attitude")) for one in methods if one.control}
 
 
@@ -86,13 +86,13 @@ def _seconds(one: Setup) -> float | None:
     run = bare_run(one.scene, one.method, chart, setting, one.scene.horizon, budget=one.budget)
     if run().outcome != "ok":
         return None
-    taken = first_call(run)
-    return min([taken, *(first_call(run) for _ in range(REPEATS if taken < LONG else 0))])
+    first = first_call(run)
+    return min([first, *(first_call(run) for _ in range(REPEATS if first < LONG else 0))])
 
 
-def chart(asked: list[Setup]) -> dict[str, Any]:
+def chart(setups: list[Setup]) -> dict[str, Any]:
     """The lines that are there, how many are still to come, and the seconds of the runs that the page shows."""
-    scene, variants = asked[0].scene, _variants(asked)
+    scene, variants = setups[0].scene, _variants(setups)
     lines = {name: _lines.get((scene, variant.name)) for name, variant in variants.items()}
     missing, key = sum(line is None for line in lines.values()), (scene, *variants)
     if missing and _newest != [key]:
@@ -101,5 +101,5 @@ def chart(asked: list[Setup]) -> dict[str, Any]:
     return {
         "lines": [{"name": name, **line} for name, line in lines.items() if line is not None],
         "missing": missing,
-        "seconds": [_seconds(one) for one in asked],
+        "seconds": [_seconds(one) for one in setups],
     }

@@ -38,9 +38,9 @@ LONGEST_BODY = 65_536  # bytes of a POST request
 POLICY = "default-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 
 
-def _netcdf(chosen: answers.Setup) -> bytes:
+def _netcdf(config: answers.Setup) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
-        return netcdf.write(answers.dataset(chosen, str), Path(folder) / "explored.nc").read_bytes()
+        return netcdf.write(answers.dataset(config, str), Path(folder) / "explored.nc").read_bytes()
 
 
 # What reads the question, what answers it in JSON, or in bytes of the type that follows.
@@ -48,10 +48,10 @@ JSON = "application/json"
 ACTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any], str]] = {
     "/run": (answers.setup, answers.answer, JSON),
     "/netcdf": (answers.setup, _netcdf, "application/x-netcdf"),
-    "/script": (answers.setup, lambda chosen: answers.script(chosen).encode(), "text/x-python; charset=utf-8"),
+    "/script": (answers.setup, lambda config: answers.script(config).encode(), "text/x-python; charset=utf-8"),
     "/cost": (cost.question, cost.chart, JSON),
-    "/oscillator": (answers.damped, lambda asked: answers.oscillator(*asked), JSON),
-    "/damped-top": (answers.damped_top, lambda asked: answers.inclination(*asked), JSON),
+    "/oscillator": (answers.damped, lambda values: answers.oscillator(*values), JSON),
+    "/damped-top": (answers.damped_top, lambda values: answers.inclination(*values), JSON),
     "/map": (answers.grid, lambda grid: answers.outcome_map(*grid), JSON),
 }
 _at_work = threading.BoundedSemaphore(cores())  # of 200 runs that take turns in the interpreter 42 took over a minute
@@ -62,15 +62,15 @@ class Server(ThreadingHTTPServer):
 
     request_queue_size = MOST_WAITING
     daemon_threads = True
-    told = 0.0  # when the last refusal was reported
+    report_time = 0.0  # when the last refusal was reported
 
     def process_request(self, request: Any, client_address: Any) -> None:
         """Give the connection a thread, or refuse it (503) and say so, at most once a second."""
         if threading.active_count() <= MOST_OPEN:
             super().process_request(request, client_address)
             return
-        if time.monotonic() - self.told > 1.0:
-            self.told = time.monotonic()
+        if time.monotonic() - self.report_time > 1.0:
+            self.report_time = time.monotonic()
             sys.stderr.write(f"symtop: {MOST_OPEN} connections are open, and others are refused (503)\n")
         with contextlib.suppress(OSError):
             request.settimeout(0.0)
@@ -139,8 +139,8 @@ class Handler(BaseHTTPRequestHandler):
             self._refuse(415, "a question must be JSON")
             return
         try:
-            given = self.headers.get("Content-Length", "0")
-            length = whole("the length of a question", int(given) if given.isdecimal() else given, 0)
+            header = self.headers.get("Content-Length", "0")
+            length = whole("the length of a question", int(header) if header.isdecimal() else header, 0)
             if length > LONGEST_BODY:
                 self._refuse(413, f"a question must be at most {LONGEST_BODY} bytes, not {length}")
                 return
@@ -149,12 +149,12 @@ class Handler(BaseHTTPRequestHandler):
                 question = json.loads(self.rfile.read(length))
             except (ValueError, RecursionError) as error:
                 raise SymtopError(f"a question must be JSON: {error}") from None
-            chosen = read(question)
+            config = read(question)
             with _at_work:
                 if self._has_left():
                     self.close_connection = True
                     return
-                answer = action(chosen)
+                answer = action(config)
         except SymtopError as error:
             # The page shows the sentence in place of a run, as an ordinary answer; a file cannot be replaced by it.
             self._refuse(200 if self.place not in ("/netcdf", "/script") else 400, str(error))

@@ -60,25 +60,25 @@ def compare(
 
     Raises SymtopError for arguments that make no sense. `symtop.plot` draws the dataset.
     """
-    chosen = find_scene(scene, bodies=True)
+    problem = find_scene(scene, bodies=True)
     one_of("quantity", quantity, QUANTITIES)
     one_of("cost", cost, COSTS)
     if horizon is not None and nutations is not None:
         raise SymtopError("compare takes horizon or nutations, not both", "horizon", "nutations")
-    if nutations is not None and not math.isfinite(chosen.nutation_period):
-        raise SymtopError(f"{chosen.name} has no nutation: give horizon, not nutations", "horizon", "nutations")
-    until = horizon if nutations is None else positive("nutations", nutations) * chosen.nutation_period
-    end = chosen.horizon if until is None else horizon_of(until)
+    if nutations is not None and not math.isfinite(problem.nutation_period):
+        raise SymtopError(f"{problem.name} has no nutation: give horizon, not nutations", "horizon", "nutations")
+    until = horizon if nutations is None else positive("nutations", nutations) * problem.nutation_period
+    end = problem.horizon if until is None else horizon_of(until)
     most = None if budget is None else positive("budget", budget)
-    records = [find(one, chosen) for one in listed(methods)]
-    variants = [one.variant(chart_of(one, chosen.observes, settings.observed(quantity))) for one in records]
+    records = [find(one, problem) for one in listed(methods)]
+    variants = [one.variant(chart_of(one, problem.observes, settings.observed(quantity))) for one in records]
     names = [one.name for one in variants]
     if not names or len(set(names)) < len(names):
         raise SymtopError(f"methods must be one or more, each once, not {names!r}", "methods")
 
-    def tried(method: Integrator) -> tuple[list[dict[str, Any]], list[str]]:
+    def runs_of(method: Integrator) -> tuple[list[dict[str, Any]], list[str]]:
         limit = BUDGET[method.implementation] * min(method.speed, 1.0) if most is None else most
-        return _runs(chosen, method, end, limit, quantity)
+        return _runs(problem, method, end, limit, quantity)
 
     exact = find_integrator("exact")
     with progress_bar("compare", quiet=boolean("quiet", quiet), total=len(names)) as bar:
@@ -86,7 +86,7 @@ def compare(
         kernels = [one for one in variants if one.implementation == "compiled"]
         files.expected[0] = len(kernels) + (0 if closed_form.load() else files.CLOSED_FORM)
         post(f"running {len(names)} methods")
-        for one in in_threads(tried, variants, min(cores(), len(variants))):
+        for one in in_threads(runs_of, variants, min(cores(), len(variants))):
             results.append(one)
             bar.update()
             post(f"{len(results)} of {len(names)} methods have run")
@@ -96,7 +96,7 @@ def compare(
             post("timing the runs")
             pairs = zip([exact, *variants], [rows, *(runs for runs, _ in results)], strict=True)
             timed_rows(
-                [(chosen, method, end, runs) for method, runs in pairs if method is not exact or not chosen.of_body]
+                [(problem, method, end, runs) for method, runs in pairs if method is not exact or not problem.of_body]
             )
     size = max(len(runs) for runs, _ in results)
     blank: dict[str, Any] = {**SPENT, "message": "", "setting_value": math.nan}
@@ -108,18 +108,18 @@ def compare(
     mean = data["reached_time"] / data["steps"].where(data["steps"] > 0.0)
     data = data.assign(
         error=data[quantity], error_bound=data[f"{quantity}_bound"], exact_seconds=rows[0].get("seconds", math.nan),
-        steps_per_nutation=chosen.time_scale(end) / data["step_size"].where(data["step_size"] > 0.0, mean),
+        steps_per_nutation=problem.time_scale(end) / data["step_size"].where(data["step_size"] > 0.0, mean),
         reached=(("variant", "target"), [reached for _, reached in results]),
     )  # fmt: skip
-    data = data.assign_coords(variant=names, target=list(settings.TARGETS), scene=chosen.name)
+    data = data.assign_coords(variant=names, target=list(settings.TARGETS), scene=problem.name)
     entries = {
         name: columns.ERROR_TABLE[f"{quantity}{name.removeprefix('error')}"] for name in ("error", "error_bound")
     }
     entries["target"] = "error that is accepted, largest over the run", *entries["error"][1:]
     own = {name: netcdf.Column(entry, {}) for name, entry in entries.items()}
     return netcdf.describe(
-        columns.described(data, chosen.units, own), f"error against cost on {chosen.name}", units=chosen.units,
-        quantity=quantity, cost=cost, horizon=end, nutations=end / chosen.nutation_period,
+        columns.described(data, problem.units, own), f"error against cost on {problem.name}", units=problem.units,
+        quantity=quantity, cost=cost, horizon=end, nutations=end / problem.nutation_period,
         timed=TIMED if cost == "time" else "nothing", budget=str(most or BUDGET),
     )  # fmt: skip
 
@@ -151,8 +151,8 @@ def _runs(
 
     if method.control is None:
         error, _ = run(math.nan)
-        met = ["met" if error <= target else "nothing can be set" for target in settings.TARGETS]
-        return list(rows.values()), met
+        answers = ["met" if error <= target else "nothing can be set" for target in settings.TARGETS]
+        return list(rows.values()), answers
     ends, power = settings.limits(scene, method, horizon, quantity), float(method.order or 2)
     power = power if method.fixed_step else 1.0
     first = settings.TARGETS[0]

@@ -182,8 +182,8 @@ def heading(about: About, scene: str) -> str:
     """What is judged."""
     cost = f", {pace(about.seconds_a_step)} a step" if about.seconds_a_step else ""
     chart = f" in the {about.chart} chart" if about.chart else ""
-    drawn = f", seed {about.seed}" if about.seed else ""
-    return f"{about.name}{chart} on {scene}{cost}{drawn}\n"
+    seed = f", seed {about.seed}" if about.seed else ""
+    return f"{about.name}{chart} on {scene}{cost}{seed}\n"
 
 
 def line(finding: Finding, width: int = WIDTH) -> str:
@@ -221,11 +221,12 @@ def description(findings: Sequence[Finding]) -> str:
     def of_kind(*kinds: str) -> str:
         return _listed([name for claim, name in KEPT.items() if measured.get(claim, NOTHING).kind in kinds])
 
-    kept, bounded, lost = of_kind("kept"), of_kind("bounded"), of_kind("drift", "growing", "random walk", "blows up")
-    words += [f"keeps {kept}"] if kept else []
+    constant, bounded = of_kind("kept"), of_kind("bounded")
+    changing = of_kind("drift", "growing", "random walk", "blows up")
+    words += [f"keeps {constant}"] if constant else []
     words += [f"{bounded} bounded"] if bounded else []
-    without = "not" if kept or bounded else "does not keep"
-    return (", ".join(words) or "nothing could be measured") + (f"; {without} {lost}" if lost else "")
+    without = "not" if constant or bounded else "does not keep"
+    return (", ".join(words) or "nothing could be measured") + (f"; {without} {changing}" if changing else "")
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -253,13 +254,13 @@ def _runs(ledger: Ledger) -> str:
         length = f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation)"
         relative = "changes of the energy are relative to the nutation's, of momenta to the larger one"
         words += [f"{length} for the constants", relative]
-    tried = ledger.about.nutation / np.asarray(traces.get("step_size", []))  # NaN where no run was made
-    if np.isfinite(tried).any():
-        failed = tried[np.isnan(traces["error"]) & np.isfinite(tried)]
+    ladder = ledger.about.nutation / np.asarray(traces.get("step_size", []))  # NaN where no run was made
+    if np.isfinite(ladder).any():
+        failed = ladder[np.isnan(traces["error"]) & np.isfinite(ladder)]
         fails = f" ({failed.max():.0f} and fewer fail)" if failed.size else ""
         one = ledger.about.nutation / traces.get("structure_step", math.nan)
         structure = f", {one:.1f} for the structure" if math.isfinite(one) else ""
-        tries = f"{np.nanmin(tried):.0f} to {np.nanmax(tried):.0f} steps a nutation for the order{fails}{structure}"
+        tries = f"{np.nanmin(ladder):.0f} to {np.nanmax(ladder):.0f} steps a nutation for the order{fails}{structure}"
         words.insert(0, tries)
     joined = ";\n    ".join(words)
     return f"Its runs: {joined}.\n" if words else ""

@@ -39,7 +39,7 @@ from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import heartbeat, integrator
 from symtop.judging.adapters.python_step import CONJUGATE
 from symtop.judging.battery import measure, stages, unmeasured
-from symtop.judging.claims.constants import KEPT, Constant, blows_up, said_to_blow_up
+from symtop.judging.claims.constants import KEPT, Constant, blow_up_finding, blows_up
 from symtop.judging.claims.subject import Subject, open_target, seconds_a_step
 from symtop.judging.findings import About, Finding, Ledger, Measured, error_units, undecided
 from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
@@ -112,47 +112,47 @@ def judge(
         raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {shown(energy)}", "energy")
     file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES)
     states = form is None and (file or isinstance(target, (xr.Dataset, Mapping)))
-    chosen, listen = find_scene(scene, bodies=True), tell or (lambda _: None)
+    problem, listen = find_scene(scene, bodies=True), tell or (lambda _: None)
     for name, flag in (("adaptive", adaptive), ("autonomous", autonomous), ("quick", quick)):
         boolean(name, flag)
-    drawn = secrets.randbelow(SEEDS) if seed is None else whole("seed", seed, 0, SEEDS)
+    seed = secrets.randbelow(SEEDS) if seed is None else whole("seed", seed, 0, SEEDS)
     structure: dict[str, Any] = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
     claims = structure | {"conserves": conserves, "energy_error": energy}
-    made = Integrator("claims", "other", "", {chart: _no_solver}, **claims)  # checked before anything is loaded
-    kept = made.conserves or frozenset()
+    record = Integrator("claims", "other", "", {chart: _no_solver}, **claims)  # checked before anything is loaded
+    names = record.conserves or frozenset()
     if states:
         if set(structure.values()) != {None}:
             raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
-        findings = of_trajectory(target, chosen, kept, energy)
+        findings = of_trajectory(target, problem, names, energy)
         about = About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory")
         listen(about)
         for finding in findings:
             listen(finding)
-        return Ledger(about.name, chosen.name, tuple(findings), {}, about)
-    if chosen.of_body and ({symplectic, symmetric, explicit} != {None} or kept - {"energy"}):
+        return Ledger(about.name, problem.name, tuple(findings), {}, about)
+    if problem.of_body and ({symplectic, symmetric, explicit} != {None} or names - {"energy"}):
         words = "order and what becomes of energy and momentum; claim the rest on a top"
-        raise SymtopError(f"a step on {chosen.name}, a RigidBody, shows its {words}")
-    implied = {"time": not autonomous, "energy": energy is None and "energy" not in kept, "order": order is None}
+        raise SymtopError(f"a step on {problem.name}, a RigidBody, shows its {words}")
+    implied = {"time": not autonomous, "energy": energy is None and "energy" not in names, "order": order is None}
     heartbeat.reset(quick=quick)
     began, findings = time.monotonic(), []
-    load = functools.partial(open_target, target, form, chart, on=chosen, adaptive=adaptive)
+    load = functools.partial(open_target, target, form, chart, on=problem, adaptive=adaptive)
     with Process(lambda: table_of(load)) as process:
         process.allow(OPENING)
         try:
             stepper = Remote(process)
             method = integrator(stepper, **claims)
-            seconds = seconds_a_step(stepper, chosen) if method.fixed_step else 0.0
+            seconds = seconds_a_step(stepper, problem) if method.fixed_step else 0.0
         except SymtopError as error:
             raise SymtopError(f"it cannot be judged: {error}") if process.lost else error from None
-        subject = Subject(method, chosen, quick, stepper, seconds, drawn, autonomous)
+        subject = Subject(method, problem, quick, stepper, seconds, seed, autonomous)
         facts = stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step
-        about = About(*facts, drawn, chosen.time_scale())
+        about = About(*facts, seed, problem.time_scale())
         listen(about)
-        for finding in _measured(subject, process, began, QUICK_VERDICT if quick else VERDICT):
+        for finding in _findings(subject, process, began, QUICK_VERDICT if quick else VERDICT):
             listen(finding)
             findings.append(finding)
     follow = frozenset(name for name, follows in implied.items() if follows)
-    return Ledger(about.name, chosen.name, tuple(findings), subject.traces, about, follow)
+    return Ledger(about.name, problem.name, tuple(findings), subject.traces, about, follow)
 
 
 def _no_solver(*_: Any) -> Any:
@@ -170,10 +170,10 @@ def read(target: Any) -> dict[str, Any]:
         reason = getattr(error, "strerror", None) or "it is no text, or empty"
         raise SymtopError(f"the trajectory {path} cannot be read: {reason}") from None
     names = head.lstrip("# ").split()
-    known = (*SCALARS, *(part for parts in VECTORS.values() for part in parts))
-    if not set(names) <= set(known) or "time" not in names or len(set(names)) < len(names):
+    fields = (*SCALARS, *(part for parts in VECTORS.values() for part in parts))
+    if not set(names) <= set(fields) or "time" not in names or len(set(names)) < len(names):
         raise SymtopError(
-            f"{path.name} must begin with a line of names, time and of {', '.join(known[1:])}, not {head[:60]!r}"
+            f"{path.name} must begin with a line of names, time and of {', '.join(fields[1:])}, not {head[:60]!r}"
         )
     try:
         columns = dict(zip(names, np.loadtxt(lines or [""] * 2, ndmin=2, unpack=True), strict=True))
@@ -196,8 +196,8 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
     if isinstance(target, xr.Dataset):
         refuse_other_scene(target, scene)
         target = sampled(target)
-    given = read(target)
-    rates, states = given.pop("omega_body", None), completed(checked(given))
+    columns = read(target)
+    rates, states = columns.pop("omega_body", None), completed(checked(columns))
     if rates is not None:
         rates = np.asarray(rates, dtype=float)
         if states.quaternion is None or rates.shape != (states.time.size, 3):
@@ -205,23 +205,23 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
         if states.momentum is None:
             moments = scene.top.moments if scene.of_body else (scene.top.I1, scene.top.I1, scene.top.I3)
             states = states._replace(momentum=rotated(states.quaternion, rates * np.array(moments)))
-            given["momentum"] = states.momentum
-    apart = errors(given, scene)
-    time = apart["time"].values
+            columns["momentum"] = states.momentum
+    deviation = errors(columns, scene)
+    time = deviation["time"].values
     if rates is not None and scene.of_body:
-        apart = apart.assign({name: ("time", values) for name, values in _of_rates(scene, time, rates).items()})
-    shown = [_error(name, scene, time, apart) for name in OF_STATES if name in apart]
+        deviation = deviation.assign({name: ("time", values) for name, values in _of_rates(scene, time, rates).items()})
+    findings = [_error(name, scene, time, deviation) for name in OF_STATES if name in deviation]
     own = _from_states(scene, states)
     for name in (*CONSTANTS, *sorted({*conserves} - {*CONSTANTS})):
-        values = own.get(name, given.get(name))
+        values = own.get(name, columns.get(name))
         declared = energy if name == "energy" and energy else "kept" if name in conserves else ""
         if values is not None:
-            shown.append(_constant(name, declared, time, np.asarray(values, float), scene))
+            findings.append(_constant(name, declared, time, np.asarray(values, float), scene))
         elif declared:
             remedy = f"; it would with {name}, or with the angular momentum beside the axis"
             remedy = remedy if name in CONSTANTS else ", as its axes are scaled to length one"
-            shown.append(undecided(name, declared, f"the trajectory shows no {name}{remedy}"))
-    return shown
+            findings.append(undecided(name, declared, f"the trajectory shows no {name}{remedy}"))
+    return findings
 
 
 def _of_rates(scene: Scene, time: np.ndarray, rates: np.ndarray) -> dict[str, np.ndarray]:
@@ -244,12 +244,12 @@ def _from_states(scene: Scene, states: Trajectory) -> dict[str, np.ndarray]:
     return {"energy": space_energy(scene.top, axis, L, p_psi), "p_phi": L[:, 2], "p_psi": p_psi}
 
 
-def _error(name: str, scene: Scene, time: np.ndarray, apart: xr.Dataset) -> Finding:
+def _error(name: str, scene: Scene, time: np.ndarray, deviation: xr.Dataset) -> Finding:
     """The largest error of a quantity and its law of growth."""
-    values = apart[name].values
+    values = deviation[name].values
     growth = constant_of(time, values) if time.size >= FEWEST else None
     largest = float(np.nanmax(values)) if np.isfinite(values).any() else math.nan
-    bound = float(np.nanmax(apart[f"{name}_bound"].values))
+    bound = float(np.nanmax(deviation[f"{name}_bound"].values))
     unit = error_units(name)
     why = f"largest error {largest:.1e}{unit} in {time.size} samples up to t = {time[-1]:.4g}{scene.second}"
     if growth is not None and math.isfinite(growth.exponent):
@@ -263,49 +263,49 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     """What became of a constant of the motion, beside what is claimed of it."""
     scale, grain = (scene.energy_scale, scene.energy_grain) if name == "energy" else (scene.momentum_scale, 1.0)
     true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)
-    changed = constant_of(time, (values - values[0]) / scale)
+    change = constant_of(time, (values - values[0]) / scale)
     if time.size < FEWEST:
-        changed = changed._replace(exponent=math.nan)
-    constant = Constant(changed, math.nan, KEPT * grain, grain)
-    where = f"in {time.size} samples; it begins {abs(values[0] - true) / scale:.1e} from the scene's"
-    finding = constant.finding(name, declared, constant.words(where))
-    risen = blows_up(scene, (values - values[0]) / scale) if name == "energy" else np.empty(0)
-    return said_to_blow_up(finding, time[risen[0]]) if risen.size else finding
+        change = change._replace(exponent=math.nan)
+    constant = Constant(change, math.nan, KEPT * grain, grain)
+    words = f"in {time.size} samples; it begins {abs(values[0] - true) / scale:.1e} from the scene's"
+    finding = constant.finding(name, declared, constant.words(words))
+    beyond = blows_up(scene, (values - values[0]) / scale) if name == "energy" else np.empty(0)
+    return blow_up_finding(finding, time[beyond[0]]) if beyond.size else finding
 
 
-def _measured(
+def _findings(
     subject: Subject, process: Process, began: float, limits: tuple[float, float, float]
 ) -> Iterator[Finding]:
     """The findings on each claim, undecided where the process was lost: all of a step that makes no call."""
     most, together, least = limits
     todo = stages(subject.kind)
     for stage in todo:
-        tried = subject
+        current = subject
         for _ in range(2):
             process.allow(max(least, min(most, together - (time.monotonic() - began))))
             try:
-                findings = measure(stage, tried)
+                findings = measure(stage, current)
             except SymtopError:
                 if not process.lost:
                     raise
             if not (process.late and subject.seconds_a_step):
                 break
-            tried = replace(subject, seconds_a_step=SHORTER * max(subject.seconds_a_step, process.late))
+            current = replace(subject, seconds_a_step=SHORTER * max(subject.seconds_a_step, process.late))
         first = "calls" in stage.claims
         process.lost += SLOW[subject.quick] if process.late else ""
         if process.lost:
-            left = tuple(claim for one in (todo if first else [stage]) for claim in one.claims)
-            findings = unmeasured(left, subject.method, process.lost)
+            claims = tuple(claim for one in (todo if first else [stage]) for claim in one.claims)
+            findings = unmeasured(claims, subject.method, process.lost)
         yield from findings
         if process.lost and first:
             return
 
 
-def apart(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
+def judge_separately(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
     """The ledger of a registered integrator, of `symtop.judging.battery.judge`, with what is not ours in a process."""
     heartbeat.reset(quick=quick)
     limits = PLUGIN, math.inf, PLUGIN
     with Process(lambda: solvers_of(method)) as process:
         subject = Subject(separated(method, process), scene, quick, seed=secrets.randbelow(SEEDS))
-        findings = tuple(_measured(subject, process, time.monotonic(), limits))
+        findings = tuple(_findings(subject, process, time.monotonic(), limits))
     return Ledger(method.name, scene.name, findings, subject.traces)

@@ -168,7 +168,7 @@ def clock(pid: int) -> float:
     return time.monotonic() - waited
 
 
-def tried(call: Callable[[], Any], what: str) -> None:
+def try_separately(call: Callable[[], Any], what: str) -> None:
     """Make a call in a process of its own first; SymtopError if that ends it or takes too long."""
     with Process(lambda: {"call": call}) as process:
         process.allow(PATIENCE)
@@ -235,8 +235,8 @@ class Remote(Stepper):
 
 
 def _run(process: Process, name: str, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-    done = process.call(name, top, start, plan)
-    return Run(**done | {one: np.array(done[one], dtype=float) for one in Run._fields[:3]})
+    fields = process.call(name, top, start, plan)
+    return Run(**fields | {one: np.array(fields[one], dtype=float) for one in Run._fields[:3]})
 
 
 def separated(method: Integrator, process: Process) -> Integrator:
@@ -248,8 +248,4 @@ def separated(method: Integrator, process: Process) -> Integrator:
 
 def solvers_of(method: Integrator) -> Table:
     """A method's solvers by their charts, whose runs are checked before they are sent."""
-    return {chart: functools.partial(_solved, method, chart) for chart in method.solvers}
-
-
-def _solved(*args: Any) -> dict[str, Any]:
-    return solve(*args)._asdict()
+    return {chart: lambda *args, chart=chart: solve(method, chart, *args)._asdict() for chart in method.solvers}

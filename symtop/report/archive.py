@@ -39,29 +39,11 @@ from symtop.model.scenes import Scene, scenes
 from symtop.model.top import NUMBERS, flat
 from symtop.report import page
 from symtop.report.formats import table
+from symtop.report.template import environment
 from symtop.run.ensemble.population import memory
 
 NAME = f"symtop-{__version__}-data"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every file in the bundle: zip has none before
-
-INTRODUCTION = """\
-Measurements of numerical integrators on the heavy symmetric (Lagrange) top. symtop {version}, code revision {revision},
-ran every method at many step sizes or tolerances and compared it with the exact motion. `results/report.html` says
-what was found and how it was measured: open it in a browser, no network is needed.
-
-**How it was made.** `symtop study --all` computed the datasets; `symtop archive` bundled them. To repeat it, install
-the packages of `versions.txt` and this revision of symtop, and run `make studies archive`. Times were taken on the
-machine of `machine.txt`, unless a dataset names another processor below.
-
-**The test set.** `scenes/scenes.csv` holds the tops and starts, each number to be read as the nearest double, and
-`scenes/states.csv` their states at {times} times with {digits} digits, from the closed form in {working}
-digits. `scenes/states.nc` holds the same as pairs of doubles, a value being `NAME + NAME_lo`. Angles are z-x-z: phi
-precession, theta inclination from the upward vertical, psi spin, in radians, phi and psi unwrapped. The axis is
-(sin theta sin phi, -sin theta cos phi, cos theta); quaternions are (w, x, y, z) from body to space.
-
-**Licence.** BSD-3-Clause, as symtop. **To cite it**, name symtop, its version and this revision; sources of the methods
-are in `citations.bib`.
-"""
 
 
 def bundle(results: Path, target: Path | None = None) -> Path:
@@ -72,8 +54,8 @@ def bundle(results: Path, target: Path | None = None) -> Path:
     page.write(results)
     files = {f"results/{path.relative_to(results).as_posix()}": path.read_bytes() for path in _stored(results)}
     with tempfile.TemporaryDirectory() as folder:
-        written = netcdf.write(states(list(scenes().values())), Path(folder) / "states.nc")
-        files["scenes/states.nc"] = written.read_bytes()
+        file = netcdf.write(states(list(scenes().values())), Path(folder) / "states.nc")
+        files["scenes/states.nc"] = file.read_bytes()
     files["scenes/states.csv"] = states_csv(list(scenes().values())).encode()
     files["scenes/scenes.csv"] = scenes_csv(list(scenes().values())).encode()
     files["citations.bib"] = resources.files("symtop.methods").joinpath("citations.bib").read_bytes()
@@ -96,30 +78,29 @@ def bundle(results: Path, target: Path | None = None) -> Path:
 def _stored(results: Path) -> list[Path]:
     """The files of a results folder that are bundled: no cases, and no figure that the report does not show."""
     gathered = page.gather(results)
-    shown = {results / kind / one["file"] for study in gathered for kind, items in (
+    report_files = {results / kind / one["file"] for study in gathered for kind, items in (
         ("figures", study["pictures"]), ("tables", study["tables"])) for one in items}  # fmt: skip
     endings = "*.nc", "*.json", "report.html", page.WORDS, page.REFERENCE
     files = [path for ending in endings for path in results.glob(ending)]
-    return sorted([*files, *shown])
+    return sorted([*files, *report_files])
 
 
 def readme(results: Path, files: Mapping[str, bytes]) -> str:
     """What is in the bundle, in Markdown: how it was made, its files, and every variable of every dataset."""
-    words = INTRODUCTION.format(
-        version=__version__, revision=netcdf.provenance()["symtop_revision"], times=TIMES,
-        digits=DIGITS, working=WORKING,
-    )  # fmt: skip
     listed = table(["file", "bytes"], [[name, f"{len(content):,}"] for name, content in sorted(files.items())])
     described = [_described(f"results/{path.name}", netcdf.read_any(path)) for path in sorted(results.glob("*.nc"))]
     described.append(_described("scenes/states.nc", states(list(scenes().values()))))
-    return "\n\n".join([f"# {NAME}", words.strip(), "## Files", listed, "## Datasets", *described]) + "\n"
+    return str(environment().get_template("archive.md").render(
+        name=NAME, version=__version__, revision=netcdf.provenance()["symtop_revision"], times=TIMES, digits=DIGITS,
+        working=WORKING, files=listed, datasets=described,
+    ))  # fmt: skip
 
 
 def _described(name: str, data: xr.Dataset | xr.DataTree) -> str:
     """One dataset: what it is, where it was made, and its variables, group by group."""
     about = [data.attrs.get(key, "") for key in ("title", "question")]
-    made = ", ".join(str(data.attrs[key]) for key in ("symtop_revision", "processor") if key in data.attrs)
-    parts = [f"### {name}", " ".join(filter(None, map(str, about))), f"Made by: {made}." if made else ""]
+    origin = ", ".join(str(data.attrs[key]) for key in ("symtop_revision", "processor") if key in data.attrs)
+    parts = [f"### {name}", " ".join(filter(None, map(str, about))), f"Made by: {origin}." if origin else ""]
     for group, variables in netcdf.groups(data).items():
         rows = [
             [str(key), " x ".join(f"{dimension} ({length})" for dimension, length in variable.sizes.items()),
@@ -171,43 +152,43 @@ def printed(number: Any, digits: int = DIGITS) -> str:
     return str(nstr(number, digits, min_fixed=0, max_fixed=0, strip_zeros=False))
 
 
-def states_csv(chosen: Iterable[Scene]) -> str:
+def states_csv(entries: Iterable[Scene]) -> str:
     """The states as CSV: scene, time, and `COLUMNS` with 30 digits each."""
     lines = [
         [scene.name, repr(time), *map(printed, state)]
-        for scene in chosen
+        for scene in entries
         for time, state in zip(times_of(scene), precise(scene), strict=True)
     ]
     return str(pd.DataFrame(lines, columns=["scene", "time", *COLUMNS]).to_csv(index=False))
 
 
-def scenes_csv(chosen: Iterable[Scene]) -> str:
+def scenes_csv(entries: Iterable[Scene]) -> str:
     """Tops and starts as CSV, every number with the 17 digits that name its double; angles in radians."""
     header = ["scene", *NUMBERS, "horizon", "nutation_period", "units", "purpose"]
     lines = [
         [scene.name, *map(repr, (*flat(scene.top, scene.start), scene.horizon, scene.nutation_period)),
          scene.units or "any consistent", scene.purpose]
-        for scene in chosen
+        for scene in entries
     ]  # fmt: skip
     return str(pd.DataFrame(lines, columns=header).to_csv(index=False))
 
 
-def states(chosen: Sequence[Scene]) -> xr.Dataset:
+def states(entries: Sequence[Scene]) -> xr.Dataset:
     """The states as pairs of doubles: dimensions scene, sample, component and part.
 
     A value is ``NAME + NAME_lo``, which is good to 31 digits; I1, I3, mgl and the start ``NAME_0`` depend on scene.
     """
-    exact = np.array([precise(scene) for scene in chosen], dtype=object)
+    exact = np.array([precise(scene) for scene in entries], dtype=object)
     values = exact.astype(float)
     both = ("scene", "sample")
-    variables: dict[str, Any] = {"time": (both, [times_of(scene) for scene in chosen])}
+    variables: dict[str, Any] = {"time": (both, [times_of(scene) for scene in entries])}
     for ending, numbers in (("", values), ("_lo", (exact - values).astype(float))):
         variables |= {f"{name}{ending}": (both, numbers[..., k]) for k, name in enumerate(ANGLES)}
         variables[f"axis{ending}"] = ((*both, "component"), numbers[..., 6:9])
         variables[f"quaternion{ending}"] = ((*both, "part"), numbers[..., 9:])
-    for name, column in zip(NUMBERS, zip(*(flat(one.top, one.start) for one in chosen), strict=True), strict=True):
+    for name, column in zip(NUMBERS, zip(*(flat(one.top, one.start) for one in entries), strict=True), strict=True):
         variables[f"{name}_0" if name in ANGLES else name] = ("scene", list(column))
-    names = [scene.name for scene in chosen]
+    names = [scene.name for scene in entries]
     coordinates = {"scene": names, "component": ["x", "y", "z"], "part": ["w", "x", "y", "z"]}
     data = netcdf.describe(columns.described(xr.Dataset(variables, coordinates)), TITLE)
     for name in (*ANGLES, "axis", "quaternion"):

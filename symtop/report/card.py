@@ -5,7 +5,6 @@ the ledger, a row a claim, with the reason of each verdict. The badge says what 
 refuted, in SVG of a fixed width for each letter, so that it looks alike with any font.
 """
 
-import html
 import io
 import math
 import textwrap
@@ -37,10 +36,10 @@ def figures(ledger: Ledger) -> tuple[Any, Any]:
 
 def _as_svg(figure: Any) -> str:
     """A figure as SVG, from its opening tag on."""
-    drawn = io.StringIO()
-    figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     plt.close(figure)
-    return drawn.getvalue().partition("<svg")[2]
+    return buffer.getvalue().partition("<svg")[2]
 
 
 def _order(axis: Any, ledger: Ledger) -> None:
@@ -58,10 +57,10 @@ def _order(axis: Any, ledger: Ledger) -> None:
     claimed = finding.declared.isdigit()
     slope = float(finding.declared) if claimed else finding.value
     if 0.5 < slope < 99.0:
-        used = valid & fitted if (valid & fitted).any() else valid
-        span, order = (steps[used].min(), steps[used].max()), round(slope)
+        points = valid & fitted if (valid & fitted).any() else valid
+        span, order = (steps[points].min(), steps[points].max()), round(slope)
         label = f"$h^{{{order}}}${', as claimed' if claimed else ''}"
-        slope_guide(axis, order, span, errors[used][np.argmin(steps[used])], label)
+        slope_guide(axis, order, span, errors[points][np.argmin(steps[points])], label)
     axis.legend(frameon=False)
 
 
@@ -111,7 +110,7 @@ def card(ledger: Ledger, path: str | Path) -> Path:
             if one.declared or one.verdict != "inapplicable"
         ],
     )
-    return _written(text, path)
+    return _write(text, path)
 
 
 def badge(ledger: Ledger) -> str:
@@ -121,28 +120,16 @@ def badge(ledger: Ledger) -> str:
     if len(words) > LONGEST:
         words = words[:LONGEST].rsplit(",", 1)[0]
     left, right = (round(len(text) * LETTER + 12) for text in ("symtop", words))
-    title, color = html.escape(words, quote=True), VERMILLION if refuted else GREEN
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {left + right} 20"',
-        f'width="{left + right}" height="20" role="img">',
-        f"<title>symtop: {title}</title>",
-        f'<rect width="{left}" height="20" fill="#444444"/>',
-        f'<rect x="{left}" width="{right}" height="20" fill="{color}"/>',
-        '<g fill="#ffffff" font-family="Verdana,DejaVu Sans,sans-serif" font-size="11">',
-        f'<text x="6" y="14" textLength="{left - 12}">symtop</text>',
-        f'<text x="{left + 6}" y="14" textLength="{right - 12}">{title}</text>',
-        "</g>",
-        "</svg>",
-    ]
-    return "\n".join(parts) + "\n"
+    template = environment(autoescape=True).get_template("badge.svg")
+    return f"{template.render(left=left, right=right, words=words, color=VERMILLION if refuted else GREEN)}\n"
 
 
 def write_badge(ledger: Ledger, path: str | Path) -> Path:
     """Write the badge as an SVG file; SymtopError if the folder cannot be written to."""
-    return _written(badge(ledger), path)
+    return _write(badge(ledger), path)
 
 
-def _written(text: str, path: str | Path) -> Path:
+def _write(text: str, path: str | Path) -> Path:
     target = at_home(path)
     with netcdf.replacing(target, target.suffix) as partial:
         partial.write_text(text, encoding="utf-8")

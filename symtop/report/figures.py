@@ -79,7 +79,7 @@ def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: S
     figure.draw_without_rendering()
     renderer, frame = figure.canvas.get_renderer(), axis.get_window_extent()
     marks = np.concatenate([_dense(axis, x, y) for *_, x, y in [*lines, *others]])
-    taken: list[Any] = []
+    boxes: list[Any] = []
     for name, color, x, y in sorted(lines, key=lambda one: -len(one[0])):
         look = {
             "textcoords": "offset points",
@@ -89,7 +89,7 @@ def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: S
             "weight": "bold",
             "path_effects": [withStroke(linewidth=2.5, foreground="white")],  # over the lines that it covers
         }
-        tried: list[Any] = []
+        candidates: list[Any] = []
         for kind, (dx, dy, side) in product(range(3), PLACES):
             end = (len(x) - 1, 0, len(x) // 2)[kind]
             text = axis.annotate(name, (x[end], y[end]), (dx, dy), ha=side, **look)
@@ -97,14 +97,14 @@ def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: S
             out = box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0 or box.y1 > frame.y1
             covered = np.all((marks > box.min) & (marks < box.max), axis=1).sum()
             price = (
-                1e3 * (sum(box.overlaps(other) for other in taken) + out) + covered + abs(dy) / 3.0 + ELSEWHERE[kind]
+                1e3 * (sum(box.overlaps(other) for other in boxes) + out) + covered + abs(dy) / 3.0 + ELSEWHERE[kind]
             )
-            tried.append((price, len(tried), text, box))
-        best = min(tried)
-        for _, _, text, _ in tried:
+            candidates.append((price, len(candidates), text, box))
+        best = min(candidates)
+        for _, _, text, _ in candidates:
             if text is not best[2]:
                 text.remove()
-        taken.append(best[3])
+        boxes.append(best[3])
 
 
 APART = 3.0  # pixels

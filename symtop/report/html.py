@@ -33,24 +33,24 @@ class Writer:
     """
 
     def __init__(
-        self, images: Mapping[str, Mapping[str, Any]], markers: Callable[[str, str], str], *taken: str
+        self, images: Mapping[str, Mapping[str, Any]], markers: Callable[[str, str], str], *reserved: str
     ) -> None:
-        self.images, self.markers, self.anchors = images, markers, {*taken}  # what links may lead to, each once
-        self._shown = 0  # figures so far: the first ones, of the front page, are loaded at once
+        self.images, self.markers, self.anchors = images, markers, {*reserved}  # what links may lead to, each once
+        self._figures = 0  # figures so far: the first ones, of the front page, are loaded at once
         self._parser = MarkdownIt("commonmark", {"html": False}).enable("table")
 
     def __call__(self, text: str) -> str:
         """A text in Markdown as HTML."""
-        made, end = [], 0
+        parts, end = [], 0
         for piece in PIECES.finditer(text):
-            made += [self._markdown(text[end : piece.start()]), self._piece(piece)]
+            parts += [self._markdown(text[end : piece.start()]), self._piece(piece)]
             end = piece.end()
-        return "\n".join(filter(None, [*made, self._markdown(text[end:])]))
+        return "\n".join(filter(None, [*parts, self._markdown(text[end:])]))
 
     def anchor(self, name: str) -> str:
         """A name for a thing on the page, with a number behind it if it was given before."""
-        later = (f"{name}-{count}" for count in itertools.count(1))
-        free = next(one for one in itertools.chain([name], later) if one not in self.anchors)
+        candidates = (f"{name}-{count}" for count in itertools.count(1))
+        free = next(one for one in itertools.chain([name], candidates) if one not in self.anchors)
         self.anchors.add(free)
         return free
 
@@ -59,11 +59,11 @@ class Writer:
             return self.markers(piece["kind"], piece["name"])
         from latex2mathml.converter import convert
 
-        shown = str(convert(piece["formula"], display="block")).replace(f' xmlns="{MATHML}"', "")  # HTML needs none
-        return f'<div class="formulas">{shown}</div>'
+        mathml = str(convert(piece["formula"], display="block")).replace(f' xmlns="{MATHML}"', "")  # HTML needs none
+        return f'<div class="formulas">{mathml}</div>'
 
     def _markdown(self, text: str) -> str:
-        blocks, title, made = _blocks(self._parser.parse(text)), "", []
+        blocks, title, parts = _blocks(self._parser.parse(text)), "", []
         while blocks:
             block = blocks.pop(0)
             kind = block[0].type
@@ -74,15 +74,15 @@ class Writer:
                 below = blocks[0] if blocks else block
                 captioned = below[0].type == "paragraph_open" and not _only(below[1], "image")
                 caption = blocks.pop(0)[1:2] if captioned else []
-                made.append(self._figure(block[1].children[0], caption))  # type: ignore[index]
+                parts.append(self._figure(block[1].children[0], caption))  # type: ignore[index]
             elif kind == "table_open":
-                made.append(self._table(block, title))
+                parts.append(self._table(block, title))
             elif kind == "heading_open":
-                made.append(self._heading(block))
+                parts.append(self._heading(block))
             else:
-                made.append(self._rendered(block))
+                parts.append(self._rendered(block))
             title = bold
-        return "\n".join(made)
+        return "\n".join(parts)
 
     def _rendered(self, tokens: Sequence[Token]) -> str:
         return str(self._parser.renderer.render(tokens, self._parser.options, {}))
@@ -94,15 +94,15 @@ class Writer:
 
     def _figure(self, image: Token, caption: Sequence[Token]) -> str:
         address, alt = str(image.attrs["src"]), html.escape(image.content)
-        shown = self.images.get(address, {})
-        size = f' width="{shown["width"]}" height="{shown["height"]}"' if shown else ""
-        lazy = ' loading="lazy" decoding="async"' if self._shown >= AT_ONCE else ""
-        self._shown += 1
+        picture = self.images.get(address, {})
+        size = f' width="{picture["width"]}" height="{picture["height"]}"' if picture else ""
+        lazy = ' loading="lazy" decoding="async"' if self._figures >= AT_ONCE else ""
+        self._figures += 1
         name = self.anchor(Path(address).stem)
         words = f"{self._rendered(caption)} {link(name, f'figure {name}')}" if caption else ""
         return (
             f'<figure id="{name}"><div class="scroll" tabindex="0" role="region" aria-label="Figure {name}"><img '
-            f'src="{shown.get("source", address)}"{size}{lazy} alt="{alt}"></div>'
+            f'src="{picture.get("source", address)}"{size}{lazy} alt="{alt}"></div>'
             f"<figcaption>{words}</figcaption></figure>"
         )
 

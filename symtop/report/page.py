@@ -77,14 +77,14 @@ def gather(results: Path) -> list[dict[str, Any]]:
             continue
         shipped = runner.file_beside(name, "page.md") if name in studies else None
         try:
-            kept = {"measured": findings.get("measured", ""), "dataset": f"{name}.nc"}
-            kept["dataset"] *= (results / f"{name}.nc").is_file()
+            about = {"measured": findings.get("measured", ""), "dataset": f"{name}.nc"}
+            about["dataset"] *= (results / f"{name}.nc").is_file()
             missing = [f"figures/{one['file']}" for one in findings["pictures"]]
             missing += [f"tables/{one['file']}" for one in findings["tables"]]
             for file in (file for file in missing if not (results / file).is_file()):
                 raise FileNotFoundError(f"{file} is missing")
             page = findings["page"] if shipped is None else shipped.read_text(encoding="utf-8")
-            gathered.append({**findings, **kept, "page": page})
+            gathered.append({**findings, **about, "page": page})
         except (OSError, KeyError, TypeError) as error:
             command = f"make {name}" if name in others else f"symtop study {name}"
             raise SymtopError(
@@ -95,7 +95,7 @@ def gather(results: Path) -> list[dict[str, Any]]:
     return gathered
 
 
-def _shown(file: Path, *, embed: bool) -> dict[str, Any]:
+def _image(file: Path, *, embed: bool) -> dict[str, Any]:
     """Address, width and height of a PNG or a GIF, so that the page does not move while its figures load."""
     from PIL import Image
 
@@ -121,9 +121,9 @@ def texts(results: Path, studies: Sequence[Mapping[str, Any]]) -> tuple[dict[str
             title = f"{study['title']}: tables"
             parts[name] += f"More: {_link(title, REFERENCE)}.\n"
             more[f"{name}-tables"] = f"## {title}\n\n{mark}{rest}"
-    known = {"reference": f"{REFERENCE}#{slug(EQUATIONS)}"} | scene_tables()
+    values = {"reference": f"{REFERENCE}#{slug(EQUATIONS)}"} | scene_tables()
     parts["measured"], more["equations"] = (
-        template.rendered(_template(name), name, known) for name in ("measured", "equations")
+        template.rendered(_template(name), name, values) for name in ("measured", "equations")
     )
     newest = next((study for study in reversed(studies) if not study["measured"]), studies[-1])["provenance"]
     versions = ", ".join(f"{name} {version}" for name, version in json.loads(newest["dependencies"]).items())
@@ -174,7 +174,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
     page, studies = template.environment(autoescape=True).get_template("report.html"), gather(results)
     parts, more = texts(results, studies)
     images = {
-        f"figures/{one['file']}": _shown(results / "figures" / one["file"], embed=embed)
+        f"figures/{one['file']}": _image(results / "figures" / one["file"], embed=embed)
         for study in studies
         for one in study["pictures"]
     }

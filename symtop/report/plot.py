@@ -85,21 +85,21 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
     """A run, its errors, or the errors of somebody's trajectory, which name no integrator."""
     if "time" not in data:
         raise SymtopError("data must have the dimension time, setting or member, as simulate, sweep and ensemble give")
-    times, known = data["time"].values, any(f"{name}_bound" in data for name in QUANTITIES)
+    times, has_bounds = data["time"].values, any(f"{name}_bound" in data for name in QUANTITIES)
     name = data.attrs.get("integrator", "")
     color = look(name).color if name else "black"
     if quantity in QUANTITIES:
-        wrong = data if known else errors(data)
+        wrong = data if has_bounds else errors(data)
         if quantity not in wrong:
-            shows = ", ".join(str(shown) for shown in wrong.data_vars if shown in QUANTITIES)
+            shows = ", ".join(str(other) for other in wrong.data_vars if other in QUANTITIES)
             raise SymtopError(f"this run does not show the {quantity}; it shows {shows}")
         ax.plot(wrong["time"].values[1:], np.maximum(wrong[quantity].values[1:], SMALLEST), color=color, lw=1.2)
-        if known:
+        if has_bounds:
             ax.plot(times, np.maximum(data[f"{quantity}_bound"].values, SMALLEST), color="0.6", lw=0.8, ls=":")
         ax.set(yscale="log", ylabel=QUANTITIES[quantity])
     else:
-        shown = {name: variable for name, variable in data.data_vars.items() if variable.dims == ("time",)}
-        values = data[one_of("quantity", quantity, dict.fromkeys([*QUANTITIES, *map(str, shown)]))]
+        variables = {name: variable for name, variable in data.data_vars.items() if variable.dims == ("time",)}
+        values = data[one_of("quantity", quantity, dict.fromkeys([*QUANTITIES, *map(str, variables)]))]
         unit = values.attrs.get("units", "")
         ax.plot(times, values.values, color=color, lw=1.2)
         ax.set_ylabel(f"{quantity} ({unit})" if unit else quantity)
@@ -225,10 +225,10 @@ def _bands(axis: Any, data: xr.Dataset, quantity: str, own: spread.Array) -> Non
     shared = (horizons == horizons[0]).all()
     places, own = spread.at_places(data, own)
     quantiles = spread.spread(own)
-    known = np.isfinite(places) & ~np.isnan(quantiles).any(axis=0) & (places > 0.0)
-    if not known.any():
+    valid = np.isfinite(places) & ~np.isnan(quantiles).any(axis=0) & (places > 0.0)
+    if not valid.any():
         raise SymtopError("there is nothing to draw: the true motion of no member is known")
-    times, errors = (places * (horizons[0] if shared else 1.0))[known], quantiles[:, known]
+    times, errors = (places * (horizons[0] if shared else 1.0))[valid], quantiles[:, valid]
     most, color = MOST[quantity], look(data.attrs["integrator"]).color
     quantiles = np.clip(errors, SMALLEST, most)
     for low, high, opaque in BANDS:
@@ -238,8 +238,8 @@ def _bands(axis: Any, data: xr.Dataset, quantity: str, own: spread.Array) -> Non
     if np.isinf(errors).any():
         axis.plot(times[[0, -1]], [most, most], color="0.4", lw=0.8, ls=":")
     names = ["median" if level == 0.5 else f"{100.0 * level:g} %" for level in spread.LEVELS]
-    ends = {f"{name}: failed" if np.isinf(error) else name: (float(times[-1]), float(shown), color)
-            for name, error, shown in zip(names, errors[:, -1], quantiles[:, -1], strict=True)}  # fmt: skip
+    ends = {f"{name}: failed" if np.isinf(error) else name: (float(times[-1]), float(height), color)
+            for name, error, height in zip(names, errors[:, -1], quantiles[:, -1], strict=True)}  # fmt: skip
     label = "time" if shared else "time, as a fraction of each member's horizon"
     words = spread.QUANTITIES[spread.kind_of(data)][quantity]
     axis.set(xlim=(0.0, times[-1]), yscale="log", ylabel=words, xlabel=label)

@@ -44,14 +44,14 @@ def kind_of(data: xr.Dataset) -> str:
 def member_errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array:
     """Errors (n, samples) of an ensemble of these members; NaN beyond the samples of a run of few steps."""
     one_of("quantity", quantity, QUANTITIES[kind_of(data)])
-    given = read_members(members)
-    refuse_others(given, data)
+    inputs = read_members(members)
+    refuse_others(inputs, data)
     if (variable := SHOWN_BY[quantity]) not in data:
         raise SymtopError(f"the ensemble was asked for without the variable {variable}")
     n, samples = data.sizes["member"], data.sizes["time"]
     stride = max(1, BLOCK // samples)
     parts = [slice(begin, begin + stride) for begin in range(0, n, stride)]
-    return np.concatenate([_errors(given.numbers[one], data.isel(member=one), quantity) for one in parts])
+    return np.concatenate([_errors(inputs.numbers[one], data.isel(member=one), quantity) for one in parts])
 
 
 @functools.lru_cache(maxsize=1)
@@ -62,7 +62,7 @@ def _forms(plain: bytes) -> ClosedForms:
 
 def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
     values = data[SHOWN_BY[quantity]].values
-    known: Any = True
+    valid: Any = True
     times = np.broadcast_to(data["time"].values, values.shape[:2])
     finite = np.isfinite(times)
     filled = np.where(finite, times, 0.0)
@@ -71,7 +71,7 @@ def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
             errors = np.abs(values - values[:, :1]) / _energy_scales(numbers)[:, None]
         elif quantity == "axis":
             truth = _forms(numbers.tobytes()).axis(filled)
-            errors, known = charts.axis_distance(values, truth), np.isfinite(truth).all(axis=2)
+            errors, valid = charts.axis_distance(values, truth), np.isfinite(truth).all(axis=2)
         else:
             rows = []
             for (body, start), when, mine in zip(members_of(numbers), filled, values, strict=True):
@@ -79,7 +79,7 @@ def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
                 true = body_samples(name, body, start, when.tobytes(), precise=False)
                 rows.append(charts.attitude_distance(mine, true.quaternion, true.quaternion_lo))
             errors = np.array(rows)
-    return np.where(finite & known, np.where(np.isfinite(errors), errors, np.inf), np.nan)
+    return np.where(finite & valid, np.where(np.isfinite(errors), errors, np.inf), np.nan)
 
 
 def _energy_scales(numbers: Array) -> Any:

@@ -95,8 +95,8 @@ def look(name: str) -> Look:
     dash = DASHES.get(family, "-")
     if name in _LOOKS:
         return _LOOKS[name]._replace(dash=dash)
-    taken = {one[:2] for one in _LOOKS.values()}
-    free = [Look(shade, marker) for marker in _MARKERS for shade in SHADES[family] if (shade, marker) not in taken]
+    pairs = {one[:2] for one in _LOOKS.values()}
+    free = [Look(shade, marker) for marker in _MARKERS for shade in SHADES[family] if (shade, marker) not in pairs]
     alike = [one for one, method in registered.items() if method.family == family and one not in _LOOKS]
     place = alike.index(name) if name in alike else zlib.crc32(name.encode())
     return free[place % len(free)]._replace(dash=dash)
@@ -115,8 +115,8 @@ def ink(color: str) -> tuple[float, ...]:
     part = np.array(to_rgb(color))
     linear = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
     linear *= min(1.0, 0.18 / max(float(linear @ np.array([0.2126, 0.7152, 0.0722])), 1e-9))
-    shown = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
-    return tuple(map(float, shown))
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
+    return tuple(map(float, encoded))
 
 
 PAPER: dict[Any, Any] = {
@@ -196,13 +196,13 @@ def grid(count: int, columns: int, labels: tuple[str, str] = ("", ""), **options
     figure, axes = panels(-(-count // columns), columns, **options)
     for axis in axes.flat[count:]:
         axis.set_visible(False)
-    used = axes.flat[:count]
-    for axis in used[-columns:]:
+    visible = axes.flat[:count]
+    for axis in visible[-columns:]:
         axis.set_xlabel(labels[0])
         axis.tick_params(which="both", labelbottom=True)  # shared axes leave it to a last row that may be hidden
-    for axis in used[::columns]:
+    for axis in visible[::columns]:
         axis.set_ylabel(labels[1])
-    return figure, used
+    return figure, visible
 
 
 def few_ticks(*axes: Any, most: int = 6) -> None:

@@ -42,10 +42,10 @@ def filled(findings: Findings, results: Path, *, pages: Mapping[str, str] | None
     `pages` are links to the pages of all studies, by name. Raises SymtopError for a template that is wrong.
     """
     name = findings["study"]
-    given = {"question": findings["question"], "pages": Links(pages or {})} | _names([findings], results)
-    given |= {"f": SimpleNamespace(**findings["facts"]), "facts": findings["facts"]}
-    given |= {kind: [one["name"] for one in findings[kind]] for kind in ("pictures", "tables")}
-    text = rendered(findings["page"], f"page of {name}", given)
+    context = {"question": findings["question"], "pages": Links(pages or {})} | _names([findings], results)
+    context |= {"f": SimpleNamespace(**findings["facts"]), "facts": findings["facts"]}
+    context |= {kind: [one["name"] for one in findings[kind]] for kind in ("pictures", "tables")}
+    text = rendered(findings["page"], f"page of {name}", context)
     head, _, body = without_gaps(text).strip().partition("\n\n")
     parts = [head, PARTIAL if GAP in text else "", body, *findings["failures"], findings.get("measured")]
     return "\n\n".join(filter(None, [*parts, _ending(findings)])) + "\n"
@@ -55,9 +55,9 @@ def front(template: str, studies: Sequence[Findings], results: Path, pages: Mapp
     """A page on all studies: `fact("STUDY.NAME")` is a fact or None, figures and tables are named ``STUDY-NAME``."""
     facts = {f"{study['study']}.{name}": value for study in studies for name, value in study["facts"].items()}
     titles = {study["title"]: pages.get(study["study"], "").partition("](")[2] for study in studies}
-    given = {"pages": Links(pages), "fact": facts.get, "methods": len(methods()), "maps": len(engines())}
-    given["listed"] = [f"[{title}]({address}" for title, address in titles.items() if address]
-    text = rendered(template, "front page", given | _names(studies, results, whole=True))
+    context = {"pages": Links(pages), "fact": facts.get, "methods": len(methods()), "maps": len(engines())}
+    context["listed"] = [f"[{title}]({address}" for title, address in titles.items() if address]
+    text = rendered(template, "front page", context | _names(studies, results, whole=True))
     return without_gaps(text).strip() + "\n"
 
 
@@ -88,7 +88,7 @@ def environment(**options: Any) -> Any:
     return Environment(loader=loader, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, **options)  # noqa: S701
 
 
-def rendered(template: str | None, name: str, given: Mapping[str, Any]) -> str:
+def rendered(template: str | None, name: str, context: Mapping[str, Any]) -> str:
     """A template (None: the plain one) with what is given; SymtopError if it is wrong or names what is not there."""
     from jinja2 import TemplateError
 
@@ -97,7 +97,7 @@ def rendered(template: str | None, name: str, given: Mapping[str, Any]) -> str:
     template = template and template.replace("endraw %}", "endraw +%}")  # which keeps the empty line that follows
     try:
         ready = ours.get_template(PLAIN) if template is None else ours.from_string(template)
-        text = ready.render(**given)
+        text = ready.render(**context)
     except (TemplateError, TypeError, ValueError) as error:
         place = f", line {error.lineno}" if getattr(error, "lineno", None) else ""  # type: ignore[union-attr]
         raise SymtopError(f"{name}{place}: {error}") from error
@@ -113,19 +113,19 @@ def without_gaps(text: str) -> str:
 def _known(block: str) -> str:
     listed = re.match(r"[-*] |\d+[.)] ", block)
     parts = re.split(r"\n(?=[-*] |\d+[.)] )" if listed else r"(?<=[.?]) |(?<=[.?]\*\*) ", block)
-    kept = [part for part in parts if GAP not in part]
-    return "" if all(re.fullmatch(r"\*\*[^*]+\*\*", part) for part in kept) else ("\n" if listed else " ").join(kept)
+    whole = [part for part in parts if GAP not in part]
+    return "" if all(re.fullmatch(r"\*\*[^*]+\*\*", part) for part in whole) else ("\n" if listed else " ").join(whole)
 
 
 def _passing(filter_: Callable[..., str]) -> Callable[..., str | None]:
     """A format as a filter of templates: None, which was not measured, passes, and a name that is not there fails."""
     from jinja2 import Undefined
 
-    def passed(value: Any, *options: Any, **named: Any) -> str | None:
+    def apply(value: Any, *options: Any, **keywords: Any) -> str | None:
         value = str(value) if isinstance(value, Undefined) else value
-        return None if value is None else filter_(value, *options, **named)
+        return None if value is None else filter_(value, *options, **keywords)
 
-    return passed
+    return apply
 
 
 def _unwrapped(block: str) -> str:
@@ -166,9 +166,9 @@ def _names(studies: Sequence[Findings], results: Path, *, whole: bool = False) -
         frame = pd.read_csv(results / "tables" / file, nrows=min(rows, MOST_ROWS))
         frame = frame if columns is None else frame[list(columns)]
         cells = [[formats.cell(value, digits) for value in row] for row in frame.itertuples(index=False)]
-        shown = f"the first {len(cells)} of {count:,} rows; " if count > len(cells) else ""
+        extent = f"the first {len(cells)} of {count:,} rows; " if count > len(cells) else ""
         whole = [MARKER.format(kind="table", name=Path(file).stem)] if count > len(cells) else []
-        head = f"**{title or name}** ({shown}[CSV](tables/{file}))"
+        head = f"**{title or name}** ({extent}[CSV](tables/{file}))"
         return "\n\n".join([head, table(list(map(str, frame.columns)), cells), *whole]) + "\n"
 
     def has(*names: str) -> bool:

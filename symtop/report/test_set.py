@@ -19,6 +19,7 @@ from symtop.core.progress import post
 from symtop.model.exact.body_digits import Digits, body_digits
 from symtop.model.scenes import Scene
 from symtop.report.archive import even_times, printed
+from symtop.report.template import environment
 from symtop.run.ensemble.bodies import body_population, scenes_of
 
 SEED, TIMES, PERIODS = 48, 100, 5.0
@@ -28,31 +29,6 @@ GIVEN = ("I1", "I2", "I3", "mgl", "cx", "cy", "cz", "qw", "qx", "qy", "qz", "wx"
 STATE = ("qw", "qx", "qy", "qz", "Lx", "Ly", "Lz")
 ROUNDED = {17: 4.5e-16, 30: 1e-29}  # rad, and of |L|: two states of so many digits may be so far apart
 CHECKERS = ("check.py", "check.c")
-README = """\
-# A test set for integrators of rigid bodies
-
-{count} bodies with a fixed point, {times} times each: attitude and angular momentum, with a bound on the error.
-
-- `problems.csv`: principal moments of inertia `I1`, `I2`, `I3`; `mgl`, weight times distance of the centre of mass, 0
-  of a free body; its direction `cx`, `cy`, `cz` in principal axes; the attitude `qw`, `qx`, `qy`, `qz` and the angular
-  velocity `wx`, `wy`, `wz` in principal axes at time 0. Read each number as the nearest double. The weight times the
-  direction is rounded to doubles; the quaternion is to be scaled to length one. Units are any consistent set.
-- `states-17.csv`, `states-30.csv`: `name`, `time`, the attitude, the angular momentum `Lx`, `Ly`, `Lz` in space, and
-  `bound`, to so many digits. `states.nc` holds the same as pairs of doubles: a value is `NAME + NAME_lo`.
-- `check.py`, `check.c`: checkers without any package. `python check.py MINE.csv states-17.csv` prints for each problem
-  the largest errors of your file, and how many samples are beyond the bound. Your file has the lines of the reference,
-  without `bound` or with it, in the same order. Doubles hold no 30 digits: `check.c` is for `states-17.csv`.
-
-**Conventions.** A quaternion (w, x, y, z) turns body vectors into space vectors, v -> q v q*; both signs are right. The
-z axis of space points up, gravity pulls down. With omega in body axes, M = (I1 wx, I2 wy, I3 wz), q' = q omega/2,
-M' = M x omega + mgl Gamma x c, Gamma = q* z q, and L = q M q*. The error of an attitude is the angle of the turn
-between two, in radians, that of the momentum |L - L'|/|L|.
-
-**How it was made.** Taylor series of order 56 in whole numbers of 190 bits; a second run with fewer bits, of a lower
-order and with longer steps is at most {gap:.0e} away. The first {free} bodies are free; of the others {chaotic}
-are chaotic: a disturbance grows more than a thousandfold in ten natural periods.
-Made by symtop, BSD-3-Clause.
-"""
 
 
 def problems() -> list[Scene]:
@@ -66,9 +42,9 @@ def times_of(scene: Scene) -> list[float]:
     return even_times(PERIODS * scene.nutation_period, TIMES)
 
 
-def write(folder: str | Path, chosen: Sequence[Scene] | None = None) -> Path:
-    """Write the test set into a folder, which must be new or empty; a minute. `chosen` are other problems."""
-    path, scenes = file_path("folder", folder), list(chosen or problems())
+def write(folder: str | Path, scenes: Sequence[Scene] | None = None) -> Path:
+    """Write the test set into a folder, which must be new or empty; a minute. `scenes` are other problems."""
+    path, scenes = file_path("folder", folder), list(scenes or problems())
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise SymtopError(f"the test set needs a folder that is new or empty, not {str(folder)!r}")
     motions = list[Digits]()
@@ -79,10 +55,11 @@ def write(folder: str | Path, chosen: Sequence[Scene] | None = None) -> Path:
     files = {"problems.csv": _problems_csv(scenes)}
     files |= {f"states-{digits}.csv": _states_csv(scenes, motions, digits) for digits in ROUNDED}
     kinds = [scene.name.rpartition("-")[0] for scene in scenes]
-    files["README.md"] = README.format(
+    readme = environment().get_template("test-set.md").render(
         count=len(scenes), times=TIMES, gap=max(motion.bound for motion in motions), chaotic=kinds.count("chaotic"),
         free=sum(scene.top.free for scene in scenes),
     )  # fmt: skip
+    files["README.md"] = f"{readme}\n"
     for name, text in files.items():
         (path / name).write_text(text, encoding="utf-8", newline="\n")
     for name in CHECKERS:

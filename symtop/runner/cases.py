@@ -98,8 +98,8 @@ class StudyCases:
                     self.failures.append(result.message)
                     bar.set_postfix_str(f"{len(self.failures)} failed", refresh=False)
                 self.computed += result.state == "computed"
-                done = self.computed + len(self.failures) - before
-                post(f"{self.study.name}: {done} of {len(tasks)} cases")
+                count = self.computed + len(self.failures) - before
+                post(f"{self.study.name}: {count} of {len(tasks)} cases")
                 bar.update()
 
             pool.run(self.study, tasks, on_result)
@@ -145,9 +145,9 @@ def status(
 def other_settings(case: Case, stored: list[Path]) -> list[str]:
     """How the settings of a case differ from the nearest that were computed on its scene with its integrator."""
     alike = [path for path in stored if store.identity_of(path).rpartition("--")[0] == case.label]
-    wanted = json.loads(json.dumps(dict(case.settings)))
+    settings = json.loads(json.dumps(dict(case.settings)))
     differing = [
-        [f"setting {name}" for name in sorted({*old, *wanted}) if old.get(name, "") != wanted.get(name, "")]
+        [f"setting {name}" for name in sorted({*old, *settings}) if old.get(name, "") != settings.get(name, "")]
         for old in (_attribute(path, "settings") for path in alike)
     ]
     return min(differing, key=len, default=["never computed"])
@@ -170,18 +170,18 @@ def check(
     cases = StudyCases.stored(study, results, quick=quick, full=full)
     # in the order of their digests, so that a sample is one of all parts of the grid
     stored = sorted(cases.data.items(), key=lambda item: store.digest_of(item[0]))
-    chosen = {path.name: data for path, data in stored[: None if everything else SAMPLE]}
-    with tempfile.TemporaryDirectory(prefix="symtop-check-") as elsewhere:
-        again = StudyCases(study, Path(elsewhere).resolve())
-        missing = again.add(case for path, case in cases.cases.items() if path.name in chosen)
+    sample = {path.name: data for path, data in stored[: None if everything else SAMPLE]}
+    with tempfile.TemporaryDirectory(prefix="symtop-check-") as folder:
+        again = StudyCases(study, Path(folder).resolve())
+        missing = again.add(case for path, case in cases.cases.items() if path.name in sample)
         again.compute(missing, pool, study.limit, fresh=False, quiet=True)
         again.read(missing)
     differing = again.failures
     for path, data in again.data.items():
         label = f"{again.cases[path].integrator} on {again.cases[path].scene}"
-        differing += [f"{label}: {text}" for text in differences(chosen[path.name], data)]
+        differing += [f"{label}: {text}" for text in differences(sample[path.name], data)]
     whole = results / f"{study.name}.nc"
     if whole.is_file() and len(stored) == len(cases.cases):
         pair = differences(netcdf.read_any(whole), cases.combined(), attributes=False)
         differing += [f"{whole.name}: {text}" for text in pair]
-    return {"study": study.name, "stored": len(stored), "compared": len(chosen), "differences": differing}
+    return {"study": study.name, "stored": len(stored), "compared": len(sample), "differences": differing}

@@ -28,12 +28,12 @@ def made_of(label: str, thing: object) -> Reasons:
     return _known[key][1]
 
 
-def used(study: Study, case: Case) -> list[str]:
+def uses(study: Study, case: Case) -> list[str]:
     """Names of the integrators that a case runs, the closed form among them, which others are measured by."""
     with failing(study.name, "uses"):
         names = {*(case.integrators if study.uses is None else study.uses(case)), REFERENCE}
-    known = integrators().keys()
-    return sorted(known if EVERY in names else {split_name(name)[0] for name in names} & known)
+    registry = integrators().keys()
+    return sorted(registry if EVERY in names else {split_name(name)[0] for name in names} & registry)
 
 
 def settings_key(study: Study, case: Case) -> str:
@@ -48,7 +48,7 @@ def reasons(study: Study, case: Case) -> Reasons:
     places = sorted(scenes()) if case.scene == EVERY else {case.scene} & catalogue.keys()
     parts = [made_of("measure", study.measure), code_hash.packages(), {"settings": settings_key(study, case)}]
     parts += [made_of(f"scene {name}", catalogue[name]) for name in places]
-    parts += [made_of(f"integrator {name}", methods[name]) for name in used(study, case)]
+    parts += [made_of(f"integrator {name}", methods[name]) for name in uses(study, case)]
     return code_hash.merged(parts) | ({"processor": code_hash.processor()} if study.is_timed(case) else {})
 
 

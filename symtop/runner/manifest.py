@@ -38,8 +38,8 @@ def is_current(results: Path, name: str, made_of: str) -> bool:
     entry = _entries(results).get(name)
     if not isinstance(entry, dict) or entry.get("made_of") != made_of or not isinstance(entry.get("files"), dict):
         return False
-    known = entry["files"]
-    return None not in known.values() and known == _marks(results, [results / file for file in known])
+    marks = entry["files"]
+    return None not in marks.values() and marks == _marks(results, [results / file for file in marks])
 
 
 def note(results: Path, name: str, made_of: str, paths: Iterable[Path]) -> None:

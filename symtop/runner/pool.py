@@ -179,44 +179,44 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         Timed cases run one at a time, or one on each core where a trial shows that they do not disturb each other.
         """
         for timed in (False, True):
-            chosen = in_order([task for task in tasks if study.is_timed(task.case) == timed])
-            if chosen and timed:
+            part = in_order([task for task in tasks if study.is_timed(task.case) == timed])
+            if part and timed:
                 wait(self._analyses)
-            local = any(plugins.is_local(name) for task in chosen for name in (task.case.scene, *task.case.integrators))
+            local = any(plugins.is_local(name) for task in part for name in (task.case.scene, *task.case.integrators))
             if self.client is not None and not timed and not local:
                 submit = partial(self.client.get_executor(pure=False).submit, execute_case)
-                _drain(chosen, submit, cluster.width(self.client), on_result)
-            elif local or (len(chosen) < WORTH_WORKERS and not self.size):
+                _drain(part, submit, cluster.width(self.client), on_result)
+            elif local or (len(part) < WORTH_WORKERS and not self.size):
 
                 def here(task: Task) -> Future[Result]:
-                    (done := Future[Result]()).set_result(execute_case(task, study))
-                    return done
+                    (future := Future[Result]()).set_result(execute_case(task, study))
+                    return future
 
-                _drain([task._replace(timed=(1, math.nan) if timed else None) for task in chosen], here, 1, on_result)
+                _drain([task._replace(timed=(1, math.nan) if timed else None) for task in part], here, 1, on_result)
             else:
-                self._in_workers(chosen, on_result, timed=timed)
+                self._in_workers(part, on_result, timed=timed)
 
     def _in_workers(self, tasks: list[Task], on_result: OnResult, *, timed: bool) -> None:
         """Compute tasks in workers; one whose worker dies is computed once more, with nobody beside it."""
-        left, died = {task.path: task for task in tasks}, dict[Path, Task]()
+        remaining, died = {task.path: task for task in tasks}, dict[Path, Task]()
         fruitless = 0
 
         def settle(task: Task, result: Result) -> None:
             nonlocal fruitless
             fruitless = 0
-            del left[task.path]
+            del remaining[task.path]
             if result.state == "died" and not alone:
                 died[task.path] = task
             else:
                 on_result(task, failed(task, ENDED) if result.state == "died" else result)
 
         for alone in (False, True):
-            while left:
-                self.open(min(self.jobs, len(left)))
-                together = self.at_once(min(self.size, len(left))) if timed else None
+            while remaining:
+                self.open(min(self.jobs, len(remaining)))
+                together = self.at_once(min(self.size, len(remaining))) if timed else None
                 width = 1 if alone else AHEAD * self.size if together is None else together[0]
                 try:
-                    ahead = [task._replace(timed=together) for task in left.values()]
+                    ahead = [task._replace(timed=together) for task in remaining.values()]
                     _drain(ahead, lambda task: self.submit(execute_case, task, limit=task.limit + GRACE), width, settle)
                 except BrokenExecutor:
                     self.close_workers()
@@ -225,7 +225,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
                         raise SymtopError(
                             "the worker processes end before they begin; try --jobs 1 or look at the free memory"
                         ) from None
-            left.update(died)
+            remaining.update(died)
 
     def at_once(self, width: int) -> tuple[int, float]:
         """How many timed cases may run at once, one for each worker if a trial shows no disturbance, or half, ...
@@ -276,10 +276,10 @@ def begin_worker(parent: int) -> None:
 
 def in_order(tasks: Sequence[Task]) -> list[Task]:
     """The first case of every family of methods, then the second, ...: methods of a family share kernels to compile."""
-    known, count = integrators(), Counter[str]()
+    methods, count = integrators(), Counter[str]()
 
     def rank(task: Task) -> int:
-        method = known.get(split_name(task.case.integrator)[0])
+        method = methods.get(split_name(task.case.integrator)[0])
         family = task.case.integrator if method is None else method.family
         count[family] += 1
         return count[family]

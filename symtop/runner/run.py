@@ -71,9 +71,9 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
     drawing = drawing_digest(study, save)
     made_of = code_hash.hashed(*sorted(path.name for path in first), drawing)
     if not fresh and manifest.is_current(results, study.name, made_of):
-        known = netcdf.read_json(results / f"{study.name}.json")
-        if isinstance(known, dict):
-            return Started(lambda: known | {"computed": 0, "seconds": time.monotonic() - began})
+        stored = netcdf.read_json(results / f"{study.name}.json")
+        if isinstance(stored, dict):
+            return Started(lambda: stored | {"computed": 0, "seconds": time.monotonic() - began})
     try:
         for new in chain([first], rounds):
             cases.compute(cases.missing(new, fresh=fresh), pool, seconds, fresh=fresh, quiet=quiet)
@@ -170,22 +170,22 @@ def findings_of(
     }  # fmt: skip
 
 
-def _answers(study: Study, function: str, data: Combined, wanted: str) -> Iterator[tuple[Any, Any]]:
+def _answers(study: Study, function: str, data: Combined, form: str) -> Iterator[tuple[Any, Any]]:
     """What the facts or the tables of a study return, by name."""
     with failing(study.name, function):
-        made = getattr(study, function)(data)
-    if not isinstance(made, Mapping):
-        raise StudyError(f"study {study.name}: {function} must return {wanted} by name, not {shown(made)[:LONGEST]}")
-    yield from made.items()
+        values = getattr(study, function)(data)
+    if not isinstance(values, Mapping):
+        raise StudyError(f"study {study.name}: {function} must return {form} by name, not {shown(values)[:LONGEST]}")
+    yield from values.items()
 
 
 def _facts(study: Study, data: Combined) -> Iterator[tuple[str, float | str | bool | None]]:
     """Facts as JSON holds them: numbers, names, and None for what was not measured."""
-    for name, given in () if study.facts is None else _answers(study, "facts", data, "numbers"):
+    for name, raw in () if study.facts is None else _answers(study, "facts", data, "numbers"):
         if not (isinstance(name, str) and name.isidentifier()):
             must = f"the name of a fact must be a word of letters, digits and _, not {name!r}"
             raise StudyError(f"study {study.name}: {must}")
-        value = given.item() if getattr(given, "ndim", None) == 0 else given  # of NumPy
+        value = raw.item() if getattr(raw, "ndim", None) == 0 else raw  # of NumPy
         if value is not None and not isinstance(value, (bool, int, float, str)):
             must = f"fact {name} must be a number, text or None, not {shown(value)[:LONGEST]}"
             raise StudyError(f"study {study.name}: {must}")

@@ -17,7 +17,7 @@ from symtop.runner.study import Study
 
 STUDIES = "symtop_studies"  # the package that every shipped study belongs to
 
-_elsewhere: dict[str, Path] = {}  # scripts of the user's own, by the name of their study
+_own_scripts: dict[str, Path] = {}  # scripts of the user's own, by the name of their study
 
 
 def folder() -> Path:
@@ -57,7 +57,7 @@ def file_of(name: str) -> Path:
         return python_file(name, "study", "a name or a Python file that is there")
     if (new := install().FORMER.get(name)) is not None:
         raise SymtopError(f"study {name} is now {new}: symtop study {new}")
-    return _elsewhere.get(name) or folder() / one_of("study", name, names()) / "study.py"
+    return _own_scripts.get(name) or folder() / one_of("study", name, names()) / "study.py"
 
 
 def file_beside(name: str, file: str) -> Path | None:
@@ -87,5 +87,5 @@ def load(name: str) -> Study:
     if not isinstance(study, Study):
         raise SymtopError(f"study {file.name} must define STUDY, a Study, not {study!r}")
     if file.parent.parent != folder():
-        _elsewhere[study.name] = file
+        _own_scripts[study.name] = file
     return study

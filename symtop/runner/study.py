@@ -34,20 +34,20 @@ def failing(study: str, function: str) -> AbstractContextManager[None]:
     return foreign_code(f"study {study}: {function}", StudyError)
 
 
-def each(study: str, function: str, make: Callable[[], Any], kind: type, wanted: str) -> Iterator[Any]:
+def each(study: str, function: str, make: Callable[[], Any], kind: type, form: str) -> Iterator[Any]:
     """What a function of a study returns or yields, one by one, each of which must be of that kind."""
     with failing(study, function):
-        made = make()
-    if isinstance(made, (str, bytes, Mapping, kind)) or not isinstance(made, Iterable):
-        raise StudyError(f"study {study}: {function} must return {wanted}, not {shown(made)[:LONGEST]}")
-    entries, end = iter(made), object()
+        answer = make()
+    if isinstance(answer, (str, bytes, Mapping, kind)) or not isinstance(answer, Iterable):
+        raise StudyError(f"study {study}: {function} must return {form}, not {shown(answer)[:LONGEST]}")
+    entries, end = iter(answer), object()
     while True:
         with failing(study, function):
             entry = next(entries, end)
         if entry is end:
             return
         if not isinstance(entry, kind):
-            raise StudyError(f"study {study}: {function} must return {wanted}; an entry is a {type(entry).__name__}")
+            raise StudyError(f"study {study}: {function} must return {form}; an entry is a {type(entry).__name__}")
         yield entry
 
 
@@ -110,8 +110,8 @@ class Case:
             try:
                 json.dumps(value)
             except (TypeError, ValueError, RecursionError):
-                held = "numbers of Python, text, lists or mappings, which JSON can hold"
-                raise SymtopError(f"setting {key!r} must be {held}, not {shown(value)[:LONGEST]}") from None
+                allowed = "numbers of Python, text, lists or mappings, which JSON can hold"
+                raise SymtopError(f"setting {key!r} must be {allowed}, not {shown(value)[:LONGEST]}") from None
 
     @property
     def integrators(self) -> tuple[str, ...]:
@@ -175,17 +175,17 @@ class Study:
         A case that measures several integrators against each other stays whole if one of them is named, and one of
         the closed form, which others are measured by, stays in any case.
         """
-        wanted = {*names, REFERENCE}
+        methods = {*names, REFERENCE}
 
-        def chosen(cases: list[Case]) -> list[Case]:
+        def select(cases: list[Case]) -> list[Case]:
             return [
                 case
                 for case in self._listed("cases", lambda: cases)
-                if any({name, split_name(name)[0]} & wanted for name in case.integrators)
+                if any({name, split_name(name)[0]} & methods for name in case.integrators)
             ]
 
         def first(quick: bool) -> list[Case]:
-            cases = chosen(self.cases(quick))
+            cases = select(self.cases(quick))
             alone = all({*case.integrators} <= {REFERENCE} for case in cases)
             if not cases or (alone and REFERENCE not in names):
                 raise StudyError(f"study {self.name} has no case of {', '.join(names)}")
@@ -203,9 +203,9 @@ class Study:
 
             return answer and answered
 
-        full, later = self.full, self.follow_up
+        full, follow_up = self.full, self.follow_up
         answers = {name: able(getattr(self, name)) for name in ("facts", "pictures", "tables", "charts")}
         return replace(
-            self, cases=first, full=full and (lambda: chosen(full())),
-            follow_up=later and (lambda data: chosen(later(data))), **answers,
+            self, cases=first, full=full and (lambda: select(full())),
+            follow_up=follow_up and (lambda data: select(follow_up(data))), **answers,
         )  # fmt: skip

@@ -39,13 +39,13 @@ def test_every_source_is_cited_once(tmp_path):
 
 def test_a_method_without_a_known_source_is_said(tmp_path):
     data = symtop.simulate("spheroid", "strang", step_size=0.01, horizon=0.1).assign_attrs(integrator="of-a-user")
-    done = cited(netcdf.write(data, tmp_path / "run.nc"))
-    assert "no source is known of of-a-user" in done.stderr
-    assert done.stdout.count("@") == 1
+    result = cited(netcdf.write(data, tmp_path / "run.nc"))
+    assert "no source is known of of-a-user" in result.stderr
+    assert result.stdout.count("@") == 1
 
 
 def test_a_file_that_is_no_dataset_is_refused(tmp_path):
     path = tmp_path / "notes.txt"
     path.write_text("no netCDF")
-    done = call("cite", path, code=2)
-    assert "cannot read" in done.output
+    result = call("cite", path, code=2)
+    assert "cannot read" in result.output

@@ -21,16 +21,16 @@ def test_run_prints_the_errors_and_writes_the_dataset(tmp_path):
     words = ("run", "spheroid", "midpoint", "--step-size", 0.01, "--output", tmp_path / "run.nc")
     assert "angle between axes" in call(*words).output
     assert netcdf.read(tmp_path / "run.nc").attrs["integrator"] == "midpoint"
-    told = numbers(call(*words, "--json").stdout)
-    assert told["steps"] == 800
-    assert 1e-3 < told["errors"]["axis"]["largest"] < 2e-2
-    assert told["errors"]["p_psi"]["largest"] < 1e-14
+    report = numbers(call(*words, "--json").stdout)
+    assert report["steps"] == 800
+    assert 1e-3 < report["errors"]["axis"]["largest"] < 2e-2
+    assert report["errors"]["p_psi"]["largest"] < 1e-14
 
 
 def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):
     path = tmp_path / "run.nc"
-    done = call("run", "spheroid", "stormer-verlet", "--step-size", 1.0, "--horizon", 50, "--output", path, code=3)
-    assert "theta left (0, pi)" in done.output
+    result = call("run", "spheroid", "stormer-verlet", "--step-size", 1.0, "--horizon", 50, "--output", path, code=3)
+    assert "theta left (0, pi)" in result.output
     assert netcdf.read(path).attrs["outcome"] == "left_chart"
 
 
@@ -89,19 +89,19 @@ OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --bod
 )
 def test_a_refusal_names_the_argument_its_value_and_what_is_allowed(words, parts, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    done = call(*words.split(), code=2)
-    (line,) = [line for line in done.stderr.splitlines() if line.startswith(("symtop: ", "Error: "))]
+    result = call(*words.split(), code=2)
+    (line,) = [line for line in result.stderr.splitlines() if line.startswith(("symtop: ", "Error: "))]
     assert all(part in line for part in parts), line
     assert ("the scene comes first" in line) is ("scene comes first" in parts)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_plugin_that_registers_nothing_is_told_of(tmp_path):
-    for text, told in (("x = 1\n", True), (ANOTHER_NAME, False), (REPLACED, False)):
+    for text, expected in (("x = 1\n", True), (ANOTHER_NAME, False), (REPLACED, False)):
         plugin = tmp_path / f"plugin_{len(text)}.py"
         plugin.write_text(text, encoding="utf-8")
-        done = call("scenes", "--plugin", plugin)
-        assert (f"{plugin.name} registers no integrator and no scene" in done.output) is told
+        result = call("scenes", "--plugin", plugin)
+        assert (f"{plugin.name} registers no integrator and no scene" in result.output) is expected
 
 
 ANOTHER_NAME = """import dataclasses
@@ -130,8 +130,8 @@ def test_a_folder_is_no_output_and_nothing_is_computed_for_it(words, computes, t
     monkeypatch.setattr(computes, lambda *_, **__: pytest.fail("it computes"))
     for option in ("--output", "--figure") if words[0] != "long" else ("--output",):
         (tmp_path / f"{option}.png").mkdir()
-        done = call(*words, option, tmp_path / f"{option}.png", code=2)
-        assert f"{option} must be a file, not the folder" in done.output
+        result = call(*words, option, tmp_path / f"{option}.png", code=2)
+        assert f"{option} must be a file, not the folder" in result.output
 
 
 @pytest.mark.parametrize(
@@ -139,18 +139,19 @@ def test_a_folder_is_no_output_and_nothing_is_computed_for_it(words, computes, t
     [
         (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
         (["recommend", "spheroid", "--accuracy", "1e-3"], "symtop.advise.recommend"),
-        (["claims", "strang", "--quick"], "symtop.judging.judge_step.apart"),
+        (["claims", "strang", "--quick"], "symtop.judging.judge_step.judge_separately"),
     ],
 )
 def test_ctrl_c_is_neither_a_failed_case_nor_bad_input(words, called, monkeypatch):
-    for interrupt in (lambda *_, **__: os.kill(os.getpid(), signal.SIGINT), _raises):
-        monkeypatch.setattr(called, interrupt)
-        done = call(*words, code=130 if interrupt is not _raises else 2)
-        assert done.output.splitlines()[-1] == ("symtop: of its own" if interrupt is _raises else "symtop: interrupted")
+    def interrupts(*_, **__):
+        os.kill(os.getpid(), signal.SIGINT)
 
+    def raises(*_, **__):
+        raise SymtopError("of its own")
 
-def _raises(*_, **__):
-    raise SymtopError("of its own")
+    for function, code, message in ((interrupts, 130, "interrupted"), (raises, 2, "of its own")):
+        monkeypatch.setattr(called, function)
+        assert call(*words, code=code).output.splitlines()[-1] == f"symtop: {message}"
 
 
 def numbers(text):
@@ -161,9 +162,9 @@ def numbers(text):
 def test_numbers_that_are_not_finite_are_null_in_json(tmp_path):
     with pytest.raises(pytest.fail.Exception):
         numbers("[NaN]")
-    done = call("recommend", "spheroid", "--accuracy", "1e-17", "--json", code=1)
-    assert numbers(done.stdout)["seconds"] is None
-    assert numbers(done.stdout)["accuracy"] == 1e-17
+    result = call("recommend", "spheroid", "--accuracy", "1e-17", "--json", code=1)
+    assert numbers(result.stdout)["seconds"] is None
+    assert numbers(result.stdout)["accuracy"] == 1e-17
     plugin = tmp_path / "endless.py"  # a top whose nutation never ends
     plugin.write_text(
         "import symtop\ntop = symtop.scene('spheroid').top\n"
@@ -191,9 +192,9 @@ def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_pa
     changes = {}
     for chart in ("angles", "axis"):
         path = tmp_path / f"{chart}.nc"
-        done = call("run", "spheroid", f"rk4[{chart}]", "--step-size", 0.02, "--output", path, "--json")
+        result = call("run", "spheroid", f"rk4[{chart}]", "--step-size", 0.02, "--output", path, "--json")
         assert netcdf.read(path).attrs["chart"] == chart
-        changes[chart] = json.loads(done.output)["errors"]["p_phi"]["largest"]
+        changes[chart] = json.loads(result.output)["errors"]["p_phi"]["largest"]
     assert changes["axis"] == 0.0 < changes["angles"]
     words = ["run", "spheroid", "rk4", "--step-size", "0.1", "--horizon", "1", "--no-guard"]
     assert call(*words).output.startswith("rk4[angles] on spheroid: reached")
@@ -202,7 +203,7 @@ def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("begun", "offered"),
+    ("line", "completion"),
     [
         ("symtop run sph", "spheroid"),
         ("symtop run tennis", "tennis-racket"),
@@ -212,11 +213,11 @@ def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_pa
         ("symtop integrators strang[att", "strang[attitude]"),
     ],
 )
-def test_the_shell_completes_names(begun, offered):
-    words = begun.split()
-    told = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": begun, "COMP_CWORD": str(len(words) - 1)}
-    done = CliRunner().invoke(main, prog_name="symtop", env=told)
-    assert f"plain,{offered}" in done.output
+def test_the_shell_completes_names(line, completion):
+    words = line.split()
+    environment = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+    result = CliRunner().invoke(main, prog_name="symtop", env=environment)
+    assert f"plain,{completion}" in result.output
 
 
 ENDING = """
@@ -248,18 +249,18 @@ def ending(before="", code="3"):
 
 
 def test_a_command_ends_with_its_code_and_takes_nothing_apart():
-    done = ending()
-    assert (done.returncode, done.stdout, done.stderr) == (3, "the answer\nwhat was registered\n", "")
+    result = ending()
+    assert (result.returncode, result.stdout, result.stderr) == (3, "the answer\nwhat was registered\n", "")
     assert ending(code="None").returncode == 0
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
 def test_what_cannot_be_printed_is_told_in_a_sentence():
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run([sys.executable, "-m", "symtop.cli", "scenes"], stdout=full, stderr=subprocess.PIPE,
+        result = subprocess.run([sys.executable, "-m", "symtop.cli", "scenes"], stdout=full, stderr=subprocess.PIPE,
                               text=True, timeout=60, check=False)  # fmt: skip
-    assert done.returncode == 2
-    assert done.stderr == "symtop: cannot write what there is to say: No space left on device\n"
+    assert result.returncode == 2
+    assert result.stderr == "symtop: cannot write what there is to say: No space left on device\n"
 
 
 @pytest.mark.skipif(not Path("/bin/sh").exists(), reason="a shell of Unix")
@@ -273,14 +274,14 @@ def test_what_cannot_be_printed_is_told_in_a_sentence():
 def test_a_stream_that_was_closed_changes_no_exit_code(words, closed, code):
     """Python has None in its place; a refusal (the control) is one all the same."""
     command = ["/bin/sh", "-c", f"{sys.executable} -m symtop.cli {words} {closed}"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    assert done.returncode == code, done.stderr
-    assert "Traceback" not in done.stderr
+    result = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert result.returncode == code, result.stderr
+    assert "Traceback" not in result.stderr
 
 
 def test_a_command_whose_threads_work_or_whose_code_is_a_text_ends_as_python_does():
-    done = ending(before="threading.Thread(target=work).start()")
-    assert done.stdout.splitlines() == ["the answer", "the thread is done", "what was registered", "taken apart"]
-    assert done.returncode == 3
-    done = ending(code="'a text'")
-    assert (done.returncode, done.stderr) == (1, "a text\n")
+    result = ending(before="threading.Thread(target=work).start()")
+    assert result.stdout.splitlines() == ["the answer", "the thread is done", "what was registered", "taken apart"]
+    assert result.returncode == 3
+    result = ending(code="'a text'")
+    assert (result.returncode, result.stderr) == (1, "a text\n")

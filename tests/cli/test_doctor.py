@@ -19,8 +19,8 @@ def faults(findings):
 
 
 def test_all_is_well_here_and_it_says_what_it_saw(tmp_path):
-    done = call("doctor", "--results", tmp_path, "--json")
-    topics = {entry["topic"]: entry["result"] for entry in json.loads(done.output)}
+    result = call("doctor", "--results", tmp_path, "--json")
+    topics = {entry["topic"]: entry["result"] for entry in json.loads(result.output)}
     assert {"python", "numba", "cache", "kernels cache", "reference cache", "studies", "published values"} <= set(
         topics
     )
@@ -96,9 +96,9 @@ def test_a_check_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path
 
     monkeypatch.setitem(doctor.CHECKS, "machine", trouble)
     monkeypatch.setitem(doctor.CHECKS, "self-check", lambda _: [])
-    done = call("doctor", "--results", tmp_path, code=1)
-    assert "BAD  machine" in done.output
-    assert "OSError: the tools are gone" in done.output
+    result = call("doctor", "--results", tmp_path, code=1)
+    assert "BAD  machine" in result.output
+    assert "OSError: the tools are gone" in result.output
 
 
 def test_every_compiled_method_is_run_in_each_of_its_charts():
@@ -123,8 +123,8 @@ def test_all_of_them_are_compiled_once(monkeypatch, tmp_path):
     for folder in sorted((tmp_path / "kernels").iterdir())[::8]:
         shutil.rmtree(folder)
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
-    done = call("doctor", "--warm", "--results", tmp_path / "r")
+    result = call("doctor", "--warm", "--results", tmp_path / "r")
     assert doctor.kernels() > 100
-    assert "not run" not in done.output
+    assert "not run" not in result.output
     again = call("doctor", "--warm", "--results", tmp_path / "r")
     assert "kernels compiled: 0;" in again.output

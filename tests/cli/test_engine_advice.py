@@ -11,10 +11,10 @@ from tests.commands import call
 
 
 def test_every_setting_has_a_map_and_every_map_of_the_engines_a_setting():
-    named = {method for settings in SETTINGS.values() for method in settings.values()}
-    assert named <= set(engines())
-    left = {name.removesuffix("-float32") for name in set(engines()) - named}
-    assert left <= {name.removesuffix("-float32") for name in named} | {"fincham"}  # as published, in no engine
+    maps = {method for settings in SETTINGS.values() for method in settings.values()}
+    assert maps <= set(engines())
+    rest = {name.removesuffix("-float32") for name in set(engines()) - maps}
+    assert rest <= {name.removesuffix("-float32") for name in maps} | {"fincham"}  # as published, in no engine
 
 
 @pytest.mark.slow
@@ -53,14 +53,14 @@ def test_bad_input_is_refused_in_a_sentence(engine, step, message):
 
 
 def test_the_command_says_what_an_engine_does():
-    done = call("recommend", "goldstein", "--i-use", "havok", "--horizon", "10", "--json")
-    assert json.loads(done.output)["errors"]["default"] > 1.5
+    result = call("recommend", "goldstein", "--i-use", "havok", "--horizon", "10", "--json")
+    assert json.loads(result.output)["errors"]["default"] > 1.5
 
 
 def test_an_accuracy_beside_an_engine_is_advised_at_its_step_below_its_errors():
     words = ["recommend", "spheroid", "--i-use", "mujoco-euler", "--accuracy", "1e-3", "--per-nutation", "500"]
-    done = call(*words)
-    engine, advice = done.output.split(" rad  mujoco-euler (mujoco-euler)\n")
+    result = call(*words)
+    engine, advice = result.output.split(" rad  mujoco-euler (mujoco-euler)\n")
     step = symtop.scene("spheroid").nutation_period / 500.0
     assert f"step {step:g}" in engine
     assert f"step_size={step!r}" in advice

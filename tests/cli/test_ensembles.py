@@ -22,17 +22,17 @@ def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path):
     path, figure = tmp_path / "runs.nc", tmp_path / "spread.png"
     words = ("--members", 50, "--seed", 3, "strang", *STEPS, "--samples", 21, "-o", path)
     call(*words)
-    done = call(*words, "--figure", figure)  # runs them again, into the same file
-    assert "strang on 50 tops: 50 reached the horizon" in done.output
-    assert "in vector registers (lanes)" in done.output
-    assert f"written to {figure}" in done.output
+    result = call(*words, "--figure", figure)  # runs them again, into the same file
+    assert "strang on 50 tops: 50 reached the horizon" in result.output
+    assert "in vector registers (lanes)" in result.output
+    assert f"written to {figure}" in result.output
     tops = symtop.population(50, seed=3)
-    wanted = symtop.ensemble(tops, "strang", per_nutation=30, nutations=2, samples=21, quiet=True)
+    expected = symtop.ensemble(tops, "strang", per_nutation=30, nutations=2, samples=21, quiet=True)
     with xr.open_dataset(path) as data:
-        assert data.load()[list(wanted.data_vars)].identical(wanted)
+        assert data.load()[list(expected.data_vars)].identical(expected)
         np.testing.assert_array_equal(data["I1"].values, tops["I1"].values)
         np.testing.assert_array_equal(data["start_theta_dot"].values, tops["theta_dot"].values)
-        largest = symtop.errors(wanted, tops)["axis"].max("time").values
+        largest = symtop.errors(expected, tops)["axis"].max("time").values
         np.testing.assert_allclose(data["axis_error"].values, largest, rtol=1e-6, atol=1e-14)
         assert data["axis_error"].attrs["long_name"].startswith("angle between axes")
     with Image.open(figure) as picture:
@@ -50,27 +50,27 @@ def test_json_has_outcomes_and_errors_and_a_finer_step_has_smaller_ones():
 
 
 def test_members_that_fail_are_counted_and_drawn(tmp_path):
-    done = call("--members", 60, "stormer-verlet", *STEPS, "--samples", 21, "--figure", tmp_path / "f.png")
-    assert "left_chart" in done.output
+    result = call("--members", 60, "stormer-verlet", *STEPS, "--samples", 21, "--figure", tmp_path / "f.png")
+    assert "left_chart" in result.output
     assert (tmp_path / "f.png").stat().st_size > 5000
-    done = call("--members", 20, "--kind", "grazing", "stormer-verlet", *STEPS, "--json", code=3)
-    assert json.loads(done.output)["largest_errors"]["axis"] == dict.fromkeys(("0.01", "0.1", "0.5", "0.9", "0.99"))
+    result = call("--members", 20, "--kind", "grazing", "stormer-verlet", *STEPS, "--json", code=3)
+    assert json.loads(result.output)["largest_errors"]["axis"] == dict.fromkeys(("0.01", "0.1", "0.5", "0.9", "0.99"))
 
 
 def test_bodies_are_run_compared_written_and_drawn(tmp_path):
     """Without epsilon they are other bodies, and a finer step has smaller errors."""
     path, figure = tmp_path / "runs.nc", tmp_path / "spread.png"
     kind = ("--bodies", "--kind", "heavy", "--epsilon", 0.1, "--members", 12, "--seed", 3)
-    done = call(*kind, "strang", *STEPS, "--samples", 21, "-o", path, "--figure", figure)
-    assert "strang on 12 bodies: 12 reached the horizon" in done.output
-    assert "angle between attitudes (rad)" in done.output
-    drawn = symtop.body_population(12, seed=3, kind="heavy", epsilon=0.1)
-    wanted = symtop.ensemble(drawn, "strang", per_nutation=30, nutations=2, samples=21, quiet=True)
+    result = call(*kind, "strang", *STEPS, "--samples", 21, "-o", path, "--figure", figure)
+    assert "strang on 12 bodies: 12 reached the horizon" in result.output
+    assert "angle between attitudes (rad)" in result.output
+    bodies = symtop.body_population(12, seed=3, kind="heavy", epsilon=0.1)
+    expected = symtop.ensemble(bodies, "strang", per_nutation=30, nutations=2, samples=21, quiet=True)
     data = netcdf.read(path)
-    assert data[list(wanted.data_vars)].drop_attrs().identical(wanted.drop_attrs())
-    np.testing.assert_array_equal(data["I2"], drawn["I2"])
-    np.testing.assert_array_equal(data["start_omega_body"], drawn["omega_body"])
-    wrong = symtop.errors(wanted, drawn)
+    assert data[list(expected.data_vars)].drop_attrs().identical(expected.drop_attrs())
+    np.testing.assert_array_equal(data["I2"], bodies["I2"])
+    np.testing.assert_array_equal(data["start_omega_body"], bodies["omega_body"])
+    wrong = symtop.errors(expected, bodies)
     np.testing.assert_array_equal(data["attitude_error"], wrong["attitude"].max("time"))
     np.testing.assert_allclose(data["energy_error"], wrong["energy"].max("time"), rtol=1e-6, atol=1e-15)
     with Image.open(figure) as picture:
@@ -103,21 +103,21 @@ def test_bodies_are_run_compared_written_and_drawn(tmp_path):
      (["midpoint[attitude]", *STEPS], "known: angles")],
 )  # fmt: skip
 def test_bad_input_is_one_sentence_and_code_2(words, says):
-    done = call(*words, code=2)
-    assert says in done.output
-    assert "Traceback" not in done.output
+    result = call(*words, code=2)
+    assert says in result.output
+    assert "Traceback" not in result.output
 
 
 def test_a_few_variables_are_kept_and_compared_and_a_budget_is_one(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     words = ("--members", 5, "strang", *STEPS, "--variables", "theta,energy", "--budget", 60, "--output=~/few.nc")
-    done = call(*words, "--figure", tmp_path / "few.png")
-    assert "energy error" in done.output
-    assert "angle between axes" not in done.output
+    result = call(*words, "--figure", tmp_path / "few.png")
+    assert "energy error" in result.output
+    assert "angle between axes" not in result.output
     with xr.open_dataset(tmp_path / "few.nc") as data:
         assert [name for name in data if "time" in data[name].dims] == ["theta", "energy"]
-    done = call("--members", 5, "strang", *STEPS, "--variables", "theta")
-    assert "largest error" not in done.output
+    result = call("--members", 5, "strang", *STEPS, "--variables", "theta")
+    assert "largest error" not in result.output
 
 
 def test_members_that_raise_are_told_in_one_sentence(tmp_path, clean_registry):
@@ -130,7 +130,7 @@ def test_members_that_raise_are_told_in_one_sentence(tmp_path, clean_registry):
         "symtop.register(symtop.Integrator(\n"
         "    name='raises-for-some', family='other', summary='', solvers={'axis': solve}))\n"
     )
-    done = call("--plugin", plugin, "--members", 20, "raises-for-some", *STEPS)
-    assert "raised an exception, the first: integrator raises-for-some on member" in done.output
-    assert "failed: TypeError: too far" in done.output
-    assert "SymtopWarning" not in done.output
+    result = call("--plugin", plugin, "--members", 20, "raises-for-some", *STEPS)
+    assert "raised an exception, the first: integrator raises-for-some on member" in result.output
+    assert "failed: TypeError: too far" in result.output
+    assert "SymtopWarning" not in result.output

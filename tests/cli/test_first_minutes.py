@@ -48,8 +48,8 @@ def test_the_guard_warns_of_what_the_verdict_calls_wrong():
 
 def test_a_method_on_the_axis_alone_runs_and_is_judged(axis_only):
     """Negative control: the attitude is still refused, with the word that helps."""
-    done = call("run", "spheroid", "on-the-axis", "--step-size", "0.01", "--plugin", axis_only)
-    assert "angle between axes" in done.output
+    result = call("run", "spheroid", "on-the-axis", "--step-size", "0.01", "--plugin", axis_only)
+    assert "angle between axes" in result.output
     words = ("run", "spheroid", "on-the-axis", "--step-size", "0.01", "--observe", "attitude", "--plugin", axis_only)
     refused = call(*words, code=2)
     assert "cannot show the attitude: observe axis" in refused.stderr
@@ -59,8 +59,8 @@ def test_a_method_on_the_axis_alone_runs_and_is_judged(axis_only):
 
 def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(axis_only, tmp_path):
     words = ["study", "convergence", "--quick", "--only", "on-the-axis", "--results", tmp_path, "--plugin", axis_only]
-    done = call(*words)
-    lines = done.output.splitlines()
+    result = call(*words)
+    lines = result.output.splitlines()
     assert lines[0].startswith("convergence: ")
     assert "show the order that the method declares" in lines[1]  # the answer of its page
     assert f"next: symtop report --results {tmp_path / 'quick' / 'only'}" in lines[-1]
@@ -88,15 +88,15 @@ def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(axis_only, 
 
 
 def test_advice_says_that_a_method_in_plain_python_was_not_tried(axis_only):
-    done = call("recommend", "goldstein", "--accuracy", "1e-3", "--horizon", "20", "--plugin", axis_only)
-    assert "Not tried, as only compiled methods are timed: on-the-axis." in done.output
+    result = call("recommend", "goldstein", "--accuracy", "1e-3", "--horizon", "20", "--plugin", axis_only)
+    assert "Not tried, as only compiled methods are timed: on-the-axis." in result.output
 
 
 def test_a_proposed_step_is_of_use():
     """The error that it leads to is between a tenth and ten times the 1e-3 rad that it is proposed for."""
     for name in ("midpoint", "strang", "rk4", "gauss-4"):
-        done = call("run", "spheroid", name, code=2)
-        step = float(done.stderr.split("for example ")[1])
+        result = call("run", "spheroid", name, code=2)
+        step = float(result.stderr.split("for example ")[1])
         error = float(symtop.errors(symtop.simulate("spheroid", name, step_size=step, guard=False))["axis"].max())
         assert 1e-5 < error < 1e-2
 
@@ -108,26 +108,6 @@ def test_figures_come_in_three_kinds_and_are_the_same_again(tmp_path):
         call("run", "spheroid", "strang", "--step-size", "0.005", "--figure", file)
         assert file.read_bytes().startswith(head)
     assert files[2].read_bytes() == files[3].read_bytes()
-
-
-def test_a_cold_kernel_is_announced_once(monkeypatch):
-    import numpy as np
-
-    from symtop.core import jit
-
-    heard = []
-    monkeypatch.setattr(jit, "on_cold", [lambda: heard.append(1)])
-
-    def kernel(x):
-        return x + float(np.pi) * COLD
-
-    assert jit.compile_kernel(kernel)(0.0) > 0.0
-    assert heard == [1]
-    assert jit.compile_kernel(kernel)(0.0) > 0.0  # from the disk
-    assert heard == [1]
-
-
-COLD = time.time()  # a constant that no kernel on disk was compiled with
 
 
 WORDS = (
@@ -143,9 +123,9 @@ for words in {WORDS}:
 
 def test_nothing_wraps_on_a_terminal_and_a_list_is_there_within_two_seconds():
     listed, several = recorded(["integrators"]), recorded([], code=SEVERAL)
-    for recording, longest, said in ((listed, 2.0, ["strang"]), (several, 60.0, ["on spheroid", "20 ", "convergence"])):
+    for recording, longest, text in ((listed, 2.0, ["strang"]), (several, 60.0, ["on spheroid", "20 ", "convergence"])):
         assert recording.code == 0, recording.text
-        assert all(word in recording.text for word in said)
+        assert all(word in recording.text for word in text)
         assert recording.widest <= 80
         assert recording.silence < longest
 
@@ -190,18 +170,18 @@ def test_the_clock_goes_on_while_somebody_holds_the_lock_of_python(tmp_path):
 def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
     from symtop.core import progress
 
-    drawn = []
+    refreshes = []
     monkeypatch.setattr(progress, "BEAT", 0.01)
     monkeypatch.setattr(progress, "is_terminal", lambda _: True)
-    monkeypatch.setattr("tqdm.tqdm.refresh", lambda *_, **__: drawn.append(1))
+    monkeypatch.setattr("tqdm.tqdm.refresh", lambda *_, **__: refreshes.append(1))
     with progress.progress_bar("a bar"):
         time.sleep(0.1)
-    count = len(drawn)
+    count = len(refreshes)
     assert count >= 3
     time.sleep(0.05)
     with progress.progress_bar("a bar", quiet=True):
         time.sleep(0.05)
-    assert len(drawn) == count
+    assert len(refreshes) == count
 
 
 def test_a_recording_hears_a_silence_and_sees_what_wraps(tmp_path):
@@ -213,5 +193,5 @@ def test_a_recording_hears_a_silence_and_sees_what_wraps(tmp_path):
 
 
 def test_a_symmetric_body_is_not_told_to_be_without_symmetry():
-    done = call("recommend", "body", "--body", "2,2,1", "--rates", "0.1,0,3", "--i-use", "mujoco", code=2)
-    assert "scene must be one of a SymmetricTop here, not body, a RigidBody" in " ".join(done.stderr.split())
+    result = call("recommend", "body", "--body", "2,2,1", "--rates", "0.1,0,3", "--i-use", "mujoco", code=2)
+    assert "scene must be one of a SymmetricTop here, not body, a RigidBody" in " ".join(result.stderr.split())

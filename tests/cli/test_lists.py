@@ -14,8 +14,7 @@ from tests.commands import call
 
 
 def printed(*words, columns=80):
-    done = call(*words, COLUMNS=str(columns))
-    return done.output
+    return call(*words, COLUMNS=str(columns)).output
 
 
 @pytest.mark.parametrize(
@@ -94,7 +93,7 @@ def test_every_scene_can_be_shown(name):
 
 
 def test_the_help_describes_every_command_in_one_whole_line():
-    done = call("--help", COLUMNS="80")
-    lines = done.output.partition("Commands:\n")[2].splitlines()
+    result = call("--help", COLUMNS="80")
+    lines = result.output.partition("Commands:\n")[2].splitlines()
     assert [line.split()[0] for line in lines] == sorted(main.commands)
     assert all(line.endswith(".") and not line.endswith("..") for line in lines)

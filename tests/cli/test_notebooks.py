@@ -25,8 +25,8 @@ def test_a_notebook_runs_and_prints_what_it_shows(book, tmp_path, monkeypatch):
     cells = [cell for cell in pages["cells"] if cell["cell_type"] == "code"]
     assert any("image/png" in output.get("data", {}) for cell in cells for output in cell["outputs"])
     for cell in cells:
-        said = io.StringIO()
-        with contextlib.redirect_stdout(said):
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
             exec(compile("".join(cell["source"]), book.name, "exec"), names)
         shown = "".join("".join(part["text"]) for part in cell["outputs"] if part["output_type"] == "stream")
-        assert said.getvalue() == shown
+        assert printed.getvalue() == shown

@@ -25,12 +25,12 @@ with clock.telling("judge"):
 """
 
 
-def said(code, *words):
+def stderr_of(code, *words):
     return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True).stderr
 
 
 def test_a_command_that_waits_says_what_it_does_and_for_how_long():
-    lines = said(SLOW, "0.5").splitlines()
+    lines = stderr_of(SLOW, "0.5").splitlines()
     assert lines[0].startswith("symtop: judge, ")
     assert lines[-1].startswith("symtop: trying methods, ")
     assert 3 <= len(lines) <= 8
@@ -38,7 +38,7 @@ def test_a_command_that_waits_says_what_it_does_and_for_how_long():
 
 
 def test_a_command_that_is_quick_says_nothing():
-    assert said(SLOW, "0.01") == ""
+    assert stderr_of(SLOW, "0.01") == ""
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")

@@ -35,8 +35,8 @@ def test_pictures_and_links_are_there():
     for page, text in PAGES.items():
         for link in re.findall(r"\]\((?!https?://)([^)#]+)\)", text):
             assert (ROOT / page).parent.joinpath(link).is_file(), (page, link)
-    named = {path.name for path in (ROOT / "docs").glob("*.md")} - {"index.md"}  # which begins with the README
-    assert named == set(re.findall(r"\(docs/([\w-]+\.md)\)", PAGES["README.md"]))
+    files = {path.name for path in (ROOT / "docs").glob("*.md")} - {"index.md"}  # which begins with the README
+    assert files == set(re.findall(r"\(docs/([\w-]+\.md)\)", PAGES["README.md"]))
 
 
 def test_no_line_is_wider_than_the_code():

@@ -17,11 +17,11 @@ TRAP = "raise SystemExit('a study of the working directory was run')\n"
 
 def run(*command, **settings):
     """What a command prints."""
-    done = subprocess.run(
+    result = subprocess.run(
         list(map(str, command)), capture_output=True, text=True, timeout=1200, check=False, **settings
     )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout
 
 
 @pytest.mark.slow
@@ -70,14 +70,14 @@ print(hashlib.sha256(data["theta"].values.tobytes() + data["energy"].values.toby
 @pytest.mark.slow
 def test_a_wheel_brings_the_kernels_of_first_runs(tmp_path):
     """The commands of the README compile nothing with an empty cache; bits are those of kernels compiled here."""
-    made, site = tmp_path / "made", tmp_path / "site"
+    wheels, site = tmp_path / "made", tmp_path / "site"
     environment = {**os.environ, "SYMTOP_COMPILE_WITH": sys.executable, "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
 
     def here(*command, **more):
         return run(*command, cwd=tmp_path, env={**environment, **more})
 
-    here(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", made, ROOT)
-    (wheel,) = made.glob("symtop-*.whl")
+    here(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", wheels, ROOT)
+    (wheel,) = wheels.glob("symtop-*.whl")
     zipfile.ZipFile(wheel).extractall(site)
     kernels = list((site / "symtop" / "kernels").rglob("*.bitcode"))
     assert len(kernels) >= 25

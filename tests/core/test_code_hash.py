@@ -3,7 +3,6 @@
 import cProfile
 import dataclasses
 import importlib.metadata
-import importlib.util
 import inspect
 import os
 import shutil
@@ -19,18 +18,9 @@ import symtop
 from symtop.core import code_hash, files, jit
 from symtop.core.code_hash import Code, by_file, changes, digest, merged
 from symtop.measure.timing import first_call
+from symtop.run.plugins import execute
 from symtop.runner import fingerprint
 from tests.commands import printed_by
-
-
-def loaded(path: Path, name: str):
-    """The module of a file, as a script or a plug-in is loaded."""
-    spec = importlib.util.spec_from_file_location(name, path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
-
 
 SCRIPT = """
 import math
@@ -53,7 +43,7 @@ def part():
 
 def test_a_script_counts_by_the_functions_and_globals_that_are_reached(tmp_path):
     (tmp_path / "script.py").write_text(SCRIPT)
-    module = loaded(tmp_path / "script.py", "fingerprint_script")
+    module = execute("fingerprint_script", tmp_path / "script.py")
     labels = {part.label for part in Code().reached("measure", module.measure)}
     assert {"function script.py:measure", "function script.py:part", "constant script.py:STEPS"} <= labels
     assert "function symtop/measure/errors.py:error_bound" in labels  # imported when the function runs
@@ -76,15 +66,15 @@ def test_changes_name_what_differs():
 
 
 def test_words_do_not_count_and_numbers_do():
-    def made(thing):
+    def reasons_of(thing):
         return Code().reasons("thing", thing)
 
     scene = symtop.scene("spheroid")
-    assert made(dataclasses.replace(scene, purpose="said otherwise", units="")) == made(scene)
-    assert made(dataclasses.replace(scene, horizon=9.0)) != made(scene)
+    assert reasons_of(dataclasses.replace(scene, purpose="said otherwise", units="")) == reasons_of(scene)
+    assert reasons_of(dataclasses.replace(scene, horizon=9.0)) != reasons_of(scene)
     method = symtop.integrator("strang")
-    assert made(dataclasses.replace(method, summary="said otherwise")) == made(method)
-    assert made(dataclasses.replace(method, order=4)) != made(method)
+    assert reasons_of(dataclasses.replace(method, summary="said otherwise")) == reasons_of(method)
+    assert reasons_of(dataclasses.replace(method, order=4)) != reasons_of(method)
 
 
 def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again(clean_registry):
@@ -120,16 +110,16 @@ def measure():
 
 
 def test_a_script_counts_by_code_with_its_classes_and_their_bases_and_without_comments():
-    def made(*numbers):
+    def reasons_of(*numbers):
         text = CLASSES.format(*numbers)
         space = {"__name__": "few", "__package__": "unknown"}
         exec(text, space)
         return Code().reasons("measure", space["measure"])
 
-    plain = made(2, 1, "words", "comment")
-    assert made(2, 1, "other words", "another comment") == plain
-    assert changes(plain, made(2, 3, "words", "comment")) == ["code <string>"]
-    assert made(4, 1, "words", "comment") != plain
+    plain = reasons_of(2, 1, "words", "comment")
+    assert reasons_of(2, 1, "other words", "another comment") == plain
+    assert changes(plain, reasons_of(2, 3, "words", "comment")) == ["code <string>"]
+    assert reasons_of(4, 1, "words", "comment") != plain
 
 
 def test_an_import_inside_a_function_is_followed_at_every_level():
@@ -155,9 +145,9 @@ def kernels_of(root: Path, store: Path) -> dict[str, int]:
         "print(float(symtop.simulate(w, m, step_size=0.02, guard=False)['theta'][-1]).hex(), "
         "L._identity(w, m, 0.01, 100, True))"
     )
-    said = printed_by(code, cwd=root, PYTHONPATH=root, SYMTOP_CACHE=store).split()
+    output = printed_by(code, cwd=root, PYTHONPATH=root, SYMTOP_CACHE=store).split()
     files = {str(path.relative_to(store)): path.stat().st_mtime_ns for path in (store / "kernels").rglob("*.code")}
-    return {"said": said, "files": files}
+    return {"output": output, "files": files}
 
 
 @pytest.mark.slow
@@ -181,10 +171,10 @@ def test_an_edited_callee_makes_a_new_kernel_and_a_comment_makes_none(tmp_path):
     after = kernels_of(tmp_path, tmp_path / "cache")
     assert len(after["files"]) > len(before["files"])
     assert before["files"].items() <= after["files"].items()
-    assert after["said"][0] != before["said"][0]
-    assert after["said"][1] != before["said"][1]
+    assert after["output"][0] != before["output"][0]
+    assert after["output"][1] != before["output"][1]
     callee.write_text(text)
-    assert kernels_of(tmp_path, tmp_path / "cache") == after | {"said": before["said"]}
+    assert kernels_of(tmp_path, tmp_path / "cache") == after | {"output": before["output"]}
 
 
 def test_a_kernel_is_told_by_what_it_calls():
@@ -195,20 +185,20 @@ def test_a_kernel_is_told_by_what_it_calls():
 
         return digest(by_file(jit.code_of(kernel)))
 
-    def made(source):
+    def part_of(source):
         space = {"__name__": "part"}
         exec(source, space)
         return jit.register_jitable(space["part"])
 
-    plain = kernel_of(made("def part(x):\n    return 2.0 * x\n"))
-    assert kernel_of(made("\n\n# moved\ndef part(x):\n    # said\n    return 2.0 * x\n")) == plain
-    assert kernel_of(made("def part(x):\n    'Documented.'\n    return 2.0 * x\n")) == plain
-    assert kernel_of(made("def part(x):\n    return 3.0 * x\n")) != plain
-    assert kernel_of(made("K = 2.0\ndef part(x):\n    return K * x\n")) != kernel_of(
-        made("K = 3.0\ndef part(x):\n    return K * x\n")
+    plain = kernel_of(part_of("def part(x):\n    return 2.0 * x\n"))
+    assert kernel_of(part_of("\n\n# moved\ndef part(x):\n    # said\n    return 2.0 * x\n")) == plain
+    assert kernel_of(part_of("def part(x):\n    'Documented.'\n    return 2.0 * x\n")) == plain
+    assert kernel_of(part_of("def part(x):\n    return 3.0 * x\n")) != plain
+    assert kernel_of(part_of("K = 2.0\ndef part(x):\n    return K * x\n")) != kernel_of(
+        part_of("K = 3.0\ndef part(x):\n    return K * x\n")
     )
-    assert kernel_of(made("def deep(x):\n    return x\ndef part(x):\n    return deep(x)\n")) != kernel_of(
-        made("def deep(x):\n    return -x\ndef part(x):\n    return deep(x)\n")
+    assert kernel_of(part_of("def deep(x):\n    return x\ndef part(x):\n    return deep(x)\n")) != kernel_of(
+        part_of("def deep(x):\n    return -x\ndef part(x):\n    return deep(x)\n")
     )
 
 
@@ -222,22 +212,22 @@ def test_what_numba_compiles_in_place_of_a_function_counts():
 
 
 def test_a_kernel_is_the_same_to_a_profiler():
-    def made(constant):
+    def kernel_with(constant):
         def kernel(x):
             return x + constant
 
         return kernel
 
-    plain = digest(by_file(jit.code_of(made(1.0))))
+    plain = digest(by_file(jit.code_of(kernel_with(1.0))))
     watching = cProfile.Profile()
     watching.enable()
     try:
-        numba.njit(made(2.0))(1.0)
+        numba.njit(kernel_with(2.0))(1.0)
     finally:
         watching.disable()
-    cleared = not made(1.0).__code__.co_flags & inspect.CO_OPTIMIZED  # by numba, for all that share the code
+    cleared = not kernel_with(1.0).__code__.co_flags & inspect.CO_OPTIMIZED  # by numba, for all that share the code
     assert cleared is (sys.version_info < (3, 12))
-    assert digest(by_file(jit.code_of(made(1.0)))) == plain
+    assert digest(by_file(jit.code_of(kernel_with(1.0)))) == plain
 
 
 def test_the_walk_of_a_kernel_takes_less_than_a_loop_in_python_and_a_walk_of_four_does_not():

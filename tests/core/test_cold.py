@@ -46,7 +46,7 @@ def second(x):
 """
 
 
-def _heard(tmp_path, before="", terminal=False):
+def _stderr_of(tmp_path, before="", terminal=False):
     """What a script that runs two methods twice prints to its standard error."""
     (tmp_path / "two_kernels.py").write_text(KERNELS, encoding="utf-8")
     environment = {**os.environ, "SYMTOP_CACHE": str(tmp_path), "PYTHONPATH": str(ROOT)}
@@ -60,12 +60,12 @@ def _heard(tmp_path, before="", terminal=False):
 
 @pytest.mark.parametrize("watched", [{"terminal": True}, {"before": "sys.modules['ipykernel'] = sys"}])
 def test_compiling_is_said_once_to_whoever_watches(tmp_path, watched):
-    assert _heard(tmp_path, **watched).count("symtop: compiling") == 1
+    assert _stderr_of(tmp_path, **watched).count("symtop: compiling") == 1
 
 
 def test_nothing_is_said_of_kernels_that_are_on_disk(tmp_path):
-    assert "symtop: compiling" not in _heard(tmp_path)  # nor of the others where nobody watches
-    assert _heard(tmp_path, before="sys.modules['ipykernel'] = sys") == ""
+    assert "symtop: compiling" not in _stderr_of(tmp_path)  # nor of the others where nobody watches
+    assert _stderr_of(tmp_path, before="sys.modules['ipykernel'] = sys") == ""
 
 
 def _kernels():
@@ -92,12 +92,12 @@ def test_every_kernel_is_kept_on_disk():
 
 def test_a_loop_makes_a_kernel_when_it_is_used(monkeypatch):
     """Loading a hundred methods would hash all their kernels otherwise, in every process."""
-    made = []
-    monkeypatch.setattr(loop, "compile_kernel", lambda part: made.append(part) or part)
+    compiled = []
+    monkeypatch.setattr(loop, "compile_kernel", lambda part: compiled.append(part) or part)
     family = loop.kernel_loop(loop.no_carry, loop.no_carry, loop.no_carry)
-    assert not made
-    assert family.march is family.march is made[0]
-    assert len(made) == 1
+    assert not compiled
+    assert family.march is family.march is compiled[0]
+    assert len(compiled) == 1
 
 
 def test_garbage_is_collected_again_after_a_kernel_is_compiled_or_refused():
@@ -107,9 +107,9 @@ def test_garbage_is_collected_again_after_a_kernel_is_compiled_or_refused():
     def refused(x):
         return x.no_such_thing
 
-    seen, compiled = [], compile_kernel(kernel)
-    jit._once(compiled, lambda _: seen.append(gc.isenabled()))((types.float64,))
-    assert seen == [False]
+    enabled, compiled = [], compile_kernel(kernel)
+    jit._once(compiled, lambda _: enabled.append(gc.isenabled()))((types.float64,))
+    assert enabled == [False]
     assert gc.isenabled()
     with pytest.raises(TypingError):
         compile_kernel(refused)(1.0)

@@ -17,15 +17,15 @@ from symtop.core import netcdf
 
 def lacking(data: xr.Dataset | xr.DataTree) -> list[str]:
     """What breaks the convention, in all groups."""
-    left = [f"global {name}" for name in ("Conventions", "title", "source", "history") if not data.attrs.get(name)]
+    faults = [f"global {name}" for name in ("Conventions", "title", "source", "history") if not data.attrs.get(name)]
     for group in netcdf.groups(data).values():
         for name, variable in group.variables.items():
             if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", str(name)):
-                left.append(f"name {name}")
-            left += [] if variable.attrs.get("long_name") else [f"long_name of {name}"]
+                faults.append(f"name {name}")
+            faults += [] if variable.attrs.get("long_name") else [f"long_name of {name}"]
             numbers = variable.dtype.kind in "fiu"
-            left += [] if bool(variable.attrs.get("units")) == numbers else [f"units of {name}"]
-    return left
+            faults += [] if bool(variable.attrs.get("units")) == numbers else [f"units of {name}"]
+    return faults
 
 
 @pytest.fixture(scope="module")

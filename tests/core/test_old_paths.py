@@ -22,10 +22,10 @@ assert symtop.base.validate.finite("x", 1) == 1.0
 
 
 def test_a_plug_in_of_the_last_version_runs_and_is_told_the_new_paths():
-    done = subprocess.run([sys.executable, "-W", "always", "-c", PLUGIN], capture_output=True, text=True, check=True)
+    result = subprocess.run([sys.executable, "-W", "always", "-c", PLUGIN], capture_output=True, text=True, check=True)
     for old in ("base.validate", "methods.gauss", "methods.registry"):
-        assert f"DeprecationWarning: symtop.{old} is now symtop.{table()[old]}" in done.stderr
-    assert done.stderr.count("DeprecationWarning") == 3
+        assert f"DeprecationWarning: symtop.{old} is now symtop.{table()[old]}" in result.stderr
+    assert result.stderr.count("DeprecationWarning") == 3
     quiet = "import symtop.core.errors; from symtop.core.old_paths import table; assert not table.cache_info().misses"
     subprocess.run([sys.executable, "-W", "error", "-c", quiet], check=True)  # the table is not read for other names
 

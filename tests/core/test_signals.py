@@ -15,24 +15,24 @@ from symtop.core.signals import InterruptedByUser, TerminatedError, deferred, en
 DATA = xr.Dataset({"value": ("x", np.arange(5.0))})
 
 
-def _at_line(wanted):
+def _at_line(number):
     """A tracer that sends SIGTERM at one of the lines that xarray's locks and files are handled by, and the count."""
-    seen = [0]
+    count = [0]
 
     def trace(frame, event, _):
         if not frame.f_code.co_filename.endswith(("xarray/backends/locks.py", "xarray/backends/file_manager.py")):
             return None
         if event == "line":
-            seen[0] += 1
-            if seen[0] == wanted:
+            count[0] += 1
+            if count[0] == number:
                 signal.raise_signal(signal.SIGTERM)
         return trace
 
-    return trace, seen
+    return trace, count
 
 
-def _written(path, wanted):
-    trace, seen = _at_line(wanted)
+def write_with_signal(path, number):
+    trace, count = _at_line(number)
     before = sys.gettrace()
     with ending_on_sigterm():
         sys.settrace(trace)
@@ -40,7 +40,7 @@ def _written(path, wanted):
             netcdf.write(DATA, path)
         finally:
             sys.settrace(before)
-    return seen[0]
+    return count[0]
 
 
 @pytest.fixture
@@ -59,13 +59,13 @@ def _a_minute():
 
 @pytest.mark.usefixtures("_a_minute")
 def test_a_write_is_whole_and_gives_back_its_lock_wherever_it_is_interrupted(tmp_path):
-    lines = _written(tmp_path / "whole.nc", -1)
+    lines = write_with_signal(tmp_path / "whole.nc", -1)
     assert lines > 50
-    for wanted in range(1, lines + 1):
-        file = tmp_path / f"{wanted}.nc"
+    for number in range(1, lines + 1):
+        file = tmp_path / f"{number}.nc"
         with pytest.raises(TerminatedError):
-            _written(file, wanted)
-        assert not HDF5_LOCK.locked(), wanted
+            write_with_signal(file, number)
+        assert not HDF5_LOCK.locked(), number
         assert file.read_bytes() == (tmp_path / "whole.nc").read_bytes()
 
 
@@ -86,16 +86,16 @@ def default_handlers():
     ],
 )
 def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, hearing, kind, default_handlers):
-    done = []
+    events = []
     with hearing(), pytest.raises(kind):  # noqa: PT012 (the moment at which it is raised is what is tested)
         with deferred():
             with deferred():
                 signal.raise_signal(number)
                 signal.raise_signal(number)
-                done.append("inner")
-            done.append("outer")
-        done.append("after")
-    assert done == ["inner", "outer"]
+                events.append("inner")
+            events.append("outer")
+        events.append("after")
+    assert events == ["inner", "outer"]
 
 
 def test_handlers_are_left_as_they_were_and_threads_are_left_alone():

@@ -29,10 +29,10 @@ def errors(x, values, relative=True):
     """Largest errors of sines and cosines, in units of 2.2e-16."""
     worst = []
     with mpmath.workdps(40):
-        for function, found in zip((mpmath.sin, mpmath.cos), values, strict=True):
+        for function, computed in zip((mpmath.sin, mpmath.cos), values, strict=True):
             true = [function(mpmath.mpf(float(angle))) for angle in x]
             scales = [abs(value) if relative else 1 for value in true]
-            gaps = [abs(mpmath.mpf(float(y)) - value) / s for y, value, s in zip(found, true, scales, strict=True)]
+            gaps = [abs(mpmath.mpf(float(y)) - value) / s for y, value, s in zip(computed, true, scales, strict=True)]
             worst.append(float(max(gaps)) / EPSILON)
     return worst
 
@@ -61,13 +61,13 @@ def test_the_second_part_of_a_quarter_turn_keeps_the_digits_at_the_pole(monkeypa
 
 
 @pytest.mark.parametrize(
-    ("coefficients", "remainder", "left"),
+    ("coefficients", "remainder", "largest"),
     [
         (sines.SINE, lambda r, z, p: (r + r * z * p) / mpmath.sin(r) - 1, 3.9e-18),
         (sines.COSINE, lambda r, z, p: (1 - z / 2 + z * z * p) / mpmath.cos(r) - 1, 9.0e-20),
     ],
 )
-def test_no_polynomial_of_the_degree_is_much_better(coefficients, remainder, left):
+def test_no_polynomial_of_the_degree_is_much_better(coefficients, remainder, largest):
     """Seven errors of alternating signs: the best polynomial has at least the least of them (de la Vallee Poussin)."""
 
     def error(x, c):
@@ -76,13 +76,13 @@ def test_no_polynomial_of_the_degree_is_much_better(coefficients, remainder, lef
 
     x = np.linspace(0.01, 0.25 * math.pi, 400)
     with mpmath.workdps(40):
-        found = np.array([error(angle, coefficients) for angle in x])
+        remainders = np.array([error(angle, coefficients) for angle in x])
         nudged = [*coefficients[:-1], coefficients[-1] * (1.0 + 1e-5)]
         worse = max(abs(error(angle, nudged)) for angle in x)
-    arcs = np.split(found, np.flatnonzero(np.diff(np.sign(found))) + 1)
-    assert np.max(np.abs(found)) == pytest.approx(left, rel=0.01)
+    arcs = np.split(remainders, np.flatnonzero(np.diff(np.sign(remainders))) + 1)
+    assert np.max(np.abs(remainders)) == pytest.approx(largest, rel=0.01)
     assert len(arcs) == 7
-    assert worse > 1.3 * left
+    assert worse > 1.3 * largest
 
 
 @pytest.mark.parametrize("size", [3.0, 100.0, 1e6, 1e12])

@@ -28,30 +28,30 @@ def test_one_thread_is_the_callers_and_several_are_not():
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_an_error_is_raised_and_what_has_not_begun_is_dropped(threads):
-    done = []
+    pieces = []
 
     def work(piece):
         if piece == 3:
             raise ValueError("the third")
-        done.append(piece)
+        pieces.append(piece)
 
     with pytest.raises(ValueError, match="the third"):
         list(in_threads(work, range(1000), threads))
-    assert len(done) < 30
+    assert len(pieces) < 30
 
 
 def test_pieces_are_taken_as_they_are_needed():
     """Results that nobody has asked for would take memory."""
-    taken = []
+    order = []
 
     def pieces():
         for k in range(100):
-            taken.append(k)
+            order.append(k)
             yield k
 
     results = in_threads(lambda piece: piece, pieces(), 2)
     assert next(results) == 0
-    assert len(taken) < 10
+    assert len(order) < 10
     assert list(results) == list(range(1, 100))
 
 

@@ -56,8 +56,8 @@ def test_an_answer_is_the_run_beside_the_truth(method):
     assert answer["largest"]["axis_error"] == error.max()
     assert np.array_equal(arrays["axis_error"], error.astype(np.float32))
     # the drawn attitude has the axis of the run
-    drawn = charts.axis_from_quaternion(arrays["attitude"].reshape(-1, 4).astype(float))
-    assert np.max(charts.axis_distance(drawn, run["axis"].values)) < 1e-6
+    axes = charts.axis_from_quaternion(arrays["attitude"].reshape(-1, 4).astype(float))
+    assert np.max(charts.axis_distance(axes, run["axis"].values)) < 1e-6
     energy = run["energy"].values
     assert np.max(np.abs(arrays["energy"])) == pytest.approx(
         np.max(np.abs(energy - energy[0])) / chosen.scene.energy_scale, rel=1e-5
@@ -159,16 +159,16 @@ def test_the_script_makes_the_same_dataset_to_the_bit(method, scene, changes, tm
 def test_a_hundred_thousand_steps_take_less_than_a_tenth_of_a_second():
     """Processor time of this thread, so that other processes do not count; each change is a new motion."""
     answers.answer(answers.setup(fields(horizon=60.0, step_size=6e-4)))
-    spent = []
+    seconds = []
     for k in range(12):
         chosen = answers.setup(fields(horizon=60.0, step_size=6e-4, theta=0.41 + 0.01 * k))
         before = time.thread_time()
         answer = answers.answer(chosen)
-        spent.append(time.thread_time() - before)
+        seconds.append(time.thread_time() - before)
         assert answer["steps"] == 100_000
-        if spent[-1] < 0.1:
+        if seconds[-1] < 0.1:
             return
-    pytest.fail(f"the fastest of twelve answers took {min(spent):.3f} s")
+    pytest.fail(f"the fastest of twelve answers took {min(seconds):.3f} s")
 
 
 def request(site, method, path, body=None, **headers):
@@ -298,8 +298,8 @@ def test_nothing_on_the_page_comes_from_elsewhere():
 
 def test_a_bad_port_is_refused(site):
     for port in (site.server_address[1], 70_000):
-        done = call("explore", "--no-browser", "--port", port, code=2)
-        assert "port must be" in done.output
+        result = call("explore", "--no-browser", "--port", port, code=2)
+        assert "port must be" in result.output
 
 
 PLOT = "document.querySelector('#plot-{}').toDataURL()"
@@ -326,8 +326,8 @@ def test_a_person_can_use_it(site, tmp_path):
 
         answered(browser, "#theta-slider", 0.9)  # a slider moves, the plots change
         assert browser.evaluate("document.querySelector('#theta').value") == "0.9"
-        named = "document.querySelector('#scene').selectedOptions[0].text"
-        assert browser.evaluate(named) == "spheroid (edited)"  # and so does the name
+        selected = "document.querySelector('#scene').selectedOptions[0].text"
+        assert browser.evaluate(selected) == "spheroid (edited)"  # and so does the name
         after = {name: browser.evaluate(PLOT.format(name)) for name in names}
         assert all(after[name] != before[name] for name in names)
 
@@ -354,7 +354,7 @@ def test_a_person_can_use_it(site, tmp_path):
         assert browser.evaluate("document.querySelector('#netcdf').disabled")
         browser.click("#reset")  # back to the scene as it is in the catalogue
         browser.wait_for("document.body.dataset.answer === 'ok'")
-        assert browser.evaluate(named) == "spheroid"
+        assert browser.evaluate(selected) == "spheroid"
         assert [browser.evaluate(f"document.querySelector('#{name}').value") for name in ("I3", "theta")] == [
             "1",
             "0.4",
@@ -389,25 +389,25 @@ def test_a_warning_is_shown_on_the_page(site, monkeypatch):
 
 def costs(**changes):
     """The chart of costs once all of its lines are there."""
-    asked, end = cost.question(fields(**changes)), time.monotonic() + 120.0
-    while (answer := cost.chart(asked))["missing"] and time.monotonic() < end:
+    setups, end = cost.question(fields(**changes)), time.monotonic() + 120.0
+    while (answer := cost.chart(setups))["missing"] and time.monotonic() < end:
         time.sleep(0.05)
     return answer
 
 
 def test_the_first_chart_of_costs_is_there_at_once_and_its_lines_are_those_of_compare(monkeypatch):
     monkeypatch.setattr(cost, "_lines", {})
-    asked = cost.question(fields(integrator="trapezoidal", second="strang", horizon=7.5))
-    cost.chart(asked)
+    setups = cost.question(fields(integrator="trapezoidal", second="strang", horizon=7.5))
+    cost.chart(setups)
     cost._lines.clear()
     began = time.thread_time()
-    first = cost.chart(asked)
+    first = cost.chart(setups)
     assert time.thread_time() - began < 1.0
     assert first["missing"] > 0
     whole = costs(integrator="trapezoidal", second="strang", horizon=7.5)
     lines = {line["name"]: line for line in whole["lines"]}
     assert {"trapezoidal", "strang", *cost.BESIDE} == {*lines}
-    data = symtop.compare(asked[0].scene, ["trapezoidal[angles]"], budget=3e5, quiet=True).isel(variant=0)
+    data = symtop.compare(setups[0].scene, ["trapezoidal[angles]"], budget=3e5, quiet=True).isel(variant=0)
     known = data["error"].values[np.isfinite(data["seconds"].values)]
     assert lines["trapezoidal"]["error"] == known.tolist()
     assert whole["missing"] == 0
@@ -427,9 +427,9 @@ def test_the_chart_of_a_body_has_the_methods_that_step_it():
 def test_the_run_of_the_page_is_a_point_on_the_line_of_its_method():
     """The least of some times, as others work beside; a run that fails has no time."""
     line = next(line for line in costs(integrator="strang")["lines"] if line["name"] == "strang")
-    (shown,) = asked = cost.question(fields(integrator="strang", step_size=0.02))
+    (shown,) = setups = cost.question(fields(integrator="strang", step_size=0.02))
     error = answers.answer(shown)["largest"]["axis_error"]
-    seconds = min(cost.chart(asked)["seconds"][0] for _ in range(8))
+    seconds = min(cost.chart(setups)["seconds"][0] for _ in range(8))
     expected = np.exp(np.interp(-np.log(error), -np.log(line["error"]), np.log(line["seconds"])))
     assert 1 / 3 < seconds / expected < 3.0
     assert costs(step_size=0.6)["seconds"] == [None]
@@ -522,10 +522,10 @@ def test_the_chart_of_costs_and_the_oscillator_are_on_the_page(site, tmp_path):
         browser.wait_for(f"{data}.missing === '0' && {data}.points === '1'")
         answered(browser, "#second", "strang")
         browser.wait_for(f"{data}.points === '2'")
-        drawn = browser.evaluate("document.querySelector('#cost').toDataURL()")
+        image = browser.evaluate("document.querySelector('#cost').toDataURL()")
         answered(browser, "#step_size", 0.05)  # the points move along their lines
         browser.wait_for(
-            f"{data}.points === '2' && document.querySelector('#cost').toDataURL() !== {json.dumps(drawn)}"
+            f"{data}.points === '2' && document.querySelector('#cost').toDataURL() !== {json.dumps(image)}"
         )
         answered(browser, "#step_size", 0.6)  # midpoint fails, strang does not
         browser.wait_for(f"{data}.points === '1'")
@@ -533,9 +533,9 @@ def test_the_chart_of_costs_and_the_oscillator_are_on_the_page(site, tmp_path):
         counted = "+document.querySelector('#{}-key').dataset.answers".format
         before = {name: (browser.evaluate(counted(name)), browser.evaluate(PLOT.format(name))) for name in names}
         browser.set("#friction-slider", 1.5)
-        for name, (count, drawn) in before.items():
+        for name, (count, image) in before.items():
             browser.wait_for(f"{counted(name)} > {count}")
-            assert browser.evaluate(PLOT.format(name)) != drawn
+            assert browser.evaluate(PLOT.format(name)) != image
         browser.wait_for("document.querySelector('#damped-top-key').textContent.includes('rad of a pole')")
         assert "friction=1.5" in browser.evaluate("location.hash")
         assert browser.evaluate("document.body.dataset.maps") == maps  # the top has not changed

@@ -13,7 +13,7 @@ from symtop.explore.server import STATIC, address
 from tests.browser import FAINT, Browser
 from tests.explore.test_explore import answered, fields, unpacked
 
-TOLD = (STATIC / "stories.js").read_text(encoding="utf-8")
+SOURCE = (STATIC / "stories.js").read_text(encoding="utf-8")
 RANGE = {"step_least": 0.01, "step_most": 0.6, "spin_least": -4.0, "spin_most": 4.0}
 
 
@@ -57,13 +57,13 @@ def test_a_story_a_cell_and_a_link(site):
         browser.wait_for("document.querySelector('#status').className === 'failed'")
         assert text(browser, "other").startswith("strang: reached t = 20")
         state = browser.evaluate("location.href")
-        kept = "[...document.querySelectorAll('input[type=number], #scene, #integrator, #second')].map((c) => c.value)"
-        before, status = browser.evaluate(kept), text(browser, "status").split(";")[0]
+        form = "[...document.querySelectorAll('input[type=number], #scene, #integrator, #second')].map((c) => c.value)"
+        before, status = browser.evaluate(form), text(browser, "status").split(";")[0]
         answered(browser, "#story", "loop")
-        assert browser.evaluate(kept) != before
+        assert browser.evaluate(form) != before
         browser.evaluate(f"location.href = {json.dumps(state)}")
         browser.wait_for(f"document.querySelector('#status').textContent.startsWith({json.dumps(status)})")
-        assert browser.evaluate(kept) == before
+        assert browser.evaluate(form) == before
         browser.wait_for("document.querySelector('#map-note').textContent.startsWith('stormer-verlet')")
         spin = browser.evaluate("document.querySelector('#psi_dot').value")
         key = "document.querySelector('#map').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowDown'}))"
@@ -112,11 +112,11 @@ def test_a_hand_reaches_everything_and_every_text_can_be_read(site):
 
 SHOWN = r'\s+scene: "(.*?)", integrator: "(.*?)", second: "(.*?)", step_size: (.*?),'
 STORIES = {  # the scene, the methods and the step of each in stories.js
-    name: found for name, *found in re.findall(rf'^  "?([a-z -]+)"?: {{{SHOWN}', TOLD, re.MULTILINE)
+    name: entry for name, *entry in re.findall(rf'^  "?([a-z -]+)"?: {{{SHOWN}', SOURCE, re.MULTILINE)
 }
 
 
-def told(story, second=False, **changes):
+def answer_to(story, second=False, **changes):
     """The answer to what a story shows, of its first method or of its second."""
     scene, *methods, step = STORIES[story]
     return answers.answer(answers.setup(fields(scene, methods[second], **{"step_size": float(step)} | changes)))
@@ -130,7 +130,7 @@ def told(story, second=False, **changes):
     ],
 )  # fmt: skip
 def test_the_second_method_of_a_story_reaches_the_end_and_the_first_where_it_says_so(story, changes, first):
-    assert [told(story, second, **changes)["outcome"] == "ok" for second in (False, True)] == [first, True]
+    assert [answer_to(story, second, **changes)["outcome"] == "ok" for second in (False, True)] == [first, True]
 
 
 def test_what_stories_say_in_numbers():
@@ -138,18 +138,18 @@ def test_what_stories_say_in_numbers():
     scenes = {story: symtop.scene(name, bodies=True) for story, (name, *_) in STORIES.items()}
     steps = {story: scenes[story].nutation_period / float(entry[-1]) for story, entry in STORIES.items()}
     assert (round(steps["cusp"]), round(steps["loop"])) == (4, 5)
-    lost, kept = (told("loop", second)["largest"] for second in (False, True))
-    assert 0.05 < lost["energy"] < 0.2
-    assert kept["energy"] < 1e-11
-    assert kept["axis_error"] == pytest.approx(0.02, abs=0.005)
-    fallen = told("sleeping")
+    drifting, conserving = (answer_to("loop", second)["largest"] for second in (False, True))
+    assert 0.05 < drifting["energy"] < 0.2
+    assert conserving["energy"] < 1e-11
+    assert conserving["axis_error"] == pytest.approx(0.02, abs=0.005)
+    fallen = answer_to("sleeping")
     assert min(np.nanmax(unpacked(fallen["arrays"]["theta"])), fallen["largest"]["axis_error"]) > 0.5
     for second in (False, True):
-        assert np.nanmax(unpacked(told("sleeping", second, psi_dot=2.5)["arrays"]["theta"])) < 0.05
+        assert np.nanmax(unpacked(answer_to("sleeping", second, psi_dot=2.5)["arrays"]["theta"])) < 0.05
     pole = symtop.ClosedForm(scenes["pole jump"].top, scenes["pole jump"].start)
     assert np.degrees(pole.theta_range[0]) == pytest.approx(0.06, abs=0.005)
     assert scenes["resonance"].nutation_period / np.pi == pytest.approx(0.202, abs=5e-4)
-    assert told("resonance")["largest"]["axis_error"] < 1e-6
+    assert answer_to("resonance")["largest"]["axis_error"] < 1e-6
 
 
 def test_what_the_story_of_the_tennis_racket_says():
@@ -159,12 +159,12 @@ def test_what_the_story_of_the_tennis_racket_says():
         return time[k] + (time[k + 1] - time[k]) * along[k] / (along[k] - along[k + 1])
 
     exact, late = [14.9, 42.4, 69.9, 97.5], [13.3, 37.7, 62.2, 86.7]
-    shown, good = told("tennis-racket"), told("tennis-racket", True)
+    shown, good = answer_to("tennis-racket"), answer_to("tennis-racket", True)
     np.testing.assert_allclose(flips(good, "true_middle"), exact, atol=0.1)
     np.testing.assert_allclose(flips(good), exact, atol=0.1)
     np.testing.assert_allclose(flips(shown), late, atol=0.1)
     assert max(shown["largest"]["energy"], good["largest"]["energy"]) < 1e-15
-    fine = flips(told("tennis-racket", step_size=0.1))
+    fine = flips(answer_to("tennis-racket", step_size=0.1))
     assert fine[-1] - exact[-1] == pytest.approx(-0.2, abs=0.1)
     assert symtop.scene("tennis-racket", bodies=True).nutation_period / 0.6 == pytest.approx(10.0, abs=0.6)
 

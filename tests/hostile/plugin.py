@@ -100,12 +100,12 @@ def warns(top, start, plan):
     return run
 
 
-def keeps_its_array(top, start, plan, kept=[]):  # noqa: B006
+def keeps_its_array(top, start, plan, runs=[]):  # noqa: B006
     """Returns states that it changes in the next call."""
     run = midpoint(top, start, plan)
-    for states in kept:
+    for states in runs:
         states[:] = np.nan
-    kept[:] = [run.states]
+    runs[:] = [run.states]
     return run
 
 

@@ -203,7 +203,7 @@ HOSTILE = {  # drawn from by seeds below zero
 # ---- runs ------------------------------------------------------------------------------------------------------------
 
 
-def drawn(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outcome:
+def draw_run(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outcome:
     """What run k does: 1 to 500 steps a nutation or a tolerance of 0.1 to 1e-13, over 1 to 1000 nutations.
 
     Methods that are drawn from change what a number draws: the runs that tests know by their number are those `without`
@@ -239,28 +239,28 @@ def drawn(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outc
 
 def one(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outcome:
     """Draw run k and do it; a run that is refused has the outcome `refused` and the sentence for a warning."""
-    asked, told = drawn(k, seed, without=without), []
+    draft, messages = draw_run(k, seed, without=without), []
     began = time.process_time()
     try:
-        scene = asked.scene()
-        controls = {**asked.control, "observe": asked.observe, "samples": 501}
+        scene = draft.scene()
+        controls = {**draft.control, "observe": draft.observe, "samples": 501}
         try:
-            run = symtop.simulate(scene, asked.integrator, guard=told.append, **controls)
+            run = symtop.simulate(scene, draft.integrator, guard=messages.append, **controls)
         except symtop.SymtopError as error:
             if "does not show" not in str(error):
                 raise
-            run = symtop.simulate(scene, asked.integrator, guard=told.append, **{**controls, "observe": "axis"})
+            run = symtop.simulate(scene, draft.integrator, guard=messages.append, **{**controls, "observe": "axis"})
     except symtop.SymtopError as error:
-        return asked._replace(outcome="refused", warning=str(error), seconds=time.process_time() - began)
+        return draft._replace(outcome="refused", warning=str(error), seconds=time.process_time() - began)
     seconds = time.process_time() - began
     with np.errstate(all="ignore"):
         error = charts.axis_distance(run["axis"].values, closed_form(scene).axis(run["time"].values))
     ended = run.attrs["outcome"]
     largest = float(np.max(error)) if ended == "ok" else math.inf
-    return asked._replace(warning=" ".join(told), outcome=ended, error=largest, seconds=seconds)
+    return draft._replace(warning=" ".join(messages), outcome=ended, error=largest, seconds=seconds)
 
 
-def told(runs: list[Outcome]) -> str:
+def summary(runs: list[Outcome]) -> str:
     """The figures of so many runs, and each run that should not be."""
     wrong, right = [run for run in runs if run.wrong], [run for run in runs if run.right]
     silent, false = [run for run in wrong if not run.warning], [run for run in right if run.warning]
@@ -278,23 +278,23 @@ def told(runs: list[Outcome]) -> str:
 
 def run_all(count: int, seed: int = SEED, without: tuple[str, ...] = ()) -> list[Outcome]:
     """Do the first `count` runs in a process apart, and in a new one after a run that does not end or that ends it."""
-    made = []
+    outcomes = []
     spawn = multiprocessing.get_context("spawn")
     ignored = "ignore", symtop.SymtopWarning
     with ProcessPool(1, context=spawn, initializer=warnings.simplefilter, initargs=ignored) as pool:
-        asked = [pool.schedule(one, (k, seed), {"without": without}, timeout=PATIENCE) for k in range(count)]
-        for k, task in enumerate(asked):
+        tasks = [pool.schedule(one, (k, seed), {"without": without}, timeout=PATIENCE) for k in range(count)]
+        for k, task in enumerate(tasks):
             try:
-                made.append(task.result())
+                outcomes.append(task.result())
             except Exception as error:  # noqa: BLE001
                 ended = "endless" if isinstance(error, TimeoutError) else "crashed"
-                made.append(drawn(k, seed, without=without)._replace(outcome=ended, warning=repr(error)))
-    return made
+                outcomes.append(draw_run(k, seed, without=without)._replace(outcome=ended, warning=repr(error)))
+    return outcomes
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("count", type=int)
     parser.add_argument("--seed", type=int, default=SEED, help="below zero: hostile kinds of scenes")
-    asked = parser.parse_args()
-    print(told(run_all(asked.count, asked.seed)))
+    arguments = parser.parse_args()
+    print(summary(run_all(arguments.count, arguments.seed)))

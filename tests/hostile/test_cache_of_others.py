@@ -25,7 +25,7 @@ def _planted(x):
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def cache(tmp_path_factory):
     """A cache that holds a kernel whose bitcode is another's."""
     root, before = tmp_path_factory.mktemp("made") / "new" / "cache", os.umask(0o002)
     with pytest.MonkeyPatch.context() as patch:
@@ -44,9 +44,9 @@ def made(tmp_path_factory):
 
 
 @pytest.fixture
-def planted(made, tmp_path, monkeypatch):
+def planted(cache, tmp_path, monkeypatch):
     """A copy of it, and the file of that kernel."""
-    root = shutil.copytree(made, tmp_path / "new") / "cache"
+    root = shutil.copytree(cache, tmp_path / "new") / "cache"
     monkeypatch.setenv("SYMTOP_CACHE", str(root))
     return root, next(root.rglob("*.bitcode"))
 
@@ -62,9 +62,9 @@ def test_a_program_in_a_cache_of_our_own_is_ours_to_run_and_so_is_its_machine_co
     """The control: this is what is refused below."""
     assert compile_kernel(_doubled)(2.0) == 8.0
     (code,) = planted[0].rglob("*.code")
-    written = code.stat().st_mtime_ns
+    before = code.stat().st_mtime_ns
     assert compile_kernel(_doubled)(2.0) == 8.0
-    assert code.stat().st_mtime_ns == written
+    assert code.stat().st_mtime_ns == before
 
 
 def test_what_is_kept_of_a_kernel_is_no_pickle(planted):
@@ -86,9 +86,9 @@ def test_what_others_may_write_is_not_read(planted, monkeypatch, at, fault):
     else:
         path.chmod(path.stat().st_mode | {"group": 0o020, "anybody": 0o002}[fault])
     words = "belongs to user 12345; set SYMTOP_CACHE" if fault == "owner" else "chmod -R go-w"
-    (found,) = [finding for finding in doctor._caches(root) if not finding.healthy]
-    assert found.topic == "compiled code"
-    assert str(path) in found.result
-    with pytest.warns(SymtopWarning, match=words) as told:
+    (doubt,) = [finding for finding in doctor._caches(root) if not finding.healthy]
+    assert doubt.topic == "compiled code"
+    assert str(path) in doubt.result
+    with pytest.warns(SymtopWarning, match=words) as record:
         assert [compile_kernel(_doubled)(2.0) for _ in range(2)] == [4.0, 4.0]
-    assert len(told) == 1
+    assert len(record) == 1

@@ -27,13 +27,13 @@ class Cluster:
         environment = {**os.environ, "PROBE_LOG": str(log), "PROBE_PAUSE": "0.5"}
         self.started = []
         self.scheduler = self._start(environment, "scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1")
-        self.address = self._said(self.scheduler, r"Scheduler at:\s+(tcp://\S+)")
+        self.address = self._match(self.scheduler, r"Scheduler at:\s+(tcp://\S+)")
         self.workers = [
             self._start(environment, "worker", self.address, "--no-nanny", "--no-dashboard", "--nthreads", "1")
             for _ in range(workers)
         ]
         for worker in self.workers:
-            self._said(worker, r"Registered to:\s+(tcp://\S+)")
+            self._match(worker, r"Registered to:\s+(tcp://\S+)")
 
     def _start(self, environment, role, *words):
         line = [sys.executable, "-m", f"distributed.cli.dask_{role}", *words]
@@ -41,10 +41,10 @@ class Cluster:
         self.started.append(process)
         return process
 
-    def _said(self, process, pattern):
+    def _match(self, process, pattern):
         for line in process.stderr:
-            if told := re.search(pattern, line):
-                return told[1]
+            if match := re.search(pattern, line):
+                return match[1]
         raise AssertionError("it ended")
 
     def end(self):
@@ -61,9 +61,9 @@ def log(tmp_path):
 @pytest.fixture
 def cluster(log, processes_with_dask):
     with contextlib.ExitStack() as stack:
-        made = Cluster(log)
-        stack.callback(made.end)
-        yield made
+        cluster_ = Cluster(log)
+        stack.callback(cluster_.end)
+        yield cluster_
 
 
 def computed(results):
@@ -82,8 +82,8 @@ def after(cluster, log, results, happens):
             time.sleep(0.05)
         happens()
         began = time.monotonic()
-        told = ended(process, 300.0)
-        return *told, time.monotonic() - began
+        result = ended(process, 300.0)
+        return *result, time.monotonic() - began
     finally:
         stop(process)
 
@@ -103,10 +103,10 @@ def test_a_worker_that_dies_costs_nothing(cluster, log, tmp_path):
     assert code == 0, err
     assert len(computed(tmp_path / "r")) == 12
     assert seconds < SECONDS
-    told, made = int(re.search(r"(\d+) of 12 cases computed", out)[1]), len(log.read_text().split())
+    count, calls = int(re.search(r"(\d+) of 12 cases computed", out)[1]), len(log.read_text().split())
     # one at most is made twice, which the killed worker was computing, or found, which it had written and not told of
-    assert made >= 12
-    assert 0 <= made - told <= 1
+    assert calls >= 12
+    assert 0 <= calls - count <= 1
     code, _, err = ended(symtop("study", PROBE, "--results", tmp_path / "here", "--jobs", 1))
     assert code == 0, err
     same(tmp_path / "here", tmp_path / "r")
@@ -116,18 +116,18 @@ def test_a_worker_that_dies_costs_nothing(cluster, log, tmp_path):
 @pytest.mark.parametrize("how", ["killed", "stopped", "without workers"])
 @pytest.mark.parametrize("what", ["study", "ensemble"])
 def test_a_cluster_that_is_gone_before_is_one_sentence(log, tmp_path, what, how):
-    made = Cluster(log, workers=0)
+    cluster = Cluster(log, workers=0)
     try:
         if how != "without workers":
-            made.scheduler.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
+            cluster.scheduler.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
         words = ["study", PROBE, "--results", tmp_path / "r"]
         if what == "ensemble":
             words = ["ensemble", "strang", "--members", 90, "--step-size", 0.1, "--horizon", 1]
         began = time.monotonic()
-        code, _, err = ended(symtop(*words, "--scheduler", made.address), 300.0)
+        code, _, err = ended(symtop(*words, "--scheduler", cluster.address), 300.0)
         seconds = time.monotonic() - began
     finally:
-        made.end()
+        cluster.end()
     print(f"{what}, {how}: {code} after {seconds:.1f} s, {err!r}")
     assert code == 2
     assert "scheduler must be the address of a dask scheduler that answers and has workers" in err

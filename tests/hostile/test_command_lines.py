@@ -6,9 +6,9 @@ import warnings
 
 import click
 import pytest
-from click.testing import CliRunner
 
 from symtop.cli.main import main
+from tests.commands import call
 
 GOOD = {
     "archive": [],
@@ -111,7 +111,7 @@ def outcome(words):
     """Exit code, output and exception of a command line in this process."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return CliRunner().invoke(main, words)
+        return call(*words, code=None)
 
 
 @pytest.mark.parametrize("name", sorted(GOOD))
@@ -125,14 +125,14 @@ def test_every_bad_command_line_is_one_sentence(name, folder, monkeypatch):
     above = sorted(path.name for path in folder.parent.iterdir())
     faults = []
     for words in (words for words in LINES if words[0] == name):
-        done = outcome(words)
+        result = outcome(words)
         option = next((word.split("=")[0] for word in reversed(words) if word.startswith("--")), "")
-        told = [line for line in done.output.splitlines() if line.startswith(("symtop: ", "Error: "))]
+        messages = [line for line in result.output.splitlines() if line.startswith(("symtop: ", "Error: "))]
         allowed = (0, 1, 2, 3) if (name, option) in FINE else (2,)
-        if done.exit_code not in allowed or not isinstance(done.exception, SystemExit | None):
-            faults.append((words, done.exit_code, repr(done.exception), done.output[-300:]))
-        elif "Traceback" in done.output or (done.exit_code == 2 and len(told) != 1):
-            faults.append((words, done.exit_code, done.output[-300:]))
+        if result.exit_code not in allowed or not isinstance(result.exception, SystemExit | None):
+            faults.append((words, result.exit_code, repr(result.exception), result.output[-300:]))
+        elif "Traceback" in result.output or (result.exit_code == 2 and len(messages) != 1):
+            faults.append((words, result.exit_code, result.output[-300:]))
         if sorted(path.name for path in folder.iterdir()) != before:
             faults.append((words, "wrote", sorted(path.name for path in folder.iterdir())))
             for path in folder.iterdir():

@@ -26,7 +26,7 @@ def crowd(tmp_path_factory):
     """The port of the command that serves the explorer, the file of what it says, that of its memory, its process."""
     log = tmp_path_factory.mktemp("explorer") / "log"
     command = [sys.executable, "-m", "symtop.cli", "explore", "--no-browser"]
-    with log.open("w") as said, subprocess.Popen(command, stdout=subprocess.PIPE, stderr=said, text=True) as process:
+    with log.open("w") as file, subprocess.Popen(command, stdout=subprocess.PIPE, stderr=file, text=True) as process:
         try:
             port = int(re.search(r":(\d+)/", process.stdout.readline()).group(1))
             yield port, log, Path(f"/proc/{process.pid}/statm"), process
@@ -38,7 +38,7 @@ HEAD = b"%s %s HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n
 GOOD = b"HTTP/1.1 200 OK"
 
 
-def asked(port, path, body=b"", *, leave=False, patience=60.0):
+def first_line(port, path, body=b"", *, leave=False, patience=60.0):
     """The first line of an answer; with `leave` the connection is reset once the question is sent."""
     verb = b"POST" if body else b"GET"
     with socket.create_connection(("127.0.0.1", port), timeout=patience) as link:
@@ -72,8 +72,8 @@ def test_a_crowd_is_served_and_nothing_is_said_of_those_who_leave(crowd, count):
     port, log, memory, _ = crowd
     sizes = []
     for _ in range(3):
-        at_once(count, lambda: asked(port, b"/run", QUESTION, leave=True))
-        assert at_once(count, lambda: asked(port, b"/run", QUESTION)) == [GOOD] * count
+        at_once(count, lambda: first_line(port, b"/run", QUESTION, leave=True))
+        assert at_once(count, lambda: first_line(port, b"/run", QUESTION)) == [GOOD] * count
         sizes.append(int(memory.read_text().split()[1]))  # pages in memory now, not the peak
     assert sizes[2] < 1.05 * sizes[1]  # the first round compiles and fills caches
     assert log.read_text() == ""
@@ -85,7 +85,7 @@ def test_three_thousand_connections_are_refused_and_forgotten(crowd):
     Those within the limit, some of whom never finish a sentence, keep nobody waiting.
     """
     port, log, memory, _ = crowd
-    assert asked(port, b"/run", QUESTION) == GOOD
+    assert first_line(port, b"/run", QUESTION) == GOOD
     before, began = int(memory.read_text().split()[1]), time.monotonic()
     resource = pytest.importorskip("resource")
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -94,7 +94,7 @@ def test_three_thousand_connections_are_refused_and_forgotten(crowd):
         idle = [socket.create_connection(("127.0.0.1", port), timeout=10.0) for _ in range(100)]
         for link in idle[:50]:
             link.sendall(HEAD % (b"POST", b"/run", 9) + b"{")
-        assert asked(port, b"/", patience=10.0) == asked(port, b"/run", QUESTION, patience=10.0) == GOOD
+        assert first_line(port, b"/", patience=10.0) == first_line(port, b"/run", QUESTION, patience=10.0) == GOOD
         idle += [socket.create_connection(("127.0.0.1", port), timeout=10.0) for _ in range(2900)]
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
@@ -110,7 +110,7 @@ def test_three_thousand_connections_are_refused_and_forgotten(crowd):
     answer = b""
     while answer != GOOD and time.monotonic() < end:
         with contextlib.suppress(OSError):
-            answer = asked(port, b"/run", QUESTION, patience=5.0)
+            answer = first_line(port, b"/run", QUESTION, patience=5.0)
         time.sleep(0.1)
     assert answer == GOOD
     for link in idle:

@@ -66,10 +66,10 @@ _MADE = xr.Dataset({"theta": ("time", np.linspace(0.0, 1.0, 40))}, coords={"time
 
 @pytest.mark.parametrize("flips", FLIPS)
 def test_a_damaged_reference_is_computed_again(tmp_path, flips):
-    draw, path, made = random.Random(6), tmp_path / "reference.nc", []
+    draw, path, calls = random.Random(6), tmp_path / "reference.nc", []
 
     def compute():
-        made.append(1)
+        calls.append(1)
         return _MADE.copy()
 
     cached(path, compute, None)
@@ -79,7 +79,7 @@ def test_a_damaged_reference_is_computed_again(tmp_path, flips):
         assert np.array_equal(data["theta"], _MADE["theta"])
         assert np.array_equal(data["time"], _MADE["time"])
         path.write_bytes(whole)
-    assert len(made) > 1  # some were noticed; in the others the byte was one of no meaning
+    assert len(calls) > 1  # some were noticed; in the others the byte was one of no meaning
 
 
 @pytest.mark.parametrize("flips", FLIPS)
@@ -115,10 +115,10 @@ def test_a_damaged_checkpoint_is_not_gone_on_from(tmp_path, monkeypatch, flips):
         book.save()
         good = book.resumed(start)
         assert (good[0].k, good[1]) == (7, [[0.5] * 15] * 3)
-        begun = refused = 0
+        restarts = refused = 0
         for _ in range(flips):
             whole = flipped(book.file, draw)
-            with warnings.catch_warnings(record=True) as told:
+            with warnings.catch_warnings(record=True) as record:
                 warnings.simplefilter("always")
                 try:
                     at, rows = book.resumed(start)
@@ -127,9 +127,9 @@ def test_a_damaged_checkpoint_is_not_gone_on_from(tmp_path, monkeypatch, flips):
                     assert file is not True
                     refused += 1
                 else:
-                    begun += at.k == 0
+                    restarts += at.k == 0
                     assert at in (good[0], start)
                     assert rows in (good[1], [])
-                    assert (at.k == 0) == any("damaged" in str(one.message) for one in told)
+                    assert (at.k == 0) == any("damaged" in str(one.message) for one in record)
             book.file.write_bytes(whole)
-        assert begun if file is True else refused
+        assert restarts if file is True else refused

@@ -12,7 +12,7 @@ from symtop.core.signals import InterruptedByUser, told_apart
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.run import plugins
-from tests.commands import call, ended, symtop as command
+from tests.commands import answer, ended, symtop as command
 
 PLUGIN = Path(__file__).with_name("plugin.py")
 RUN = ["--step-size", "0.01", "--horizon", "2"]
@@ -25,42 +25,40 @@ def misbehaving():
     return sys.modules["symtop_plugin_plugin"]
 
 
-def said_of(words):
+def output_of(words):
     """Exit code and the lines of a command that must not end in a traceback, and must leave the scene as it was."""
     with warnings.catch_warnings():
-        done = call(*words, code=None)
-    assert done.exception is None or isinstance(done.exception, SystemExit), words
-    assert "Traceback" not in done.output
+        code, output = answer(*words)
     assert repr(symtop.scene("spheroid")) == BEFORE
-    return done.exit_code, done.output.splitlines()
+    return code, output.splitlines()
 
 
 @pytest.mark.parametrize("guard", ["--guard", "--no-guard"])
 def test_every_refused_run_is_one_sentence(misbehaving, guard):
     for name in misbehaving.REFUSED:
-        code, lines = said_of(["run", "spheroid", name, *RUN, guard])
+        code, lines = output_of(["run", "spheroid", name, *RUN, guard])
         assert (code, len(lines)) == (2, 1), (name, lines)
         assert lines[0].startswith(f"symtop: integrator {name} "), lines
 
 
 @pytest.mark.parametrize("guard", ["--guard", "--no-guard"])
 def test_what_can_be_used_is_used(misbehaving, guard):
-    _, (_, *expected) = said_of(["run", "spheroid", "midpoint[angles]", *RUN, guard])
+    _, (_, *expected) = output_of(["run", "spheroid", "midpoint[angles]", *RUN, guard])
     for name in misbehaving.TOLERATED:
-        code, (_, *lines) = said_of(["run", "spheroid", name, *RUN, guard])
+        code, (_, *lines) = output_of(["run", "spheroid", name, *RUN, guard])
         assert code == 0, name
         if "float32" not in name:
             assert [line.split("largest")[-1] for line in lines[-5:]] == [
                 line.split("largest")[-1] for line in expected[-5:]
             ], name
     for name in misbehaving.BROKEN:
-        assert said_of(["run", "spheroid", name, *RUN, guard])[0] == 3, name
+        assert output_of(["run", "spheroid", name, *RUN, guard])[0] == 3, name
 
 
 def test_an_ensemble_of_them_is_one_sentence(misbehaving):
     words = ["--members", "3", "--step-size", "0.1", "--horizon", "1"]
     for name in misbehaving.REFUSED:
-        code, lines = said_of(["ensemble", name, *words])
+        code, lines = output_of(["ensemble", name, *words])
         assert code in (2, 3), (name, lines)
         assert lines[-1].startswith(("symtop: ", "ensemble")) or code == 3, lines
 
@@ -68,7 +66,7 @@ def test_an_ensemble_of_them_is_one_sentence(misbehaving):
 @pytest.mark.slow
 def test_the_claims_of_all_of_them_are_judged(misbehaving):
     for name in (*misbehaving.REFUSED, *misbehaving.TOLERATED, *misbehaving.BROKEN):
-        assert said_of(["claims", name, "--quick"])[0] in (0, 1), name
+        assert output_of(["claims", name, "--quick"])[0] in (0, 1), name
 
 
 def test_a_solver_does_not_reach_the_plan_or_an_earlier_run(misbehaving):
@@ -109,9 +107,9 @@ def test_a_solver_that_expects_steps_forwards_is_ended(misbehaving, monkeypatch)
 @pytest.mark.slow
 def test_in_processes_of_their_own():
     for name, code in (("raises-system-exit", 2), ("raises-interrupt", 2), ("raises-base", 2), ("signals-itself", 130)):
-        told = ended(command("run", "spheroid", name, *RUN, "--plugin", PLUGIN))
-        assert told[0] == code, told
-        assert told[2] == "symtop: interrupted\n" if code == 130 else told[2].count("\n") == 1
+        result = ended(command("run", "spheroid", name, *RUN, "--plugin", PLUGIN))
+        assert result[0] == code, result
+        assert result[2] == "symtop: interrupted\n" if code == 130 else result[2].count("\n") == 1
 
 
 def test_a_study_whose_measure_exits_has_a_case_that_failed(tmp_path):
@@ -123,7 +121,7 @@ def test_a_study_whose_measure_exits_has_a_case_that_failed(tmp_path):
         "STUDY = Study('leaving', 't', 'q', lambda quick: [Case('spheroid', 'midpoint', {'k': k}) "
         "for k in range(2)], measure)\n"
     )
-    code, lines = said_of(["study", str(script), "--results", str(tmp_path / "r")])
+    code, lines = output_of(["study", str(script), "--results", str(tmp_path / "r")])
     assert code == 2
     assert "no case could be measured" in lines[-1]
     assert len(list((tmp_path / "r").rglob("*.failed.json"))) == 2
@@ -134,6 +132,6 @@ def test_a_study_writes_nothing_beside_its_results(tmp_path, monkeypatch, name):
     monkeypatch.setattr("sys.dont_write_bytecode", False)  # as on most machines
     script = tmp_path / "named.py"
     script.write_text(f"from symtop.runner.study import Study\nSTUDY = Study({name!r}, *[None] * 7)\n")
-    code, lines = said_of(["study", str(script), "--results", str(tmp_path / "in" / "r")])
+    code, lines = output_of(["study", str(script), "--results", str(tmp_path / "in" / "r")])
     assert (code, len(lines)) == (2, 1)
     assert [path.name for path in tmp_path.iterdir()] == ["named.py"]

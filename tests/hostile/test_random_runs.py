@@ -15,7 +15,7 @@ from symtop.run import guard
 from symtop.run.linear_stability import nutation_growth, trace
 from symtop.run.motion import landmarks
 from symtop.run.simulation import make_plan
-from tests.hostile.random_runs import LONGEST, NEWER, drawn, one, run_all, told
+from tests.hostile.random_runs import LONGEST, NEWER, draw_run, one, run_all, summary
 from tests.run.test_guard import nutating
 
 # runs of the first 20,000 that were wrong in silence, and of the next 40,000
@@ -44,11 +44,11 @@ def test_what_is_right_is_not_warned_of(k):
 @pytest.mark.parametrize("count", [100, pytest.param(1500, marks=pytest.mark.slow)])
 def test_random_runs_are_not_wrong_in_silence(count):
     runs = run_all(count, seed=3, without=NEWER)
-    assert not [run for run in runs if run.wrong and not run.warning], told(runs)
-    assert not [run for run in runs if run.outcome in ("endless", "crashed") or run.seconds > LONGEST], told(runs)
+    assert not [run for run in runs if run.wrong and not run.warning], summary(runs)
+    assert not [run for run in runs if run.outcome in ("endless", "crashed") or run.seconds > LONGEST], summary(runs)
     right = [run for run in runs if run.right]
     assert len(right) > count / 4
-    assert sum(bool(run.warning) for run in right) < max(0.01 * len(right), 3), told(runs)
+    assert sum(bool(run.warning) for run in right) < max(0.01 * len(right), 3), summary(runs)
 
 
 def test_newer_methods_are_not_wrong_in_silence():
@@ -56,7 +56,7 @@ def test_newer_methods_are_not_wrong_in_silence():
     runs = [one(k, 3, without=older) for k in range(40)]
     assert {run.integrator for run in runs} <= {*NEWER}
     assert sum(run.wrong for run in runs) > 2
-    assert not [run for run in runs if run.wrong and not run.warning], told(runs)
+    assert not [run for run in runs if run.wrong and not run.warning], summary(runs)
 
 
 def test_growth_is_that_of_linear_theory_for_methods_that_are_not_symmetric():
@@ -65,13 +65,13 @@ def test_growth_is_that_of_linear_theory_for_methods_that_are_not_symmetric():
     frequency = landmarks(scene).frequency
     for turn in (0.5, 1.0, 1.5):
         expected = math.sqrt(1.0 - turn**6 / 72.0 + turn**8 / 576.0)
-        found = nutation_growth(symtop.integrator("rk4"), scene, turn / frequency, "axis", frequency)
-        assert found.factor == pytest.approx(expected, rel=5e-3)
+        growth = nutation_growth(symtop.integrator("rk4"), scene, turn / frequency, "axis", frequency)
+        assert growth.factor == pytest.approx(expected, rel=5e-3)
     symmetric = nutation_growth(symtop.integrator("strang"), scene, 0.5 / frequency, "axis", frequency)
     assert symmetric.factor == pytest.approx(1.0, abs=1e-5)
     for name, sign in (("physx", 1.0), ("rapier", 1.0), ("yade", -1.0), ("bullet", -1.0)):
-        found = nutation_growth(symtop.integrator(name), scene, 0.1 / frequency, "axis", frequency)
-        assert sign * (found.factor - 1.0) > 1e-3
+        growth = nutation_growth(symtop.integrator(name), scene, 0.1 / frequency, "axis", frequency)
+        assert sign * (growth.factor - 1.0) > 1e-3
 
 
 def test_growth_says_how_far_rounding_hides_it():
@@ -94,7 +94,7 @@ def test_a_run_of_very_fine_steps_is_not_warned_of():
 
 def test_growth_does_not_see_what_two_runs_share():
     """The control: the trace of the same method and step takes a drift for growth."""
-    run = drawn(74)
+    run = draw_run(74)
     scene, method, step = run.scene(), symtop.integrator(run.integrator), run.control["step_size"]
     frequency = landmarks(scene).frequency
     assert trace(method, scene, step, "axis").growth > 1.005
@@ -106,7 +106,7 @@ def test_a_probe_ends_where_a_solver_takes_ever_smaller_steps(monkeypatch):
     assert guard.MOST_WORK == {"compiled": 5e6, "python": 5e5}
     for implementation, most in guard.MOST_WORK.items():  # a tenth of the work and less than a tenth of the time
         monkeypatch.setitem(guard.MOST_WORK, implementation, most / 10.0)
-    run = drawn(620, 2)
+    run = draw_run(620, 2)
     scene, method = run.scene(), symtop.integrator(run.integrator)
     plan, _ = make_plan(scene, method, tolerance=run.control["tolerance"], horizon=run.horizon, samples=11)
     began = time.process_time()

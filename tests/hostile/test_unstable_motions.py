@@ -26,25 +26,24 @@ SILENT = [
 ]  # fmt: skip
 
 
-def sleeper(tilt, ratio=0.9, name="sleeper"):
+def sleeper(tilt, ratio=0.9):
     """A top let go almost upright, at a share of the spin from which it sleeps."""
     top = symtop.SymmetricTop(1.3, 0.7, 2.1)
-    return symtop.Scene(
-        name, top, symtop.Angles(tilt, psi_dot=ratio * 2.0 * math.sqrt(top.I1 * top.mgl) / top.I3), 50.0
-    )
+    spin = ratio * 2.0 * math.sqrt(top.I1 * top.mgl) / top.I3
+    return symtop.Scene("sleeper", top, symtop.Angles(tilt, psi_dot=spin), 50.0)
 
 
 @pytest.mark.parametrize("case", SILENT, ids=lambda case: f"{case[6]}-{case[3]:.1g}")
 def test_the_guard_warns_where_the_motion_grows_what_a_tolerance_leaves(case):
     I1, I3, mgl, theta, theta_dot, psi_dot, name, observe, tolerance, horizon = case
     top, start = symtop.SymmetricTop(I1, I3, mgl), symtop.Angles(theta, 0.3, 0.1, theta_dot, 0.0, psi_dot)
-    scene, told = symtop.Scene("unstable", top, start, horizon), []
-    run = symtop.simulate(scene, name, tolerance=tolerance, observe=observe, samples=201, guard=told.append)
+    scene, messages = symtop.Scene("unstable", top, start, horizon), []
+    run = symtop.simulate(scene, name, tolerance=tolerance, observe=observe, samples=201, guard=messages.append)
     truth = ClosedForm(top, start).axis(run["time"].values)
     assert run.attrs["outcome"] == "ok"
     assert charts.axis_distance(run["axis"].values, truth).max() > 0.05
-    assert len(told) == 1
-    assert "try tolerance" in told[0]
+    assert len(messages) == 1
+    assert "try tolerance" in messages[0]
 
 
 @pytest.mark.parametrize("name", ["dop853", "lsoda", "rk45"])
@@ -69,15 +68,15 @@ def test_what_two_integrations_differ_by_is_the_start_and_not_the_closed_form(ti
     times = np.linspace(0.0, 2.0 * scene.nutation_period, 21)[1:]
     truth = symtop.reference(scene, times)
     quad, _ = integrate(scene, times, "quad")
-    apart = charts.axis_distance(charts.axis_from_quaternion(quad[:, :4].astype(float)), truth["axis"].values)
-    assert (apart <= truth["axis_error_bound"]).all()
+    distances = charts.axis_distance(charts.axis_from_quaternion(quad[:, :4].astype(float)), truth["axis"].values)
+    assert (distances <= truth["axis_error_bound"]).all()
     rounding = np.finfo(float).eps * scene.top.I3 * scene.start.psi_dot / scene.top.I1
     other = ClosedForm(scene.top, dataclasses.replace(scene.start, theta_dot=rounding)).axis(times)
-    moved = charts.axis_distance(other, truth["axis"].values).max()
+    shift = charts.axis_distance(other, truth["axis"].values).max()
     factor = conditioning(scene, float(times[-1]))
-    assert moved < 10.0 * factor * np.finfo(float).eps
+    assert shift < 10.0 * factor * np.finfo(float).eps
     if tilt <= 1e-5:
-        assert moved > 1e2 * truth["axis_error_bound"].max()
+        assert shift > 1e2 * truth["axis_error_bound"].max()
         assert "rounding the start anew moves the axis by" in truth.attrs["conditioning"]
 
 
@@ -93,19 +92,19 @@ def test_conditioning_is_the_growth_of_the_motion():
 def test_where_one_rounding_moves_the_axis_anywhere_the_answer_says_so(name, time):
     """A distance ends at pi: divided by a change that departs as far it is far below the growth."""
     chosen = symtop.scene(name)
-    said = symtop.reference(chosen, [time]).attrs["conditioning"]
+    words = symtop.reference(chosen, [time]).attrs["conditioning"]
     factor = conditioning(chosen, time)
-    assert said.startswith("at least ")
-    assert "or more: nothing is known of the axis" in said
+    assert words.startswith("at least ")
+    assert "or more: nothing is known of the axis" in words
     times = np.linspace(0.0, time, 101)[1:]
     starts = [chosen.start]
     for rate in ("phi_dot", "psi_dot"):
         ulp_more = math.nextafter(getattr(chosen.start, rate), math.inf)
         starts.append(dataclasses.replace(chosen.start, **{rate: ulp_more}))
     true, *others = (ClosedForm(chosen.top, start).axis(times) for start in starts)
-    moved = max(charts.axis_distance(other, true).max() for other in others)
-    assert moved > 0.3
-    assert factor * np.finfo(float).eps > moved / 10.0
+    shift = max(charts.axis_distance(other, true).max() for other in others)
+    assert shift > 0.3
+    assert factor * np.finfo(float).eps > shift / 10.0
 
 
 @pytest.mark.parametrize("time", [64.0, 68.0])
@@ -120,10 +119,10 @@ def test_where_a_small_change_departs_far_a_smaller_one_shows_the_growth(time):
 
 
 def test_a_motion_that_departs_little_is_told_as_before():
-    for name, time, lost in (("separatrix", 20.0, "5e-12"), ("spheroid", 1.5e13, "0.02")):
-        said = symtop.reference(name, [time]).attrs["conditioning"]
-        assert "at least" not in said
-        assert said.endswith(f"; rounding the start anew moves the axis by {lost} rad")
+    for name, time, size in (("separatrix", 20.0, "5e-12"), ("spheroid", 1.5e13, "0.02")):
+        words = symtop.reference(name, [time]).attrs["conditioning"]
+        assert "at least" not in words
+        assert words.endswith(f"; rounding the start anew moves the axis by {size} rad")
 
 
 @pytest.mark.parametrize(

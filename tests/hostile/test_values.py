@@ -254,11 +254,11 @@ def came(function, arguments):
             function(**arguments)
             return ""
         except symtop.SymtopError as error:
-            said = str(error)
-            assert "\n" not in said
-            assert " " in said
-            assert len(said) < 6000
-            return said
+            sentence = str(error)
+            assert "\n" not in sentence
+            assert " " in sentence
+            assert len(sentence) < 6000
+            return sentence
         finally:
             assert time.process_time() - began < SECONDS
 

@@ -23,9 +23,9 @@ def only(monkeypatch):
     """A function that leaves the claims of these names in the table of the battery, with a third of the time."""
 
     def choose(*names):
-        left = [one._replace(claims=tuple(claim for claim in one.claims if claim in names)) for one in battery.TABLE]
-        assert {claim for stage in left for claim in stage.claims} == {*names}
-        monkeypatch.setattr(battery, "TABLE", tuple(stage for stage in left if stage.claims))
+        stages = [one._replace(claims=tuple(claim for claim in one.claims if claim in names)) for one in battery.TABLE]
+        assert {claim for stage in stages for claim in stage.claims} == {*names}
+        monkeypatch.setattr(battery, "TABLE", tuple(stage for stage in stages if stage.claims))
         shorten(monkeypatch)
 
     return choose

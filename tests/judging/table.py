@@ -18,34 +18,34 @@ from tests.judging.test_blind import SHOWN, step_of
 right.INERTIA = symtop.scene("spheroid").top.I1
 
 
-def spent():
+def processor_time():
     """Seconds of the processor so far, of this process and its children."""
     return sum(os.times()[:4])
 
 
-def judged(name, claims, options, *, quick):
+def ledger_of(name, claims, options, *, quick):
     """The ledger of a method and the seconds that it cost."""
-    before = spent()
+    before = processor_time()
     ledger = symtop.judge(step_of(name, right, wrong), quick=quick, seed=1, **claims, **options)
-    return ledger, spent() - before
+    return ledger, processor_time() - before
 
 
 def main():
     """Print the tables."""
     quick, rows, costs = "--full" not in sys.argv, [], []
     for name, (claims, line, options) in wrong.CLAIMS.items():
-        ledger, cost = judged(name, claims, options, quick=quick)
+        ledger, cost = ledger_of(name, claims, options, quick=quick)
         costs.append((cost, name))
         rows.append((line, line in ledger.refuted, ledger[line].resolution, name))
     print("| refuted by | wrong methods | caught | resolution |\n|---|---|---|---|")
     for line, group in groupby(sorted(rows, key=lambda row: row[0]), key=lambda row: row[0]):
         of_line = list(group)
         least, most = (choose(row[2] for row in of_line) for choose in (min, max))
-        missed = ", ".join(row[3] for row in of_line if not row[1])
-        print(f"| {line} | {len(of_line)} | {sum(row[1] for row in of_line)} | {least:.0e} to {most:.0e} |", missed)
+        passing = ", ".join(row[3] for row in of_line if not row[1])
+        print(f"| {line} | {len(of_line)} | {sum(row[1] for row in of_line)} | {least:.0e} to {most:.0e} |", passing)
     bad = []
     for name, (claims, options) in right.CLAIMS.items():
-        ledger, cost = judged(name, claims, options, quick=quick)
+        ledger, cost = ledger_of(name, claims, options, quick=quick)
         costs.append((cost, name))
         doubted = [claim for claim in claims if claim in SHOWN and ledger[claim].verdict != "confirmed"]
         bad += [f"{name}: {'/'.join(ledger.refuted)} refuted, {'/'.join(doubted)} not confirmed"] * bool(

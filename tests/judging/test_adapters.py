@@ -26,7 +26,7 @@ from symtop.judging.claims import order, structure
 from symtop.judging.claims.subject import FORMS, open_target
 from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Measured, line, undecided
 from symtop.judging.remote import clock
-from tests.commands import call
+from tests.commands import answer
 from tests.judging.blind.right import midpoint, product, rates, turn, verlet
 from tests.judging.conftest import shorten
 
@@ -88,9 +88,9 @@ def test_a_separable_step_makes_the_steps_of_the_splitting_that_it_is():
     ).isel(time=-1)
     stepper = SeparableStep(verlet)
     par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
-    done = stepper.march(SPHEROID.top, par, np.array(state), 0.004, np.array([200]))
-    np.testing.assert_allclose(done.states[0], [float(ours["theta"]), float(ours["p_theta"])], rtol=1e-12)
-    assert done.evaluations == 400
+    run = stepper.march(SPHEROID.top, par, np.array(state), 0.004, np.array([200]))
+    np.testing.assert_allclose(run.states[0], [float(ours["theta"]), float(ours["p_theta"])], rtol=1e-12)
+    assert run.evaluations == 400
 
 
 def test_a_separable_step_is_judged_in_the_plane(only):
@@ -326,10 +326,10 @@ def changes_its_input(f, t, y, h):
 
 def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset(monkeypatch):
     shorten(monkeypatch)
-    told = []
-    ledger = symtop.judge(changes_its_input, quick=True, tell=told.append)
-    assert told[0].name == "changes_its_input"
-    assert told[1:] == list(ledger.findings)
+    events = []
+    ledger = symtop.judge(changes_its_input, quick=True, tell=events.append)
+    assert events[0].name == "changes_its_input"
+    assert events[1:] == list(ledger.findings)
     assert [one.claim for one in ledger.findings] == [claim for stage in stages("step") for claim in stage.claims]
     assert {one.verdict for one in ledger.findings} <= set(VERDICTS) - {"refuted", "confirmed"}
     assert "writes to its input" in ledger["calls"].why
@@ -342,11 +342,11 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset(monkeypat
     assert all(len(line) <= 100 for line in screen)
     assert sum(bool(line) for line in screen) <= 18
     told_of = {line[:15].strip(): line[15:] for line in screen}
-    said = {
+    expected = {
         "order": "1.0", "symplectic": "no, a step misses the Poisson bracket by ", "p_phi": "kept, to ",
         "energy": "drifts, by ", "work": "2.0 force evaluations a step", "pole": "a run through the upright axis ",
     }  # fmt: skip
-    assert [name for name, words in said.items() if not told_of[name].startswith(words)] == []
+    assert [name for name, words in expected.items() if not told_of[name].startswith(words)] == []
     h, nutation = float(data["structure_step"]), symtop.scene("spheroid").nutation_period
     assert f" steps a nutation for the order, {nutation / h:.1f} for the structure;" in str(ledger)
     assert told_of["pole"].endswith(" rad off (good: 1e-7 or falling with h)")
@@ -377,8 +377,7 @@ STEPS = EXAMPLES / "judged_steps.py"
 
 
 def run_judge(*arguments):
-    done = call("judge", *arguments, "--quick", code=None)
-    return done.exit_code, done.output
+    return answer("judge", *arguments, "--quick")
 
 
 def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch, only):

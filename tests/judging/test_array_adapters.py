@@ -28,15 +28,15 @@ def needs(package):
     return pytest.mark.skipif(absent, reason=f"{package} is not installed")
 
 
-def judged(*arguments):
+def judge(*arguments):
     """The exit code, and the findings by claim, or what is said of the refusal."""
     command = [sys.executable, "-m", "symtop.cli", "judge", *map(str, arguments), "--quick", "--json"]
-    done = subprocess.run(
+    result = subprocess.run(
         command, capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": str(ROOT)}
     )
-    if done.returncode == 2:
-        return 2, done.stderr
-    return done.returncode, {one["claim"]: one for one in json.loads(done.stdout)}
+    if result.returncode == 2:
+        return 2, result.stderr
+    return result.returncode, {one["claim"]: one for one in json.loads(result.stdout)}
 
 
 @pytest.mark.parametrize("chart", ["axis", "attitude"])
@@ -67,11 +67,11 @@ def test_a_solver_in_a_session_that_has_imported_jax(tmp_path):
         SOLVERS + "ledger = symtop.judge(midpoint, order=2, quick=True)\nprint(ledger['order'].verdict)\n"
         "import jax\nprint(jax.config.jax_enable_x64)\n"
     )
-    done = subprocess.run(
+    result = subprocess.run(
         [sys.executable, str(tmp_path / "session.py")], capture_output=True, text=True, check=True,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
     )  # fmt: skip
-    assert done.stdout.split() == ["confirmed", "False"]
+    assert result.stdout.split() == ["confirmed", "False"]
 
 
 BATCHES = """
@@ -104,10 +104,10 @@ FORMS = [pytest.param(name, marks=needs(name)) for name in ("torch", "jax")]
 def test_a_method_has_its_order_and_no_more(tmp_path, file, options, order):
     (tmp_path / "my.py").write_text(SOLVERS)
     target = EXAMPLES / file if ":" in file else f"{tmp_path / 'my.py'}:{file}"
-    code, findings = judged(target, *options, "--order", order, "--not-symplectic")
+    code, findings = judge(target, *options, "--order", order, "--not-symplectic")
     assert (code, findings["order"]["verdict"], findings["symplectic"]["verdict"]) == (0, "confirmed", "confirmed")
     if ":" in file:
-        code, findings = judged(target, *options, "--order", order + 1)
+        code, findings = judge(target, *options, "--order", order + 1)
         assert (code, findings["order"]["verdict"]) == (1, "refuted")
 
 
@@ -123,9 +123,9 @@ REFUSED = {
 def test_what_does_not_fit_is_told_so(tmp_path, form):
     (tmp_path / "my.py").write_text(SOLVERS if form == "diffrax" else BATCHES)
     for name in ("in_two_parts",) if form == "diffrax" else ("mixes", "first_row", "raises"):
-        code, said = judged(f"{tmp_path / 'my.py'}:{name}", "--form", form)
+        code, output = judge(f"{tmp_path / 'my.py'}:{name}", "--form", form)
         assert code == 2
-        assert REFUSED[name] in said
+        assert REFUSED[name] in output
 
 
 def heun(f, t, y, h):

@@ -125,8 +125,8 @@ def test_what_is_written_in_c(tmp_path, source, options, claims, refuted):
     if refuted:
         assert refuted in ledger.refuted, str(ledger)
     else:
-        kept = ("energy", "p_phi", "p_psi") if "energy" in claims else ()
-        confirmed(ledger, *(claim for claim in claims if claim in SHOWN), *kept)
+        constants = ("energy", "p_phi", "p_psi") if "energy" in claims else ()
+        confirmed(ledger, *(claim for claim in claims if claim in SHOWN), *constants)
 
 
 @needs_compiler
@@ -191,7 +191,7 @@ def test_a_wrong_method_is_caught_by_the_line_that_names_its_defect(name):
 @pytest.mark.slow
 def test_a_step_that_tires_after_a_hundred_thousand_is_found_in_full():
     """It is of order 4 as long as the order is measured; a run of as many steps, and the first call again, show it."""
-    wrong._made[0] = -80_000
+    wrong._steps[0] = -80_000
     assert "calls" in symtop.judge(wrong.tires, order=4).refuted
 
 

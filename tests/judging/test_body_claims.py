@@ -19,7 +19,7 @@ from tests.judging.blind import right
 FREE, HEAVY = (body_scenes()[name] for name in ("check-case-2", "heavy-brick"))
 
 
-def said(method: Integrator, scene: symtop.Scene) -> Ledger:
+def ledger_of(method: Integrator, scene: symtop.Scene) -> Ledger:
     """What the battery finds, quickly."""
     return judge(method, scene, quick=True)
 
@@ -30,7 +30,7 @@ def said(method: Integrator, scene: symtop.Scene) -> Ledger:
 ])  # fmt: skip
 def test_what_methods_claim_on_a_body_holds(name: str, energy: str, momentum: str) -> None:
     for scene in (FREE, HEAVY):
-        ledger = said(symtop.integrator(name), scene)
+        ledger = ledger_of(symtop.integrator(name), scene)
         assert ledger.refuted == []
         assert ledger["order"].verdict == "confirmed"
         assert (ledger["energy"].measured.kind, ledger["momentum"].measured.kind) == (energy, momentum)
@@ -39,10 +39,10 @@ def test_what_methods_claim_on_a_body_holds(name: str, energy: str, momentum: st
 def test_false_claims_on_a_body_are_refuted() -> None:
     rk4 = symtop.integrator("rk4")
     lie = dataclasses.replace(rk4, name="lie", family="splitting", order=3, symplectic=True)
-    assert said(lie, FREE).refuted == ["energy", "momentum"]  # order 4 where 3 is claimed is no false claim
-    assert said(dataclasses.replace(rk4, name="higher", order=5), HEAVY).refuted == ["order"]
-    assert said(symtop.integrator("no-gyro"), FREE)["order"].measured.kind == "wrong limit"
-    assert said(symtop.integrator("stormer-verlet"), FREE)["energy"].verdict == "undecided"
+    assert ledger_of(lie, FREE).refuted == ["energy", "momentum"]  # order 4 where 3 is claimed is no false claim
+    assert ledger_of(dataclasses.replace(rk4, name="higher", order=5), HEAVY).refuted == ["order"]
+    assert ledger_of(symtop.integrator("no-gyro"), FREE)["order"].measured.kind == "wrong limit"
+    assert ledger_of(symtop.integrator("stormer-verlet"), FREE)["energy"].verdict == "undecided"
 
 
 def rotation_swapped(q: Any, w: Any, h: float, inertia: Any, torque: Any) -> Any:
@@ -65,18 +65,18 @@ def test_a_step_of_ones_own_is_judged_on_a_body(step: Callable[..., Any], order:
     assert refuted == [] or ledger["order"].measured.kind == "wrong limit"
 
 
-@pytest.mark.parametrize(("asked", "words"), [
+@pytest.mark.parametrize(("claims", "words"), [
     ({"form": "separable"}, "form must be ode, rotation, scipy, not separable"),
     ({"symplectic": True}, "claim the rest on a top"), ({"conserves": ["p_psi"]}, "claim the rest on a top"),
 ])  # fmt: skip
-def test_what_a_step_on_a_body_cannot_show_is_refused(asked: dict[str, Any], words: str) -> None:
+def test_what_a_step_on_a_body_cannot_show_is_refused(claims: dict[str, Any], words: str) -> None:
     with pytest.raises(symtop.SymtopError, match=words):
-        symtop.judge(right.rk4, scene=FREE, quick=True, **asked)
+        symtop.judge(right.rk4, scene=FREE, quick=True, **claims)
 
 
 def test_the_command_judges_on_a_body() -> None:
-    done = call("claims", "strang", "--scene", "check-case-2", "--quick", "--json")
-    findings = {one["claim"]: one["verdict"] for one in json.loads(done.stdout)}
+    result = call("claims", "strang", "--scene", "check-case-2", "--quick", "--json")
+    findings = {one["claim"]: one["verdict"] for one in json.loads(result.stdout)}
     assert findings == {"order": "confirmed", "energy": "confirmed", "momentum": "confirmed"}
 
 

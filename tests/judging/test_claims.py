@@ -20,7 +20,7 @@ from symtop.methods.framework.plan import Run
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.splitting import composition
 from symtop.model import charts
-from tests.commands import call
+from tests.commands import answer
 from tests.conftest import random_scenes
 from tests.judging.blind.right import euler, implicit_euler
 
@@ -52,12 +52,12 @@ def still(chart, change=lambda y: y):
     return Integrator(name="still", family="other", summary="", solvers={chart: solve})
 
 
-@pytest.mark.parametrize("where", random_scenes(3, seed=41), ids=lambda s: s.name)
+@pytest.mark.parametrize("scene", random_scenes(3, seed=41), ids=lambda s: s.name)
 @pytest.mark.parametrize("chart", CHARTS)
-def test_the_brackets_of_every_chart_are_those_of_its_variables(chart, where):
-    step = one_step(still(chart), chart, where, 0.1)
-    assert symplectic_defect(step, where.start).size < 1e-11
-    tables = bracket(chart, step.at(where.start))
+def test_the_brackets_of_every_chart_are_those_of_its_variables(chart, scene):
+    step = one_step(still(chart), chart, scene, 0.1)
+    assert symplectic_defect(step, scene.start).size < 1e-11
+    tables = bracket(chart, step.at(scene.start))
     np.testing.assert_array_equal(tables, -tables.T)
 
 
@@ -68,16 +68,16 @@ def test_a_momentum_that_grows_by_a_millionth_a_step_is_seen_as_not_symplectic(c
         return state
 
     step = one_step(still(chart, swell), chart, SPHEROID, 0.1)
-    found = symplectic_defect(step, SPHEROID.start)
-    assert 1e-8 < found.size < 1e-5
-    assert found.noise < 1e-10
+    defect = symplectic_defect(step, SPHEROID.start)
+    assert 1e-8 < defect.size < 1e-5
+    assert defect.noise < 1e-10
 
 
-@pytest.mark.parametrize(("name", "chart", "kept"), [("strang", "axis", True), ("gauss-4", "axis", False)])
-def test_only_a_real_defect_stays_as_the_differences_are_refined(name, chart, kept):
-    found = symplectic_defect(*step_map(symtop.integrator(name), chart, SPHEROID))
-    assert bool(found.raw[-1] < found.raw[0] / 100.0) is kept
-    assert (found.size < 1e-11) is kept
+@pytest.mark.parametrize(("name", "chart", "conserves"), [("strang", "axis", True), ("gauss-4", "axis", False)])
+def test_only_a_real_defect_stays_as_the_differences_are_refined(name, chart, conserves):
+    defect = symplectic_defect(*step_map(symtop.integrator(name), chart, SPHEROID))
+    assert bool(defect.raw[-1] < defect.raw[0] / 100.0) is conserves
+    assert (defect.size < 1e-11) is conserves
 
 
 def test_a_step_is_one_map_unless_it_looks_at_the_start():
@@ -172,9 +172,9 @@ def test_an_energy_that_sinks_to_its_least_and_stays_there_is_not_bounded(larges
 
 def test_a_run_too_short_for_an_exponent_is_not_called_bounded():
     short = np.where(TIME < 4.0, WAVE + 1e-6, np.nan)  # ends before the last two decades begin
-    found = long.change_of(TIME, short, short[:2], 2000)
-    assert math.isnan(found.changed.exponent)
-    assert (found.kind, found.grows) == ("unknown", None)
+    short_run = long.change_of(TIME, short, short[:2], 2000)
+    assert math.isnan(short_run.changed.exponent)
+    assert (short_run.kind, short_run.grows) == ("unknown", None)
 
 
 def test_an_oscillation_with_noise_is_never_called_a_drift():
@@ -189,9 +189,9 @@ def test_a_claim_about_several_charts_is_judged_in_the_worst_of_them():
     runs = {chart: long.long_run(rk4, SPHEROID, chart, quick=True) for chart in rk4.charts()}
     kinds = {chart: run.constants["p_phi"].kind for chart, run in runs.items()}
     assert kinds == {"angles": "drift", "axis": "kept", "attitude": "kept"}
-    found = one_finding(constants, rk4, "p_phi")
-    assert found.measured.kind == "drift"
-    assert found.why.endswith("in the angles chart")
+    finding = one_finding(constants, rk4, "p_phi")
+    assert finding.measured.kind == "drift"
+    assert finding.why.endswith("in the angles chart")
 
 
 # ---- order -----------------------------------------------------------------------------------------------------------
@@ -214,8 +214,8 @@ CLASSICAL = ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 /
 OUTER = 1 / (2 - 2 ** (1 / 3))
 
 
-def triple(off):
-    outer, half = OUTER + off, (1 - OUTER - off) / 2
+def triple(shift):
+    outer, half = OUTER + shift, (1 - OUTER - shift) / 2
     return symtop.composition(
         "triple", (outer, 1 - 2 * outer, outer), (outer / 2, half, half, outer / 2), chart="space", order=4
     )
@@ -236,8 +236,8 @@ def triple(off):
     ],
 )  # fmt: skip
 def test_a_table_that_is_off_is_refuted_before_any_run(method, verdict, why):
-    found = one_finding(order, method, "order")
-    assert (found.verdict, found.why.startswith(f"its table {why}")) == (verdict, True), found.why
+    finding = one_finding(order, method, "order")
+    assert (finding.verdict, finding.why.startswith(f"its table {why}")) == (verdict, True), finding.why
 
 
 def test_every_splitting_of_the_catalogue_has_the_order_that_it_claims():
@@ -281,8 +281,8 @@ def test_the_angles_end_at_a_pole_and_the_space_frame_does_not():
 @pytest.mark.parametrize("name", ["midpoint", "strang", "rk4"])
 def test_honest_claims_are_confirmed(name):
     ledger = judge(symtop.integrator(name), SPHEROID, quick=True)
-    assert [found.claim for found in ledger.findings] == list(CLAIMS)
-    assert {found.verdict for found in ledger.findings} <= set(VERDICTS) - {"refuted", "undecided"}
+    assert [finding.claim for finding in ledger.findings] == list(CLAIMS)
+    assert {finding.verdict for finding in ledger.findings} <= set(VERDICTS) - {"refuted", "undecided"}
     assert {ledger[claim].verdict for claim in ("order", "symplectic", "symmetric", "explicit")} == {"confirmed"}
 
 
@@ -290,8 +290,8 @@ def test_what_nobody_claimed_is_measured_and_a_claim_that_denies_what_the_method
     none = dict.fromkeys(("order", "explicit", "symplectic", "symmetric", "conserves"))
     verlet = dataclasses.replace(symtop.integrator("stormer-verlet"), **none)
     ledger = judge(verlet, SPHEROID, quick=True)
-    assert {found.verdict for found in ledger.findings} == {"measured", "inapplicable"}
-    assert not any(found.declared for found in ledger.findings)
+    assert {finding.verdict for finding in ledger.findings} == {"measured", "inapplicable"}
+    assert not any(finding.declared for finding in ledger.findings)
     kinds = [ledger[claim].measured.kind for claim in ("symplectic", "symmetric", "energy")]
     assert kinds == ["yes", "yes", "bounded"]
     assert abs(ledger["order"].value - 2.0) < 0.05
@@ -303,13 +303,13 @@ def test_what_cannot_be_judged_says_why():
     def broken(top, start, plan):
         raise RuntimeError("no luck " * 100)
 
-    said = {"order": 2, "explicit": True, "symmetric": False}
-    kept = frozenset({"energy", "p_phi", "cayley_energy"})
-    ledger = judge(Integrator("broken", "other", "", {"axis": broken}, conserves=kept, **said), SPHEROID)
-    judged = [found for found in ledger.findings if found.verdict != "inapplicable"]
-    assert {found.verdict for found in judged} == {"undecided"}
-    assert all("no luck" in found.why and len(found.why) < 260 for found in judged)
-    assert {found.claim: found.declared for found in judged if found.declared} == {
+    claims = {"order": 2, "explicit": True, "symmetric": False}
+    names = frozenset({"energy", "p_phi", "cayley_energy"})
+    ledger = judge(Integrator("broken", "other", "", {"axis": broken}, conserves=names, **claims), SPHEROID)
+    relevant = [finding for finding in ledger.findings if finding.verdict != "inapplicable"]
+    assert {finding.verdict for finding in relevant} == {"undecided"}
+    assert all("no luck" in finding.why and len(finding.why) < 260 for finding in relevant)
+    assert {finding.claim: finding.declared for finding in relevant if finding.declared} == {
         "order": "2", "symmetric": "no", "energy": "kept", "p_phi": "kept", "invariant": "cayley_energy",
         "explicit": "yes", "pole": "no pole",
     }  # fmt: skip
@@ -318,13 +318,13 @@ def test_what_cannot_be_judged_says_why():
 
 
 def test_a_method_whose_every_step_is_exact_is_judged_by_its_errors():
-    found = one_finding(order, symtop.integrator("exact-discrete"), "order")
-    assert (found.declared, found.verdict) == ("exact", "confirmed")
-    assert found.value < 1e-12
+    finding = one_finding(order, symtop.integrator("exact-discrete"), "order")
+    assert (finding.declared, finding.verdict) == ("exact", "confirmed")
+    assert finding.value < 1e-12
     liar = dataclasses.replace(symtop.integrator("srkn-14-6"), order=None, exact_steps=True)
-    found = one_finding(order, liar, "order")
-    assert found.verdict == "refuted"
-    assert found.value > 1e-5
+    finding = one_finding(order, liar, "order")
+    assert finding.verdict == "refuted"
+    assert finding.value > 1e-5
     with pytest.raises(symtop.SymtopError, match="exact_steps"):
         dataclasses.replace(symtop.integrator("rk4"), exact_steps=True)
 
@@ -380,15 +380,10 @@ def test_every_file_of_false_claims_is_tested():
     }
 
 
-def run_claims(*arguments):
-    done = call("claims", *arguments, code=None)
-    return done.exit_code, done.output
-
-
 @pytest.mark.parametrize("liar", [pytest.param(n, marks=pytest.mark.slow if n in OWN_KERNEL else []) for n in CAUGHT])
 def test_a_liar_is_caught_for_the_right_reason(liar, clean_registry):
     quick = [] if liar in OWN_KERNEL else ["--quick"]
-    code, output = run_claims("--plugin", str(planted.LIARS / f"{liar}.py"), "--json", *quick)
+    code, output = answer("claims", "--plugin", str(planted.LIARS / f"{liar}.py"), "--json", *quick)
     claim, why = CAUGHT[liar]
     findings = {row.pop("claim"): row for row in json.loads(output)}
     assert code == 1
@@ -408,21 +403,21 @@ HONEST = [
 
 
 @pytest.mark.slow  # `test_honest_claims_are_confirmed` has three of them on the spheroid
-@pytest.mark.parametrize(("name", "where"), list(zip(HONEST, random_scenes(len(HONEST), seed=2024), strict=True)))
-def test_no_false_alarm_on_random_tops(name, where):
-    ledger = judge(symtop.integrator(name), where, quick=name in HONEST[:3])
-    assert [found.sentence(name) for found in ledger.findings if found.verdict == "refuted"] == []
+@pytest.mark.parametrize(("name", "scene"), list(zip(HONEST, random_scenes(len(HONEST), seed=2024), strict=True)))
+def test_no_false_alarm_on_random_tops(name, scene):
+    ledger = judge(symtop.integrator(name), scene, quick=name in HONEST[:3])
+    assert [finding.sentence(name) for finding in ledger.findings if finding.verdict == "refuted"] == []
 
 
 @pytest.mark.slow
 def test_no_registered_integrator_is_refuted_and_few_claims_stay_open():
     ledgers = [judge(method, SPHEROID) for method in symtop.integrators().values()]
-    findings = [(ledger.integrator, found) for ledger in ledgers for found in ledger.findings]
-    judged = [(name, found) for name, found in findings if found.verdict != "inapplicable"]
-    assert [found.sentence(name) for name, found in judged if found.verdict == "refuted"] == []
-    assert sum(found.verdict == "undecided" for _, found in judged) <= len(judged) / 10
-    assert all(found.why for _, found in judged)
-    assert all(math.isfinite(found.resolution) for _, found in judged if found.verdict == "confirmed")
+    findings = [(ledger.integrator, finding) for ledger in ledgers for finding in ledger.findings]
+    relevant = [(name, finding) for name, finding in findings if finding.verdict != "inapplicable"]
+    assert [finding.sentence(name) for name, finding in relevant if finding.verdict == "refuted"] == []
+    assert sum(finding.verdict == "undecided" for _, finding in relevant) <= len(relevant) / 10
+    assert all(finding.why for _, finding in relevant)
+    assert all(math.isfinite(finding.resolution) for _, finding in relevant if finding.verdict == "confirmed")
 
 
 def test_a_finding_without_a_number_is_valid_json():

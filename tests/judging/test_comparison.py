@@ -85,9 +85,9 @@ def test_failed_settings_stay_with_their_outcome_and_are_drawn(data):
     assert failed_setting(cell).startswith(words)
     assert failed_setting(data.sel(variant="taylor[axis]")) == ""
     ax = symtop.plot(data)
-    written = [text.get_text() for text in ax.texts]
-    assert f"stormer-verlet[angles]: {words}" in written
-    assert len({text.split(":")[0] for text in written} & set(data["variant"].values)) == data.sizes["variant"]
+    labels = [text.get_text() for text in ax.texts]
+    assert f"stormer-verlet[angles]: {words}" in labels
+    assert len({text.split(":")[0] for text in labels} & set(data["variant"].values)) == data.sizes["variant"]
     plt.close(ax.figure)
 
 
@@ -166,23 +166,23 @@ def test_a_horizon_beyond_the_budget_is_not_run():
 def test_the_command_prints_a_line_for_each_variant(tmp_path):
     words = ["spheroid", "midpoint", "rk4", "--nutations", "1", "--cost", "evaluations", "--budget", "1e4"]
     figure, output = tmp_path / "c.png", tmp_path / "c.nc"
-    done = call("compare", *words, "--figure", figure, "--output", output)
-    lines = {line.split()[0]: line for line in done.stdout.splitlines() if line}
+    result = call("compare", *words, "--figure", figure, "--output", output)
+    lines = {line.split()[0]: line for line in result.stdout.splitlines() if line}
     assert "not: budget" in lines["midpoint[angles]"]
     assert "not: " not in lines["rk4[axis]"]
     assert any(
-        line.startswith("midpoint[angles]: ") and "its least error was" in line for line in done.stdout.splitlines()
+        line.startswith("midpoint[angles]: ") and "its least error was" in line for line in result.stdout.splitlines()
     )
     assert figure.stat().st_size > 1000
     stored = netcdf.read(output)
-    told = json.loads(call("compare", *words, "--json").stdout)
-    runs = {(one["variant"], one["target"]): one for one in told["cheapest"]}
+    report = json.loads(call("compare", *words, "--json").stdout)
+    runs = {(one["variant"], one["target"]): one for one in report["cheapest"]}
     assert runs["midpoint[angles]", 1e-9] == {
         "variant": "midpoint[angles]", "target": 1e-9, "reached": False, "reason": "budget"
     }  # fmt: skip
     assert runs["rk4[axis]", 1e-6]["force_evaluations"] == least(stored, 1e-6)["rk4[axis]"]
-    assert [told[name] for name in ("scene", "cost")] == ["spheroid", "evaluations"]
-    assert done.stdout.startswith("spheroid to t = 1.18017 s (1 nutations): ")
+    assert [report[name] for name in ("scene", "cost")] == ["spheroid", "evaluations"]
+    assert result.stdout.startswith("spheroid to t = 1.18017 s (1 nutations): ")
     for bad in (["rk5"], [], ["rk4", "--figure", "c.doc"]):
         call("compare", "spheroid", *bad, code=2)
 
@@ -191,14 +191,14 @@ def test_the_command_prints_a_line_for_each_variant(tmp_path):
 def test_times_are_those_of_timeit_by_hand():
     """Within 15 %, in one attempt of five at least: other work on the machine comes and goes."""
     scene, method = symtop.scene("goldstein"), symtop.integrator("rk4[axis]")
-    off = []
+    gaps = []
     for _ in range(5):
         data = symtop.compare(scene, "rk4", nutations=10, budget=1e5, quiet=True)
         place = cheapest(data, 1e-6)[0]
         run = bare_run(scene, method, "axis", data["step_size"].values[0, place], data.attrs["horizon"])
         count, _ = timeit.Timer(run).autorange()
         by_hand = min(timeit.repeat(run, number=max(count // 20, 1), repeat=40)) / max(count // 20, 1)
-        off.append(abs(data["seconds"].values[0, place] / by_hand - 1.0))
-        if off[-1] < 0.15:
+        gaps.append(abs(data["seconds"].values[0, place] / by_hand - 1.0))
+        if gaps[-1] < 0.15:
             return
-    pytest.fail(f"off by {statistics.median(off):.0%}")
+    pytest.fail(f"off by {statistics.median(gaps):.0%}")

@@ -45,11 +45,11 @@ def test_the_memory_of_a_run_does_not_grow_with_its_steps(name):
 
 
 def test_memory_that_grows_with_the_steps_is_seen():
-    good, kept = symtop.integrator("stormer-verlet"), []
+    good, store = symtop.integrator("stormer-verlet"), []
 
     def hoard(top, start, plan):
-        kept.clear()
-        kept.append(np.zeros(4 * round(plan.horizon / plan.step_size)))
+        store.clear()
+        store.append(np.zeros(4 * round(plan.horizon / plan.step_size)))
         return good.solvers["angles"](top, start, plan)
 
     assert 16.0 < bytes_a_step(dataclasses.replace(good, solvers={"angles": hoard})) < 48.0
@@ -70,13 +70,13 @@ def test_a_step_that_blows_up_has_the_time_of_its_finite_steps():
 
 @pytest.mark.parametrize("quick", [True, False])
 def test_finer_runs_after_one_that_fails_late_share_its_steps(quick):
-    made = []
+    steps = []
 
     def fails(f, t, y, h):
-        made.append(h)
+        steps.append(h)
         return y * (math.nan if t > 20.0 * SPHEROID.nutation_period and h > 0.005 * SPHEROID.nutation_period else 1.0)
 
     method = integrator(PythonStep(fails, "axis"))
     run = long_run(method, SPHEROID, "axis", quick=quick, most=4000)
     assert run.outcome == "ok"
-    assert (len(made) < 6000) is quick
+    assert (len(steps) < 6000) is quick

@@ -141,11 +141,11 @@ FORESEEN = {  # the line that tells the faulty rule apart; "" where nothing can
 }  # fmt: skip
 
 
-def judged(row, faulty):
+def ledger_of(row, faulty):
     """The ledger of a row's faulty or mended rule."""
     function, wrong, right, options = RULES[row]
-    given = wrong if faulty else right
-    return symtop.judge(functools.partial(function, **given) if function else given, **{"quick": True} | options)
+    rule = wrong if faulty else right
+    return symtop.judge(functools.partial(function, **rule) if function else rule, **{"quick": True} | options)
 
 
 def page():
@@ -166,14 +166,14 @@ def test_the_page_has_every_report_and_what_was_foreseen():
 def test_the_faulty_rule_is_refuted_and_the_mended_one_is_not(row, only):
     line = FORESEEN[row]
     only(line)
-    assert judged(row, faulty=True).refuted == [line] == [page()[row][1]]
-    assert judged(row, faulty=False).refuted == []
+    assert ledger_of(row, faulty=True).refuted == [line] == [page()[row][1]]
+    assert ledger_of(row, faulty=False).refuted == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("row", RULES)
 def test_what_the_page_says_is_what_judge_says(row):
-    mended, faulty = judged(row, faulty=False), judged(row, faulty=True)
+    mended, faulty = ledger_of(row, faulty=False), ledger_of(row, faulty=True)
     assert mended.refuted == []
     assert mended["order"].verdict == "confirmed"
     assert ", ".join(faulty.refuted) == page()[row][1]

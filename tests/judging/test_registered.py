@@ -48,11 +48,11 @@ def claims(plugin, *names):
 
 def test_a_plug_in_that_fails_is_told_of(tmp_path):
     (tmp_path / "plugin.py").write_text(PLUGIN)
-    said = {"nothing": "must return a Run", "leaves": "ended with code 0", "crashes": "was ended by SIGSEGV"}
-    names = [f"{name}-at-once" for name in said]
+    expected = {"nothing": "must return a Run", "leaves": "ended with code 0", "crashes": "was ended by SIGSEGV"}
+    names = [f"{name}-at-once" for name in expected]
     code, out, _ = claims(tmp_path / "plugin.py", *names)
     assert code == 1
-    for name, words in zip(names, said.values(), strict=True):
+    for name, words in zip(names, expected.values(), strict=True):
         own = [line for line in out.splitlines() if line.startswith(f"{name}, ")]
         assert any(words in line for line in own), own
 

@@ -49,28 +49,28 @@ def test_a_csv_file_has_the_errors_and_the_drift_of_its_states(table, tmp_path):
 
 def test_an_energy_that_blows_up_is_said_to(table):
     """Euler's method gains energy; that of `table` drifts, and friction that takes all of it is no blow-up."""
-    stepper, given = open_target(euler, None, "axis"), {"time": table[:101, 0], "axis": table[:101, 1:4]}
+    stepper, columns = open_target(euler, None, "axis"), {"time": table[:101, 0], "axis": table[:101, 1:4]}
     par, state = FORMULATIONS["axis"].prepare(SPHEROID.top, SPHEROID.start)
     states = stepper.march(SPHEROID.top, par, np.array(state), H, STRIDE * np.arange(101)).states
     states[:, :3] /= np.linalg.norm(states[:, :3], axis=1)[:, None]
-    ledger = symtop.judge({"time": given["time"], "axis": states[:, :3], "momentum": states[:, 3:]}, energy="bounded")
+    ledger = symtop.judge({"time": columns["time"], "axis": states[:, :3], "momentum": states[:, 3:]}, energy="bounded")
     assert ledger["energy"].measured.kind == "blows up"
     assert ledger.refuted == ["energy"]
     assert "energy         blows up at t = " in str(ledger)
-    lost = symtop.judge(given | {"momentum": np.exp(-given["time"])[:, None] * table[:101, 4:]}, energy="bounded")
-    assert lost["energy"].measured.kind != "blows up"
+    damped = symtop.judge(columns | {"momentum": np.exp(-columns["time"])[:, None] * table[:101, 4:]}, energy="bounded")
+    assert damped["energy"].measured.kind != "blows up"
 
 
 def test_a_netcdf_file_a_mapping_and_blanks_are_the_same(table, tmp_path):
-    given = {"time": table[:, 0], "axis": table[:, 1:4], "momentum": table[:, 4:]}
-    plain = symtop.judge(given)
+    columns = {"time": table[:, 0], "axis": table[:, 1:4], "momentum": table[:, 4:]}
+    plain = symtop.judge(columns)
     (tmp_path / "run.txt").write_text("# " + text(table).replace(",", "  "), encoding="utf-8")
     names = {"axis": ("time", "component"), "momentum": ("time", "component")}
-    data = xr.Dataset({name: (names[name], given[name]) for name in names}, {"time": given["time"]})
+    data = xr.Dataset({name: (names[name], columns[name]) for name in names}, {"time": columns["time"]})
     netcdf.write(data, tmp_path / "run.nc")
     for file in ("run.txt", "run.nc"):
-        found = symtop.judge(str(tmp_path / file))
-        assert [one.value for one in found.findings] == [one.value for one in plain.findings]
+        ledger = symtop.judge(str(tmp_path / file))
+        assert [one.value for one in ledger.findings] == [one.value for one in plain.findings]
 
 
 def test_reported_constants_do_not_hide_those_of_the_states(table):
@@ -82,31 +82,31 @@ def test_reported_constants_do_not_hide_those_of_the_states(table):
 
 
 def test_a_claim_that_the_samples_do_not_show_is_undecided_and_not_lost(table, tmp_path):
-    file, given = tmp_path / "run.csv", {"time": table[:, 0], "axis": table[:, 1:4]}
+    file, columns = tmp_path / "run.csv", {"time": table[:, 0], "axis": table[:, 1:4]}
     claims = ["p_phi", "axis_length"]
-    ledger = symtop.judge(given, conserves=claims, energy="bounded")
+    ledger = symtop.judge(columns, conserves=claims, energy="bounded")
     assert {one.claim: one.declared for one in ledger.findings if one.verdict == "undecided"} == {
         "energy": "bounded", "p_phi": "kept", "axis_length": "kept",
     }  # fmt: skip
     assert "the trajectory shows no p_phi; it would with p_phi" in ledger["p_phi"].why
     assert "p_psi" not in ledger  # nobody claims it
     assert "Claims: 3 undecided." in str(ledger)
-    whole = symtop.judge(given | {"momentum": table[:, 4:]}, conserves=claims, energy="bounded")
+    whole = symtop.judge(columns | {"momentum": table[:, 4:]}, conserves=claims, energy="bounded")
     assert (whole["p_phi"].verdict, whole["energy"].verdict) == ("confirmed", "refuted")
     file.write_text(text(table[:, :4], "time,ex,ey,ez"), encoding="utf-8")
-    done = call("judge", file, "--conserves", "p_phi", "--energy", "kept")  # nothing is refuted
-    assert "Claims: 2 undecided." in done.output
-    assert "the trajectory shows no energy" in " ".join(done.output.split())
+    result = call("judge", file, "--conserves", "p_phi", "--energy", "kept")  # nothing is refuted
+    assert "Claims: 2 undecided." in result.output
+    assert "the trajectory shows no energy" in " ".join(result.output.split())
 
 
 def test_an_unknown_claim_about_a_trajectory_is_refused_and_one_that_a_ledger_has_not(table, tmp_path):
     (tmp_path / "run.csv").write_text(text(table), encoding="utf-8")
-    done = call("judge", tmp_path / "run.csv", "--conserves", "p_phi,enrgy", code=2)
-    assert "'enrgy' is unknown; did you mean energy" in done.output
-    given = {"time": table[:, 0], "axis": table[:, 1:4]}
+    result = call("judge", tmp_path / "run.csv", "--conserves", "p_phi,enrgy", code=2)
+    assert "'enrgy' is unknown; did you mean energy" in result.output
+    columns = {"time": table[:, 0], "axis": table[:, 1:4]}
     with pytest.raises(symtop.SymtopError, match="conserves must be a set of names, not 'p_phi'"):
-        symtop.judge(given, conserves="p_phi")
-    ledger = symtop.judge(given)
+        symtop.judge(columns, conserves="p_phi")
+    ledger = symtop.judge(columns)
     assert [ledger[claim].claim for claim in ledger] == ["axis_error", "theta_error"]
     with pytest.raises(symtop.SymtopError, match="claim 'order' is not in this ledger, which has axis_error, theta_"):
         ledger["order"]
@@ -115,8 +115,8 @@ def test_an_unknown_claim_about_a_trajectory_is_refused_and_one_that_a_ledger_ha
 def test_the_true_motion_keeps_everything():
     truth = symtop.reference(SPHEROID, np.linspace(0.0, 60.0, 801))
     names = ("axis", "quaternion", "energy", "p_phi", "p_psi")
-    given = {"time": truth["time"].values} | {name: truth[name].values for name in names}
-    ledger = symtop.judge(given, conserves=["p_phi", "p_psi"], energy="kept")
+    columns = {"time": truth["time"].values} | {name: truth[name].values for name in names}
+    ledger = symtop.judge(columns, conserves=["p_phi", "p_psi"], energy="kept")
     assert ledger.refuted == []
     assert {ledger[name].verdict for name in ("energy", "p_phi", "p_psi")} == {"confirmed"}
     assert max(ledger[f"{name}_error"].value for name in ("axis", "attitude", "theta")) < 1e-13
@@ -125,8 +125,8 @@ def test_the_true_motion_keeps_everything():
 def test_the_command_takes_a_file(table, tmp_path):
     file = tmp_path / "run.csv"
     file.write_text(text(table), encoding="utf-8")
-    done = call("judge", file, "--energy", "kept", "--json", code=1)
-    assert {row["claim"]: row["verdict"] for row in json.loads(done.output)}["energy"] == "refuted"
+    result = call("judge", file, "--energy", "kept", "--json", code=1)
+    assert {row["claim"]: row["verdict"] for row in json.loads(result.output)}["energy"] == "refuted"
     assert "a card shows a method" in call("judge", file, "--card", tmp_path / "card.html", code=2).output
 
 
@@ -175,10 +175,10 @@ def test_a_body_is_judged_by_attitudes_and_rates(scene, tmp_path):
     turned = true.copy()  # an attitude that creeps, and rates that are right
     turned[:, 1:5] = [product(rows[1:5], (1.0, 1e-4 * rows[0], 0.0, 0.0)) for rows in true]
     file.write_text(text(turned, OF_BODY), encoding="utf-8")
-    off = symtop.judge(file, scene=scene)
-    assert off["attitude_error"].value == pytest.approx(4e-3, rel=1e-3)
-    assert off["rates_error"].value < 1e-13
-    assert off["momentum_error"].value > 1e-5
+    other = symtop.judge(file, scene=scene)
+    assert other["attitude_error"].value == pytest.approx(4e-3, rel=1e-3)
+    assert other["rates_error"].value < 1e-13
+    assert other["momentum_error"].value > 1e-5
     file.write_text(text(of_body(scene, 1.001), OF_BODY), encoding="utf-8")
     assert symtop.judge(file, scene=scene)["rates_error"].value == pytest.approx(
         1e-3 * np.linalg.norm(true[:, 5:], axis=1).max(), rel=1e-9
@@ -190,8 +190,8 @@ def test_a_conjugate_attitude_of_a_body_is_refused_although_it_starts_right(tmp_
     file, wrong = tmp_path / "run.csv", of_body("check-case-2")
     wrong[:, 1:5] *= CONJUGATE
     file.write_text(text(wrong, OF_BODY), encoding="utf-8")
-    done = call("judge", file, "--scene", "check-case-2", code=2)
-    assert "its sample at t = 0.2 is the true one if it is read as from space to body" in done.stderr
+    result = call("judge", file, "--scene", "check-case-2", code=2)
+    assert "its sample at t = 0.2 is the true one if it is read as from space to body" in result.stderr
     axis, late = text(wrong[:, [0, 5, 6, 7]], "time,wx,wy,wz"), np.copy(wrong[:, :5])
     for content, words in [
         (axis, "one of axis, quaternion, theta"),
@@ -209,7 +209,7 @@ def test_rates_of_a_top_are_its_momentum():
     run = symtop.simulate(SPHEROID, "strang[attitude]", step_size=1e-3, horizon=3.0, samples=31)
     q, axis = run["quaternion"].values, run["axis"].values
     rates = np.ones((len(q), 3)) * [0.3, -0.2, 0.5]
-    given = {"time": run["time"].values, "quaternion": q, "omega_body": rates, "axis": axis}
-    energy = symtop.judge(given)["energy"]
+    columns = {"time": run["time"].values, "quaternion": q, "omega_body": rates, "axis": axis}
+    energy = symtop.judge(columns)["energy"]
     moving = 0.5 * (top.I1 * 0.13 + top.I3 * 0.25) + top.mgl * axis[:, 2]
     assert energy.value == pytest.approx(np.abs(moving - moving[0]).max() / SPHEROID.energy_scale, rel=1e-9)

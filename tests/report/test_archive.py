@@ -45,8 +45,8 @@ def results(tmp_path_factory):
     (case,) = STUDY.cases(True)
     data = netcdf.describe(datasets.combine([(case, STUDY.measure(case))]), "Small", question=STUDY.question)
     netcdf.write(data, folder / "small.nc")
-    found = runner.findings_of(STUDY, data, folder, style.save, failures=[], cases=1)
-    netcdf.write_json(folder / "peers.json", found | {"study": "peers", "measured": "once"})
+    findings = runner.findings_of(STUDY, data, folder, style.save, failures=[], cases=1)
+    netcdf.write_json(folder / "peers.json", findings | {"study": "peers", "measured": "once"})
     (folder / "cases" / "small").mkdir(parents=True)
     (folder / "cases" / "small" / "one.nc").write_bytes(b"a case")
     (folder / "figures" / "old.png").write_bytes(b"not shown")
@@ -58,9 +58,9 @@ def bundled(results):
     """Its bundle: contents by name, without the folder that they are in."""
     path = archive.bundle(results)
     assert path == results / f"{archive.NAME}.zip"
-    with zipfile.ZipFile(path) as held:
-        assert held.testzip() is None
-        return {name.removeprefix(f"{archive.NAME}/"): held.read(name) for name in held.namelist()}
+    with zipfile.ZipFile(path) as file:
+        assert file.testzip() is None
+        return {name.removeprefix(f"{archive.NAME}/"): file.read(name) for name in file.namelist()}
 
 
 def test_it_holds_what_the_report_is_made_of_and_no_more(bundled):
@@ -76,7 +76,7 @@ def test_it_holds_what_the_report_is_made_of_and_no_more(bundled):
 def test_every_file_has_its_sum(bundled):
     sums = dict(reversed(line.split("  ")) for line in bundled["SHA256SUMS"].decode().splitlines())
     assert sums.keys() == bundled.keys() - {"SHA256SUMS"}
-    assert all(hashlib.sha256(bundled[name]).hexdigest() == told for name, told in sums.items())
+    assert all(hashlib.sha256(bundled[name]).hexdigest() == digest for name, digest in sums.items())
 
 
 def test_the_readme_names_every_file_and_describes_every_variable(bundled):
@@ -86,7 +86,7 @@ def test_the_readme_names_every_file_and_describes_every_variable(bundled):
     states = readme.partition("### scenes/states.nc")[2]
     assert re.findall(r"\| theta_lo \| scene \(\d+\) x sample \(10\) \| rad \| \S", states)
     assert netcdf.provenance()["symtop_revision"] in readme
-    assert max(map(len, archive.INTRODUCTION.splitlines())) <= 120
+    assert max(map(len, readme.partition("## Files")[0].splitlines())) <= 120
 
 
 def test_the_states_can_be_read_from_the_bundle(bundled, tmp_path):
@@ -98,8 +98,8 @@ def test_the_states_can_be_read_from_the_bundle(bundled, tmp_path):
 
 
 def test_the_same_results_make_the_same_bundle(results, bundled, tmp_path):
-    with zipfile.ZipFile(archive.bundle(results, tmp_path / "again.zip")) as held:
-        again = {name.removeprefix(f"{archive.NAME}/"): held.read(name) for name in held.namelist()}
+    with zipfile.ZipFile(archive.bundle(results, tmp_path / "again.zip")) as file:
+        again = {name.removeprefix(f"{archive.NAME}/"): file.read(name) for name in file.namelist()}
     dated = {"results/report.html", "SHA256SUMS"}  # the page says the day
     assert {name for name in bundled if again[name] != bundled[name]} <= dated
 

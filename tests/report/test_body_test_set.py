@@ -21,7 +21,7 @@ KINDS = ("near-separatrix", "regular", "lagrange")
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory):
+def bodies(tmp_path_factory):
     """A test set of three problems over one natural period, and their scenes."""
     patch = pytest.MonkeyPatch()
     patch.setattr(test_set, "PERIODS", 1.0)
@@ -39,9 +39,9 @@ def read(file):
 def checked(folder, mine, reference="states-17.csv"):
     """Of each problem the largest errors of attitude and momentum and the number beyond the bound."""
     words = [sys.executable, str(folder / "check.py"), str(mine), str(folder / reference)]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
-    rows = [line.split() for line in done.stdout.splitlines()]
-    return {row[0]: (float(row[2]), float(row[5]), int(row[6])) for row in rows}, done.stdout
+    result = subprocess.run(words, capture_output=True, text=True, check=True)
+    rows = [line.split() for line in result.stdout.splitlines()]
+    return {row[0]: (float(row[2]), float(row[5]), int(row[6])) for row in rows}, result.stdout
 
 
 def own_file(path, scenes, times, change=lambda body: body):
@@ -59,20 +59,20 @@ def own_file(path, scenes, times, change=lambda body: body):
     return path
 
 
-def test_the_reference_has_nothing_beyond_its_bounds(written):
-    folder, scenes = written
+def test_the_reference_has_nothing_beyond_its_bounds(bodies):
+    folder, scenes = bodies
     for reference in ("states-17.csv", "states-30.csv"):
-        found, _ = checked(folder, folder / reference, reference)
-        assert [*found] == [scene.name for scene in scenes]
-        assert all(beyond == 0 and attitude == momentum == 0.0 for attitude, momentum, beyond in found.values())
-    found, _ = checked(folder, folder / "states-30.csv")  # rounding to 17 digits is within the bound
-    assert all(beyond == 0 and 0.0 < attitude < 2e-16 for attitude, _, beyond in found.values())
+        rows, _ = checked(folder, folder / reference, reference)
+        assert [*rows] == [scene.name for scene in scenes]
+        assert all(beyond == 0 and attitude == momentum == 0.0 for attitude, momentum, beyond in rows.values())
+    rows, _ = checked(folder, folder / "states-30.csv")  # rounding to 17 digits is within the bound
+    assert all(beyond == 0 and 0.0 < attitude < 2e-16 for attitude, _, beyond in rows.values())
     with pytest.raises(subprocess.CalledProcessError):
         checked(folder, folder / "problems.csv")
 
 
-def test_a_sign_in_the_inertia_is_found_by_both_checkers(written, tmp_path):
-    folder, scenes = written
+def test_a_sign_in_the_inertia_is_found_by_both_checkers(bodies, tmp_path):
+    folder, scenes = bodies
     times = read(folder / "states-17.csv")
     right = own_file(tmp_path / "right.csv", scenes, times)
     wrong = own_file(tmp_path / "wrong.csv", scenes, times, lambda b: RigidBody(*b.moments[::-1], b.mgl, b.centre))
@@ -85,14 +85,14 @@ def test_a_sign_in_the_inertia_is_found_by_both_checkers(written, tmp_path):
     subprocess.run([compiler, str(folder / "check.c"), "-o", str(tmp_path / "check"), "-lm"], check=True)
     for mine, answer in ((wrong, shown), (folder / "states-17.csv", None)):
         words = [str(tmp_path / "check"), str(mine), str(folder / "states-17.csv")]
-        done = subprocess.run(words, capture_output=True, text=True, check=True).stdout
-        assert done == answer if answer else done.count(" 0 beyond the bound") == len(scenes)
+        result = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+        assert result == answer if answer else result.count(" 0 beyond the bound") == len(scenes)
 
 
-def test_the_digits_are_those_of_other_ways(written):
+def test_the_digits_are_those_of_other_ways(bodies):
     """A free body by its closed form in 50 digits, heavy ones in quadruple precision; the pairs of doubles likewise."""
     pytest.importorskip("heyoka")
-    folder, scenes = written
+    folder, scenes = bodies
     data, rows = netcdf.read(folder / "states.nc"), read(folder / "states-30.csv")
     for scene in scenes:
         times = data["time"].sel(problem=scene.name).values
@@ -123,8 +123,8 @@ def test_a_start_that_is_moved_by_a_rounding_is_another_motion(monkeypatch):
     one, again = (body_digits(scene.top, scene.start, [0.5]) for _ in range(2))
     assert one == again
     w1, w2, w3 = scene.start.omega_body
-    moved = body_digits(scene.top, Attitude(scene.start.quaternion, (np.nextafter(w1, 9.0), w2, w3)), [0.5])
-    assert 1e-18 < abs(moved.momentum[0][0] - one.momentum[0][0]) < 1e-14
+    other = body_digits(scene.top, Attitude(scene.start.quaternion, (np.nextafter(w1, 9.0), w2, w3)), [0.5])
+    assert 1e-18 < abs(other.momentum[0][0] - one.momentum[0][0]) < 1e-14
     monkeypatch.setattr("symtop.model.exact.body_digits.LONGEST", 5)
     with pytest.raises(symtop.SymtopError, match="times must be within 5 steps of the series, not reach 1000"):
         body_digits(scene.top, scene.start, [1000.0])
@@ -133,5 +133,5 @@ def test_a_start_that_is_moved_by_a_rounding_is_another_motion(monkeypatch):
 def test_the_command_refuses_a_folder_that_holds_something(tmp_path):
     (tmp_path / "test-set").mkdir()
     (tmp_path / "test-set" / "mine").touch()
-    done = call("archive", "--test-set", "--results", tmp_path, code=2)
-    assert "the test set needs a folder that is new or empty" in done.stderr
+    result = call("archive", "--test-set", "--results", tmp_path, code=2)
+    assert "the test set needs a folder that is new or empty" in result.stderr

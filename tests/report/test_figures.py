@@ -33,34 +33,34 @@ def least_text(figure) -> tuple[float, str]:
 
 def faults(name, figure) -> list[str]:
     """What keeps a figure from being read: nothing, of a good one."""
-    found = []
+    problems = []
     least, text = least_text(figure)
     if least < style.LEAST_TEXT - 1e-9:
-        found.append(f"{text!r} has {least:.1f} points")
+        problems.append(f"{text!r} has {least:.1f} points")
     if (
         not figure.get_suptitle() and runner.file_beside(name, "page.md") is None
     ):  # a template has the titles of its figures
-        found.append("no message")
+        problems.append("no message")
     legends = [*figure.legends, *(axis.get_legend() for axis in figure.axes if axis.get_legend())]
     most = max((len(one.get_texts()) for one in legends), default=0)
     if most > MOST_ENTRIES and name not in (*SHOWN_BY_ORDER, *KEYED):
-        found.append(f"a legend of {most} entries")
+        problems.append(f"a legend of {most} entries")
     for axis in figure.axes if name not in SHOWN_BY_ORDER else []:
         kinds = {line.get_label() for line in axis.get_lines() if saturation(line.get_color()) > GREYS}
         if len(kinds - {label for label in kinds if label.startswith("_")}) > MOST_LINES:
-            found.append(f"{len(kinds)} coloured lines")
-    return found
+            problems.append(f"{len(kinds)} coloured lines")
+    return problems
 
 
 @pytest.mark.parametrize("name", runner.names())
 def test_every_figure_can_be_read_in_print(name, quick_results):
     data = netcdf.read_any(quick_results / f"{name}.nc")
     study = runner.load(name)
-    drawn = [one for one in study.pictures(data) if not hasattr(one.figure, "suffix")]
-    assert drawn or study.facts(data)["busy"]  # times of a busy machine are not drawn
-    assert {one.name: faults(name, one.figure) for one in drawn} == {one.name: [] for one in drawn}
-    assert all(one.figure.get_figwidth() <= style.WIDTH for one in drawn)
-    assert all(one.figure.get_figheight() <= 10.0 for one in drawn)  # inches: a page
+    pictures = [one for one in study.pictures(data) if not hasattr(one.figure, "suffix")]
+    assert pictures or study.facts(data)["busy"]  # times of a busy machine are not drawn
+    assert {one.name: faults(name, one.figure) for one in pictures} == {one.name: [] for one in pictures}
+    assert all(one.figure.get_figwidth() <= style.WIDTH for one in pictures)
+    assert all(one.figure.get_figheight() <= 10.0 for one in pictures)  # inches: a page
 
 
 def test_a_figure_that_cannot_be_read_is_found(monkeypatch):
@@ -106,23 +106,23 @@ def test_labels_keep_their_order_and_their_distance(places):
 
 
 @pytest.mark.parametrize(
-    ("value", "said"),
+    ("value", "text"),
     [(1e-6, "10⁻⁶"), (1.4e-13, "1.4 × 10⁻¹³"), (0.0123, "0.012"), (185.3, "185"), (1093.0, "1093"),
      (30012.0, "3 × 10⁴"), (7.0, "7")],
 )  # fmt: skip
-def test_a_number_of_a_title(value, said):
-    assert formats.number(value).replace(formats.FIRM, " ") == said
+def test_a_number_of_a_title(value, text):
+    assert formats.number(value).replace(formats.FIRM, " ") == text
     assert " " not in formats.number(value)
 
 
 def test_a_published_figure_has_a_vector_beside_it_and_the_same_bytes_again(tmp_path):
-    written = []
+    files = []
     for folder in ("one", "two"):
         figure, axes = style.panels(1, 1)
         axes[0, 0].plot([1.0, 2.0])
         style.publish(figure, tmp_path / folder / "a.png")
-        written.append([(tmp_path / folder / f"a.{kind}").read_bytes() for kind in ("png", "pdf")])
-    assert written[0] == written[1]
-    assert written[0][1].startswith(b"%PDF")
-    with_pixels = np.frombuffer(written[0][0][16:24], ">u4")
+        files.append([(tmp_path / folder / f"a.{kind}").read_bytes() for kind in ("png", "pdf")])
+    assert files[0] == files[1]
+    assert files[0][1].startswith(b"%PDF")
+    with_pixels = np.frombuffer(files[0][0][16:24], ">u4")
     assert with_pixels[0] == round(style.WIDTH * style.DPI)

@@ -65,11 +65,11 @@ def test_failed_runs_are_named_and_angles_end_at_pi(quantity, most):
     for name, fail in (("stormer-verlet", True), ("strang", False)):
         runs = symtop.ensemble(tops, name, per_nutation=30, nutations=2, quiet=True)
         ax = symtop.plot(runs, members=tops, quantity=quantity)
-        said = [text.get_text() for text in ax.texts]
-        assert said == ["1 %", "10 %", "median", *(f"{level} %{': failed' * fail}" for level in (90, 99))]
-        drawn = np.concatenate([band.get_paths()[0].vertices[:, 1] for band in ax.collections])
-        assert drawn.max() <= most
-        assert (drawn.max() == most) == fail
+        texts = [text.get_text() for text in ax.texts]
+        assert texts == ["1 %", "10 %", "median", *(f"{level} %{': failed' * fail}" for level in (90, 99))]
+        heights = np.concatenate([band.get_paths()[0].vertices[:, 1] for band in ax.collections])
+        assert heights.max() <= most
+        assert (heights.max() == most) == fail
         plt.close(ax.figure)
 
 
@@ -83,9 +83,9 @@ def sweep():
 def test_what_is_no_number_of_each_run_is_no_x_of_a_sweep(sweep, x):
     with pytest.raises(
         SymtopError, match=r"^x .* is unknown; (known: step_size, tolerance, steps|did you mean)"
-    ) as said:
+    ) as info:
         symtop.plot(sweep, plt.figure().gca(), x=x)
-    assert "outcome," not in str(said.value)
+    assert "outcome," not in str(info.value)
 
 
 def test_one_integrator_or_scene_of_a_sweep_is_drawn(sweep):

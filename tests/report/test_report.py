@@ -123,9 +123,9 @@ def test_a_table_in_full_is_opened_searched_sorted_and_saved(browser):
     every = browser.evaluate(names)
     assert every == list(symtop.integrators())
     browser.set(f"{fold} input", "gauss compiled")
-    found = browser.evaluate(names)
-    assert {"gauss-2", "gauss-12"} <= set(found)
-    assert "rk4" not in found
+    rows_shown = browser.evaluate(names)
+    assert {"gauss-2", "gauss-12"} <= set(rows_shown)
+    assert "rk4" not in rows_shown
     browser.set(f"{fold} input", "no such method")
     assert browser.evaluate(f"{names}.length") == 0
     browser.set(f"{fold} input", "")
@@ -159,12 +159,12 @@ def test_the_keyboard_reaches_content_tables_and_points(browser):
     reachable = "[...document.querySelectorAll('.scroll, .chart svg')].filter(one => one.tabIndex || !one.ariaLabel)"
     assert browser.evaluate(f"{reachable}.length") == 0
     browser.evaluate("document.querySelector('.chart svg').focus()")
-    said = []
+    tips = []
     for _ in range(2):
         browser.press("ArrowRight")
-        said.append(browser.evaluate("document.querySelector('.chart .tip').textContent"))
-    assert said[0] != said[1]
-    assert all(re.search("step|tolerance", one) for one in said)
+        tips.append(browser.evaluate("document.querySelector('.chart .tip').textContent"))
+    assert tips[0] != tips[1]
+    assert all(re.search("step|tolerance", one) for one in tips)
     browser.press("Escape")
     assert browser.evaluate("document.querySelector('.chart .tip').hidden")
 
@@ -215,11 +215,11 @@ def test_pointing_at_a_run_shows_what_it_was(browser, results):
 
 def test_methods_cost_error_and_run_length_are_chosen(browser, results):
     browser.resize(1280, 900)
-    marks, drawn = (
+    marks, lines = (
         "document.querySelectorAll('.chart .mark').length",
         "document.querySelector('.chart svg').innerHTML.split('<circle')[0]",
     )
-    everything, before = browser.evaluate(marks), browser.evaluate(drawn)
+    everything, before = browser.evaluate(marks), browser.evaluate(lines)
     data = xr.load_dataset(results / "speed.nc").sel(scene="goldstein").isel(nutations=0)
     good = (data["axis"] > 0.0) & (data["seconds"] > 0.0) & (data["variant"] != "exact")
     assert everything == int(good.sum())
@@ -239,11 +239,11 @@ def test_methods_cost_error_and_run_length_are_chosen(browser, results):
         select = f".chart select[name='{menu}']"
         first = browser.evaluate(f'document.querySelector("{select}").value')
         browser.set(select, choice)
-        assert browser.evaluate(drawn) != before
+        assert browser.evaluate(lines) != before
         assert shown in browser.evaluate(labels)
         assert bool(browser.evaluate(key)) is (menu == "run length")  # the bound is that of the axis over its time
         browser.set(select, first)
-        assert browser.evaluate(drawn) == before
+        assert browser.evaluate(lines) == before
 
 
 def test_the_chart_takes_the_place_of_its_figure_on_the_screen_and_not_in_print(browser):

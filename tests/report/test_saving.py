@@ -8,7 +8,7 @@ from PIL import Image
 from symtop.report import style
 
 
-def drawn() -> Figure:
+def sample_figure() -> Figure:
     """A figure with a layout, a legend, a shared axis and a formula."""
     figure, axes = style.panels(1, 2, sharey=True)
     for k, axis in enumerate(axes.flat):
@@ -27,6 +27,6 @@ def pixels(path, mode: str) -> np.ndarray:
 
 @pytest.mark.parametrize(("write", "dpi"), [(style.sketch, style.SKETCHED), (style.publish, style.DPI)])
 def test_a_picture_has_the_pixels_of_savefig(tmp_path, write, dpi):
-    write(drawn(), tmp_path / "a.png")
-    drawn().savefig(tmp_path / "b.png", dpi=dpi)
+    write(sample_figure(), tmp_path / "a.png")
+    sample_figure().savefig(tmp_path / "b.png", dpi=dpi)
     assert np.array_equal(pixels(tmp_path / "a.png", "RGBA"), pixels(tmp_path / "b.png", "RGBA"))

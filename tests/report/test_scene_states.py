@@ -26,7 +26,7 @@ def like(entry):
     return symtop.Scene("stored", top, start, float(entry["t"]))
 
 
-def apart(printed, stored):
+def digit_gap(printed, stored):
     """By how many units of the last of 30 digits two numbers differ."""
     digit = Decimal(stored).adjusted() - (DIGITS - 1)
     return abs(Decimal(printed) - Decimal(stored)).scaleb(-digit)
@@ -39,9 +39,9 @@ def test_thirty_digits_agree_with_four_independent_evaluations(truth, name):
     assert float(row["time"]) == float(entry["t"])
     stored = {ours: entry["state"][theirs] for ours, theirs in THEIRS.items()}
     stored |= dict(zip(COLUMNS[6:], [*entry["axis_xyz"], *entry["quaternion_wxyz"]], strict=True))
-    assert all(apart(row[column], value) <= 1 for column, value in stored.items())
+    assert all(digit_gap(row[column], value) <= 1 for column, value in stored.items())
     other = read(archive.states_csv([like(entry | {"mgl": str(float(entry["mgl"]) * (1.0 + 2.3e-16))})]))[-1]
-    assert apart(other["theta"], stored["theta"]) > 1e10  # another last bit of mgl is another motion
+    assert digit_gap(other["theta"], stored["theta"]) > 1e10  # another last bit of mgl is another motion
 
 
 def test_every_scene_has_ten_times_up_to_its_horizon():

@@ -39,9 +39,9 @@ def test_a_page_is_short_and_its_figures_have_titles_captions_and_words_for_the_
     assert len(text.split()) <= MOST_WORDS
     figures = CALL.findall(text)
     assert len(re.findall(r"figure\(", text)) == len(figures) <= MOST_FIGURES
-    for given, caption in figures:
-        assert re.search(r'title="[^"]{8,}"', given), given
-        assert re.search(r'alt="[^"]{20,}"', given), given
+    for arguments, caption in figures:
+        assert re.search(r'title="[^"]{8,}"', arguments), arguments
+        assert re.search(r'alt="[^"]{20,}"', arguments), arguments
         assert len(caption.split()) > 8, caption
 
 
@@ -57,9 +57,9 @@ def test_the_front_page_renders_without_any_study_and_with_what_there_is(tmp_pat
     assert template.GAP not in text
     facts = {"bounds": 4, "bounds_held": 3, "closed_form": 1e-16, "digits": 45}
     study = {"study": "truth", "title": "Truth", "facts": facts, "pictures": [], "tables": []}
-    said = template.front(TEXTS["front"], [study], tmp_path, {"truth": "[How?](#how)"})
-    assert "3 of 4 error bounds hold" in said
-    assert "[Truth](#how)" in said
+    page = template.front(TEXTS["front"], [study], tmp_path, {"truth": "[How?](#how)"})
+    assert "3 of 4 error bounds hold" in page
+    assert "[Truth](#how)" in page
 
 
 PAGE = """# {{ question }}

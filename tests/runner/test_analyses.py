@@ -16,7 +16,7 @@ from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool
 from symtop.runner.run import analyse_stored, drawing_digest
 from symtop.runner.study import Case
-from tests.commands import call, leftovers, same
+from tests.commands import answer, leftovers, same
 
 SCRIPT = """
 import os, signal
@@ -47,12 +47,12 @@ STUDY = Study(NAME, NAME, "Who?", cases, measure, facts)
 def script(tmp_path):
     """Writes the study of a name, and returns its file."""
 
-    def written(name):
+    def write(name):
         file = tmp_path / f"{name}.py"
         file.write_text(f"NAME = {name!r}\n{SCRIPT}")
         return str(file)
 
-    return written
+    return write
 
 
 @pytest.fixture(scope="module")
@@ -70,23 +70,22 @@ def shared(pool, monkeypatch):
 
 def studied(results, *files):
     """Exit code and output of one command for several studies."""
-    done = call("study", *files, "--results", results, "--jobs", "2", code=None)
-    return done.exit_code, done.output
+    return answer("study", *files, "--results", results, "--jobs", 2)
 
 
-def said_by(results, name):
+def process_of(results, name):
     return json.loads((results / f"{name}.json").read_text())["facts"]["said_by"]
 
 
 def test_each_of_several_is_concluded_by_another_process_to_the_same_files(script, tmp_path):
     files = [script("first"), script("second")]
-    code, told = studied(tmp_path / "together", *files)
-    assert code == 0, told
-    assert told.index("first: 2 of 2") < told.index("second: 2 of 2")
-    assert {said_by(tmp_path / "together", name) == os.getpid() for name in ("first", "second")} == {False}
+    code, output = studied(tmp_path / "together", *files)
+    assert code == 0, output
+    assert output.index("first: 2 of 2") < output.index("second: 2 of 2")
+    assert {process_of(tmp_path / "together", name) == os.getpid() for name in ("first", "second")} == {False}
     for file in files:
         assert studied(tmp_path / "alone", file)[0] == 0  # the control: one by itself has nothing to run beside
-    assert {said_by(tmp_path / "alone", name) for name in ("first", "second")} == {os.getpid()}
+    assert {process_of(tmp_path / "alone", name) for name in ("first", "second")} == {os.getpid()}
     assert same(tmp_path / "together", tmp_path / "alone") == 6
     assert "0 of 2 cases computed" in studied(tmp_path / "together", *files)[1]
     assert not leftovers(tmp_path / "together")
@@ -94,10 +93,10 @@ def test_each_of_several_is_concluded_by_another_process_to_the_same_files(scrip
 
 @pytest.mark.usefixtures("shared")
 def test_a_process_that_is_killed_is_done_without(script, tmp_path):
-    code, told = studied(tmp_path / "r", script("killed"), script("second"))
-    assert code == 0, told
-    assert said_by(tmp_path / "r", "killed") == os.getpid()
-    assert "second: 2 of 2 cases computed" in told  # by whichever process was left
+    code, output = studied(tmp_path / "r", script("killed"), script("second"))
+    assert code == 0, output
+    assert process_of(tmp_path / "r", "killed") == os.getpid()
+    assert "second: 2 of 2 cases computed" in output  # by whichever process was left
     assert not leftovers(tmp_path / "r")
 
 
@@ -105,10 +104,10 @@ def test_a_case_whose_file_is_gone_has_failed(script, tmp_path, pool):
     """The study is not taken for whole without it, and the next run computes it again."""
     study, results = runner.load(script("first")), tmp_path / "r"
     answer = runner.start(study, results, pool, quiet=True, beside=True)
-    gone, other = sorted((results / "cases" / "first").glob("*.npz"))
-    gone.unlink()
+    missing, other = sorted((results / "cases" / "first").glob("*.npz"))
+    missing.unlink()
     (failure,) = answer.result()["failures"]
-    assert gone.name in failure
+    assert missing.name in failure
     assert other.name not in failure
     again = runner.start(study, results, pool, quiet=True).result()
     assert (again["failures"], again["computed"]) == ([], 1)
@@ -131,12 +130,12 @@ def test_a_study_that_is_edited_before_it_is_concluded_is_drawn_again(script, tm
 @pytest.mark.parametrize("bad", ["refused", "silent"])
 def test_what_stops_one_study_does_not_stop_the_others(script, tmp_path, bad):
     """A grid that is refused ends the command after those before it; of findings that fail the next go on."""
-    code, told = studied(tmp_path / "r", script("first"), script(bad), script("second"))
+    code, output = studied(tmp_path / "r", script("first"), script(bad), script("second"))
     assert code == 2
-    assert "first: 2 of 2 cases computed" in told
+    assert "first: 2 of 2 cases computed" in output
     assert (tmp_path / "r" / "first.json").is_file()
-    assert f"study {bad} has" in told
-    assert ("second: 2 of 2 cases computed" in told) == (bad == "silent")
+    assert f"study {bad} has" in output
+    assert ("second: 2 of 2 cases computed" in output) == (bad == "silent")
     assert (tmp_path / "r" / "second.json").is_file() == (bad == "silent")
     assert not leftovers(tmp_path / "r")
 
@@ -145,24 +144,24 @@ def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
     study = runner.load(script("first"))
     (tmp_path / "figures").mkdir()
     (tmp_path / "cases" / "first").mkdir(parents=True)
-    left = [tmp_path / name for name in (".first.nc.x.part", ".first.json.y.part", "figures/.first-a.png.z.part.png")]
+    own = [tmp_path / name for name in (".first.nc.x.part", ".first.json.y.part", "figures/.first-a.png.z.part.png")]
     others = [tmp_path / name for name in (".other.nc.x.part", "figures/.other-a.png.z.part.png")]
-    for file in (*left, *others):
+    for file in (*own, *others):
         file.touch()
     with files.locked(tmp_path / "first.nc", wait=True):
         store.tidy(tmp_path, study)
-        assert all(file.is_file() for file in left)  # somebody writes them
+        assert all(file.is_file() for file in own)  # somebody writes them
     store.tidy(tmp_path, study)
-    assert not any(file.is_file() for file in left)
+    assert not any(file.is_file() for file in own)
     assert all(file.is_file() for file in others)
 
 
 def test_timed_cases_wait_for_the_analysis_of_the_study_before(script, tmp_path, pool):
-    done = []
+    states = []
     future = pool.analyse(time.sleep, 0.3)
 
     def measure(_):
-        done.append(future.done())
+        states.append(future.done())
         return xr.Dataset()
 
     for timed in (False, True):
@@ -170,4 +169,4 @@ def test_timed_cases_wait_for_the_analysis_of_the_study_before(script, tmp_path,
         symtop.register_scene(replace(symtop.scene("spheroid"), name=f"here-{timed}"))  # cases of this process
         here = replace(study, cases=lambda _, name=f"here-{timed}": [Case(name, "midpoint")])
         runner.start(here, tmp_path / "r", pool, quiet=True)
-    assert done == [False, True]
+    assert states == [False, True]

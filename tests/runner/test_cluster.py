@@ -23,8 +23,8 @@ pytestmark = [
 def cluster(processes_with_dask):
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
-    ) as made:
-        yield made
+    ) as dask_cluster:
+        yield dask_cluster
 
 
 def test_a_case_that_fails_there_is_recorded_here(cluster, tmp_path):
@@ -42,13 +42,13 @@ def test_a_case_that_fails_there_is_recorded_here(cluster, tmp_path):
 
 
 def test_an_ensemble_computed_there_is_the_one_computed_here(cluster, tmp_path, monkeypatch):
-    members, asked = population(90, seed=4), {"per_nutation": 20, "nutations": 2, "samples": 11, "quiet": True}
+    members, options = population(90, seed=4), {"per_nutation": 20, "nutations": 2, "samples": 11, "quiet": True}
     monkeypatch.setattr(chunks, "CHUNK", 11 * 20)
     for name in ("strang", "cayley-tuned[axis]"):
-        here = ensemble(members, name, **asked)
-        assert ensemble(members, name, scheduler=cluster.scheduler_address, **asked).identical(here)
+        here = ensemble(members, name, **options)
+        assert ensemble(members, name, scheduler=cluster.scheduler_address, **options).identical(here)
     path = tmp_path / "runs.nc"
-    with ensemble(members, name, scheduler=cluster.scheduler_address, path=path, **asked) as data:
+    with ensemble(members, name, scheduler=cluster.scheduler_address, path=path, **options) as data:
         assert data.load().identical(here)
 
 

@@ -19,16 +19,13 @@ from symtop.core import files, netcdf
 from symtop.core.errors import SymtopError
 from symtop.core.signals import at_most
 from symtop.runner import pool as work, run as runner, store
-from tests.commands import PROBE, call, contents, ended, leftovers, same, stop, symtop
+from tests.commands import PROBE, answer, contents, ended, leftovers, same, stop, symtop
 from tests.kills import survive
 
 
 def probe(results, *words):
-    """The quick probe in this process: exit code and what it said."""
-    done = call("study", PROBE, "--quick", "--results", results, *words, code=None)
-    assert "Traceback" not in done.output
-    assert done.exception is None or isinstance(done.exception, SystemExit), done.exception
-    return done.exit_code, done.output
+    """Exit code and output of the quick probe in this process."""
+    return answer("study", PROBE, "--quick", "--results", results, *words)
 
 
 def refused(results, says):
@@ -89,12 +86,12 @@ def test_a_real_limit_on_the_size_of_files(tmp_path):
     code += "from symtop.cli.main import main; sys.argv[0] = 'symtop'; main()"
     words = ["study", str(PROBE), "--results", str(tmp_path / "small")]
 
-    done = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=240, check=False
     )
-    assert done.returncode == 2, done.stderr
-    assert done.stderr.startswith("symtop: cannot write")
-    assert "Traceback" not in done.stderr
+    assert result.returncode == 2, result.stderr
+    assert result.stderr.startswith("symtop: cannot write")
+    assert "Traceback" not in result.stderr
     assert not list((tmp_path / "small").rglob("*.npz"))
     assert not leftovers(tmp_path / "small")
 
@@ -200,8 +197,8 @@ def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
         code, out, err = ended(run)
         assert code == 0, err
         assert "of 12 cases computed" in out
-    begun = log.read_text().split()
-    assert len(begun) == len(set(begun)) == 12
+    names = log.read_text().split()
+    assert len(names) == len(set(names)) == 12
     code, _, err = ended(symtop("study", PROBE, "--results", tmp_path / "alone"))
     assert code == 0, err
     same(tmp_path / "shared", tmp_path / "alone")
@@ -227,7 +224,7 @@ def test_what_a_killed_worker_left_beside_a_case_goes_when_it_is_computed_here(t
 # ---- signals ---------------------------------------------------------------------------------------------------------
 
 
-def begun(log: Path, count: int, process) -> None:
+def wait_for_cases(log: Path, count: int, process) -> None:
     """Wait until so many cases have begun."""
     end = time.monotonic() + 120.0
     while time.monotonic() < end and process.poll() is None:
@@ -248,7 +245,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quic
     log = tmp_path / "log"
     words = ["study", PROBE, "--results", tmp_path / "r", "--jobs", 2, *(["--quick"] if quick else [])]
     process = symtop(*words, PROBE_LOG=log, PROBE_PAUSE=0.5)
-    begun(log, 3 if quick else 5, process)
+    wait_for_cases(log, 3 if quick else 5, process)
     os.killpg(process.pid, number) if number == signal.SIGHUP else process.send_signal(number)  # as a terminal does
     start = time.monotonic()
     ended_with, _, err = ended(process)
@@ -256,11 +253,11 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quic
     assert ended_with == code
     assert err == f"symtop: {says}; what was computed is kept, and the same command goes on from there\n"
     assert not leftovers(tmp_path / "r")
-    kept = len(list((tmp_path / "r").rglob("cases/probe/*.npz")))
-    assert kept >= 1, [path.read_text() for path in (tmp_path / "r").rglob("*.failed.json")]
+    count = len(list((tmp_path / "r").rglob("cases/probe/*.npz")))
+    assert count >= 1, [path.read_text() for path in (tmp_path / "r").rglob("*.failed.json")]
     code, out, err = ended(symtop(*words, PROBE_LOG=log))
     assert code == 0, err
-    assert f"{(4 if quick else 12) - kept} of" in out
+    assert f"{(4 if quick else 12) - count} of" in out
     assert not leftovers(tmp_path / "r")
 
 
@@ -269,17 +266,17 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quic
     ("words", "longest", "kills"), [([PROBE], 2.5, 10), (["convergence", "factors", "reduction", "--quick"], 15.0, 6)]
 )  # python -m tests.kills --all: 30
 def test_kill_9_at_random_moments(tmp_path, words, longest, kills):
-    found = survive(words, tmp_path, longest, kills)
-    assert found.kills == kills
-    assert found.lost > 0  # some of the kills did come in the middle of a case
-    print(found)
+    outcome = survive(words, tmp_path, longest, kills)
+    assert outcome.kills == kills
+    assert outcome.lost > 0  # some of the kills did come in the middle of a case
+    print(outcome)
 
 
 @pytest.mark.slow
 def test_a_worker_that_is_killed_costs_no_more_than_what_it_was_computing(tmp_path):
     log = tmp_path / "log"
     process = symtop("study", PROBE, "--results", tmp_path / "r", "--jobs", 2, PROBE_LOG=log, PROBE_PAUSE=0.5)
-    begun(log, 4, process)
+    wait_for_cases(log, 4, process)
     workers = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
     spawned = [pid for pid in workers if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
     os.kill(spawned[0], signal.SIGKILL)
@@ -343,10 +340,10 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
     }
     lines = err.strip().splitlines()
     assert len(lines) == 2 * len(says)
-    for name, said in says.items():
-        found = [line for line in lines if f"bad-{name} on " in line]
-        assert len(found) == 2, err
-        assert all(said in line for line in found), found
+    for name, sentence in says.items():
+        own = [line for line in lines if f"bad-{name} on " in line]
+        assert len(own) == 2, err
+        assert all(sentence in line for line in own), own
     data = netcdf.read(results / "probe.nc")
     assert list(data["outcome"].sel(variant="bad-nan").values) == ["not_finite", "not_finite"]
     good = data.drop_sel(variant="bad-nan")
@@ -406,12 +403,12 @@ def test_paths_that_are_not_ascii(tmp_path):
 def test_no_terminal_and_closed_streams(tmp_path, closed):
 
     words = f"{sys.executable} -m symtop.cli study {PROBE} --results {tmp_path / 'r'} --jobs 2"
-    done = subprocess.run(
+    result = subprocess.run(
         ["/bin/sh", "-c", words + "".join(f" {n}>&-" if n != "0" else " 0<&-" for n in closed)],
         timeout=240,
         check=False,
     )
-    assert done.returncode == 0
+    assert result.returncode == 0
     assert len(contents(tmp_path / "r")) == 13
 
 

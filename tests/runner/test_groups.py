@@ -66,9 +66,9 @@ def test_a_check_names_the_group_that_differs():
     assert differences(tree(), tree()) == []
     (difference,) = differences(tree(), tree(PHASE + np.uint8(1)))
     assert difference.startswith("phases: energy differs")
-    lost = tree()
-    del lost["phases"]
-    assert differences(tree(), lost) == ["group phases is in one of them only"]
+    partial = tree()
+    del partial["phases"]
+    assert differences(tree(), partial) == ["group phases is in one of them only"]
     assert differences(LONG, LONG) == []
 
 
@@ -84,8 +84,8 @@ def test_cases_that_would_replace_each_other_are_refused():
         [steps[0], (steps[1][0], other)]
     )  # the control: another round, which measures something else
     assert {"energy", "seconds"} <= set(both.data_vars)
-    apart = datasets.combine([(Case("spheroid", "rk4", {"n": n}, group=f"n-{n}"), LONG) for n in (6, 3)])
-    assert set(apart.children) == {"n-6", "n-3"}
+    separate = datasets.combine([(Case("spheroid", "rk4", {"n": n}, group=f"n-{n}"), LONG) for n in (6, 3)])
+    assert set(separate.children) == {"n-6", "n-3"}
 
 
 def test_a_case_without_a_group_among_cases_with_one_is_refused():

@@ -44,14 +44,14 @@ def test_functions_count_wherever_they_stand_and_however_they_were_imported(tmp_
     """What a new process says that the method of a plug-in is made of: as it was, moved, and edited."""
     files = {"plug": PLUGIN, "coeffs": "def twice(x):\n    return 2 * x\n\ndef unused():\n    return 1\n",
              "lazily": "def late(x):\n    return x\n", "other": "x = 1\n"}  # fmt: skip
-    moved = {
+    same_code = {
         "plug": f"# moved\n{PLUGIN}",
         "coeffs": "# a comment\ndef twice(x):\n    return 2 * x\n",
         "other": "x = 2\n",
     }
     edits = {"lazily": "def late(x):\n    return -x\n", "coeffs": "def twice(x):\n    return 3 * x\n"}
     folders = [write(tmp_path / name, **files | changed).parent
-               for name, changed in (("first", {}), ("moved", moved), ("edited", edits))]  # fmt: skip
+               for name, changed in (("first", {}), ("moved", same_code), ("edited", edits))]  # fmt: skip
     before, same, other = map(json.loads, printed_by(CODE, *folders).splitlines())
     assert {"code plug.py", "code coeffs.py", "code lazily.py"} <= before.keys()
     assert "code other.py" not in before
@@ -60,14 +60,14 @@ def test_functions_count_wherever_they_stand_and_however_they_were_imported(tmp_
 
 
 @pytest.mark.parametrize(
-    ("mistake", "told"),
+    ("mistake", "message"),
     [
         ("symtop.Integrator(name='m', family='other', summary='', solvers={'angles': print}, symplectic='yes')",
          "plugin plug.py: symplectic must be True, False or None, not 'yes'"),
         ("1 / 0", "plugin plug.py failed: ZeroDivisionError"),
     ],
 )  # fmt: skip
-def test_a_mistake_in_a_plugin_is_told_with_its_name_and_as_no_option_of_the_command(mistake, told, tmp_path):
-    done = call("integrators", "--plugin", write(tmp_path, plug=f"import symtop\n{mistake}\n"), code=2)
-    assert done.output.startswith(f"symtop: {told}")
-    assert done.output.count("\n") == 1
+def test_a_mistake_in_a_plugin_is_told_with_its_name_and_as_no_option_of_the_command(mistake, message, tmp_path):
+    result = call("integrators", "--plugin", write(tmp_path, plug=f"import symtop\n{mistake}\n"), code=2)
+    assert result.output.startswith(f"symtop: {message}")
+    assert result.output.count("\n") == 1

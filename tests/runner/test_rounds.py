@@ -54,8 +54,8 @@ def test_timed_cases_that_alone_are_missing_run_in_new_workers(study, tmp_path, 
     later.unlink()
     monkeypatch.setattr(pools, "WORTH_WORKERS", 1)
     with Pool(2) as pool:
-        done = runner.run(study, results, quiet=True, pool=pool)
-    assert (done["computed"], done["failures"]) == (1, [])
+        result = runner.run(study, results, quiet=True, pool=pool)
+    assert (result["computed"], result["failures"]) == (1, [])
     again = store.load_case(later)
     assert os.getpid() not in set(np.ravel(again["process"]))
     assert set(np.ravel(again["later"])) == {2.0}

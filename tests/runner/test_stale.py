@@ -157,13 +157,13 @@ def test_coefficients_and_the_numbers_of_a_scene_count(clean_registry):
 def test_a_case_depends_on_the_integrators_that_its_study_says_it_runs():
     reduction = runner.load("reduction")
     twins = next(case for case in reduction.cases(True) if case.settings["part"] == "twins")
-    assert fingerprint.used(reduction, twins) == sorted(["exact", twins.integrator, f"{twins.integrator}-unreduced"])
+    assert fingerprint.uses(reduction, twins) == sorted(["exact", twins.integrator, f"{twins.integrator}-unreduced"])
     silent = dataclasses.replace(reduction, uses=None)
-    assert fingerprint.used(silent, twins) == sorted(["exact", twins.integrator])
+    assert fingerprint.uses(silent, twins) == sorted(["exact", twins.integrator])
     several = Case("goldstein", "together", {"integrators": ["rk4[axis]", "strang[axis]"]})
-    assert fingerprint.used(silent, several) == ["exact", "rk4", "strang"]
+    assert fingerprint.uses(silent, several) == ["exact", "rk4", "strang"]
     starred = Case("goldstein", "*", {})
-    assert fingerprint.used(of_everyone(), starred) == sorted(symtop.integrators())
+    assert fingerprint.uses(of_everyone(), starred) == sorted(symtop.integrators())
 
 
 def test_all_digests_of_all_studies_are_the_same_whatever_the_process_has_run():
@@ -195,14 +195,14 @@ def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
     script = tmp_path / "counted.py"
     text = PROBE.read_text()
     versions = [text, text.replace("Is it whole?", "Is it?").replace("figsize=(2, 2)", "figsize=(3, 2)")]
-    for call, made in (
+    for call, definition in (
         ("STEPS", "STEPS = {}"),
         ("len(helper())", "def helper():\n    return range({})"),
         ("cached()", "@functools.cache\ndef cached():\n    return {}"),
         ("Few().count()", "class Few:\n    def count(self):\n        return {}"),
     ):
         assert text.count("samples=51") == 1
-        versions += [f"{text.replace('samples=51', f'samples={call}')}\n\n{made.format(n)}\n" for n in (51, 53)]
+        versions += [f"{text.replace('samples=51', f'samples={call}')}\n\n{definition.format(n)}\n" for n in (51, 53)]
     digests = set()
     for version in versions:
         script.write_text("import functools\n" + version)

@@ -9,7 +9,7 @@ import xarray as xr
 from symtop.core.errors import SymtopError
 from symtop.runner import run as runner
 from symtop.runner.study import Case, StudyError, each
-from tests.commands import call
+from tests.commands import answer
 
 SCRIPT = """\
 import numpy as np
@@ -43,19 +43,16 @@ STUDY = Study(name="mine", title="t", question="q?", cases=cases, measure=measur
 """
 
 
-def ran(folder, change, *words):
+def run_study(folder, change, *words):
     """Exit code and output of a study that is right but for a change."""
     script = folder / "mine.py"
     script.write_text(SCRIPT.format(change=change))
     sys.modules.pop("symtop_study_mine", None)  # of an earlier text
-    command = ["study", str(script), "--jobs", "1", "--results", str(folder / "results"), *words]
-    done = call(*command, code=None)
-    assert done.exception is None or isinstance(done.exception, SystemExit), repr(done.exception)
-    return done.exit_code, done.output
+    return answer("study", script, "--jobs", 1, "--results", folder / "results", *words)
 
 
 def test_the_study_itself_is_right(tmp_path):
-    code, output = ran(tmp_path, "")
+    code, output = run_study(tmp_path, "")
     assert code == 0, output
     assert "2 of 2 cases computed, 1 figure" in output
     assert "  worst: 0.25\n" in output
@@ -76,7 +73,7 @@ def test_the_study_itself_is_right(tmp_path):
 )
 @pytest.mark.parametrize("words", [(), ("--status",), ("--only", "rk4")])
 def test_a_grid_that_is_none_is_refused(tmp_path, change, says, words):
-    code, output = ran(tmp_path, change, *words)
+    code, output = run_study(tmp_path, change, *words)
     assert code == 2, output
     assert output.startswith("symtop: study mine: ")
     assert output.count("\n") == 1
@@ -105,7 +102,7 @@ def test_a_grid_that_is_none_is_refused(tmp_path, change, says, words):
     ],
 )  # fmt: skip
 def test_an_answer_of_the_wrong_kind_is_refused_and_the_cases_are_kept(tmp_path, change, says):
-    code, output = ran(tmp_path, change)
+    code, output = run_study(tmp_path, change)
     assert code == 2, output
     assert output.startswith("symtop: study mine: ")
     assert output.count("\n") == 1
@@ -115,7 +112,7 @@ def test_an_answer_of_the_wrong_kind_is_refused_and_the_cases_are_kept(tmp_path,
 
 def test_a_step_that_is_nan_in_a_measure_is_no_option_of_the_command(tmp_path):
     change = "measure = lambda case: symtop.simulate(case.scene, case.integrator, step_size=float('nan'))"
-    code, output = ran(tmp_path, change)
+    code, output = run_study(tmp_path, change)
     assert code == 2
     assert "study mine: no case could be measured; rk4 on spheroid failed: step_size must be a finite" in output
 
@@ -141,9 +138,9 @@ def test_what_python_raises_is_kept_as_the_cause(tmp_path):
     script = tmp_path / "mine.py"
     script.write_text(SCRIPT.format(change="facts = lambda data: 1 / 0"))
     sys.modules.pop("symtop_study_mine", None)
-    with pytest.raises(SymtopError, match="facts failed: ZeroDivisionError") as caught:
+    with pytest.raises(SymtopError, match="facts failed: ZeroDivisionError") as info:
         runner.run(runner.load(str(script)), tmp_path / "results", jobs=1, quiet=True)
-    assert isinstance(caught.value.__cause__, ZeroDivisionError)
+    assert isinstance(info.value.__cause__, ZeroDivisionError)
     assert xr.open_dataset(tmp_path / "results" / "mine.nc").sizes["variant"] == 2
 
 
@@ -154,11 +151,11 @@ def test_a_page_that_is_wrong_is_told_of(tmp_path):
         ("{% if f.worst %}", "page of mine, line 1: Unexpected end of template"),
     ):
         (tmp_path / "mine.md").write_text(page)
-        code, output = ran(tmp_path, "")
+        code, output = run_study(tmp_path, "")
         assert code == 2, output
         assert says in output
     (tmp_path / "mine.md").write_text("# {{ question }}\n\nThe worst is {{ f.worst | number }}.\n\n{{ table('one') }}")
-    code, output = ran(tmp_path, "")
+    code, output = run_study(tmp_path, "")
     assert code == 0, output
     assert "0 of 2 cases computed" in output
     assert "  The worst is 0.25.\n" in output

@@ -37,12 +37,12 @@ def test_every_fact_and_table_of_the_report_follows_from_a_stored_dataset(quick_
     """Nothing is said that the dataset on disk does not say again; `seconds` aside, nothing else is asked."""
     for name in runner.names():
         study, stored = runner.load(name), netcdf.read_any(quick_results / f"{name}.nc")
-        said = json.loads((quick_results / f"{name}.json").read_text(encoding="utf-8"))
-        again = runner.findings_of(study, stored, tmp_path, None, failures=[], cases=said["cases"])
-        assert json.loads(json.dumps(again["facts"])) == said["facts"], name
-        assert any(type(value) in (int, float) for value in said["facts"].values()), name
-        assert again["tables"] == said["tables"], name
-        for table in said["tables"]:
+        findings = json.loads((quick_results / f"{name}.json").read_text(encoding="utf-8"))
+        again = runner.findings_of(study, stored, tmp_path, None, failures=[], cases=findings["cases"])
+        assert json.loads(json.dumps(again["facts"])) == findings["facts"], name
+        assert any(type(value) in (int, float) for value in findings["facts"].values()), name
+        assert again["tables"] == findings["tables"], name
+        for table in findings["tables"]:
             file = f"tables/{table['file']}"
             assert (tmp_path / file).read_bytes() == (quick_results / file).read_bytes(), file
 
@@ -77,10 +77,10 @@ def test_fresh_computes_everything_and_the_files_are_the_same_to_the_byte(tmp_pa
         }
 
     before = bytes_of()
-    done = probe(tmp_path, "--fresh", "--json")
-    assert done.exit_code == 0
-    (said,) = json.loads(done.output)
-    assert said["computed"] == said["cases"] == 4
+    result = probe(tmp_path, "--fresh", "--json")
+    assert result.exit_code == 0
+    (summary,) = json.loads(result.output)
+    assert summary["computed"] == summary["cases"] == 4
     assert before == bytes_of()
 
 
@@ -98,9 +98,9 @@ def test_every_file_says_where_it_comes_from(tmp_path):
 def test_check_finds_a_value_that_this_version_does_not_compute(tmp_path):
     assert probe(tmp_path, "--check").exit_code == 2  # nothing is stored
     assert probe(tmp_path).exit_code == 0
-    done = probe(tmp_path, "--check", "--fresh")
-    assert done.exit_code == 0, done.output
-    assert "4 of 4 cases computed again, the same to the last bit" in done.output
+    result = probe(tmp_path, "--check", "--fresh")
+    assert result.exit_code == 0, result.output
+    assert "4 of 4 cases computed again, the same to the last bit" in result.output
     victim = next((tmp_path / "quick" / "cases" / "probe").glob("*.npz"))
     study = runner.load(str(PROBE))
     (case,) = [one for one in study.cases(True) if one.label == victim.name.split("--")[0] + "--" + one.integrator
@@ -108,9 +108,9 @@ def test_check_finds_a_value_that_this_version_does_not_compute(tmp_path):
     data = store.load_case(victim)
     data["energy"][3] = np.nextafter(data["energy"].values[3], np.inf)
     store.save_case(data, victim, study, case)  # well made, and wrong
-    done = probe(tmp_path, "--check", "--fresh")
-    assert done.exit_code == 1
-    assert "energy differs by up to" in done.output
+    result = probe(tmp_path, "--check", "--fresh")
+    assert result.exit_code == 1
+    assert "energy differs by up to" in result.output
 
 
 def test_differences_leave_out_times_and_nothing_else():
@@ -144,8 +144,8 @@ def test_the_full_grid_and_the_ordinary_one_keep_each_others_cases(tmp_path):
     (tmp_path / "grids.py").write_text(GRIDS)
 
     def computed(*words):
-        done = call("study", tmp_path / "grids.py", "--results", tmp_path / "r", "--json", *words)
-        return json.loads(done.output)
+        result = call("study", tmp_path / "grids.py", "--results", tmp_path / "r", "--json", *words)
+        return json.loads(result.output)
 
     for words, count in (([], 2), (["--full"], 2), ([], 0), (["--full"], 0)):
         assert computed(*words)[0]["computed"] == count, words
@@ -168,8 +168,8 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path, clean_registr
     cases.append(dataclasses.replace(cases[0], integrator="unlucky[angles]"))
     small = dataclasses.replace(whole, cases=lambda quick: cases)
     symtop.register(unlucky)
-    found = runner.run(small, tmp_path, quick=True, quiet=True)
-    assert found["failures"] == [
+    findings = runner.run(small, tmp_path, quick=True, quiet=True)
+    assert findings["failures"] == [
         "unlucky[angles] on goldstein failed: integrator unlucky[angles] failed: RuntimeError: no luck"
     ]
     assert list(netcdf.read(tmp_path / "stability.nc")["variant"].values) == ["midpoint[angles]"]

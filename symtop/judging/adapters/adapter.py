@@ -95,8 +95,8 @@ def repeat(once: Callable[[int, Any], Any], y: Any, marks: Marks, show: Callable
 
 def relative_gap(first: Any, second: Any) -> float:
     """Largest difference, relative to the largest number; infinite where it is none."""
-    apart = float(np.max(np.abs(first - second))) / max(float(np.max(np.abs(first))), 1e-300)
-    return apart if np.isfinite(apart) else math.inf
+    gap = float(np.max(np.abs(first - second))) / max(float(np.max(np.abs(first))), 1e-300)
+    return gap if np.isfinite(gap) else math.inf
 
 
 def label_of(thing: Any) -> str:
@@ -116,14 +116,14 @@ class AdapterSolver:
         form = self.stepper.form
         par, state = form.prepare(top, start)
         states, evaluations = self.stepper.march(top, par, np.array(state, dtype=float), plan.step_size, plan.marks)
-        outcome, reached, made = OK, plan.horizon, int(plan.marks[-1])
+        outcome, reached, steps = OK, plan.horizon, int(plan.marks[-1])
         for k, row in enumerate(states):
             outcome = form.ended(row.tolist()) if np.isfinite(row).all() else NOT_FINITE
             if outcome != OK:
                 states[k:] = np.nan
-                reached, made = float(plan.times[max(k - 1, 0)]), int(plan.marks[max(k - 1, 0)])
+                reached, steps = float(plan.times[max(k - 1, 0)]), int(plan.marks[max(k - 1, 0)])
                 break
-        return as_run(form, par, plan.times, states, made, evaluations, outcome, reached)
+        return as_run(form, par, plan.times, states, steps, evaluations, outcome, reached)
 
     def onward(self, top: SymmetricTop, start: Angles, steps: Sequence[float]) -> Run:
         """The end of steps of these lengths, each a run of its own from the state where the last one ended."""

@@ -130,18 +130,18 @@ class Program(Stepper):
         seconds, began = heartbeat.patience + SLACK * self.seconds_a_step * steps, time.monotonic()
         with heartbeat.call(h, 2.0 * seconds):
             try:
-                done = subprocess.run(  # noqa: S603  (the command is the user's)
+                result = subprocess.run(  # noqa: S603  (the command is the user's)
                     self.words, input=line.encode(), capture_output=True, timeout=seconds, check=False
                 )
             except subprocess.TimeoutExpired:
                 what = f"{steps} steps of {h:.3g}"
                 raise SymtopError(f"{self.name} had not ended {seconds:.0f} s after it was asked for {what}") from None
-        if done.returncode != 0:
-            words = " ".join(done.stderr.decode(errors="replace").split())[-WORDS:]
-            raise SymtopError(f"{self.name} ended with code {done.returncode}: {words or 'it said nothing'}")
+        if result.returncode != 0:
+            words = " ".join(result.stderr.decode(errors="replace").split())[-WORDS:]
+            raise SymtopError(f"{self.name} ended with code {result.returncode}: {words or 'it said nothing'}")
         if steps > 0:
             self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps) if steps > 50 else 0.0
-        return done.stdout
+        return result.stdout
 
 
 def _states(answer: bytes, rows: int, size: int, name: str) -> Array:
@@ -151,8 +151,8 @@ def _states(answer: bytes, rows: int, size: int, name: str) -> Array:
     try:
         values = np.array(answer.decode("ascii").replace(",", " ").split(), dtype=float)
     except ValueError:
-        shown = answer[:40].decode(errors="replace").strip()
-        raise SymtopError(f"{name} must write numbers, as text or as raw doubles, not {shown!r}") from None
+        excerpt = answer[:40].decode(errors="replace").strip()
+        raise SymtopError(f"{name} must write numbers, as text or as raw doubles, not {excerpt!r}") from None
     if values.size != rows * size:
         must = f"{rows} states of {size} numbers (the start and one every stride steps), {rows * size} in all"
         raise SymtopError(f"{name} must write {must}, not {values.size}")
@@ -198,8 +198,8 @@ class BatchStep(Stepper):
         """A step of the first row alone, and in the batch."""
         pair = (_once(step, 0.0, rows, h, COMPILING)[0] for rows in (self._array(y[None]), batch + 0.0))
         one, two = (state_like(y, np.asarray(row)) for row in pair)
-        if (apart := relative_gap(one, two)) > SAME:
-            how = f"the same state with another row beside it comes out different by {apart:.1e}"
+        if (gap := relative_gap(one, two)) > SAME:
+            how = f"the same state with another row beside it comes out different by {gap:.1e}"
             raise SymtopError(f"a row of a batch must be stepped by itself: {how}")
         self._tried = True
 
@@ -209,8 +209,8 @@ def _once(step: Callable[..., Any], t: float, batch: Any, h: float, seconds: flo
         after = step(t, batch, h)
     if tuple(getattr(after, "shape", ())) != tuple(batch.shape):
         shape = getattr(after, "shape", None)
-        given = type(after).__name__ if shape is None else f"shape {tuple(shape)}"
-        raise SymtopError(f"step must return a batch of states, shape {tuple(batch.shape)}, not {given}")
+        form = type(after).__name__ if shape is None else f"shape {tuple(shape)}"
+        raise SymtopError(f"step must return a batch of states, shape {tuple(batch.shape)}, not {form}")
     return after
 
 

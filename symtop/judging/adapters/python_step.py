@@ -63,11 +63,11 @@ def state_like(before: Array, after: Any, what: str = "step") -> Array:
     """What a step returned as an array of floats; SymtopError if it is no state."""
     if type(after) is np.ndarray and after.shape == before.shape and after.dtype == np.float64:
         return after
-    shown = np.asarray(after) if after is not None else None
-    if shown is None or shown.shape != before.shape or shown.dtype.kind not in "fiu":
-        given = "None" if shown is None else f"{type(after).__name__} of shape {shown.shape} and type {shown.dtype}"
-        raise SymtopError(f"{what} must return the new state, {before.size} real numbers, not {given}")
-    return shown.astype(float)
+    array = np.asarray(after) if after is not None else None
+    if array is None or array.shape != before.shape or array.dtype.kind not in "fiu":
+        form = "None" if array is None else f"{type(after).__name__} of shape {array.shape} and type {array.dtype}"
+        raise SymtopError(f"{what} must return the new state, {before.size} real numbers, not {form}")
+    return array.astype(float)
 
 
 class Equations:
@@ -147,30 +147,30 @@ class ScipySolver(PythonStep):
         end, size = t + (int(marks[-1]) + 2) * h, abs(h)
         with heartbeat.call(h):
             options = {"max_step": size, "first_step": size}
-            made: Any = self.function(f, t, y, end, **options, rtol=ANY, atol=ANY)
-            if hasattr(made, "newton_tol") or hasattr(made, "kappa"):
-                made = self.function(f, t, y, end, **options, rtol=LOOSE, atol=LOOSE)
+            solver: Any = self.function(f, t, y, end, **options, rtol=ANY, atol=ANY)
+            if hasattr(solver, "newton_tol") or hasattr(solver, "kappa"):
+                solver = self.function(f, t, y, end, **options, rtol=LOOSE, atol=LOOSE)
                 for name in ("newton_tol", "kappa", "tiny_err"):
-                    setattr(made, name, SOLVED / LOOSE)
+                    setattr(solver, name, SOLVED / LOOSE)
 
         def once(k: int, y: Array) -> Array:
-            if made.status != "running" or not np.isfinite(y).all():
+            if solver.status != "running" or not np.isfinite(y).all():
                 return np.full(y.shape, np.nan)
             with heartbeat.call(h):
-                made.step()
-            if abs(made.t - (t + (k + 1) * h)) > SAME * size * (k + 1):
+                solver.step()
+            if abs(solver.t - (t + (k + 1) * h)) > SAME * size * (k + 1):
                 raise SymtopError(
                     f"{self.name} must make steps of max_step = first_step = {size:.3g} where the tolerance accepts "
-                    f"any error, and made one of {made.t - t - k * h:.3g}"
+                    f"any error, and made one of {solver.t - t - k * h:.3g}"
                 )
-            return state_like(y, made.y, "a solver")
+            return state_like(y, solver.y, "a solver")
 
         with contextlib.ExitStack() as undo:  # Newton's iteration goes on until it is solved
             for module in {sys.modules.get(one.__module__) for one in self.function.__mro__}:  # type: ignore[attr-defined]
                 if hasattr(module, NEWTON):
                     undo.callback(setattr, module, NEWTON, getattr(module, NEWTON))
                     setattr(module, NEWTON, MOST_NEWTON)
-            return repeat(once, state_like(y, made.y, "a solver"), marks)
+            return repeat(once, state_like(y, solver.y, "a solver"), marks)
 
 
 class Body(NamedTuple):
@@ -204,8 +204,8 @@ def _body_shown(body: Body, _times: Array, states: Array) -> Array:
 
 
 def _body_momenta(body: Body, states: Array) -> tuple[Array, Array]:
-    shown = _body_shown(body, states[:, 0], states)
-    p_phi, p_psi = space_momenta("attitude", shown) if body.of_top else FORMS[BODY].momenta(None, shown)
+    rows = _body_shown(body, states[:, 0], states)
+    p_phi, p_psi = space_momenta("attitude", rows) if body.of_top else FORMS[BODY].momenta(None, rows)
     return p_phi, p_psi
 
 
@@ -220,15 +220,15 @@ def _matrix_of(top: Any, at: Any) -> tuple[Body, tuple[float, ...]]:
 
 def _with_quaternions(states: Array) -> Array:
     """States (q, w) of states (R, w): q of the nearest rotation, |q|^2 the length of R's third column; NaN if none."""
-    shown = np.full((len(states), 7), np.nan)
+    rows = np.full((len(states), 7), np.nan)
     matrices = states[:, :9].reshape(-1, 3, 3)
     with np.errstate(all="ignore"):
         good = np.isfinite(states).all(axis=1) & (np.linalg.det(matrices) > 0.0)
     if good.any():
         turned = Rotation.from_matrix(matrices[good]).as_quat()[:, [3, 0, 1, 2]]
         lengths = np.sqrt(np.linalg.norm(matrices[good][:, :, 2], axis=1))
-        shown[good] = np.concatenate([lengths[:, None] * turned, states[good, 9:]], axis=1)
-    return shown
+        rows[good] = np.concatenate([lengths[:, None] * turned, states[good, 9:]], axis=1)
+    return rows
 
 
 MATRIX = ROTATION._replace(

@@ -59,8 +59,8 @@ def _calls(subject: Subject) -> Finding:
         return run(state, 1)[0]
 
     stepper.renew()  # the step has been timed
-    moved = {name: getattr(start, name) * (1.0 - ELSEWHERE) for name in Angles.__slots__}
-    other = Angles(**moved | {"phi": 0.0, "psi": 0.0})  # which a map of (theta, p_theta) shows as zero
+    values = {name: getattr(start, name) * (1.0 - ELSEWHERE) for name in Angles.__slots__}
+    other = Angles(**values | {"phi": 0.0, "psi": 0.0})  # which a map of (theta, p_theta) shows as zero
     first = once(start, h)
     if not np.isfinite(first).all():
         kind = f"returns {'NaN' if np.isnan(first).any() else 'infinity'}"
@@ -74,14 +74,14 @@ def _calls(subject: Subject) -> Finding:
     traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # in two words, and in a clause
     single = {"single precision": "its numbers are those of single precision"}
     traits |= single if (first == first.astype(np.float32)).all() else {}
-    missed, why = _cut(stepper, scene, h / 10.0, PARTS) if stepper.own_loop else (0.0, "")
-    if missed > MISSED:
-        return _refuted("miscounts steps", why, missed, MISSED)
-    traits |= {"remembers": why} if missed > REMEMBERED else {}
-    missed, why = _cut(stepper, scene, h / 1.6, _late(subject))
-    if missed > (most := MISSED if stepper.own_loop else RECALLED):
+    miss, why = _cut(stepper, scene, h / 10.0, PARTS) if stepper.own_loop else (0.0, "")
+    if miss > MISSED:
+        return _refuted("miscounts steps", why, miss, MISSED)
+    traits |= {"remembers": why} if miss > REMEMBERED else {}
+    miss, why = _cut(stepper, scene, h / 1.6, _late(subject))
+    if miss > (most := MISSED if stepper.own_loop else RECALLED):
         why = f"it keeps something between calls: {why} (seed {subject.seed})"
-        return _refuted("keeps state", why, missed, most)
+        return _refuted("keeps state", why, miss, most)
     if (gap := relative_gap(first, once(start, h))) > SAME:
         why = f"it keeps something between calls: the first one, repeated, differs by {gap:.1e}"
         return _refuted("keeps state", why, gap)

@@ -99,9 +99,9 @@ class Constant(NamedTuple):
         least = self.changed.exponent - self.changed.exponent_interval
         return True if self.kind == "drift" or least > BOUNDED else None
 
-    def words(self, where: str) -> str:
-        """Its largest change, `where` that is, and how it grows."""
-        words, change = f"largest relative change {self.changed.largest:.1e} {where}", self.changed
+    def words(self, place: str) -> str:
+        """Its largest change, the place of it, and how it grows."""
+        words, change = f"largest relative change {self.changed.largest:.1e} {place}", self.changed
         if self.kind in ("kept", "unknown"):
             return words
         return f"{words}, growth exponent {change.exponent:.2f} +- {change.exponent_interval:.2f}"
@@ -177,7 +177,7 @@ def long_run(
             share = QUICK_SHARE if quick else 1.0
             limit = share * EVALUATIONS[method.implementation] / cost if most is None else most
             steps = max(min(QUICK_STEPS if quick else STEPS, limit) * method.speed, PILOT)
-        shown, run, plan = _run(method, scene, inside, steps, step, SAMPLES)
+        trajectory, run, plan = _run(method, scene, inside, steps, step, SAMPLES)
         if run.outcome == "ok" or not method.fixed_step:
             break
         if quick and most is not None:
@@ -187,25 +187,25 @@ def long_run(
     reported = None
     plain = isinstance(method.solvers[inside], AdapterSolver)
     if not (plain or scene.of_body):  # else its momenta are those of its states
-        reported = _reported(method, scene, chart, shown, (run, plan))
+        reported = _reported(method, scene, chart, trajectory, (run, plan))
         if method.fixed_step:
             reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
-    changes, every_step, blown_up = constants(scene, shown), constants(scene, pilot), math.nan
-    if (risen := blows_up(scene, changes["energy"])).size:
-        blown_up = float(plan.times[risen[0]])
-        shown, run, plan = _run(method, scene, inside, blown_up / step, step, SAMPLES)
-        changes = constants(scene, shown)
-    made, grains = max(run.steps, 1), {"energy": scene.energy_grain}
-    kept = {
-        name: change_of(plan.times, changes[name], every_step[name], made, grains.get(name, 1.0), plain=plain)
+    changes, every_step, blown_up = constants(scene, trajectory), constants(scene, pilot), math.nan
+    if (beyond := blows_up(scene, changes["energy"])).size:
+        blown_up = float(plan.times[beyond[0]])
+        trajectory, run, plan = _run(method, scene, inside, blown_up / step, step, SAMPLES)
+        changes = constants(scene, trajectory)
+    count, grains = max(run.steps, 1), {"energy": scene.energy_grain}
+    by_name = {
+        name: change_of(plan.times, changes[name], every_step[name], count, grains.get(name, 1.0), plain=plain)
         for name in (changes if chart != PLANE else ("energy",))
     }
     message, nutations = sentence(run.outcome, run.reached, float(plan.times[-1])), run.reached / unit
-    costs = run.force_evaluations / made, run.newton_iterations / made, steady
+    costs = run.force_evaluations / count, run.newton_iterations / count, steady
     times = plan.times / unit
     rows = tops(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS)  # fewer, where no sample is
     energy = np.array([np.pad(row, (0, WINDOWS - len(row)), constant_values=math.nan) for row in rows])
-    return LongRun(kept, run.outcome, message, chart, run.steps, nutations, *costs, reported, energy, blown_up)
+    return LongRun(by_name, run.outcome, message, chart, run.steps, nutations, *costs, reported, energy, blown_up)
 
 
 def blows_up(scene: Scene, change: Array) -> NDArray[np.int64]:
@@ -213,7 +213,7 @@ def blows_up(scene: Scene, change: Array) -> NDArray[np.int64]:
     return np.flatnonzero(change > 1.0 + 2.0 * abs(scene.top.mgl) / scene.energy_scale)
 
 
-def said_to_blow_up(finding: Finding, time: float, steps: str = "") -> Finding:
+def blow_up_finding(finding: Finding, time: float, steps: str = "") -> Finding:
     """The finding on such an energy."""
     measured, when = Measured("blows up", finding.value, f"blows up at t = {time:.3g}{steps}"), f"by t = {time:.3g}"
     why = f"{when} it rises by more than that of the nutation and 2 |mgl|: {finding.why}"
@@ -238,13 +238,13 @@ def _contradiction(
 
 
 def _reported(
-    method: Integrator, scene: Scene, chart: str, shown: Trajectory, long: tuple[Run, Plan]
+    method: Integrator, scene: Scene, chart: str, trajectory: Trajectory, long: tuple[Run, Plan]
 ) -> Difference | None:
     """How far the reported momenta are from those of the states, over the long run."""
     run, plan = long
     if chart == "angles":
         return from_increments(method, scene, plan) if method.fixed_step else None
-    gaps = {name: np.abs(getattr(run, name) - getattr(shown, name)) for name in ("p_phi", "p_psi")}
+    gaps = {name: np.abs(getattr(run, name) - getattr(trajectory, name)) for name in ("p_phi", "p_psi")}
     size, name = max((float(np.max(gap[np.isfinite(gap)], initial=0.0)), name) for name, gap in gaps.items())
     return Difference(name, size / scene.momentum_scale, REPORTED, f"of the larger momentum in {run.steps} steps")
 
@@ -254,8 +254,8 @@ def constants(scene: Scene, run: Trajectory) -> Rows:
     """Relative change of every constant that the run's chart has, at its samples."""
     changes = residuals(scene, run)
     if scene.of_body:
-        moved = (run.momentum - run.momentum[0]) / scene.momentum_scale
-        return changes | {"momentum": np.linalg.norm(moved, axis=1) if scene.top.free else moved[:, 2]}
+        change = (run.momentum - run.momentum[0]) / scene.momentum_scale
+        return changes | {"momentum": np.linalg.norm(change, axis=1) if scene.top.free else change[:, 2]}
     if run.chart != "angles":
         changes["axis_length"] = np.linalg.norm(run.axis, axis=1) - 1.0
         if math.isfinite(run.step_size):
@@ -313,7 +313,7 @@ def measure(subject: Subject) -> list[Finding]:
         except SymtopError as error:
             every = (*OF_A_RUN, "momentum")
             findings = [undecided(claim, declared(method, claim), str(error)) for claim in every]
-        by_chart.append([_named(one, chart) for one in findings])
+        by_chart.append([_with_chart(one, chart) for one in findings])
     if runs:
         run = min(runs, key=lambda run: run.steps)
         length = {"steps_run": np.array(run.steps), "nutations_run": np.array(run.nutations)}
@@ -327,7 +327,7 @@ def of_run(method: Integrator, run: LongRun) -> list[Finding]:
     return [*motion, _of_states(run), _invariant(method, run), *_costs(method, run)]
 
 
-def _named(finding: Finding, chart: str) -> Finding:
+def _with_chart(finding: Finding, chart: str) -> Finding:
     """The finding with its chart, where the reason does not speak of it already."""
     plain = finding.verdict == "inapplicable" or finding.why.endswith(" chart")
     return finding if plain else finding._replace(why=f"{finding.why}, in the {chart} chart")
@@ -351,7 +351,7 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
     most = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
     if claim == "energy" and run.blown_up > 0.0:
         steps = f", after {run.steps} steps, {run.steps / run.nutations:.0f} a nutation"
-        return said_to_blow_up(finding, run.blown_up, steps)
+        return blow_up_finding(finding, run.blown_up, steps)
     if run.outcome not in ("ok", "not_finite", "not_normalised") or (ended and kind in ("kept", "bounded")):
         return finding._replace(verdict="undecided", why=f"{why}; but the run {run.message}")
     if method.fixed_step and constant.sudden:

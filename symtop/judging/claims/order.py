@@ -168,20 +168,20 @@ def _terms(series: Series) -> Measured:
     """The order that a series shows, or the least that it can be."""
     text, term = f"{series.order} or more", series.order + 1
     if series.is_exact:
-        off = f"{series.defect[term]:.1g} +- {series.noise[term]:.0g} of it"
-        text = f"{series.order}: in one step the term in h^{term} is the first that is wrong, by {off}"
+        miss = f"{series.defect[term]:.1g} +- {series.noise[term]:.0g} of it"
+        text = f"{series.order}: in one step the term in h^{term} is the first that is wrong, by {miss}"
     return Measured("by a term", series.order, text=text)
 
 
 def series_of(subject: Subject) -> Series | None:
     """The series of the chart with the lowest order; None where no step is one map of the state."""
-    shown = []
+    candidates = []
     for chart in subject.charts if subject.method.fixed_step else ():
         with contextlib.suppress(SymtopError):
             step, start = map_of(subject, chart)
             if restart_gap(step, start) <= ONE_MAP:
-                shown.append(step_series(step, start, subject.scene.time_scale()))
-    return min(shown, key=lambda one: one.order, default=None)
+                candidates.append(step_series(step, start, subject.scene.time_scale()))
+    return min(candidates, key=lambda one: one.order, default=None)
 
 
 class Order(NamedTuple):
@@ -206,27 +206,27 @@ def measured_order(
     method: Integrator, scene: Scene, *, quick: bool = False, finest: float | None = None, main: str = ""
 ) -> Order:
     """Slopes of the errors of attitude (or axis, or `main`), theta and energy; `finest`: most steps of a run."""
-    runs, shown = [(scene, NUTATIONS)], observable(method)
-    main = main or shown
+    runs, quantity = [(scene, NUTATIONS)], observable(method)
+    main = main or quantity
     if finest is not None and method.fixed_step:
         runs.append((scene, SHARE))  # the same number of steps, and smaller errors
-    known = method.fixed_step and method.order is not None and not scene.of_body
-    if known and not quick and method.implementation == "compiled":
+    has_order = method.fixed_step and method.order is not None and not scene.of_body
+    if has_order and not quick and method.implementation == "compiled":
         runs += [(find_scene(FALLBACK), nutations) for nutations in LONGER]
     count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # steps that are chosen scatter
     most = FINEST[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
-    tried: list[Order] = []
-    for chosen, nutations in runs:
-        horizon = nutations * chosen.time_scale()
-        settings = ladder(method, chosen, horizon, count, most)
-        table = order_table(chosen, method, settings, horizon, shown, dense=finest is None)
+    orders: list[Order] = []
+    for problem, nutations in runs:
+        horizon = nutations * problem.time_scale()
+        settings = ladder(method, problem, horizon, count, most)
+        table = order_table(problem, method, settings, horizon, quantity, dense=finest is None)
         step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
-        fits = {name: order_fit(chosen, method, table, name, horizon) for name in (main, "theta", "energy")}
+        fits = {name: order_fit(problem, method, table, name, horizon) for name in (main, "theta", "energy")}
         columns = table["tolerance"].values, step, table[main].values, table[f"{main}_bound"].values
-        tried.append(Order(chosen.name, *columns, fits[main], fits))
-        if tried[-1].measured:
-            return tried[-1]
-    return tried[-1 if scene.of_body else 0]
+        orders.append(Order(problem.name, *columns, fits[main], fits))
+        if orders[-1].measured:
+            return orders[-1]
+    return orders[-1 if scene.of_body else 0]
 
 
 def _by_steps(subject: Subject) -> Finding:
@@ -383,18 +383,18 @@ def time_order(subject: Subject) -> list[Finding]:
     if series.order < 0:
         return [inapplicable("time", "a step of no length moves a state that is not of its chart")]
     power = series.order if order is None else order
-    shown = min(series.order, power)
-    declared, measured, verdict = yes_no(order), Measured("order", shown, text=str(shown)), "measured"
+    lower = min(series.order, power)
+    declared, measured, verdict = yes_no(order), Measured("order", lower, text=str(lower)), "measured"
     if series.order >= min(power, series.resolved):
         if series.order < power:  # no higher term is resolved
-            measured, verdict = Measured("order", shown, text=f"{shown} or more"), "undecided"
+            measured, verdict = Measured("order", lower, text=f"{lower} or more"), "undecided"
         elif order is not None:
             verdict = "confirmed"
         why = f"where f depends on t, {series.words(power)}"
     elif subject.knows_top:
         return [inapplicable("time", "it knows equations of the top beside f, which depend on no time")]
     elif calls == {BEGIN * subject.scene.time_scale()}:  # a step for f(y): no fault on a top
-        declared, measured = "", Measured("f(y) only", shown, text=f"f(y) only, {shown}")
+        declared, measured = "", Measured("f(y) only", lower, text=f"f(y) only, {lower}")
         why = "f is asked at the start of a step alone, which is right for f(y); where f depends on t, "
         why += series.wrong_term()
     elif series_by_clock(subject, 0.0)[0].order <= series.order:  # the order is wrong, and not the times

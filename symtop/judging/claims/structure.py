@@ -57,8 +57,8 @@ def measure(subject: Subject) -> list[Finding]:
         try:
             step, start = map_of(subject, chart)
             subject.traces["structure_step"] = np.array(step.h)
-            answers.append(_asked(_bracket, step, start, subject.traces))
-            answers.append(_asked(_returned, step, start))
+            answers.append(_answer_at(_bracket, step, start, subject.traces))
+            answers.append(_answer_at(_returned, step, start))
             if subject.method.fixed_step and not subject.in_plane:
                 answers = _elsewhere(subject, step, answers)
         except SymtopError as error:
@@ -110,7 +110,7 @@ def _badness(one: Finding) -> tuple[int, float]:
     return ("", "yes", "no").index(one.measured.kind), one.value if math.isfinite(one.value) else -1.0
 
 
-def _asked(ask: Callable[..., Answer], step: maps.StepMap, start: Angles, *traces: dict[str, Any]) -> Answer:
+def _answer_at(ask: Callable[..., Answer], step: maps.StepMap, start: Angles, *traces: dict[str, Any]) -> Answer:
     """What `ask` answers at a step; at half of it where a no all but goes: its own iteration has not converged."""
     answer = ask(step, start, *traces)
     if answer[0] is False and step.method.fixed_step:
@@ -134,8 +134,8 @@ def _bracket(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None = 
             return True, defect.rest, floor, why
         return None, defect.size, floor, f"two steps differ from twice one step by {gap:.0e}: no one map"
     stands = defect.raw[-1] > STANDS * defect.raw[0] and defect.raw[-1] > 100.0 * MET
-    met = stands or defect.size > max(10.0 * defect.noise, MET)
-    return False if met else None, defect.size, floor, f"defect of the bracket {defect.size:.1e} (it goes {shrinks})"
+    bad = stands or defect.size > max(10.0 * defect.noise, MET)
+    return False if bad else None, defect.size, floor, f"defect of the bracket {defect.size:.1e} (it goes {shrinks})"
 
 
 def _returned(step: maps.StepMap, start: Angles) -> Answer:
@@ -152,8 +152,8 @@ def _elsewhere(subject: Subject, step: maps.StepMap, answers: list[Answer]) -> l
         with contextlib.suppress(SymtopError):
             other = maps.moved(step, scene)
             for i, ask in enumerate((_bracket, _returned)):
-                if answers[i][0] and (drawn := _asked(ask, other, scene.start))[0] is False:
-                    answers[i] = *drawn[:3], f"{drawn[3]} ({name})"
+                if answers[i][0] and (answer := _answer_at(ask, other, scene.start))[0] is False:
+                    answers[i] = *answer[:3], f"{answer[3]} ({name})"
     return answers
 
 
@@ -197,11 +197,11 @@ def passages(method: Integrator) -> list[Passage]:
 
 def pole(subject: Subject) -> list[Finding]:
     """The finding on the pole; of a bare step it is measured alone, for its chart may be the simplest and no claim."""
-    claim, passed = "" if subject.stepper else declared(subject.method, "pole"), passages(subject.method)
-    judged = [one for one in passed if one.chart != "angles"] or passed
-    verdict = "measured" if not claim else "confirmed" if all(one.passes for one in judged) else "refuted"
-    if claim and any(one.outcome not in ("ok", "left_chart", "not_finite", "not_normalised") for one in judged):
+    claim, rows = "" if subject.stepper else declared(subject.method, "pole"), passages(subject.method)
+    relevant = [one for one in rows if one.chart != "angles"] or rows
+    verdict = "measured" if not claim else "confirmed" if all(one.passes for one in relevant) else "refuted"
+    if claim and any(one.outcome not in ("ok", "left_chart", "not_finite", "not_normalised") for one in relevant):
         verdict = "undecided"
-    measured = Measured(", ".join(dict.fromkeys(one.word for one in judged)))
-    value = max(one.finer for one in judged)
-    return [Finding("pole", claim, measured, verdict, "; ".join(map(str, passed)), value, POLE_RIGHT)]
+    measured = Measured(", ".join(dict.fromkeys(one.word for one in relevant)))
+    value = max(one.finer for one in relevant)
+    return [Finding("pole", claim, measured, verdict, "; ".join(map(str, rows)), value, POLE_RIGHT)]

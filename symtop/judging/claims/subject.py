@@ -141,12 +141,12 @@ def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
 
     first, steps = min(seconds(1)[0], seconds(1)[0]), 1
     while True:
-        taken, finite = seconds(4 * steps)
+        cost, finite = seconds(4 * steps)
         steps *= 4 if finite else 1
-        if not finite or taken - first > max(ENOUGH, first) or steps > 1e7:  # a start's cost scatters as much as it is
-            taken = min(seconds(steps)[0] for _ in range(3))  # others may have been at work
+        if not finite or cost - first > max(ENOUGH, first) or steps > 1e7:  # a start's cost scatters as much as it is
+            cost = min(seconds(steps)[0] for _ in range(3))  # others may have been at work
             # the start alone may have been disturbed; a process that waited before is told of its waiting later
-            return max(taken - first * finite, 0.5 * taken, LEAST * steps) / steps
+            return max(cost - first * finite, 0.5 * cost, LEAST * steps) / steps
 
 
 def declared(method: Integrator, claim: str) -> str:
@@ -209,8 +209,8 @@ def _python_step(thing: Any, name: str, chart: str, kind: str, *, adaptive: bool
         inspect.signature(thing).bind(*arguments.split(","))
     except TypeError:
         hint = "; a rotation, q = (w, x, y, z), takes (q, w, h, inertia, torque): form rotation" * (kind == "ode")
-        given = f"{inspect.signature(thing)}{hint}"
-        raise SymtopError(f"a step of the form {kind} must take {arguments}, not {given}") from None
+        signature = f"{inspect.signature(thing)}{hint}"
+        raise SymtopError(f"a step of the form {kind} must take {arguments}, not {signature}") from None
     except ValueError:  # built in, without a signature
         pass
     if kind in ("torch", "jax"):
@@ -236,7 +236,7 @@ def _thing(target: Any) -> tuple[Any, str]:
         module = execute(f"symtop_judged_{Path(file).stem}", file)
     thing = getattr(module, name or "step", None)
     if not (callable(thing) or is_solver(thing)):
-        known = [key for key, value in vars(module).items() if callable(value) and not key.startswith("_")]
-        hint = f"it has {', '.join(known[:8])}" if known else "it has no function"
+        functions = [key for key, value in vars(module).items() if callable(value) and not key.startswith("_")]
+        hint = f"it has {', '.join(functions[:8])}" if functions else "it has no function"
         raise SymtopError(f"{file.name} must have a function {name or 'step'!r}; {hint}")
     return thing, f"{file.stem}-{name}" if name else file.stem

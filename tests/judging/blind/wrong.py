@@ -186,12 +186,12 @@ def root_of_the_step(f, t, y, h):
     return y + root * root * f(t + h / 2, y + h / 2 * f(t, y))
 
 
-_kept = {}
+_memory = {}
 
 
 def first_momenta(f, t, y, h):
     """L.e is put back to what it was when the method was first called."""
-    spin = _kept.setdefault("spin", float(y[:3] @ y[3:]))
+    spin = _memory.setdefault("spin", float(y[:3] @ y[3:]))
     y = rk4(f, t, y, h)
     y[3:] += (spin - y[:3] @ y[3:]) * y[:3] / (y[:3] @ y[:3])
     return y
@@ -208,16 +208,16 @@ def counted(f, t, y, h):
 
 def compensated(f, t, y, h):
     """Rounding is carried from one call to the next, and ten thousand times too large."""
-    change = h * f(t + h / 2, y + h / 2 * f(t, y)) + _kept.get("rest", 0.0)
+    change = h * f(t + h / 2, y + h / 2 * f(t, y)) + _memory.get("rest", 0.0)
     after = y + change
-    _kept["rest"] = 1e4 * (change - (after - y))
+    _memory["rest"] = 1e4 * (change - (after - y))
     return after
 
 
 def poisoned(f, t, y, h):
     """The implicit midpoint rule from the last slope: a step that fails spoils all later ones."""
-    _kept["slope"] = solved(lambda k: f(t + h / 2, y + h / 2 * k), _kept.get("slope", f(t, y)))
-    return y + h * _kept["slope"]
+    _memory["slope"] = solved(lambda k: f(t + h / 2, y + h / 2 * k), _memory.get("slope", f(t, y)))
+    return y + h * _memory["slope"]
 
 
 def rounded(f, t, y, h):
@@ -276,10 +276,10 @@ def separable_no_half_square(state, h, dT, dV):
 def separable_stale(state, h, dT, dV):
     """Velocity Verlet whose first force is the last one of the call before."""
     theta, p = state
-    p = p - h / 2 * _kept.get("force", dV(theta))
+    p = p - h / 2 * _memory.get("force", dV(theta))
     theta = theta + h * dT(p)
-    _kept["force"] = dV(theta)
-    return theta, p - h / 2 * _kept["force"]
+    _memory["force"] = dV(theta)
+    return theta, p - h / 2 * _memory["force"]
 
 
 def separable_swapped(state, h, dT, dV):
@@ -355,12 +355,12 @@ def adams_from_a_table(f, t, y, h):
     return after
 
 
-_made = [0]
+_steps = [0]
 
 
 def tires(f, t, y, h):
-    _made[0] += 1
-    return (rk4 if _made[0] < 3_000 else euler)(f, t, y, h)
+    _steps[0] += 1
+    return (rk4 if _steps[0] < 3_000 else euler)(f, t, y, h)
 
 
 def sometimes_noisy(f, t, y, h):
