@@ -22,6 +22,7 @@ from symtop.methods.runge_kutta.adams import (
     SIGMA,
     G,
 )
+from symtop.model.top import flat
 
 
 def prepared(steps, h, k):
@@ -121,7 +122,7 @@ def steps_of(tolerance):
     scene = symtop.scene("spheroid")
     solver = symtop.integrator("adams").solvers["axis"]
     kernel, place, times = solver.loop(tolerance), np.zeros(solver.room), np.array([8.0])
-    numbers = (scene.top.I1, scene.top.I3, scene.top.mgl, *(getattr(scene.start, n) for n in scene.start.__slots__))
+    numbers = flat(scene.top, scene.start)
     seen, made = -1, []
     states, momenta = np.empty((1, 6)), np.empty((1, 2))
     while seen < 1:

@@ -16,12 +16,6 @@ NAME = "galerkin-simpson"
 SIMPSON = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 
 
-def point_of(where):
-    """(theta, phi, psi, p_theta, p_phi, p_psi) at a scene's start."""
-    at, momenta = where.start, where.top.momenta(where.start)
-    return np.array([at.theta, at.phi, at.psi, where.top.I1 * at.theta_dot, momenta.p_phi, momenta.p_psi])
-
-
 def derivatives(top, theta, rate):
     """dL/dq' and dL/dq of the Lagrangian in three angles."""
     s, c = np.sin(theta), np.cos(theta)
@@ -59,18 +53,18 @@ def independent_step(top, point, h, weights=SIMPSON):
 @pytest.mark.parametrize("where", random_scenes(8, seed=21), ids=lambda s: s.name)
 def test_one_step_is_the_stationary_parabola(where):
     """The reduction to two unknowns, and all six results of a step, against six equations solved as they stand."""
-    method, point = symtop.integrator(NAME), point_of(where)
     for h in (0.1, 0.02):
-        found = StepMap(method, "angles", where.top, 1.0, h).image(point)
-        assert np.max(np.abs(found - independent_step(where.top, point, h))) < 2e-12
+        step = StepMap(symtop.integrator(NAME), "angles", where.top, 1.0, h)
+        point = step.point(where.start)
+        assert np.max(np.abs(step.image(point) - independent_step(where.top, point, h))) < 2e-12
 
 
 def test_other_weights_are_another_method():
     where = random_scenes(1, seed=21)[0]
-    point = point_of(where)
-    found = StepMap(symtop.integrator(NAME), "angles", where.top, 1.0, 0.1).image(point)
+    step = StepMap(symtop.integrator(NAME), "angles", where.top, 1.0, 0.1)
+    point = step.point(where.start)
     wrong = independent_step(where.top, point, 0.1, weights=(0.17, 0.66, 0.17))
-    assert not np.max(np.abs(found - wrong)) < 2e-12
+    assert not np.max(np.abs(step.image(point) - wrong)) < 2e-12
 
 
 def test_a_step_without_its_last_force_is_neither_symplectic_nor_symmetric():
@@ -128,7 +122,7 @@ def test_every_derivative_of_a_trial_is_right(where):
 
 
 def test_the_recomputed_momenta_see_a_wrong_increment():
-    """The negative control of the last test: a phi that moved 1e-10 too far shows in p_phi."""
+    """A phi that moved 1e-10 too far shows in p_phi."""
     where = symtop.scene("spheroid")
     par, state = on_angles(where.top, where.start)
     carry = kernel.begin(par, kernel.Iteration(), state, 0.01)

@@ -17,11 +17,10 @@ from symtop.methods.runge_kutta.explicit import LOOPS, runge_kutta
 from symtop.methods.runge_kutta.pair_tables import DORMAND_PRINCE
 from symtop.model.scenes import closed_form
 from symtop.run.simulation import integrate, make_plan
-from tests.judging.blind.right import explicit
+from tests.judging.blind.right import CLASSICAL, explicit
 from tests.measure.test_step_series import series
 
-KUTTA_A = ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0))
-KUTTA_B = (1 / 6, 1 / 3, 1 / 3, 1 / 6)
+KUTTA_A, KUTTA_B, _ = CLASSICAL
 
 
 @pytest.mark.parametrize(
@@ -145,8 +144,8 @@ def test_p_phi_stays_where_it_is_linear_in_the_state_and_is_lost_in_angles(name)
 # --- Dormand-Prince -------------------------------------------------------------------------------------------------
 
 
-def _walk(scene, tolerance, horizon, pair=pairs.RK45, **limits):
-    plan, _ = make_plan(scene, integrator("rk45-compiled"), None, tolerance, horizon=horizon, samples=301)
+def _walk(scene, tolerance, pair=pairs.RK45, **limits):
+    plan, _ = make_plan(scene, integrator("rk45-compiled"), None, tolerance, horizon=8.0, samples=301)
     return plan, replace(pairs.solver(FORMULATIONS["angles"], pair, pair.rows), **limits)(scene.top, scene.start, plan)
 
 
@@ -163,9 +162,9 @@ def test_the_tableau_is_scipys():
 def test_adaptive_outcomes():
     scene, pair = symtop.scene("spheroid"), pairs.RK45
     for error in (math.inf, math.nan):
-        hopeless = _walk(scene, 1e-6, 8.0, pair._replace(table=DORMAND_PRINCE._replace(error=(error,) * 7)))[1]
+        hopeless = _walk(scene, 1e-6, pair._replace(table=DORMAND_PRINCE._replace(error=(error,) * 7)))[1]
         assert (hopeless.outcome, hopeless.steps) == ("step_too_small", 0)
-    plan, run = _walk(scene, 1e-9, 8.0, block=500, most=1000)
+    plan, run = _walk(scene, 1e-9, block=500, most=1000)
     assert run.outcome == "out_of_budget"
     assert 0.0 < run.reached < 8.0
     assert np.array_equal(np.isfinite(run.states[:, 0]), plan.times <= run.reached)
