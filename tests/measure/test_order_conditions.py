@@ -42,12 +42,12 @@ def test_known_tables_have_their_orders():
     assert conditions([[0.0]], [0.9]).order == 0
 
 
-@pytest.mark.parametrize(("off", "found"), [(1e-9, 2), (1e-13, 4)])
-def test_a_coefficient_that_is_off_shows_beyond_rounding(off, found):
+@pytest.mark.parametrize(("off", "order"), [(1e-9, 2), (1e-13, 4)])
+def test_a_coefficient_that_is_off_shows_beyond_rounding(off, order):
     # the same nodes; b4 off c3 = off/12 in the tall tree of order 3
     rows = ((), (0.5,), (0.0, 0.5), (off, 0.0, 1.0 - off))
     table = conditions(square(rows), CLASSICAL[1])
-    assert table.order == found
+    assert table.order == order
     assert table.defect[2] == pytest.approx(off / 12, rel=0.01, abs=1e-16)
 
 

@@ -123,10 +123,10 @@ def steps_of(tolerance):
     solver = symtop.integrator("adams").solvers["axis"]
     kernel, place, times = solver.loop(tolerance), np.zeros(solver.room), np.array([8.0])
     numbers = flat(scene.top, scene.start)
-    seen, made = -1, []
+    samples, made = -1, []
     states, momenta = np.empty((1, 6)), np.empty((1, 2))
-    while seen < 1:
-        seen, *_ = kernel(numbers, tolerance, times, 1, seen, place, states, momenta)
+    while samples < 1:
+        samples, *_ = kernel(numbers, tolerance, times, 1, samples, place, states, momenta)
         made.append((place[6 + 6 * LAST + LENGTH], int(place[6 + 6 * LAST + ORDER_THEN])))
     return made[1:]  # the first call evaluates f at the start
 

@@ -132,8 +132,8 @@ def test_two_runs_in_one_register_have_the_bits_of_each_alone(name, chart):
     moved = replace(scene.start, **({"psi_dot": 1.0} if chart == "axis" else {"omega_body": (0.1, 0.2, 0.3)}))
     run, fixed = pairs.two_runs(chart, pairs.DOP8, number), integrator("dop853-compiled-fixed").solvers[chart]
     near, far = (fixed(scene.top, start, Plan.steps(h, marks)).states for start in (scene.start, moved))
-    seen = np.empty((near.shape[1] + far.shape[1], marks.size))
-    for which, row in enumerate(seen):
+    out = np.empty((near.shape[1] + far.shape[1], marks.size))
+    for which, row in enumerate(out):
         run(flat(scene.top, scene.start), flat(scene.top, moved), h, marks, which, row)
-    np.testing.assert_array_equal(seen.T, np.hstack([near, far]))
+    np.testing.assert_array_equal(out.T, np.hstack([near, far]))
     assert not np.array_equal(near, far)

@@ -36,8 +36,8 @@ def test_a_step_of_a_users_tableau_is_the_definition_and_has_its_order(a, b, ord
     scene, method, h = symtop.scene("spheroid"), runge_kutta("mine", a, b), 0.01
     par, state = with_rates(scene.top, scene.start)
     expected = explicit(a, b, list(map(sum, a)))(lambda t, y: np.array(field_angles(par, y)), 0.0, np.array(state), h)
-    found = LOOPS["angles"](par, method.solvers["angles"].rule, state, h, np.array([1])).states[0]
-    np.testing.assert_allclose(found, expected, rtol=2e-15)
+    result = LOOPS["angles"](par, method.solvers["angles"].rule, state, h, np.array([1])).states[0]
+    np.testing.assert_allclose(result, expected, rtol=2e-15)
     assert series(method, "axis").order == order
 
 
@@ -98,8 +98,8 @@ def test_the_right_hand_side_is_the_derivative_of_the_true_motion(name, chart):
     states = [form.prepare(scene.top, symtop.Angles(*map(float, values)))[1] for values in motion]
     back2, back, here, ahead, ahead2 = np.array(states)
     slope = (8.0 * (ahead - back) - (ahead2 - back2)) / (12.0 * h)
-    found = np.array(form.field(par, tuple(here)))
-    np.testing.assert_allclose(found, slope, atol=1e-7 * np.max(np.abs(slope)))
+    result = np.array(form.field(par, tuple(here)))
+    np.testing.assert_allclose(result, slope, atol=1e-7 * np.max(np.abs(slope)))
 
 
 @pytest.mark.parametrize("chart", list(FORMULATIONS))
@@ -200,14 +200,14 @@ def test_scipys_solvers_are_solve_ivp(name):
 
 def test_taylor_in_three_precisions():
     pytest.importorskip("heyoka")
-    found = {}
+    result = {}
     for name in ("taylor", "taylor-longdouble", "taylor-quad"):
-        run, found[name] = _error(name, None, "attitude", horizon=4.0)
+        run, result[name] = _error(name, None, "attitude", horizon=4.0)
         assert run.attrs["chart"] == "attitude"
         assert run["quaternion"].dtype == np.float64
     # beyond double what is left is the rounding of the samples and of the closed form
-    assert found["taylor"] < 5e-14
-    assert max(found["taylor-longdouble"], found["taylor-quad"]) < 5e-15
+    assert result["taylor"] < 5e-14
+    assert max(result["taylor-longdouble"], result["taylor-quad"]) < 5e-15
     loose = _error("taylor-quad", 1e-8, horizon=4.0)[1]
     assert loose > 1e-12  # the tolerance reaches heyoka
 
