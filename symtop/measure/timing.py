@@ -107,11 +107,11 @@ def timings(
     draw = random.Random(0)  # noqa: S311
     for number in range(batches):
         for index in draw.sample(range(len(functions)), len(functions)):
-            taken = samples[index]
-            done = (len(taken) >= least and calls[index] * sum(taken) >= patience) or agree(taken, close)
-            if len(taken) <= number and not done:
-                taken.append(_batch(functions[index], calls[index]) / calls[index])
-    return [Timing(tuple(taken), first) for taken, first in zip(samples, firsts, strict=True)]
+            row = samples[index]
+            done = (len(row) >= least and calls[index] * sum(row) >= patience) or agree(row, close)
+            if len(row) <= number and not done:
+                row.append(_batch(functions[index], calls[index]) / calls[index])
+    return [Timing(tuple(row), first) for row, first in zip(samples, firsts, strict=True)]
 
 
 def agree(samples: Sequence[float], close: float) -> bool:
