@@ -13,7 +13,7 @@ from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
 from symtop.methods.runge_kutta import pairs
-from symtop.methods.runge_kutta.pair_tables import DOP853, TSIT5, VERN9
+from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5, VERN9
 from symtop.model import scenes as models
 from symtop.model.top import flat
 from symtop.run.simulation import make_plan
@@ -49,7 +49,11 @@ def test_tables_meet_the_order_conditions_of_every_tree_up_to_their_order_and_no
     assert conditions(wrong, b, order).order < order
 
 
-def test_the_table_of_order_eight_is_scipys():
+def test_the_tables_of_order_five_and_eight_are_scipys():
+    theirs, pair = integrate.RK45, DORMAND_PRINCE
+    np.testing.assert_array_equal(square(pair, 6)[:, :5], theirs.A)
+    for mine, other in ((pair.b, theirs.B), (pair.error, theirs.E), (pair.dense, theirs.P)):
+        np.testing.assert_array_equal(mine, other)
     theirs = integrate.DOP853
     np.testing.assert_array_equal(square(DOP853, 12), theirs.A)
     np.testing.assert_array_equal(DOP853.b, theirs.B)

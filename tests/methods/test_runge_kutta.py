@@ -149,16 +149,6 @@ def _walk(scene, tolerance, pair=pairs.RK45, **limits):
     return plan, replace(pairs.solver(FORMULATIONS["angles"], pair, pair.rows), **limits)(scene.top, scene.start, plan)
 
 
-def test_the_tableau_is_scipys():
-    from scipy.integrate import RK45
-
-    pair = DORMAND_PRINCE
-    np.testing.assert_array_equal(np.concatenate(pair.a), RK45.A[1:][np.tril_indices(5)])
-    np.testing.assert_array_equal(pair.b, RK45.B)
-    np.testing.assert_array_equal(pair.error, RK45.E)
-    np.testing.assert_array_equal(pair.dense, RK45.P)
-
-
 def test_adaptive_outcomes():
     scene, pair = symtop.scene("spheroid"), pairs.RK45
     for error in (math.inf, math.nan):
