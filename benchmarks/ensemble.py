@@ -17,13 +17,15 @@ long `simulate` alone.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import symtop
+from benchmarks.pages import Table
 from symtop.core.parallel import cores
+from symtop.measure.timing import timings
 from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.loop import FixedStep
 from symtop.model.charts import View
@@ -146,20 +148,14 @@ def calls() -> list[Call]:
         def alone(name: str = method) -> object:
             return symtop.simulate(scene, name, step_size=h, horizon=STEPS * h, samples=2, observe="axis", guard=False)
 
-        timed: list[Callable[[], object]] = [lambda: together(*SHORT), lambda: together(*LONG), alone]
-        best = [np.inf] * len(timed)
-        for _ in range(ALL_ROUNDS):
-            for k, call in enumerate(timed):
-                begun = time.perf_counter()
-                call()
-                best[k] = min(best[k], time.perf_counter() - begun)
+        each = timings([lambda: together(*SHORT), lambda: together(*LONG), alone], ALL_ROUNDS, batch=0.0)
         few, many = SHORT[0] * SHORT[1], LONG[0] * LONG[1]
-        short, long = best[0] / CALLED, best[1] / CALLED
-        rows.append(Call(method, short - few * (long - short) / (many - few), long / many, best[2] / STEPS))
+        short, long = (timing.best / CALLED for timing in each[:2])
+        rows.append(Call(method, short - few * (long - short) / (many - few), long / many, each[2].best / STEPS))
     return rows
 
 
-def said_of(rows: list[Call]) -> list[str]:
+def said_of(rows: Sequence[Call]) -> list[str]:
     """What the calls of a user take."""
     return [
         f"`symtop.ensemble` of {CALLED} tops, {row.method}, two samples of the axis, {cores()} cores: "
@@ -169,7 +165,7 @@ def said_of(rows: list[Call]) -> list[str]:
     ]
 
 
-def verdict(items: list[Item]) -> list[str]:
+def verdict(items: Sequence[Item]) -> list[str]:
     """How much faster an ensemble is, and how much it could be."""
     took = {item.name: item for item in items}
     fast = max((item for item in items if item.name.startswith(WHOLE)), key=lambda item: item.ratio)
@@ -182,18 +178,20 @@ def verdict(items: list[Item]) -> list[str]:
     return [f"{said}."]
 
 
-def lines(items: list[Item]) -> list[str]:
-    """As text."""
-    return (
-        [f"{'a member of an ensemble':<48} us   times faster than `simulate`"]
-        + [f"{item.name:<44} {item.seconds * 1e6:8.2f} {item.ratio:8.1f}" for item in items]
-        + verdict(items)
+def table(items: Sequence[Item]) -> Table:
+    """Every part, and every way of making the runs."""
+    return Table(
+        f"A member of an ensemble: {NUTATIONS * PER_NUTATION} steps of {METHOD} [{CHART}], {SAMPLES} samples, "
+        f"{MEMBERS} tops",
+        ["what", "us a member", "times faster than `simulate`"],
+        [[item.name, f"{item.seconds * 1e6:.2f}", f"{item.ratio:.3g}"] for item in items],
     )
 
 
 def main() -> None:
     """Measure and print."""
-    print("\n".join([*lines(measure()), *said_of(calls())]))
+    items = measure()
+    print("\n".join([table(items).text, *verdict(items), *said_of(calls())]))
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import symtop
 from benchmarks import twin
+from benchmarks.pages import Table
 from symtop.measure.timing import Timing, timings
 from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import methods
@@ -101,26 +102,18 @@ def measure() -> list[Row]:
     ]
 
 
-def lines(rows: Sequence[Row]) -> list[str]:
-    """The table, and what it says."""
-    columns = (
-        ("ns/step", 9),
-        ("spread", 8),
-        ("C", 8),
-        ("/ C", 7),
-        ("of fifths", 11),
-        ("same bits", 14),
-        ("/ Verlet", 10),
-    )
-    table = [f"{'kernel':<42}" + "".join(f"{title:>{width}}" for title, width in columns)]
-    for row in rows:
-        name, fifths = f"{row.name} [{row.chart}]", f"{row.ratio_low:.2f} .. {row.ratio_high:.2f}"
-        same = "yes" if row.difference == 0.0 else f"{row.difference:.0e}"
-        table.append(
-            f"{name:<42}{row.nanoseconds:9.1f}{row.spread:8.0%}{row.in_c:8.1f}{row.ratio:7.2f}  {fifths:<13}{same:>10}"
-            f"{row.verlet_steps:10.2f}"
-        )
-    return [*table, "", *verdict(rows)]
+def table(rows: Sequence[Row]) -> Table:
+    """Every kernel beside its twin."""
+    return Table(
+        "A step of every kernel",
+        ["kernel", "ns a step", "in C", "of C's", "spread of the fifths", "same bits as C", "steps of stormer-verlet"],
+        [
+            [f"{row.name}[{row.chart}]", f"{row.nanoseconds:.1f}", f"{row.in_c:.1f}", f"{row.ratio:.2f}",
+             f"{row.ratio_low:.2f} to {row.ratio_high:.2f}",
+             "yes" if row.difference == 0.0 else f"{row.difference:.0e}", f"{row.verlet_steps:.2f}"]
+            for row in rows
+        ],
+    )  # fmt: skip
 
 
 def verdict(rows: Sequence[Row]) -> list[str]:

@@ -279,20 +279,11 @@ def tables(measured: Measured) -> list[Table]:
     ]  # fmt: skip
 
 
-def lines(measured: Measured) -> list[str]:
-    """The tables as text, and what they say."""
-    text = []
-    for table in tables(measured):
-        widths = [max(map(len, column)) for column in zip(table.header, *table.rows, strict=True)]
-        padded = [map(str.ljust, row, widths) for row in (table.header, *table.rows)]
-        text += [table.title, *map("  ".join, padded), ""]
-    return [*text, *verdict(measured)]
-
-
 def measure() -> Measured:
     """All of it."""
     return Measured(steps(), threads(), batches())
 
 
 if __name__ == "__main__":
-    print("\n".join(lines(measure())))
+    measured = measure()
+    print("\n".join([*(table.text for table in tables(measured)), *verdict(measured)]))

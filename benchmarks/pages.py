@@ -19,6 +19,13 @@ class Table(NamedTuple):
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
 
+    @property
+    def text(self) -> str:
+        """All of it for a terminal: each column is as wide as its longest cell."""
+        widths = [max(map(len, column)) for column in zip(self.header, *self.rows, strict=True)]
+        lines = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in (self.header, *self.rows))
+        return "\n".join([self.title, *lines, ""])
+
 
 def findings(
     name: str, title: str, question: str, sentences: Sequence[str], how_to_read: str, tables: Sequence[Table], *,

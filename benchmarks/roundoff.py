@@ -1,6 +1,6 @@
 """Rounding of four methods against the same maps in 80-bit arithmetic: a second opinion on the drift study's ensembles.
 
-    python benchmarks/roundoff.py --steps 1e7        (needs gcc and a long double of 80 bits)
+    python -m benchmarks.roundoff --steps 1e7        (needs gcc and a long double of 80 bits)
 
 Both runs start from the same doubles and are compared at the same steps, so that nothing has to be known about the
 oscillation of the energy: the modified energy of the one less that of the other, in long double, is rounding alone. The
@@ -10,26 +10,16 @@ theta, which grows as n^3/2.
 
 import argparse
 import ctypes
-import subprocess
-from pathlib import Path
 
 import numpy as np
 
 import symtop
+from benchmarks.twin import library
 from symtop.methods.framework.loop import inside
 from symtop.run.long_run import PER_NUTATION, chart_of, long_run, windows
 from symtop.run.modified_energy import modified_energy
 
-HERE = Path(__file__).resolve().parent
 WIDE = np.longdouble
-
-
-def build() -> ctypes.CDLL:
-    """Compile the 80-bit maps."""
-    library = HERE / "build" / "extended.so"
-    library.parent.mkdir(exist_ok=True)
-    subprocess.run(["gcc", "-O3", "-shared", "-fPIC", "-o", str(library), str(HERE / "extended.c"), "-lm"], check=True)
-    return ctypes.CDLL(str(library))
 
 
 def main() -> None:
@@ -40,22 +30,23 @@ def main() -> None:
     if np.finfo(WIDE).nmant < 63:
         print("long double is no wider than double here: nothing to compare with")
         return
-    library, where = build(), symtop.scene("spheroid")
-    h, ends = where.nutation_period / PER_NUTATION, windows(int(options.steps))
+    maps, spheroid = library("extended", (), ("-O3",)), symtop.scene("spheroid")
+    h, ends = spheroid.nutation_period / PER_NUTATION, windows(int(options.steps))
     print(f"{'method':<16}{'steps':>12}{'80 bits':>12}{'by itself':>12}{'theta':>12}")
     for name, method in symtop.integrators().items():
         if method.modified_energy is None:
             continue
         chart, solver = chart_of(method)
         assert inside(solver) is solver
-        par, rule, state = solver.setup(where.top, where.start, h)
-        found = long_run(where, name, steps=int(options.steps), step_size=h, quiet=True)["modified_energy_mean"].values
+        par, rule, state = solver.setup(spheroid.top, spheroid.start, h)
+        run = long_run(spheroid, name, steps=int(options.steps), step_size=h, quiet=True)
+        alone = run["modified_energy_mean"].values
         size = 2 if chart == "angles" else 6
         wide = np.array(state[:size], dtype=WIDE)
-        momenta = where.top.momenta(where.start)
-        top = np.array([where.top.I1, where.top.mgl, momenta.north, momenta.south], dtype=WIDE)
-        step, function = np.array([h], dtype=WIDE), library[name.replace("-", "_")]
-        at, done = solver.loop.begun(par, rule, state, h), 0
+        momenta = spheroid.top.momenta(spheroid.start)
+        top = np.array([spheroid.top.I1, spheroid.top.mgl, momenta.north, momenta.south], dtype=WIDE)
+        step, function = np.array([h], dtype=WIDE), maps[name.replace("-", "_")]
+        at, done = solver.loop.start(par, rule, state, h), 0
         for place, end in enumerate(ends):
             _, at = solver.loop.advance(par, rule, at, h, np.array([end]))
             function(top.ctypes.data_as(ctypes.c_void_p), wide.ctypes.data_as(ctypes.c_void_p),
@@ -63,11 +54,11 @@ def main() -> None:
             done = end
             ours = np.array(at.state[:size], dtype=WIDE) + np.array(at.low[:size], dtype=WIDE)
             pair = np.stack([ours, wide])
-            energies = modified_energy(where, name, chart, pair, h)
-            drift = float((energies[0] - energies[1]) / where.energy_scale)
+            energies = modified_energy(spheroid, name, chart, pair, h)
+            drift = float((energies[0] - energies[1]) / spheroid.energy_scale)
             theta = pair[:, 0] if chart == "angles" else np.arccos(pair[:, 2])
             if place % 6 == 0 or end == ends[-1]:
-                print(f"{name:<16}{end:>12}{drift:>12.1e}{found[place]:>12.1e}{float(theta[0] - theta[1]):>12.1e}")
+                print(f"{name:<16}{end:>12}{drift:>12.1e}{alone[place]:>12.1e}{float(theta[0] - theta[1]):>12.1e}")
 
 
 if __name__ == "__main__":

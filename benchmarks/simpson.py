@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 import symtop
+from symtop.measure.order import power_law
 from symtop.measure.timing import bare_run, timings
 from symtop.model.scenes import Scene, scene as find_scene
 
@@ -48,19 +49,14 @@ class Cost(NamedTuple):
     seconds: float
 
 
-def slope(steps: np.ndarray, errors: np.ndarray) -> float:
-    """Of the logarithm of the error over that of the step."""
-    return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
-
-
 def convergence(scene: Scene) -> list[Point]:
     """Orders of the inclination and of the energy over ten nutations."""
     horizon = NUTATIONS * scene.nutation_period
     rows = [f"{name}[angles]" for name in (SIMPSON, MIDPOINT)]
     data = symtop.sweep(scene, rows, per_nutation=PER_NUTATION, horizon=horizon, quiet=True).isel(scene=0)
     steps = 1.0 / np.array(PER_NUTATION)
-    found = {name: [slope(steps, data[name].values[k]) for k in range(2)] for name in ("theta", "energy")}
-    return [Point(f"order of {name}", *found[name], MIDPOINT) for name in found]
+    orders = {name: [power_law(steps, data[name].values[k]).slope for k in range(2)] for name in ("theta", "energy")}
+    return [Point(f"order of {name}", *pair, MIDPOINT) for name, pair in orders.items()]
 
 
 def conservation(scene: Scene) -> list[Point]:
@@ -88,10 +84,10 @@ def reduced(scene: Scene) -> Point:
             )["theta"].values
             for name in (SIMPSON, MIDPOINT, CLASSICAL)
         }
-        for name, found in apart.items():
-            found.append(float(np.abs(states[name] - states[CLASSICAL]).max()))
-    found = [slope(1.0 / np.array(PER_NUTATION), np.array(values)) for values in apart.values()]
-    return Point(f"order of the difference from {CLASSICAL}[angles]", *found, MIDPOINT)
+        for name, gaps in apart.items():
+            gaps.append(float(np.abs(states[name] - states[CLASSICAL]).max()))
+    orders = [power_law(1.0 / np.array(PER_NUTATION), gaps).slope for gaps in apart.values()]
+    return Point(f"order of the difference from {CLASSICAL}[angles]", *orders, MIDPOINT)
 
 
 def points(scene: Scene) -> list[Point]:

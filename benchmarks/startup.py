@@ -5,6 +5,9 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
+
+from benchmarks.pages import Table
 
 STEP = 0.01
 FIRST = f"import symtop; symtop.simulate('spheroid', 'midpoint', step_size={STEP})"
@@ -33,6 +36,6 @@ def measure(repeats: int = 3) -> dict[str, float]:
     }
 
 
-def lines(found: dict[str, float]) -> list[str]:
-    """The table."""
-    return [f"{name:<42}{seconds * 1e3:>12.2f} ms" for name, seconds in found.items()]
+def table(seconds: Mapping[str, float]) -> Table:
+    """What is waited for."""
+    return Table("Starting", ["what", "ms"], [[name, f"{value * 1e3:.2f}"] for name, value in seconds.items()])

@@ -5,11 +5,13 @@ finer ones do too), and the time of that run with everything a call costs. Verle
 than microseconds do.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 import symtop
+from benchmarks.pages import Table
 from symtop.measure.timing import timings
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import methods
@@ -71,9 +73,10 @@ def measure(accuracy: float = ACCURACY) -> list[Reached]:
     return sorted(rows, key=lambda row: row.seconds)
 
 
-def lines(rows: list[Reached], accuracy: float) -> list[str]:
-    """The table."""
-    head = f"{'method':<42}{'steps':>9}{'us':>10}{'Verlet steps':>14}"
-    return [f"time to an attitude error of {accuracy:g} on spheroid, t = {HORIZON:g}", head] + [
-        f"{row.name:<42}{row.steps:>9}{row.seconds * 1e6:>10.1f}{row.verlet_steps:>14.0f}" for row in rows
-    ]
+def table(rows: Sequence[Reached], accuracy: float) -> Table:
+    """Every method that meets the accuracy."""
+    return Table(
+        f"Time to an attitude error of {accuracy:g} on spheroid at t = {HORIZON:g}",
+        ["method", "steps", "us", "steps of stormer-verlet"],
+        [[row.name, str(row.steps), f"{row.seconds * 1e6:.1f}", f"{row.verlet_steps:.0f}"] for row in rows],
+    )

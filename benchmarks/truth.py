@@ -7,11 +7,12 @@ single forms. Samples among many, the constants of one top among many and a long
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.pages import Table
 from symtop.measure.timing import timings
 from symtop.model.exact import closed_form, free_body
 from symtop.model.exact.closed_form import ClosedForm, ClosedForms
@@ -116,7 +117,10 @@ def _of_many() -> list[Row]:
     ]
 
 
-def lines(rows: list[Row]) -> list[str]:
-    """The table."""
-    head = f"{'closed form':<50}{'median us':>12}{'99 % us':>12}"
-    return [head] + [f"{row.name:<50}{row.median * 1e6:>12.3f}{row.slow * 1e6:>12.3f}" for row in rows]
+def table(rows: Sequence[Row]) -> Table:
+    """Every call."""
+    return Table(
+        "The closed form",
+        ["call", "median us", "99 % below, us"],
+        [[row.name, f"{row.median * 1e6:.3g}", f"{row.slow * 1e6:.3g}"] for row in rows],
+    )

@@ -5,11 +5,11 @@ its attributes. What is left between their sum and the whole is Python between t
 steps of the method, which travels between machines better than microseconds do.
 """
 
-import statistics
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import symtop
+from benchmarks.pages import Table
 from symtop.core import netcdf
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.calling import solve
@@ -77,21 +77,24 @@ def one_step() -> dict[str, float]:
     return dict(zip(calls, best, strict=True))
 
 
-def lines(items: list[Item], steps: dict[str, float]) -> list[str]:
-    """The tables."""
-    head = f"{STEPS} steps of {METHOD}[{CHART}] on {SCENE}"
-    rows = [f"{item.name:<42}{item.seconds * 1e6:>10.1f} us{item.steps:>12.0f}" for item in items]
+def tables(items: Sequence[Item], steps: Mapping[str, float]) -> list[Table]:
+    """The parts of a run, and the run of one step of every method."""
+    return [
+        Table(
+            f"A run of {STEPS} steps of {METHOD} on {SCENE}, by its parts",
+            ["part", "us", "steps of the method"],
+            [[item.name, f"{item.seconds * 1e6:.1f}", f"{item.steps:.0f}"] for item in items],
+        ),
+        Table("A run of one step", ["method", "us"], [[name, f"{s * 1e6:.2f}"] for name, s in steps.items()]),
+    ]
+
+
+def verdict(items: Sequence[Item], steps: Mapping[str, float]) -> list[str]:
+    """What a run and its largest parts take, and a run of one step at most."""
+    took = {item.name: item.seconds * 1e6 for item in items}
     slowest = max(steps, key=lambda name: steps[name])
-    middle = statistics.median(steps.values())
-    last = f"a run of one step: {middle * 1e6:.1f} us (median), at most {steps[slowest] * 1e6:.1f} us, {slowest}"
-    return [f"{head:<42}{'':>13}{'steps':>12}", *rows, last]
-
-
-def main() -> None:
-    """Print the tables, with every method by itself."""
-    steps = one_step()
-    print("\n".join([*lines(measure(), steps), *(f"  {name:<40}{s * 1e6:>10.2f} us" for name, s in steps.items())]))
-
-
-if __name__ == "__main__":
-    main()
+    run = (
+        f"`simulate` takes {took['simulate']:.0f} us for {STEPS} steps of {METHOD}[{CHART}] on {SCENE}, "
+        f"{took['solver, every step shown']:.0f} in the solver and {took['guard']:.0f} in the guard."
+    )
+    return [run, f"A run of one step takes {steps[slowest] * 1e6:.1f} us at most, with {slowest}."]

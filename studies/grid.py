@@ -9,6 +9,15 @@ from symtop.measure.settings import smallest_charts
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import TAGS, Scene, scenes
 
+ALL_BUT_TWO = {  # tags that leave spheroid and goldstein, with the reason
+    "ordinary": "spheroid and goldstein show it",
+    "repeats": "spheroid and goldstein show the same",
+    "fast": "two ordinary tops are enough",
+    "steady": "two ordinary tops are enough",
+    "unstable": "two ordinary tops are enough",
+    "near_pole": "the angles chart fails",
+}
+
 
 def grid_scenes(left_out: Iterable[str] = (), suits: Callable[[Scene], bool] = lambda _: True) -> list[str]:
     """Names of the scenes of a grid, in the order of the catalogue, a user's own at the end.

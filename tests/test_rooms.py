@@ -12,7 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
+from scipy.sparse.csgraph import connected_components
 
 ROOT = Path(__file__).resolve().parents[1]
 ORDER = (  # from the ground up
@@ -105,23 +107,14 @@ def upward(modules: dict[str, Module]) -> list[str]:
 
 def circles(modules: dict[str, Module]) -> list[str]:
     """Sets of files that import each other, directly or through others; TYPE_CHECKING imports aside."""
-    graph = {
-        name: {arrow.target for arrow in module.arrows if not arrow.typing} & modules.keys() - {name}
-        for name, module in modules.items()
-    }
-    reached: dict[str, set[str]] = {}
-    for name, targets in graph.items():
-        ahead, seen = set(targets), set[str]()
-        while ahead:
-            seen |= ahead
-            ahead = set().union(*(graph[step] for step in ahead)) - seen
-        reached[name] = seen
-    groups = {
-        tuple(sorted(other for other in reached[name] if name in reached[other]))
-        for name in graph
-        if name in reached[name]
-    }
-    return [" <-> ".join(group) for group in sorted(groups)]
+    names = sorted(modules)
+    graph = np.zeros((len(names), len(names)), dtype=bool)
+    for place, name in enumerate(names):
+        targets = {arrow.target for arrow in modules[name].arrows if not arrow.typing}
+        graph[place] = [other in targets for other in names]
+    count, group = connected_components(graph, connection="strong")
+    sets = ([name for name, one in zip(names, group, strict=True) if one == k] for k in range(count))
+    return sorted(" <-> ".join(members) for members in sets if len(members) > 1)
 
 
 def strangers(modules: dict[str, Module]) -> list[str]:

@@ -6,11 +6,10 @@ make peers        (makes benchmarks/peers/.venv once)
 import argparse
 from pathlib import Path
 
-from benchmarks.peers import ADAPTERS, load, together
+from benchmarks.peers import ADAPTERS, load, summary, together
 from benchmarks.peers.adapters.diffrax import PACKAGE as DIFFRAX, SOLVERS
 from benchmarks.peers.measure import SCENES, measure
 from benchmarks.peers.study import STUDY, findings
-from benchmarks.peers.summary import lines
 from symtop.core import netcdf
 from symtop.measure import columns
 
@@ -38,7 +37,8 @@ def main() -> None:
         netcdf.write(data, file)
         many = together.measure(SOLVERS if any(peer.package == DIFFRAX for peer in peers) else ())
     netcdf.write_json(told, findings(data, many, options.results, missing))
-    print("\n".join([*lines(data), "", *together.lines(many)]))
+    said = [*summary.pairs(data), *summary.verdict(data), ""]
+    print("\n".join([summary.tables(data)[1].text, *said, together.table(many).text, *together.verdict(many)]))
 
 
 if __name__ == "__main__":

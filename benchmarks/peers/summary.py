@@ -326,12 +326,3 @@ HOW_TO_READ = (
     "the same call; counts of wins are over libraries that are handed equations, not heyoka's stepper, which symtop "
     "offers. None of this says anything about a library's other uses."
 )
-
-
-def lines(data: xr.Dataset) -> list[str]:
-    """The first table and the verdict, for a terminal."""
-    table: Any = tables(data)[1]
-    rows = [table.header, *table.rows]
-    widths = [max(len(row[i]) for row in rows) + 2 for i in range(len(table.header))]
-    text = ["".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return [*text, "", *pairs(data), *verdict(data)]

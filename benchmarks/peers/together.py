@@ -9,7 +9,6 @@ the ones that others count. The error is the largest of all tops, of the axis at
 """
 
 import os
-import time
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
@@ -19,6 +18,7 @@ import symtop
 from benchmarks import lanes
 from benchmarks.pages import Table
 from benchmarks.peers.adapters import diffrax as adapter
+from symtop.measure.timing import timings
 from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.space import on_axis
@@ -125,13 +125,9 @@ def _cell(count: int, tolerance: float, solvers: Iterable[str]) -> list[Row]:
             calls[f"{name}[{chart}], lanes"] = fixed(name, chart, numbers, steps)
     calls |= {f"diffrax {solver}, vmap": vmapped(solver, numbers, tolerance) for solver in solvers}
     errors = {name: worst(call, numbers) for name, call in calls.items()}  # compiles, too
-    best = dict.fromkeys(calls, np.inf)
-    for _ in range(ROUNDS):
-        for name, call in calls.items():
-            begun = time.perf_counter()
-            call()
-            best[name] = min(best[name], time.perf_counter() - begun)
-    return [Row(name, count, tolerance, errors[name], call()[1], best[name] / count) for name, call in calls.items()]
+    each = timings([*calls.values()], ROUNDS, batch=0.0, warm=True)
+    return [Row(name, count, tolerance, errors[name], call()[1], timing.best / count)
+            for (name, call), timing in zip(calls.items(), each, strict=True)]  # fmt: skip
 
 
 def table(rows: list[Row]) -> Table:
@@ -169,14 +165,6 @@ def verdict(rows: list[Row]) -> list[str]:
     return said
 
 
-def lines(rows: list[Row]) -> list[str]:
-    """As text."""
-    shown = table(rows)
-    widths = [max(map(len, column)) for column in zip(shown.header, *shown.rows, strict=True)]
-    return [
-        shown.title, *("  ".join(map(str.ljust, row, widths)) for row in (shown.header, *shown.rows)), *verdict(rows)
-    ]  # fmt: skip
-
-
 if __name__ == "__main__":
-    print("\n".join(lines(measure())))
+    rows = measure()
+    print("\n".join([table(rows).text, *verdict(rows)]))

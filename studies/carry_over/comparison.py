@@ -5,7 +5,7 @@ the target; not reached is infinite, and infinite ones tie. Families with a numb
 are resampled together.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -60,11 +60,6 @@ def label(name: str) -> str:
     return name.removesuffix(f"[{BODY}]")
 
 
-def targets() -> Sequence[float]:
-    """The errors that are asked."""
-    return ASKED
-
-
 def group_of(data: xr.DataTree, span: str) -> xr.Dataset:
     """The dataset of a group over its only scene."""
     return data[span].to_dataset().isel(scene=0)
@@ -75,22 +70,22 @@ def costs(data: xr.DataTree, family: str, target: float, quantity: str = "axis",
     """Costs of all methods of bodies; span "own" has the same methods in charts of the top, of epsilon = 0."""
     group = group_of(data, span)
     names = [str(name) for name in group["variant"].values]
-    asked = group.sel(quantity=quantity).sel(target=target, method="nearest")
+    part = group.sel(quantity=quantity).sel(target=target, method="nearest")
     if span != "own":
-        asked = asked.sel(family=family)
-    values, met = (asked[name].transpose("variant", "member").values.astype(float) for name in ("cost", "met_at"))
-    known = prices(data)
+        part = part.sel(family=family)
+    values, met = (part[name].transpose("variant", "member").values.astype(float) for name in ("cost", "met_at"))
+    tariff = prices(data)
     for row, name in enumerate(names):
         fixed = str(group["control"].values[row]) == "step_size"
-        price, call = known.at(name, np.full(met.shape[1], np.nan) if fixed else met[row])
+        price, call = tariff.at(name, np.full(met.shape[1], np.nan) if fixed else met[row])
         values[row] = values[row] * price + call
-    errors = known.error[[known.names.index(name) for name in names]]
+    errors = tariff.error[[tariff.names.index(name) for name in names]]
     return Costs(names, [str(needs) for needs in group["needs"].values], values, errors)
 
 
-def there(taken: Costs) -> NDArray[np.int64]:
+def judged_bodies(table: Costs) -> NDArray[np.int64]:
     """The bodies that are asked."""
-    return np.flatnonzero(~np.isnan(taken.values).all(axis=0))
+    return np.flatnonzero(~np.isnan(table.values).all(axis=0))
 
 
 def medians(values: Array) -> Array:
@@ -108,26 +103,26 @@ def tau_of(first: Array, second: Array) -> float:
     return float((one * other).sum() / np.sqrt(pairs)) if pairs else float("nan")
 
 
-def _bootstrapped(
+def bootstrap_tau(
     first: Costs, second: Costs, rows: tuple[list[int], list[int]], paired: bool, draws: int = DRAWS
 ) -> Interval:
     """Tau of the medians of two rows of methods, with bodies and prices drawn; without draws no interval."""
-    here, other = there(first), there(second)
-    if here.size < 3 or other.size < 3:
+    bodies, others = judged_bodies(first), judged_bodies(second)
+    if bodies.size < 3 or others.size < 3:
         return Interval(*(float("nan"),) * 3)
     a, b = first.values[rows[0]], second.values[rows[1]]
-    value = tau_of(medians(a[:, here]), medians(b[:, other]))
-    generator, drawn = np.random.default_rng(4), [] if draws else [float("nan")]
+    value = tau_of(medians(a[:, bodies]), medians(b[:, others]))
+    generator, taus = np.random.default_rng(4), [] if draws else [float("nan")]
     price = factors(first.errors[rows[0]], DRAWS), factors(second.errors[rows[1]], DRAWS)
-    both = np.intersect1d(here, other)
+    both = np.intersect1d(bodies, others)
     for k in range(draws):
         if paired:
-            chosen = both[generator.integers(both.size, size=both.size)]
-            pair = chosen, chosen
+            draw = both[generator.integers(both.size, size=both.size)]
+            pair = draw, draw
         else:
-            pair = tuple(part[generator.integers(part.size, size=part.size)] for part in (here, other))
-        drawn.append(tau_of(medians(a[:, pair[0]]) * price[0][k], medians(b[:, pair[1]]) * price[1][k]))
-    ends = np.nanquantile(drawn, ENDS).tolist() if np.isfinite(drawn).any() else (float("nan"),) * 2
+            pair = tuple(part[generator.integers(part.size, size=part.size)] for part in (bodies, others))
+        taus.append(tau_of(medians(a[:, pair[0]]) * price[0][k], medians(b[:, pair[1]]) * price[1][k]))
+    ends = np.nanquantile(taus, ENDS).tolist() if np.isfinite(taus).any() else (float("nan"),) * 2
     return Interval(value, *ends)
 
 
@@ -137,20 +132,20 @@ def tau(data: xr.DataTree, family: str, target: float, quantity: str = "axis", s
     first, second = (costs(data, name, target, quantity, span) for name in (SYMMETRIC, family))
     rows = list(range(len(first.names)))
     draws = DRAWS if quantity == "axis" else 0
-    return _bootstrapped(first, second, (rows, rows), family not in (CHAOTIC, FREE), draws)
+    return bootstrap_tau(first, second, (rows, rows), family not in (CHAOTIC, FREE), draws)
 
 
 @of_one_dataset
 def ceiling(data: xr.DataTree, target: float, quantity: str = "axis", span: str = "short") -> Interval:
     """Tau between two halves of the bodies of epsilon = 0."""
-    taken = costs(data, SYMMETRIC, target, quantity, span)
-    here, generator, drawn = there(taken), np.random.default_rng(5), list[float]()
+    table = costs(data, SYMMETRIC, target, quantity, span)
+    bodies, generator, taus = judged_bodies(table), np.random.default_rng(5), list[float]()
     for _ in range(DRAWS):
-        order = generator.permutation(here)
-        drawn.append(tau_of(*(medians(taken.values[:, half]) for half in np.array_split(order, 2))))
-    if not np.isfinite(drawn).any():
+        order = generator.permutation(bodies)
+        taus.append(tau_of(*(medians(table.values[:, half]) for half in np.array_split(order, 2))))
+    if not np.isfinite(taus).any():
         return Interval(*(float("nan"),) * 3)
-    return Interval(float(np.nanmedian(drawn)), *np.nanquantile(drawn, ENDS).tolist())
+    return Interval(float(np.nanmedian(taus)), *np.nanquantile(taus, ENDS).tolist())
 
 
 @of_one_dataset
@@ -160,7 +155,7 @@ def own_tau(data: xr.DataTree, family: str, target: float) -> Interval:
     places = [label(name) for name in second.names]
     methods = [integrator(name).method for name in first.names]
     rows = [k for k, name in enumerate(methods) if name in places], [places.index(m) for m in methods if m in places]
-    return _bootstrapped(first, second, rows, family not in (CHAOTIC, FREE))
+    return bootstrap_tau(first, second, rows, family not in (CHAOTIC, FREE))
 
 
 # ---- winners ---------------------------------------------------------------------------------------------------------
@@ -172,33 +167,33 @@ def classes(data: xr.DataTree) -> list[str]:
     return [*(name for name in NEEDS if name in present), ANY]
 
 
-def of_class(taken: Costs, needs: str) -> list[int]:
+def of_class(table: Costs, needs: str) -> list[int]:
     """Rows of a class."""
-    return [row for row, one in enumerate(taken.needs) if needs in (one, ANY)]
+    return [row for row, one in enumerate(table.needs) if needs in (one, ANY)]
 
 
 @of_one_dataset
 def winner(data: xr.DataTree, family: str, target: float, needs: str = ANY, span: str = "short") -> str | None:
     """The method of a class with the least median cost."""
-    taken = costs(data, family, target, span=span)
-    rows, here = of_class(taken, needs), there(taken)
-    middle = medians(taken.values[np.ix_(rows, here)]) if here.size and rows else np.array([1e300])
-    return taken.names[rows[int(np.argmin(middle))]] if middle.min() < 1e300 else None
+    table = costs(data, family, target, span=span)
+    rows, bodies = of_class(table, needs), judged_bodies(table)
+    middle = medians(table.values[np.ix_(rows, bodies)]) if bodies.size and rows else np.array([1e300])
+    return table.names[rows[int(np.argmin(middle))]] if middle.min() < 1e300 else None
 
 
 @of_one_dataset
 def transferred(data: xr.DataTree, family: str, target: float, needs: str = ANY, span: str = "short") -> Interval:
     """The cost of the winner at epsilon = 0 over the least of its class on each body: median, and of 95 % the ends."""
     best = winner(data, SYMMETRIC, target, needs, span)
-    taken = costs(data, family, target, span=span)
-    rows, here = of_class(taken, needs), there(taken)
-    if best is None or not here.size:
+    table = costs(data, family, target, span=span)
+    rows, bodies = of_class(table, needs), judged_bodies(table)
+    if best is None or not bodies.size:
         return Interval(*(float("nan"),) * 3)
-    values = taken.values[np.ix_(rows, here)]
+    values = table.values[np.ix_(rows, bodies)]
     solved = np.isfinite(values).any(axis=0)
     if not solved.any():
         return Interval(*(float("nan"),) * 3)
-    ratio = values[rows.index(taken.names.index(best))][solved] / values[:, solved].min(axis=0)
+    ratio = values[rows.index(table.names.index(best))][solved] / values[:, solved].min(axis=0)
     return Interval(*np.quantile(ratio, (0.5, *ENDS), method="nearest").tolist())
 
 
@@ -207,13 +202,13 @@ def contenders(data: xr.DataTree) -> list[str]:
     names = set[str]()
     for family in FAMILIES:
         for target in ASKED:
-            taken = costs(data, family, target)
-            here = there(taken)
-            for needs in classes(data) if here.size else ():
-                rows = of_class(taken, needs)
-                middle = medians(taken.values[np.ix_(rows, here)])
+            table = costs(data, family, target)
+            bodies = judged_bodies(table)
+            for needs in classes(data) if bodies.size else ():
+                rows = of_class(table, needs)
+                middle = medians(table.values[np.ix_(rows, bodies)])
                 near = (middle <= WITHIN * middle.min()) & (middle < 1e300)
-                names |= {taken.names[row] for row, close in zip(rows, near, strict=True) if close}
+                names |= {table.names[row] for row, close in zip(rows, near, strict=True) if close}
     return [str(name) for name in group_of(data, "short")["variant"].values if str(name) in names]
 
 
@@ -223,21 +218,21 @@ def contenders(data: xr.DataTree) -> list[str]:
 @of_one_dataset
 def safest(data: xr.DataTree, family: str, target: float, span: str = "short", without: str = "") -> dict[str, Safe]:
     """By method its safe setting and seconds: `symtop_studies.cost.ranking.safe`; `without` one stratum."""
-    group, known, ladders = group_of(data, span), prices(data), list[Ladder]()
+    group, tariff, ladders = group_of(data, span), prices(data), list[Ladder]()
     part = group.sel(quantity="axis").sel(target=target, method="nearest")
     work = group["work"]
     strata = data["bodies"].to_dataset().isel(variant=0).sel(scene="short", family=family)["stratum"].values
-    kept = strata[: part.sizes["member"]] != (without or None)
+    members = strata[: part.sizes["member"]] != (without or None)
     if span != "own":
         part, work = part.sel(family=family), work.sel(family=family)
     for name in map(str, group["variant"].values):
         met = part["met_at"].sel(variant=name).values.astype(float)
-        met = met[~np.isnan(part["cost"].sel(variant=name).values) & kept]
+        met = met[~np.isnan(part["cost"].sel(variant=name).values) & members]
         fixed = integrator(name).fixed_step
         settings = np.array([setting_of(integrator(name), level) for level in range(work.sizes["level"])])
-        price, call = known.at(name, np.full(settings.size, np.nan) if fixed else settings)
+        price, call = tariff.at(name, np.full(settings.size, np.nan) if fixed else settings)
         seconds = work.sel(variant=name).values * price + call
-        ladders.append(Ladder(name, met, settings, seconds, fixed, float(known.error[known.names.index(name)])))
+        ladders.append(Ladder(name, met, settings, seconds, fixed, float(tariff.error[tariff.names.index(name)])))
     return {one.name: one for one in safe(ladders)[0]}
 
 
@@ -261,23 +256,23 @@ def own_factors(data: xr.DataTree, family: str, target: float, without: str = ""
 
 def price_factors(data: xr.DataTree) -> dict[str, float]:
     """By method, price of an evaluation in the chart of bodies over that in the top's own."""
-    known = prices(data)
+    tariff = prices(data)
     own = {integrator(name).method: name for name in map(str, group_of(data, "own")["variant"].values)}
     pairs = {
         name: own[label(name)] for name in map(str, group_of(data, "short")["variant"].values) if label(name) in own
     }
     at = np.array([1e-8])
-    return {name: float(known.at(name, at)[0][0] / known.at(other, at)[0][0]) for name, other in pairs.items()}
+    return {name: float(tariff.at(name, at)[0][0] / tariff.at(other, at)[0][0]) for name, other in pairs.items()}
 
 
 # ---- what goes wrong -------------------------------------------------------------------------------------------------
 
 
 @of_one_dataset
-def silent(data: xr.DataTree, name: str, family: str, chosen: str = "") -> float:
+def silent(data: xr.DataTree, name: str, family: str, stratum: str = "") -> float:
     """The share of bodies whose run of a method with `STEPS` steps a period is wrong without a sign.
 
-    `chosen` is a stratum of free bodies, or regular or chaotic by growth in ten periods; empty for all.
+    `stratum` is a stratum of free bodies, or regular or chaotic by growth in ten periods; empty for all.
     """
     group = group_of(data, "short").sel(variant=name, family=family)
     about = data["bodies"].to_dataset().isel(variant=0).sel(scene="short", family=family)
@@ -285,11 +280,11 @@ def silent(data: xr.DataTree, name: str, family: str, chosen: str = "") -> float
     row = int(np.argmin(np.abs(np.log(settings / STEPS))))
     status = group["status"].transpose("kept", "member").values[row]
     part = status > 0.0
-    if chosen in ("regular", CHAOTIC):
+    if stratum in ("regular", CHAOTIC):
         chaos = about["growth"].values[: status.size] > CHAOS
-        part &= chaos if chosen == CHAOTIC else ~chaos
-    elif chosen:
-        part &= about["stratum"].values[: status.size] == chosen
+        part &= chaos if stratum == CHAOTIC else ~chaos
+    elif stratum:
+        part &= about["stratum"].values[: status.size] == stratum
     return float((status[part] == 3.0).mean()) if part.any() else float("nan")
 
 
@@ -298,22 +293,22 @@ def fixed_steps(data: xr.DataTree) -> list[str]:
     return [name for name in map(str, group_of(data, "short")["variant"].values) if integrator(name).fixed_step]
 
 
-def silent_shares(data: xr.DataTree, family: str, chosen: str = "") -> Array:
+def silent_shares(data: xr.DataTree, family: str, stratum: str = "") -> Array:
     """The shares of all methods of fixed step."""
-    return np.array([silent(data, name, family, chosen) for name in fixed_steps(data)])
+    return np.array([silent(data, name, family, stratum) for name in fixed_steps(data)])
 
 
 @of_one_dataset
 def exponents(data: xr.DataTree) -> dict[tuple[str, str, str], float]:
     """By method, family and quantity the exponent of growth of the median error with time, over all times."""
     group = data["growth"].to_dataset().isel(scene=0)
-    found = {}
+    slopes = {}
     for name in map(str, group["variant"].values):
         for family in map(str, group["family"].values):
             for quantity in ("attitude", "energy"):
                 error = group[f"error_{quantity}"].sel(variant=name, family=family).values
-                found[label(name), family, quantity] = exponent(group["time"].values, error, quantity)
-    return found
+                slopes[label(name), family, quantity] = exponent(group["time"].values, error, quantity)
+    return slopes
 
 
 def exponent(time: Array, error: Array, quantity: str) -> float:
@@ -369,7 +364,7 @@ def engine_tau(data: xr.DataTree, family: str, place: int) -> Interval:
     """The ranking of engines' maps by error against that at epsilon = 0."""
     first, second = (engine_errors(data, name, place) for name in (SYMMETRIC, family))
     rows = [*range(len(first.names))]
-    return _bootstrapped(first, second, (rows, rows), family not in (CHAOTIC, FREE))
+    return bootstrap_tau(first, second, (rows, rows), family not in (CHAOTIC, FREE))
 
 
 def lost(data: xr.DataTree, family: str, place: int) -> float:
@@ -391,6 +386,6 @@ def factor_verdict(factor: float, with_factor: float = DOUBLE) -> str:
     return YES if size <= LEVEL else FACTOR if size <= with_factor else NO
 
 
-def worst(verdicts: Iterator[str]) -> str:
+def worst(verdicts: Iterable[str]) -> str:
     """The verdict that is furthest from carrying over."""
     return max(verdicts, key=(YES, FACTOR, PARTLY, NO).index)

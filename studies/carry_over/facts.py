@@ -13,7 +13,7 @@ from symtop.report.formats import duration, number, percent
 
 from . import comparison as by
 from .bodies import ASKED, CHAOTIC, FAMILIES, FREE, SYMMETRIC
-from .comparison import ANY, FACTOR, LEVEL, MOST_OF, NO, OTHERS, PARTLY, SEVERAL, YES, label
+from .comparison import ANY, LEVEL, MOST_OF, NO, OTHERS, SEVERAL, YES, label
 from .limits import LEVELS, MOST
 
 SHOWN = ("0.1", "0.3", CHAOTIC, FREE)  # families of the short table
@@ -74,12 +74,12 @@ def first_steps(data: xr.DataTree, family: str) -> float:
     """The same of the cheapest methods that need f(t, y) alone, the most of the targets; without needles."""
     each = [(by.winner(data, SYMMETRIC, target, "derivative"), by.own_factors(data, family, target, NEEDLE))
             for target in ASKED]  # fmt: skip
-    return max((found[name] for name, found in each if name in found), default=math.nan)
+    return max((factors[name] for name, factors in each if name in factors), default=math.nan)
 
 
-def silent_share(data: xr.DataTree, family: str, chosen: str = "") -> float:
+def silent_share(data: xr.DataTree, family: str, stratum: str = "") -> float:
     """Mean share over methods of runs that are wrong without a sign."""
-    shares = by.silent_shares(data, family, chosen)
+    shares = by.silent_shares(data, family, stratum)
     return float(np.nanmean(shares)) if np.isfinite(shares).any() else math.nan
 
 
@@ -101,21 +101,23 @@ def silent_words(data: xr.DataTree, family: str) -> str:
     return f"{mean}, {tops} of tops (order 2: {span}, from 4 on to {percent(four, 1)})"
 
 
+def exponent_gaps(data: xr.DataTree, family: str) -> dict[str, float]:
+    """By method and quantity the difference of an exponent of growth from that at epsilon = 0, where both are known."""
+    exponents = by.exponents(data)
+    gaps = {f"{name}, {quantity}": abs(value - exponents[name, SYMMETRIC, quantity])
+            for (name, one, quantity), value in exponents.items() if one == family}  # fmt: skip
+    return {name: gap for name, gap in gaps.items() if not math.isnan(gap)}
+
+
 def exponent_gap(data: xr.DataTree, family: str) -> tuple[float, str]:
     """The largest difference of an exponent of growth from that at epsilon = 0, and of which method."""
-    found = by.exponents(data)
-    gaps = {f"{name}, {quantity}": abs(value - found[name, SYMMETRIC, quantity])
-            for (name, one, quantity), value in found.items() if one == family}  # fmt: skip
-    known = {name: gap for name, gap in gaps.items() if not math.isnan(gap)}
-    return max(((gap, name) for name, gap in known.items()), default=(math.nan, ""))
+    return max(((gap, name) for name, gap in exponent_gaps(data, family).items()), default=(math.nan, ""))
 
 
 def exponents_within(data: xr.DataTree, family: str) -> tuple[int, int]:
     """How many exponents of growth are within `EXPONENT` of those at epsilon = 0, and of how many."""
-    found = by.exponents(data)
-    gaps = [abs(value - found[name, SYMMETRIC, quantity])
-            for (name, one, quantity), value in found.items() if one == family]  # fmt: skip
-    return sum(gap <= by.EXPONENT for gap in gaps), sum(not math.isnan(gap) for gap in gaps)
+    gaps = exponent_gaps(data, family).values()
+    return sum(gap <= by.EXPONENT for gap in gaps), len(gaps)
 
 
 def order_gap(data: xr.DataTree, family: str) -> tuple[float, str]:
@@ -143,24 +145,18 @@ def resonance_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
     return f"{percent(share, 1)} of steps, {percent(before, 1)} of tops", by.factor_verdict(ratio, SEVERAL)
 
 
-def worst_engine_tau(data: xr.DataTree, family: str) -> by.Interval:
-    """Tau of engines' maps with the step that has the lesser."""
-    return min((by.engine_tau(data, family, place) for place in range(len(LEVELS))), key=lambda one: one.value)
-
-
 def engine_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
     """Tau of engines' maps, of the step with the lesser, and the bodies lost at once with the longer step."""
     if "engines" not in data.children:
         return "nan", NO
     places = range(len(LEVELS))
-    each = [by.engine_tau(data, family, place) for place in places]
-    gone = [(by.lost(data, family, place), by.lost(data, SYMMETRIC, place)) for place in places]
-    verdicts = [*map(by.ranking_verdict, each),
+    taus = [by.engine_tau(data, family, place) for place in places]
+    lost = [(by.lost(data, family, place), by.lost(data, SYMMETRIC, place)) for place in places]
+    verdicts = [*map(by.ranking_verdict, taus),
                 *(by.factor_verdict(share / before if before else 1.0 + share / by.LEAST, SEVERAL)
-                  for share, before in gone)]  # fmt: skip
-    tau = worst_engine_tau(data, family)
-    shares = f"{percent(gone[0][0], 0)}, {percent(gone[0][1], 0)} of tops"
-    return f"{tau_words(tau)}; lost at once {shares}", by.worst(iter(verdicts))
+                  for share, before in lost)]  # fmt: skip
+    shares = f"{percent(lost[0][0], 0)}, {percent(lost[0][1], 0)} of tops"
+    return f"{tau_words(min(taus, key=lambda one: one.value))}; lost at once {shares}", by.worst(verdicts)
 
 
 def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
@@ -169,7 +165,7 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
     own_middle, own_most = own_steps(data, family)
     share, before = silent_share(data, family), silent_share(data, SYMMETRIC)
     gap, order, first = exponent_gap(data, family)[0], order_gap(data, family)[0], first_steps(data, family)
-    within, told = exponents_within(data, family)
+    within, known = exponents_within(data, family)
     round_ones = own_steps(data, family, NEEDLE)
     but = f"; without needles {number(round_ones[0], 3)}, up to {number(round_ones[1], 3)}" if family == FREE else ""
     ratio = share / before if before > 0.0 else math.nan
@@ -183,7 +179,7 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
         "first": (f"up to {number(first, 3)} times{', without needles' if family == FREE else ''}",
                   by.factor_verdict(first)),
         "silent": (silent_words(data, family), by.factor_verdict(ratio, SEVERAL)),
-        "growth": (f"{within} of {told} exponents within {by.EXPONENT}, all within {number(gap, 2)}",
+        "growth": (f"{within} of {known} exponents within {by.EXPONENT}, all within {number(gap, 2)}",
                    YES if gap <= by.EXPONENT else NO),
         "order": (f"lower by at most {number(max(order, 0.0), 2)}, limit {by.LOWER}", YES if order <= by.LOWER else NO),
         "limit": limit_cell(data, family), "resonances": resonance_cell(data, family),
@@ -215,16 +211,18 @@ def carry(data: xr.DataTree) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def sentence(told: str, verdict: str) -> str:
+def sentence(numbers: str, verdict: str) -> str:
     """A cell: the verdict first."""
-    return "not measured" if "nan" in told else f"{verdict}: {told}"
+    return "not measured" if "nan" in numbers else f"{verdict}: {numbers}"
 
 
 def facts(data: xr.DataTree) -> dict[str, Any]:
-    """Counts, taus and their ceiling, winners, factors of steps, silent wrong runs, growth, order, prices, truth."""
+    """Counts, taus and their ceiling, cheap methods, factors of steps, silent wrong runs, growth, order, prices, truth.
+
+    A number of a family has its `key` in its name; the page quotes some of them.
+    """
     about = data["bodies"].to_dataset().isel(variant=0).sel(scene="short")
-    grown = about["growth"].values
-    named: dict[str, Any] = {
+    answers: dict[str, Any] = {
         "bodies": data["short"].sizes["member"], "methods": data["short"].sizes["variant"],
         "long_bodies": data["long"].sizes["member"] if "long" in data.children else None,
         "long_methods": data["long"].sizes["variant"] if "long" in data.children else None,
@@ -232,85 +230,67 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         "lower": by.LOWER,
         "off_bound": float(np.nanmax(about["off_bound"].values)),
         "truth_bound": float(np.nanmedian(about["truth_bound"].values[: len(FAMILIES) - 1])),
+        "judged_chaotic": float(about["judged"].sel(family=CHAOTIC)),
+        "ceiling_6": by.ceiling(data, 1e-6).value,
     }  # fmt: skip
-    for row, family in enumerate(map(str, about["family"].values)):
-        if np.isfinite(grown[row]).any():
-            named[f"chaos_{key(family)}"] = float((grown[row] > by.CHAOS)[np.isfinite(grown[row])].mean())
-        named[f"judged_{key(family)}"] = float(about["judged"].values[row])
-    for target in ASKED:
-        named[f"ceiling_{decades(target)}"], low, _ = by.ceiling(data, target)
-        named[f"ceiling_{decades(target)}_low"] = low
-        best = by.winner(data, SYMMETRIC, target)
-        named[f"winner_{decades(target)}"] = best and label(best)
+    for family in ("0.1", "0.3"):
+        growth = about["growth"].sel(family=family).dropna("member").values
+        answers[f"chaos_{key(family)}"] = float((growth > by.CHAOS).mean()) if growth.size else None
+    for target in (1e-3, 1e-6):
         start = by.winner(data, SYMMETRIC, target, "derivative")
-        named[f"start_{decades(target)}"] = start and label(start)
+        answers[f"start_{decades(target)}"] = start and label(start)
     for family in OTHERS:
-        named |= _of_family(data, family)
-    named["silent_0"] = silent_share(data, SYMMETRIC)
+        answers |= _of_family(data, family)
+    answers["silent_0"] = silent_share(data, SYMMETRIC)
     prices = np.array([*by.price_factors(data).values()])
     if prices.size:
-        named |= {"price": float(np.median(prices)), "price_low": prices.min(), "price_high": prices.max()}
+        answers |= {"price": float(np.median(prices)), "price_high": prices.max()}
     taus = [by.own_tau(data, SYMMETRIC, target).value for target in ASKED]
-    named |= {"own_tau_low": min(taus), "own_tau_high": max(taus)}
-    heavy = [family for family in OTHERS if family not in (CHAOTIC, FREE)]
-    named["heavy_steps"] = max((steps(data, family)[1] for family in heavy), default=None)
-    named["heavy_tau"] = min((worst_tau(data, family).value for family in heavy), default=None)
-    named["verdicts"] = count(data)
+    answers |= {"own_tau_low": min(taus), "own_tau_high": max(taus)}
+    heavy = [worst_tau(data, family).value for family in OTHERS if family not in (CHAOTIC, FREE)]
+    answers["heavy_tau"] = min(heavy, default=None)
     each = [by.tau(data, family, target) for family in OTHERS for target in ASKED]
     known = [one for one in each if math.isfinite(one.value) and math.isfinite(one.low)]
-    named |= {"taus": len(known), "outside": sum(not one.low <= one.value <= one.high for one in known)}
+    answers |= {"taus": len(known), "outside": sum(not one.low <= one.value <= one.high for one in known)}
     free = [by.step_factors(data, FREE, target) for target in ASKED]
-    named |= {"fixed": len(by.fixed_steps(data)), "free_steps": len({name for one in free for name in one})}
-    named |= dict(zip(("silent_3_low", "silent_3_most", "silent_3_four"), silent_orders(data, "0.3"), strict=True))
+    answers |= {"fixed": len(by.fixed_steps(data)), "free_steps": len({name for one in free for name in one})}
+    answers |= dict(zip(("silent_3_low", "silent_3_most", "silent_3_four"), silent_orders(data, "0.3"), strict=True))
     if "engines" in data.children:
-        named |= {"engines": data["engines"].sizes["variant"], "engine_bodies": data["engines"].sizes["member"]}
-        named |= {f"lost_{key(family)}": by.lost(data, family, 0) for family in FAMILIES}
-        named |= {f"engine_tau_{key(family)}": worst_engine_tau(data, family).value for family in OTHERS}
+        answers |= {f"lost_{key(family)}": by.lost(data, family, 0) for family in (SYMMETRIC, "0.3")}
     if "steady" in data.children:
-        named |= {"resonant_0": by.resonant(data, SYMMETRIC), "grid": float(data["steady"]["grid"].max())}
-    return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in named.items()}
+        answers["grid"] = float(data["steady"]["grid"].max())
+    return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in answers.items()}
 
 
 def _of_family(data: xr.DataTree, family: str) -> dict[str, Any]:
-    tau, best, place = worst_tau(data, family), worst_winner(data, family), key(family)
-    gap, order = exponent_gap(data, family), order_gap(data, family)
-    named: dict[str, Any] = {
-        f"tau_{place}": tau.value, f"tau_{place}_low": tau.low, f"tau_{place}_high": tau.high,
-        f"transfer_{place}": best.value, f"transfer_{place}_high": best.high,
-        f"steps_{place}": steps(data, family)[0], f"steps_{place}_high": steps(data, family)[1],
-        f"own_{place}_high": own_steps(data, family)[1], f"first_{place}": first_steps(data, family),
-        f"silent_{place}": silent_share(data, family),
-        f"growth_{place}": gap[0], f"growth_{place}_of": gap[1] or None,
+    place, order = key(family), order_gap(data, family)
+    within, known = exponents_within(data, family)
+    answers: dict[str, Any] = {
+        f"tau_{place}": worst_tau(data, family).value, f"steps_{place}_high": steps(data, family)[1],
+        f"first_{place}": first_steps(data, family), f"silent_{place}": silent_share(data, family),
+        f"growth_{place}_of": exponent_gap(data, family)[1] or None,
+        f"growth_{place}_within": within, f"growth_{place}_told": known,
         f"order_{place}": order[0], f"order_{place}_of": order[1] or None,
     }  # fmt: skip
-    named |= dict(zip((f"growth_{place}_within", f"growth_{place}_told"), exponents_within(data, family), strict=True))
     ratio = by.limit_factors(data, family)
     if ratio.size:
-        named[f"limit_{place}_low"], named[f"limit_{place}"] = limit_ends(data, family)
         least = np.nanquantile(ratio, 1.0 - MOST_OF, axis=1)
-        named[f"limit_{place}_of"] = label(str(data["steady"]["variant"].values[int(np.argmin(least))]))
-        named[f"limit_{place}_least"], named[f"resonant_{place}"] = float(least.min()), by.resonant(data, family)
+        answers[f"limit_{place}_low"], answers[f"limit_{place}_least"] = limit_ends(data, family)[0], float(least.min())
+        answers[f"limit_{place}_of"] = label(str(data["steady"]["variant"].values[int(np.argmin(least))]))
     if family == FREE:
-        named |= dict(zip(("round_steps", "round_steps_high"), own_steps(data, family, NEEDLE), strict=True))
+        answers["round_steps"] = own_steps(data, family, NEEDLE)[0]
     for name, kind, seen, first in by.orders(data) if order[1] else ():
         if (name, kind) == (order[1], family):
-            named |= {f"order_{place}_seen": seen, f"order_{place}_top": first}
-            named[f"order_{place}_declared"] = integrator(name).order
+            answers |= {f"order_{place}_seen": seen, f"order_{place}_top": first}
+            answers[f"order_{place}_declared"] = integrator(name).order
     if "long" in data.children:
-        named[f"long_tau_{place}"] = worst_tau(data, family, "long").value
-        named[f"long_steps_{place}_high"] = steps(data, family, "long")[1]
-    return named
+        answers[f"long_tau_{place}"] = worst_tau(data, family, "long").value
+    return answers
 
 
 def key(family: str) -> str:
     """A family as a part of the name of a fact."""
     return family.replace("0.", "")
-
-
-def count(data: xr.DataTree) -> str:
-    """How many cells of the table carry over, with a factor, in part and not."""
-    told = [text.partition(":")[0] for row in carry(data).iloc[:, 1:].values for text in row]
-    return ", ".join(f"{told.count(verdict)} {verdict}" for verdict in (YES, FACTOR, PARTLY, NO))
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
@@ -334,7 +314,7 @@ def rankings(data: xr.DataTree) -> pd.DataFrame:
                 top = by.ceiling(data, target, quantity, span)
                 for family in OTHERS:
                     one = by.tau(data, family, target, quantity, span)
-                    asked = by.there(by.costs(data, family, target, quantity, span)).size
+                    asked = by.judged_bodies(by.costs(data, family, target, quantity, span)).size
                     rows.append([span, quantity, target, words(family), asked, *one, top.value, top.low,
                                  by.own_tau(data, family, target).value if (span, quantity) == ("short", "axis")
                                  else math.nan])  # fmt: skip
@@ -382,13 +362,11 @@ def silent_table(data: xr.DataTree) -> pd.DataFrame:
     rows = []
     for family in FAMILIES:
         names = sorted(set(about["stratum"].sel(family=FREE).values.tolist()) - {""}) if family == FREE else STRATA
-        for chosen in ["", *names]:
-            shares = by.silent_shares(data, family, chosen)
+        for stratum in ["", *names]:
+            shares = by.silent_shares(data, family, stratum)
             if np.isfinite(shares).any():
-                told = dict(zip(map(label, by.fixed_steps(data)), shares, strict=True))
-                rows.append(
-                    {"bodies": words(family), "stratum": chosen or "all", "mean": float(np.nanmean(shares))} | told
-                )
+                line = {"bodies": words(family), "stratum": stratum or "all", "mean": float(np.nanmean(shares))}
+                rows.append(line | dict(zip(map(label, by.fixed_steps(data)), shares, strict=True)))
     return pd.DataFrame(rows)
 
 
@@ -413,20 +391,20 @@ def limit_table(data: xr.DataTree) -> pd.DataFrame:
     """Linear limits and resonances by method, errors and lost bodies by engine's map, each by family."""
     rows: list[dict[str, Any]] = []
     measures = {
-        "linear limit, h omega": lambda shown: np.nanmedian(np.nan_to_num(shown, nan=MOST), axis=1),
-        "share of steps that resonate": lambda shown: np.nanmean(shown, axis=1),
+        "linear limit, h omega": lambda values: np.nanmedian(np.nan_to_num(values, nan=MOST), axis=1),
+        "share of steps that resonate": lambda values: np.nanmean(values, axis=1),
     }
-    for (told, of), name in zip(measures.items(), ("limit", "grown"), strict=True):
+    for (title, of), name in zip(measures.items(), ("limit", "grown"), strict=True):
         each = {family: by.steady(data, name, family) for family in FAMILIES}
         names = map(label, map(str, data["steady"]["variant"].values)) if "steady" in data.children else []
-        columns = {words(family): of(shown) for family, shown in each.items() if shown.size}
-        rows += [{"measured": told, "method": one} | {name: column[k] for name, column in columns.items()}
+        columns = {words(family): of(values) for family, values in each.items() if values.size}
+        rows += [{"measured": title, "method": one} | {name: column[k] for name, column in columns.items()}
                  for k, one in enumerate(names)]  # fmt: skip
     for place, level in enumerate(LEVELS) if "engines" in data.children else ():
-        for name, told in (("error", "median error of the axis, rad"), ("lost", "share lost in the first period")):
+        for name, title in (("error", "median error of the axis, rad"), ("lost", "share lost in the first period")):
             each = {family: by.engine_errors(data, family, place, name) for family in FAMILIES}
             for k, one in enumerate(each[SYMMETRIC].names):
-                line = {"measured": f"{told}, {number(FIRST * 2**level, 2)} steps a period", "method": label(one)}
+                line = {"measured": f"{title}, {number(FIRST * 2**level, 2)} steps a period", "method": label(one)}
                 middle = np.nanmedian if name == "error" else np.nanmean
-                rows.append(line | {words(family): float(middle(taken.values[k])) for family, taken in each.items()})
+                rows.append(line | {words(family): float(middle(costs.values[k])) for family, costs in each.items()})
     return pd.DataFrame(rows)

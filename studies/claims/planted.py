@@ -4,13 +4,12 @@ A battery that finds every claim true shows little by itself. Beside the claims 
 refute, for what each of them gets wrong.
 """
 
-import json
-import subprocess
-import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from symtop_studies import fresh_process
 
 from symtop.core.code_hash import file_hash
 from symtop.judging.battery import SCENE, judge
@@ -30,7 +29,6 @@ FALSE = {  # file: the claim that is false first of all
 }  # fmt: skip
 LIES = {PREFIX + name: claim for name, claim in FALSE.items()}
 QUICK = tuple(PREFIX + name for name in ("symplectic-rk4", "hidden-kick", "coefficients-swapped", "reported-leak"))
-START = "from symtop.runner import scripts; scripts.install(); from symtop_studies.claims import planted; planted.{}()"
 
 
 def file_of(name: str) -> Path:
@@ -45,20 +43,16 @@ def cases(quick: bool) -> list[Case]:
     ]
 
 
-def answer() -> None:
-    """What a fresh process does: a name and whether to be quick on standard input, the findings on standard output."""
-    name, quick = json.load(sys.stdin)
+def findings(name: str, quick: bool) -> list[dict[str, Any]]:
+    """In this process: load one of `LIES` and judge it."""
     (registered,) = plugins.load(file_of(name))
     ledger = judge(integrator(registered), scene(SCENE), quick=quick)
-    print(json.dumps([finding.plain() for finding in ledger.findings]))  # noqa: T201
+    return [finding.plain() for finding in ledger.findings]
 
 
 def measured(case: Case) -> xr.Dataset:
     """The findings on one of them. A fresh process loads it, so that no other case of this one meets it."""
-    command = [sys.executable, "-c", START.format(answer.__name__)]  # named, so that a case depends on its code
-    question = json.dumps([case.integrator, case.settings["quick"]])
-    done = subprocess.run(command, input=question, stdout=subprocess.PIPE, text=True, check=True)  # noqa: S603
-    findings = json.loads(done.stdout.splitlines()[-1])
-    columns = {name: [np.nan if one[name] is None else one[name] for one in findings] for name in Finding._fields}
+    each = fresh_process.call(findings, case.integrator, case.settings["quick"])
+    columns = {name: [np.nan if one[name] is None else one[name] for one in each] for name in Finding._fields}
     claims = columns.pop("claim")
     return xr.Dataset({name: ("claim", values) for name, values in columns.items()}, coords={"claim": claims})

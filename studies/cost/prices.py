@@ -27,15 +27,13 @@ samples by dense output, is timed in the same rounds, and the ratio is a table.
 """
 
 import functools
-import json
-import subprocess
-import sys
 import warnings
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from symtop_studies import fresh_process
 from symtop_studies.memoize import of_one_dataset
 
 from symtop.measure.timing import quartile_spread, timings
@@ -67,7 +65,6 @@ OUTER = 1.35  # standard deviations between the quartiles of a normal distributi
 MEDIAN, STUDENT = 1.25, 2.78 / 1.96
 HEYOKA, SAMPLED = "taylor[axis]", "with dense output"
 Call = tuple[Callable[[], object], float]  # with its number of force evaluations
-START = "from symtop.runner import scripts; scripts.install(); from symtop_studies.cost import prices; prices.{}()"
 
 
 @functools.cache
@@ -123,7 +120,7 @@ def bare_heyoka(chart: str, tolerance: float, nutations: float) -> Call:
     return run, float(run()[3] * one.order)
 
 
-def timed(names: list[str], rounds: int, batch: float) -> dict[str, Any]:
+def slopes(names: list[str], rounds: int, batch: float) -> list[tuple[str, float, float, float]]:
     """In this process: price and call of each variant at each of its tolerances, as (name, tolerance, price, call)."""
     makers = {(name, tolerance): functools.partial(run_of, integrator(name), tolerance)
               for name in names for tolerance in tolerances_of(integrator(name))}  # fmt: skip
@@ -136,12 +133,7 @@ def timed(names: list[str], rounds: int, batch: float) -> dict[str, Any]:
         if most > few:  # a run that fails early has no slope
             price = (long.best - short.best) / (most - few)
             answers.append((*key, price, short.best - few * price))
-    return {"slopes": answers}
-
-
-def answer() -> None:
-    """What a fresh process does: the question is JSON on standard input, and so is the answer on standard output."""
-    print(json.dumps(timed(**json.load(sys.stdin))))  # noqa: T201
+    return answers
 
 
 def measured(names: list[str], rounds: int, batch: float) -> xr.Dataset:
@@ -149,13 +141,9 @@ def measured(names: list[str], rounds: int, batch: float) -> xr.Dataset:
 
     ``sampled`` is the price of `taylor[axis]` with dense output.
     """
-    question = json.dumps({"names": names, "rounds": rounds, "batch": batch})
-    command = [sys.executable, "-c", START.format(answer.__name__)]  # named, so that a case depends on its code
-    done = subprocess.run(command, input=question, stdout=subprocess.PIPE, text=True, check=True)  # noqa: S603
-    slopes = json.loads(done.stdout.splitlines()[-1])["slopes"]
     price, call = (np.full((len(names), len(TOLERANCES)), np.nan) for _ in range(2))
     sampled = np.full(len(names), np.nan)
-    for name, tolerance, slope, rest in slopes:
+    for name, tolerance, slope, rest in fresh_process.call(slopes, names, rounds, batch):
         if name == SAMPLED:
             sampled[names.index(HEYOKA)] = slope
             continue

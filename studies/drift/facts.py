@@ -34,7 +34,7 @@ MEANING = {
 CLOSE = 0.1  # a prediction that is further off, relative, counts as missed
 WHOLE = 0.99  # of the longest run of a scene: a shorter run counts as shortened
 NAMES = {  # of the facts of each group
-    HISTORIES: "scenes nutations steps tolerance own variants holding shortened shortest energy_lost "
+    HISTORIES: "nutations steps tolerance own variants holding shortened shortest energy_lost "
     "energy_drifts energy_lost_most energy_lost_worst bounded_runs bounded_as_t lost_runs lost_faster",
     WINDOWS: "long_steps long_scene moved scattered long_momenta",
     ROUNDINGS: "members walk_least walk_most gain_least gain_most",
@@ -63,7 +63,6 @@ def of_histories(histories: xr.Dataset) -> dict[str, Any]:
     given = histories["tolerance"].max("scene").values[~own]
     lost = fate["energy_largest"][fate["energy"].isin(BEHAVIOURS[2:])]
     return {
-        "scenes": " and ".join(map(str, histories["scene"].values)),
         "nutations": float(histories["nutations"].max()),
         "steps": float(histories["steps_a_nutation"].max()),
         "tolerance": float(np.nanmax(given)) if np.isfinite(given).any() else None,

@@ -5,16 +5,13 @@ error, rad), call, process. A time is the median over processes that are started
 sample of each: where memory and code lie differs from process to process and stays the same within one.
 """
 
-import json
 import math
-import pickle
-import subprocess
-import sys
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from symtop_studies import fresh_process
 
 from symtop.measure import settings
 from symtop.measure.timing import first_call, quartile_spread, timings
@@ -29,9 +26,6 @@ FINER = 1e-3  # of the target: the tolerance that a second search begins with
 NOISY, TRIES = 0.25, 2  # the distance of the quartiles over the median of a time that is taken again; how often
 ENOUGH = 0.03  # seconds of a function's samples in one process; a longer one has one, the median of five is of five
 WARM = 0.01  # of the horizon: a run that loads and compiles what the timed one calls
-START = (
-    "from symtop.runner import scripts; scripts.install(); from symtop_studies.factors import measures; measures.{}()"
-)
 
 
 class Goal(NamedTuple):
@@ -79,26 +73,20 @@ class Runs(NamedTuple):
     batch: float  # seconds
 
 
-def answer() -> None:
-    """What a fresh process does: `Runs` pickled on standard input, the least time of each as JSON on the other."""
-    asked: Runs = pickle.load(sys.stdin.buffer)  # noqa: S301  (of the process that started this one)
+def least_times(asked: Runs) -> list[float]:
+    """In this process: the least time of each run, in seconds."""
     known = {cell.name: cell for cell in cells()}
     functions: Any = [caller(asked.scene, known[name], *run) for name, *run in asked.runs]
     for name, call, setting, horizon in asked.runs:
         brief: Any = caller(asked.scene, known[name], call, min(setting, WARM * horizon), WARM * horizon)
         first_call(brief)
     taken = timings(functions, asked.rounds, asked.batch, warm=True, patience=ENOUGH, least=1)
-    print(json.dumps([timing.best for timing in taken]))  # noqa: T201
+    return [timing.best for timing in taken]
 
 
 def timed(asked: Runs, processes: int) -> Array:
     """The least time of every run in each of some fresh processes, (runs, processes)."""
-    command = [sys.executable, "-c", START.format(answer.__name__)]  # named, so that a case depends on its code
-    answers = []
-    for _ in range(processes):
-        done = subprocess.run(command, input=pickle.dumps(asked), stdout=subprocess.PIPE, check=True)  # noqa: S603
-        answers.append(json.loads(done.stdout.splitlines()[-1]))
-    return np.array(answers).T
+    return np.array([fresh_process.call(least_times, asked) for _ in range(processes)]).T
 
 
 def settled_times(asked: Runs, processes: int) -> Array:

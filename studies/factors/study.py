@@ -8,7 +8,7 @@ in it alone.
 import math
 
 import xarray as xr
-from symtop_studies.grid import grid_scenes
+from symtop_studies.grid import ALL_BUT_TWO, grid_scenes
 
 from symtop.methods.framework.registry import integrators
 from symtop.model.scenes import TAGS, scene
@@ -18,14 +18,6 @@ from . import facts, figures
 from .cells import CALLS, COMPILED, KERNEL, LANGUAGES, QUICK
 from .measures import Goal, factorial
 
-LEFT_OUT = {  # tags of scenes, with the reason
-    "ordinary": "spheroid and goldstein show it",
-    "repeats": "spheroid and goldstein show the same",
-    "fast": "two ordinary tops are enough",
-    "steady": "two ordinary tops are enough",
-    "unstable": "two ordinary tops are enough",
-    "near_pole": "the angles chart fails",
-}
 GOALS = (
     (10.0, 1e-6, LANGUAGES, CALLS),
     (10.0, 1e-9, LANGUAGES, CALLS),
@@ -38,7 +30,7 @@ BATCH = (0.0015, 0.001)  # seconds, in full and quick
 
 def cases(quick: bool) -> list[Case]:
     """One case a scene: what is compared is timed together."""
-    names = grid_scenes(TAGS if quick else LEFT_OUT, lambda one: math.isfinite(one.nutation_period))
+    names = grid_scenes(TAGS if quick else ALL_BUT_TWO, lambda one: math.isfinite(one.nutation_period))
     settings = {
         "schemes": list(QUICK) if quick else None,
         "goals": [list(goal) for goal in (GOALS[:1] if quick else GOALS)],

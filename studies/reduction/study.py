@@ -9,7 +9,7 @@ rules to stop differ as well: it shows that both are one map, and not what elimi
 import math
 
 import xarray as xr
-from symtop_studies.grid import grid_scenes
+from symtop_studies.grid import ALL_BUT_TWO, grid_scenes
 
 from symtop.measure.settings import ladder
 from symtop.methods.framework.registry import integrator, methods
@@ -20,20 +20,12 @@ from . import facts, figures, tables
 from .commutation import reduced_first
 
 FIRST = "spheroid"
-LEFT_OUT = {  # tags of scenes, with the reason
-    "ordinary": "spheroid and goldstein show it",
-    "repeats": "spheroid and goldstein show the same",
-    "fast": "two ordinary tops are enough",
-    "steady": "two ordinary tops are enough",
-    "unstable": "two ordinary tops are enough",
-    "near_pole": "the angles chart fails",
-}
 
 
 def cases(quick: bool) -> list[Case]:
     """Compiled methods with several charts (first scene), with an unreduced form, with a reduced-first step."""
     grid = []
-    for name in grid_scenes(TAGS if quick else LEFT_OUT, lambda one: math.isfinite(one.nutation_period)):
+    for name in grid_scenes(TAGS if quick else ALL_BUT_TWO, lambda one: math.isfinite(one.nutation_period)):
         start, period = scene(name), scene(name).nutation_period
         several = [
             method

@@ -58,7 +58,6 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "scenes": ", ".join(map(str, data["scene"].values)),
         "lengths": " and ".join(f"{length:g}" for length in data["nutations"].values),
         "variants": data.sizes["variant"] - 1,
-        "bound": float(part["axis_bound"].min()),  # rad, what the truth can judge
     }  # fmt: skip
     for target in TARGETS:
         first = next(((name, one) for name, one in costs(data, target).items() if for_any_body(name)), (None, None))

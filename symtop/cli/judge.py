@@ -13,6 +13,7 @@ from symtop.core.errors import SymtopError
 
 CHARTS = ("axis", "attitude", "angles")
 BESIDE, NUTATIONS, MOST_BESIDE = ("rk4", "strang", "dop853", "taylor"), 10.0, 2e4  # of runs, and their evaluations
+LONGEST_BESIDE = 5.0  # seconds of a run of the judged step, which may be slow
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
 
 
@@ -96,13 +97,15 @@ def judge(
         for file, write in ((card, cards.card), (badge, cards.write_badge)):
             if file is not None:
                 write(ledger, file)
-    _draw_beside(target, scene, figure, as_json, options)
+    _draw_beside(target, scene, figure, as_json, options, ledger.about.seconds_a_step)
     say_written(output, card, badge, figure, err=as_json)
     if ledger.refuted:
         sys.exit(1)
 
 
-def _draw_beside(target: str, scene: str, file: str | None, quiet: bool, options: dict[str, Any]) -> None:
+def _draw_beside(
+    target: str, scene: str, file: str | None, quiet: bool, options: dict[str, Any], seconds_a_step: float
+) -> None:
     """Draw a step's error against force evaluations beside `BESIDE`, if a file was named, and say who comes first."""
     if file is None:
         return
@@ -119,7 +122,8 @@ def _draw_beside(target: str, scene: str, file: str | None, quiet: bool, options
         if stepper.chart not in (*CHARTS, BODY):
             raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
         methods = [integrator(stepper, order=options["order"]), *BESIDE]
-        data = compare(on, methods, cost="evaluations", nutations=NUTATIONS, budget=MOST_BESIDE, quiet=True)
+        most = min(MOST_BESIDE, LONGEST_BESIDE / max(seconds_a_step, 1e-9))  # a step evaluates the force at least once
+        data = compare(on, methods, cost="evaluations", nutations=NUTATIONS, budget=most, quiet=True)
         draw_compare(data, file)
     most, errors = ranked(data)
     if not quiet and errors:

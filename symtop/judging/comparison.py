@@ -90,12 +90,14 @@ def compare(
             results.append(one)
             bar.update()
             post(f"{len(results)} of {len(names)} methods have run")
-        bar.set_description("timing")
-        post("timing the runs")
         rows: list[dict[str, Any]] = [{"setting_value": math.nan, "outcome": "ok"}]
-        pairs = zip([exact, *variants], [rows, *(runs for runs, _ in results)], strict=True)
-        timed = [(chosen, method, end, runs) for method, runs in pairs if method is not exact or not chosen.of_body]
-        timed_rows(timed if cost == "time" else [])
+        if cost == "time":
+            bar.set_description("timing")
+            post("timing the runs")
+            pairs = zip([exact, *variants], [rows, *(runs for runs, _ in results)], strict=True)
+            timed_rows(
+                [(chosen, method, end, runs) for method, runs in pairs if method is not exact or not chosen.of_body]
+            )
     size = max(len(runs) for runs, _ in results)
     blank: dict[str, Any] = {**SPENT, "message": "", "setting_value": math.nan}
     tables = [

@@ -143,7 +143,9 @@ def _fitted(
     places = nodes if backward else 0.5 * (nodes + 1.0)
     exact = np.stack([motion(width * float(place)) for place in places])
     error = np.stack([image(width * float(place)) for place in places]) - exact
-    if not np.isfinite(error).all():
+    with np.errstate(over="ignore"):
+        squares = error * error  # as the fits need them
+    if not np.isfinite(squares).all():
         raise SymtopError("a step is not finite")
     scatter, degree = _degree(nodes, error)
     power = max(degree, LEAST_POWER)

@@ -111,6 +111,8 @@ class RigidBody:
         The matrix is diagonalised, moments in increasing order, and the turn kept in `axes`. `in_principal` takes an
         attitude in the axes of the matrix to one of this body.
         """
+        from scipy.spatial.transform import Rotation  # 0.1 s
+
         if unknown := sorted(others.keys() - {"mass", "gravity", "distance"}):
             raise TypeError(f"from_inertia() got an unexpected keyword argument '{unknown[0]}'")
         if others:
@@ -126,8 +128,9 @@ class RigidBody:
         if np.linalg.det(turn) < 0.0:
             turn[:, 2] = -turn[:, 2]
         along = turn.T @ np.array(vector("centre", centre, 3))
+        axes = np.roll(Rotation.from_matrix(turn).as_quat(), 1)  # scalar first
         I1, I2, I3 = moments.tolist()
-        return cls(I1, I2, I3, mgl, tuple(along.tolist()), _quaternion_of(turn))
+        return cls(I1, I2, I3, mgl, tuple(along.tolist()), tuple(axes.tolist()))
 
     @classmethod
     def from_brick(cls, mass: float, sides: Sequence[float]) -> "RigidBody":
@@ -242,11 +245,3 @@ def rotated(quaternion: Any, vectors: Any) -> Any:
     parts = zip((a, b, c), (x, y, z), turn, strict=True)
     turned = np.stack([size * v + along * r + twice * u for v, r, u in parts], axis=-1)
     return turned if turned.ndim > 1 else tuple(turned.tolist())
-
-
-def _quaternion_of(matrix: Any) -> tuple[float, float, float, float]:
-    """The quaternion of a rotation matrix."""
-    from scipy.spatial.transform import Rotation  # 0.1 s
-
-    x, y, z, w = Rotation.from_matrix(matrix).as_quat().tolist()
-    return w, x, y, z

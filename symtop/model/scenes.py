@@ -341,8 +341,8 @@ def added_scenes() -> list[str]:
     return list(_added)
 
 
-class _Scenes(dict[str, Scene]):
-    """The scenes as a dict; a notebook shows it as a table."""
+class Catalogue(dict[str, Any]):
+    """Records by name, scenes or integrators; a notebook shows them as a table."""
 
     def _repr_html_(self) -> str:
         import pandas as pd  # 0.2 s
@@ -355,19 +355,19 @@ class _Scenes(dict[str, Scene]):
 @by_name
 def scenes() -> dict[str, Scene]:
     """All known scenes of tops, by name."""
-    return _Scenes({**_catalogue(), **{name: entry for name, entry in _added.items() if not entry.of_body}})
+    return Catalogue({**_catalogue(), **{name: entry for name, entry in _added.items() if not entry.of_body}})
 
 
 @by_name
 def body_scenes() -> dict[str, Scene]:
     """All known scenes of bodies without symmetry, by name."""
-    return _Scenes({**_bodies(), **{name: entry for name, entry in _added.items() if entry.of_body}})
+    return Catalogue({**_bodies(), **{name: entry for name, entry in _added.items() if entry.of_body}})
 
 
 @by_name
 def all_scenes() -> dict[str, Scene]:
     """All known scenes, those of tops first, by name."""
-    return _Scenes(scenes() | body_scenes())
+    return Catalogue(scenes() | body_scenes())
 
 
 @by_name

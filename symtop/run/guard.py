@@ -307,11 +307,11 @@ def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, *, series:
         return ""
     motion: Integrated = Integrated(scene) if series or scene.of_body else Exact(scene)
     expected = forecast(scene, method, chart, plan, motion)
-    found = trouble(motion, method, chart, plan, expected)
-    if found is None:
+    problem = trouble(motion, method, chart, plan, expected)
+    if problem is None:
         return ""
-    remedy = "" if math.isnan(found.step) else f"; {_remedy(motion, method, chart, plan, found)}"
-    return f"{method.name} on {scene.name}: {found.reason}{remedy}"
+    remedy = "" if math.isnan(problem.step) else f"; {_remedy(motion, method, chart, plan, problem)}"
+    return f"{method.name} on {scene.name}: {problem.reason}{remedy}"
 
 
 def _remedy(motion: Integrated, method: Integrator, chart: str, plan: Plan, first: Trouble) -> str:
@@ -321,12 +321,12 @@ def _remedy(motion: Integrated, method: Integrator, chart: str, plan: Plan, firs
         if not plan.horizon / step <= MOST_STEPS:
             return f"take {first.otherwise or 'another method'}: more than {MOST_STEPS:.0e} steps would be needed"
         step = float(f"{step:.2g}")
-        tried = plan._replace(step_size=step)  # a forecast looks at the step and the horizon
-        expected = forecast(motion.scene, method, chart, tried, motion)
-        if expected.outcome == "ok" and trouble(motion, method, chart, tried, expected) is None:
+        finer = plan._replace(step_size=step)  # a forecast looks at the step and the horizon
+        expected = forecast(motion.scene, method, chart, finer, motion)
+        if expected.outcome == "ok" and trouble(motion, method, chart, finer, expected) is None:
             word = "take"
             break
-        step = min(LESS * step, _smaller(method, tried, expected))
+        step = min(LESS * step, _smaller(method, finer, expected))
     return f"{word} a step of about {step:.2g}{others}"
 
 
@@ -396,9 +396,8 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
         end = sentence(expected.outcome, expected.reached, plan.horizon, second)
         return Trouble(f"expect the run to be {end}")
     if method.adaptive:
-        advice = (
-            f"try tolerance {max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance):.1g}"
-        )
+        tolerance = max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance)
+        advice = f"try tolerance {tolerance:.1g}"
         if expected.unstable >= expected.axis_error:
             return Trouble(f"{size}: the motion is unstable, and a change of its start grows large; {advice}")
         return Trouble(f"{size}: errors add up over {plan.horizon / marks.period:.3g} {period}s; {advice}")

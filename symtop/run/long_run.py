@@ -104,9 +104,9 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     head = solver.loop(par, rule, state, h, scattered(0, FIRST, 8 * SAMPLES))
     first, momenta = presented(head.states), head.momenta
     ran = np.isfinite(first).all(axis=1) & np.isfinite(momenta).all(axis=1)  # a run may fail in its first steps
-    at_start, given = presented(solver.loop(par, rule, state, h, np.array([0])).states), np.array([start[:2]])
-    first, momenta = (first[ran], momenta[ran]) if ran.any() else (at_start, given)
-    energy_start = float(energies(at_start, given)[0][0])
+    at_start, momenta_start = presented(solver.loop(par, rule, state, h, np.array([0])).states), np.array([start[:2]])
+    first, momenta = (first[ran], momenta[ran]) if ran.any() else (at_start, momenta_start)
+    energy_start = float(energies(at_start, momenta_start)[0][0])
     rest = modified.oscillation(*modified.section(chart, first), energies(first, momenta)[1])
 
     def gauge(states: Array, momenta: Array, *, shown: bool = False) -> dict[str, Array]:
@@ -128,14 +128,14 @@ def _watch_body(scene: Scene, method: Integrator) -> Gauge:
     body, size = scene.top, scene.momentum_scale
     solver, start = chart_of(method, of_body=True)[1], body.momenta(scene.start)
     par, _ = solver.prepare(body, scene.start)
-    begun = body_energy(body, np.array([[*scene.start.quaternion, *body.momentum(scene.start)]]))[0]
+    energy_start = body_energy(body, np.array([[*scene.start.quaternion, *body.momentum(scene.start)]]))[0]
 
     def gauge(states: Array, momenta: Array, *, shown: bool = False) -> dict[str, Array]:
         if not shown and solver.present is not None:
             states = solver.present(par, np.zeros(len(states)), states)
         view = View(BODY, body, states)
         return {
-            "energy": (view.energy - begun) / scene.energy_scale,
+            "energy": (view.energy - energy_start) / scene.energy_scale,
             "p_phi": (momenta[:, 0] - start.p_phi) / size,
             "momentum": np.linalg.norm(states[:, 4:], axis=1) / size - 1.0,
             "theta": view.theta,
@@ -224,11 +224,10 @@ def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensate
 
 def leaves(carry: Any) -> list[float]:
     """The floats in a kernel's carry: tuples of tuples, or one array."""
-    if isinstance(carry, np.ndarray):
-        return [float(value) for value in carry.ravel()]
     if isinstance(carry, tuple):
         return [value for part in carry for value in leaves(part)]
-    return [float(carry)]
+    values: list[float] = np.ravel(carry).astype(float).tolist()
+    return values
 
 
 def regrown(carry: Any, values: Iterator[float]) -> Any:
@@ -260,10 +259,8 @@ class _Checkpoint:
         if data.attrs.get("identity") != self.identity:
             words = "belongs to another run or version; remove it or name another file"
             raise SymtopError(f"checkpoint {self.file} {words}", "checkpoint")
-        values = iter([float(value) for value in data["position"].values])
-        state, low, carry = regrown(start[:3], values)
-        at = Position(state, low, carry, int(data["steps_done"]))
-        return at, [[float(value) for value in row] for row in data["rows"].values]
+        state, low, carry = regrown(start[:3], iter(data["position"].values.tolist()))
+        return Position(state, low, carry, int(data["steps_done"])), data["rows"].values.tolist()
 
     def _read(self, file: Path) -> xr.Dataset | None:
         """What is in the file; None of a damaged one of the cache, from which nothing can go on."""

@@ -25,7 +25,7 @@ from symtop.methods.framework.registry import integrator
 from symtop.methods.runge_kutta.pairs import DOP8, two_runs
 from symtop.model.charts import BODY, Array, attitude_distance, axes, axis_distance
 from symtop.model.scenes import Scene, closed_form
-from symtop.model.top import Angles, SymmetricTop, flat
+from symtop.model.top import Angles, flat
 from symtop.run.reference.sensitivity import displacement
 
 SERIES = {BODY: "series-general-adaptive", "axis": "series-adaptive"}
@@ -59,9 +59,10 @@ class Landmarks(NamedTuple):
 
 
 @functools.lru_cache(maxsize=256)
-def _landmarks(top: SymmetricTop, at: Angles) -> Landmarks:
-    scene, momenta = Scene("landmarks", top, at, 1.0), top.momenta(at)
-    form = closed_form(scene)
+def landmarks(scene: Scene) -> Landmarks:
+    """The landmarks of a scene's motion, by its closed form; made once and kept."""
+    top, at, form = scene.top, scene.start, closed_form(scene)
+    momenta = top.momenta(at)
     highest, lowest = form.theta_range
     upper = highest <= math.pi - lowest
     gap = highest if upper else math.pi - lowest
@@ -74,11 +75,6 @@ def _landmarks(top: SymmetricTop, at: Angles) -> Landmarks:
     shear = spread / max(moved) if math.isfinite(spread) else 1.0
     pole, frequency = "upper" if upper else "lower", top.nutation_frequency(momenta)
     return Landmarks(form.nutation_period, frequency, lowest - highest, gap, pole, rate, shear)
-
-
-def landmarks(scene: Scene) -> Landmarks:
-    """The landmarks of a scene's motion, by its closed form; made once and kept."""
-    return _landmarks(scene.top, scene.start)
 
 
 class Growth(NamedTuple):
@@ -126,7 +122,7 @@ class Integrated:
     points = 100  # of a piece that are compared
 
     def __init__(self, scene: Scene) -> None:
-        self.scene, self.known = scene, dict[float, Growth]()
+        self.scene, self.growths = scene, dict[float, Growth]()
         self.chart, self.watches = (BODY, "attitude") if scene.of_body else ("axis", "axis")
         slow, self.fast, self.inertia = _frequencies(scene)
         self.marks = Landmarks(2.0 * math.pi / slow, slow, math.nan, math.inf, "upper", 0.0, 0.0)
@@ -177,14 +173,14 @@ class Integrated:
         """
         step = 2.0 * math.pi / self.fast / PAIR_STEPS
         until = min(horizon, WATCHED[self.chart] * self.marks.period, MOST_WATCHED * step)
-        if until not in self.known:
+        if until not in self.growths:
             steps = max(math.ceil(until / step), POINTS)
             h, marks, apart = until / steps, np.arange(1, POINTS + 1) * steps // POINTS, np.empty(POINTS)
             starts = (flat(self.scene.top, start) for start in (self.scene.start, self.moved()))
             units = (2.0 if self.chart == BODY else 1.0) / MOVED, 1.0 / (MOVED * self.inertia * self.marks.frequency)
             two_runs(self.chart, DOP8, _apart)(*starts, h, marks, units, apart)
-            self.known[until] = Growth.of(np.multiply(marks, h, dtype=float), apart, SATURATED / MOVED)
-        return self.known[until]
+            self.growths[until] = Growth.of(np.multiply(marks, h, dtype=float), apart, SATURATED / MOVED)
+        return self.growths[until]
 
     def amplification(self, until: float, horizon: float) -> float:
         """A at a time of a run to the horizon."""

@@ -16,12 +16,12 @@ from symtop.model.scenes import added_scenes, body_scenes, scenes
 _loaded: dict[Path, list[str]] = {}  # files of plug-ins in use, and the names that each has registered
 
 
-def python_file(path: str | Path, name: str, wanted: str) -> Path:
-    """A file by its path; SymtopError that argument `name` must be what is `wanted` if it is not there."""
+def python_file(path: str | Path, name: str, kind: str) -> Path:
+    """A file by its path; SymtopError that argument `name` must be of that `kind` if it is not there."""
     with contextlib.suppress(OSError, ValueError):  # a name that is too long, or holds a null character
         if (file := at_home(path).resolve()).is_file():
             return file
-    raise SymtopError(f"{name} must be {wanted}, not {str(path)!r}", name)
+    raise SymtopError(f"{name} must be {kind}, not {str(path)!r}", name)
 
 
 def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:

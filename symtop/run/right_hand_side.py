@@ -59,11 +59,11 @@ def guard(
     rules = {name: getattr(next(iter(one.solvers.values())), "rule", None) for name, one in integrators().items()}
     tables = {name: rule for name, rule in rules.items() if isinstance(rule, Tableau)}
     rule = tables.get(one_of("method", method, [*SCIPY, *tables]))
-    names, given = ("step_size", "tolerance"), (step_size, tolerance)
-    if given[rule is not None] is not None:
+    names, values = ("step_size", "tolerance"), (step_size, tolerance)
+    if values[rule is not None] is not None:
         raise SymtopError(f"{method} takes {names[rule is None]}, not {names[rule is not None]}", *names)
-    start, setting = np.array(row("y0", y0)), positive(names[rule is None], given[rule is None])
-    begin, end, wanted = finite("t0", t0), positive("horizon", horizon), positive("accuracy", accuracy)
+    start, setting = np.array(row("y0", y0)), positive(names[rule is None], values[rule is None])
+    begin, end, accuracy = finite("t0", t0), positive("horizon", horizon), positive("accuracy", accuracy)
 
     def rate(t: float, y: Array) -> Array:
         value = np.asarray(f(t, y), dtype=float)
@@ -72,7 +72,7 @@ def guard(
         return value
 
     with foreign_code("f"), np.errstate(all="ignore"):
-        return _outlook(rate, begin, start, end, method, rule, setting, wanted)
+        return _outlook(rate, begin, start, end, method, rule, setting, accuracy)
 
 
 def _stepped(f: Any, rule: Tableau, t: float, y: Array, h: float, marks: Any) -> Array:
@@ -106,11 +106,8 @@ def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
     """The solution by DOP853, a function of the time, and how long it is."""
     from scipy.integrate import DOP853, OdeSolution  # 0.2 s
 
-    solver, times, parts = (
-        DOP853(_finite(f), t, y, t + end, rtol=FINE, atol=FINE * float(np.abs(y).max())),
-        [t],
-        list[Any](),
-    )
+    solver = DOP853(_finite(f), t, y, t + end, rtol=FINE, atol=FINE * float(np.abs(y).max()))
+    times, parts = [t], list[Any]()
     while solver.status == "running" and len(parts) < WATCHED and solver.step() is None:
         times.append(solver.t)
         parts.append(solver.dense_output())
@@ -118,63 +115,60 @@ def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
 
 
 def _outlook(
-    f: Any, t: float, y: Array, end: float, method: str, rule: Tableau | None, setting: float, wanted: float
+    f: Any, t: float, y: Array, end: float, method: str, rule: Tableau | None, setting: float, accuracy: float
 ) -> Outlook:
     """See `guard`."""
     from scipy.integrate import solve_ivp
 
     near, watched = _motion(f, t, y, end)
-    seen = watched * np.arange(1.0, POINTS + 1.0) / POINTS
-    true = near(t + seen)
+    elapsed = watched * np.arange(1.0, POINTS + 1.0) / POINTS
+    true = near(t + elapsed)
     spread, extent = np.std(true, axis=1), float(np.linalg.norm(np.ptp(true, axis=1))) or 1.0
-    rates = np.std([f(t + time, state) for time, state in zip(seen, true.T, strict=True)], axis=0)
+    rates = np.std([f(t + time, state) for time, state in zip(elapsed, true.T, strict=True)], axis=0)
     frequency = float(np.linalg.norm(rates)) / max(float(np.linalg.norm(spread)), TINY)
     moved = y + MOVED * extent / math.sqrt(y.size)
     far, reached = _motion(f, t, moved, watched)
-    times = seen[seen <= reached * (1.0 + EPSILON)]
+    times = elapsed[elapsed <= reached * (1.0 + EPSILON)]
     apart = np.linalg.norm(far(t + times) - near(t + times), axis=0) / (MOVED * extent)
     growth, kind = Growth.of(times, apart, SATURATED / MOVED), "step" if rule else "tolerance"
     piece = min(end, watched, max(SHARE * end, PERIODS * 2.0 * math.pi / max(frequency, TINY)))
 
-    def made(start: Array) -> tuple[Array, Array, float]:
+    def run_piece(start: Array) -> tuple[Array, Array, float]:
         """Times and states of the piece, and the mean step of an explicit method."""
         if rule:
             marks = np.unique(np.rint(np.linspace(0.0, min(round(piece / setting), PROBED), POINTS + 1)[1:]).clip(1.0))
             return marks * setting, _stepped(f, rule, t, start, setting, marks), setting
-        (name, cost), shown = SCIPY[method], np.minimum(t + piece * seen / watched, t + piece)
+        (name, cost), shown = SCIPY[method], np.minimum(t + piece * elapsed / watched, t + piece)
         run = solve_ivp(_finite(f), (t, t + piece), start, name, shown, rtol=setting, atol=setting)
         return run.t - t, run.y.T, piece * cost / run.nfev
 
-    times, states, mean = made(y)
+    times, states, mean = run_piece(y)
     error = np.linalg.norm(states - near(t + times).T, axis=1)
     ended = not np.isfinite(error).all() or times[-1] < 0.99 * min(piece, PROBED * setting if rule else piece)
     total, since = growth.at(end), growth.at(float(times[-1]))
     expected = max(grown(Probe(times, error, "ok", end, 0), end, straight=False), float(error.max()) * total / since)
     expected = math.inf if ended else min(expected, 2.0 * extent)
-    better = setting * (wanted / max(expected, TINY)) ** (1.0 / ((rule and integrator(method).order) or 1))
+    better = setting * (accuracy / max(expected, TINY)) ** (1.0 / ((rule and integrator(method).order) or 1))
     change = math.sqrt(EPSILON) * extent
     slopes = [(f(t, y + change * unit) - f(t, y)) / change for unit in np.eye(y.size)]
     fastest, cause = float(np.abs(np.linalg.eigvals(np.array(slopes))).max()), "step"
     why = f"errors add up over {end * frequency / (2.0 * math.pi):.3g} periods; take a {kind} of about {better:.1g}"
-    if not expected > wanted:
-        cause, why = "", f"a {kind} of {better:.1g} would do for {wanted:.1g}"
+    if not expected > accuracy:
+        cause, why = "", f"a {kind} of {better:.1g} would do for {accuracy:.1g}"
     elif mean * fastest > 1.0 and fastest > STIFF * frequency:
         cause, better = "stiffness", math.nan
         why = f"f has rates of {fastest:.1g}, the motion of {frequency:.1g}; take an implicit method, such as radau"
-    elif ended or np.linalg.norm(made(moved)[1] - states, axis=1).max() > OWN * since**2 * MOVED * extent:
+    elif ended or np.linalg.norm(run_piece(moved)[1] - states, axis=1).max() > OWN * since**2 * MOVED * extent:
         better = min(better, 0.3 * setting)
-        cause, why = (
-            "instability",
-            f"it multiplies a small change more than the motion does; try a {kind} of {better:.1g}",
-        )
+        cause = "instability"
+        why = f"it multiplies a small change more than the motion does; try a {kind} of {better:.1g}"
     elif total > UNSTABLE * growth.at(0.5 * end):
-        lost = total * EPSILON * extent > wanted
+        lost = total * EPSILON * extent > accuracy
         cause, better = "instability", math.nan if lost else better
         why = f"the motion multiplies a small change {total:.1g} times; " + (
             "rounding alone decides, shorten the horizon" if lost else f"try a {kind} of {better:.1g}"
         )
     elif float(error.max()) < 10.0 * FINE * float(np.abs(true).max()):
         cause, better, why = "rounding", math.nan, f"rounding adds up, and no {kind} helps"
-    return Outlook(
-        expected, better, cause, total, f"{method}: expect an error of {expected:.1g} by t = {t + end:.4g}: {why}"
-    )
+    sentence = f"{method}: expect an error of {expected:.1g} by t = {t + end:.4g}: {why}"
+    return Outlook(expected, better, cause, total, sentence)

@@ -40,8 +40,8 @@ def unseen(times: Array, period: Any) -> Array:
     """
     turns = np.atleast_2d(times / period)
     phases = turns - np.floor(turns)  # as `np.mod` has it, in a third of the time
-    seen = np.bitwise_or.reduce(1 << (STRETCHES * phases).astype(np.int64), axis=1)
-    widest, sparse = np.full(len(phases), 2.0 / STRETCHES), seen != (1 << STRETCHES) - 1
+    bits = np.bitwise_or.reduce(1 << (STRETCHES * phases).astype(np.int64), axis=1)
+    widest, sparse = np.full(len(phases), 2.0 / STRETCHES), bits != (1 << STRETCHES) - 1
     if sparse.any():
         phases = np.sort(phases[sparse], axis=1)
         widest[sparse] = np.max(np.diff(phases, append=phases[:, :1] + 1.0), axis=1)
@@ -170,12 +170,12 @@ def simulate(
 
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
-    heard = guard if callable(guard) else _warn if isinstance(guard, str) or boolean("guard", guard) else None
-    given = scene, integrator, step_size, tolerance, horizon, samples, observe, budget
-    chosen, method, chart, plan, dithered = _prepared(*given)
+    report = guard if callable(guard) else _warn if isinstance(guard, str) or boolean("guard", guard) else None
+    arguments = scene, integrator, step_size, tolerance, horizon, samples, observe, budget
+    chosen, method, chart, plan, dithered = _prepared(*arguments)
     if isinstance(guard, str):
         one_of("guard", guard, ("series",) if chosen.of_body else ("exact", "series"))
-    trajectory, caution = _guarded(chosen, method, chart, plan, heard, series=guard == "series")
+    trajectory, caution = _guarded(chosen, method, chart, plan, report, series=guard == "series")
     data = dataset(trajectory.time, trajectory.columns, chosen.units)
     data.attrs = netcdf.attributes_of(
         f"{method.name} on {chosen.name}", integrator=method.name, scene=chosen.name, chart=chart,

@@ -97,8 +97,9 @@ def test_what_the_benchmark_leaves_is_what_the_report_shows(tmp_path):
     batch = lanes.Batch(1e-6, 1.2e-6, 45, 7e-6, 16e-6, 2.6e-6)
     together = lanes.Measured(lane_rows, [lanes.Threads("strang", "axis", 1.9, 1.8, 2.0)], [batch])
     called = [ensemble.Call("strang", 0.9e-6, 2.5e-9, 25e-9)]
-    content = bench.findings(rows, {}, forms, reached, items, one_step, many, called, together, 1e-9, facts)
-    netcdf.write_json(tmp_path / "bench.json", content)
+    results = bench.Results(rows, {"python": 0.012}, forms, 1e-9, reached, items, one_step, many, called, together)
+    assert "python  12.00\n" in bench.tables(results)[-1].text
+    netcdf.write_json(tmp_path / "bench.json", bench.findings(results, facts))
     text = page.write(tmp_path).read_text()
     markdown = (tmp_path / "report.md").read_text() + (tmp_path / "reference.md").read_text()
     calls = "0.90 us a member beside its steps, 2.50 ns a step, 10.0 times"

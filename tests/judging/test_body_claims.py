@@ -90,3 +90,10 @@ def test_a_step_is_drawn_beside_methods_on_a_body(tmp_path: Path) -> None:
     assert data["variant"].values.tolist() == ["step[body]", "rk4[body]"]
     one, other = (data["error"].sel(variant=name).min() for name in data["variant"].values)
     assert one == pytest.approx(other, rel=0.5)
+
+
+@pytest.mark.parametrize("scene", ["spheroid", "heavy-brick"])
+def test_a_run_that_ends_in_its_first_nutation_shows_no_constant(scene: str) -> None:
+    """Two steps of 1e300 times the state: what did not change in the first is not said to be kept."""
+    ledger = symtop.judge(lambda f, t, y, h: 1e300 * y, scene=scene, quick=True)
+    assert {ledger[claim].measured.kind for claim in ("energy", "order")} == {""}

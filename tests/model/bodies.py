@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.numbers import context
+from tests.judging.blind.right import product
 
 DIGITS, GUARD = 50, 50
 UNIT = 2.0**-53
@@ -61,16 +62,6 @@ def bodies(count: int, seed: int, kinds: tuple[str, ...] = KINDS) -> Iterator[Bo
         yield Body(kind, inertia[order], rng.normal(size=4), momentum[order])
 
 
-def product(p: Any, q: Any) -> tuple[Any, ...]:
-    """p q of quaternions."""
-    return (
-        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
-        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
-        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
-        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
-    )
-
-
 class PreciseBody:
     """The motion of a free body, its numbers read exactly: `states` are (q, M) in mpf, `period` may be None."""
 
@@ -78,7 +69,7 @@ class PreciseBody:
         self.mp = mp = context(digits + GUARD)
         moments, momentum, start = ([mp.convert(value) for value in row] for row in (inertia, momentum, quaternion))
         length = mp.norm(start)
-        self.start, self.given = [value / length for value in start], momentum
+        self.start, self.given = np.array([value / length for value in start]), momentum
         self.G, rates = mp.norm(momentum), [1 / value for value in moments]
         low, middle, high = sorted(range(3), key=lambda i: moments[i])
         outer = (moments[high] - moments[middle]) * moments[low] * momentum[high] ** 2
@@ -98,10 +89,8 @@ class PreciseBody:
         a, self.b, self.gamma = alpha / gamma, beta / gamma, gamma
         self.A1, self.A3 = mp.sqrt(m1**2 + self.b * m2**2), mp.sqrt(m3**2 + a * m2**2)
         self.A2, self.nu = self.s * self.A1 / mp.sqrt(self.b), a / self.b
-        self.k2, k1 = (
-            self.nu * (self.A1 / self.A3) ** 2,
-            self.s * gap * rates[0] * rates[1] * rates[2] / (beta * self.A3**2),
-        )
+        self.k2 = self.nu * (self.A1 / self.A3) ** 2
+        k1 = self.s * gap * rates[0] * rates[1] * rates[2] / (beta * self.A3**2)
         self.kc = mp.sqrt(k1)
         self.rate = mp.sqrt(beta * gamma) * self.A3
         self.K = mp.pi / (2 * mp.agm(1, self.kc)) if k1 else None
@@ -113,8 +102,7 @@ class PreciseBody:
             self.u0 = (2 if sn >= 0 else -2) * self.K - self.u0
         self.whole = self._third(mp.one, mp.zero, self.kc) if k1 else None
         self.psi0 = self._swing(self.u0)[1]
-        first = product(self.start, self._body(self._frame(self.m, mp.zero), -1))
-        self.constant = first
+        self.constant = product(self.start, self._body(self._frame(self.m, mp.zero), -1))
 
     def states(self, times: Any) -> list[tuple[Any, ...]]:
         """Quaternion and momentum in body axes at each time."""
@@ -125,7 +113,8 @@ class PreciseBody:
         if self.steady:
             half = self.rate * t / 2
             axis = [value / self.G if self.G else 0 for value in self.given]
-            return *product(self.start, (mp.cos(half), *(value * mp.sin(half) for value in axis))), *self.given
+            turn = np.array([mp.cos(half), *(value * mp.sin(half) for value in axis)])
+            return *product(self.start, turn), *self.given
         m, psi = self._swing(self.u0 + self.rate * t)
         turned = self._body(self._frame(m, self.a3 * self.G * t + psi - self.psi0))
         momentum = self._body((0, *m))[1:]
@@ -170,14 +159,15 @@ class PreciseBody:
         """exp(k psi/2) and the shortest turn of m to axis 3, in canonical axes."""
         mp, n = self.mp, [value / self.G for value in m]
         half = mp.sqrt(2 * (1 + n[2]))
-        return product((mp.cos(psi / 2), 0, 0, mp.sin(psi / 2)), (half / 2, n[1] / half, -n[0] / half, 0))
+        turn, shortest = (mp.cos(psi / 2), 0, 0, mp.sin(psi / 2)), (half / 2, n[1] / half, -n[0] / half, 0)
+        return product(np.array(turn), np.array(shortest))
 
     def _body(self, canonical: tuple[Any, ...], way: int = 1) -> tuple[Any, ...]:
         """A quaternion, or its inverse, in body axes."""
         vector = [self.mp.zero] * 3
         for sign, axis, value in zip(self.signs, self.axes, canonical[1:], strict=True):
             vector[axis] = way * sign * value
-        return canonical[0], *vector
+        return np.array([canonical[0], *vector])
 
 
 def apart(mp: Any, quaternion: Any, true: Any) -> float:

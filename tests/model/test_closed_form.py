@@ -183,11 +183,8 @@ def test_many_samples_are_worth_compiling(monkeypatch):
 def test_the_exact_separatrix_climbs_for_ever(rate):
     """theta = 4 atan tanh(g t/2), g = sqrt(abs(mgl)/I1), in double and in 40 digits; a pole is passed at time 0."""
     top, start = SymmetricTop(4.0, 2.5, -4.0), Angles(0.0, 0.3, 0.2, rate, 0.7, -0.7)
-    form, precise, times = (
-        ClosedForm(top, start),
-        PreciseForm(top, start),
-        np.array([-30.0, -1.0, 0.0, 1e-9, 0.5, 3.0, 40.0]),
-    )
+    form, precise = ClosedForm(top, start), PreciseForm(top, start)
+    times = np.array([-30.0, -1.0, 0.0, 1e-9, 0.5, 3.0, 40.0])
     motion, axis = form(times), form.axis(times)
     assert precise.climbs
     assert form.nutation_period == precise.nutation_period == math.inf
@@ -237,12 +234,12 @@ def test_next_to_the_separatrix_the_motion_is_periodic():
 @pytest.mark.parametrize("count", [2, pytest.param(40, marks=pytest.mark.slow)])
 def test_every_family_keeps_the_accuracy_that_is_claimed(count):
     """So many of each; `python -m benchmarks.accuracy` measures ten thousand."""
-    found = accuracy.measure(count, jobs=1)
-    assert found.tops == count * len(REGIMES)
-    assert found.broken == []
-    assert found.share("double-double") > 0.7
-    assert found.share("40 digits") == 0.0
-    assert all(found.largest(name) < 0.6 * bound for name, bound in ROUNDING.items() if name != "attitude")
+    accuracies = accuracy.measure(count, jobs=1)
+    assert accuracies.tops == count * len(REGIMES)
+    assert accuracies.broken == []
+    assert accuracies.share("double-double") > 0.7
+    assert accuracies.share("40 digits") == 0.0
+    assert all(accuracies.largest(name) < 0.6 * bound for name, bound in ROUNDING.items() if name != "attitude")
 
 
 def test_a_form_that_is_wrong_in_the_fifteenth_digit_breaks_the_claim(monkeypatch):

@@ -9,8 +9,6 @@ import pytest
 
 from benchmarks.families import tops
 from symtop.core.errors import SymtopError
-from symtop.methods.framework.plan import Plan
-from symtop.methods.library import exact
 from symtop.model import charts
 from symtop.model.charts import space_momenta
 from symtop.model.exact import closed_form, samples
@@ -96,9 +94,9 @@ def test_a_member_without_a_form_fails_alone():
     assert "must meet a pole or miss it by 1e-145" in forms.refused[1]
     assert forms.arithmetic[1] == ""
     assert np.isnan(forms.nutation_period[1])
-    for seen in (forms.state(TIMES), forms.axis(TIMES), forms(TIMES).phi):
-        assert np.isnan(seen[1]).all()
-        assert np.isfinite(seen[[0, 2]]).all()
+    for values in (forms.state(TIMES), forms.axis(TIMES), forms(TIMES).phi):
+        assert np.isnan(values[1]).all()
+        assert np.isfinite(values[[0, 2]]).all()
 
 
 @pytest.mark.parametrize(
@@ -141,15 +139,6 @@ def test_threads_share_forms_and_kernels():
     with ThreadPoolExecutor(8) as pool:
         for result in pool.map(work, range(8)):
             assert result == (alone, alone)
-
-
-def test_exact_solves_many_tops_as_it_solves_one():
-    pairs, plan = _pairs(1), Plan.until(np.linspace(0.0, 5.0, 6), math.nan)
-    states, momenta = ClosedForms(np.array([flat(*pair) for pair in pairs])).run(plan.times)
-    for i, pair in enumerate(pairs):
-        run = exact.solve(*pair, plan)
-        assert states[i].tobytes() == run.states.tobytes()
-        assert momenta[i].tobytes() == np.stack([run.p_phi, run.p_psi], axis=-1).tobytes()
 
 
 def test_distances_from_an_axis_are_those_of_the_chart(implementation):

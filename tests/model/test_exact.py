@@ -66,15 +66,6 @@ def test_thirty_digits_of_the_published_states(name):
     assert all(abs(x - mp.mpf(y)) < 1e-12 for x, y in pairs)
 
 
-@pytest.mark.parametrize("name", [name for name in TRUTH if name.endswith("_ieee")])
-def test_double_precision_reproduces_the_states_of_exact_doubles(name):
-    entry = TRUTH[name]
-    top = SymmetricTop(*(float(entry[k]) for k in ("I1", "I3", "mgl")))
-    form = ClosedForm(top, Angles(*map(float, [*entry["q0_theta_phi_psi"], *entry["v0"]])))
-    for ours, printed in zip(form(float(entry["t"])), entry["state"].values(), strict=True):
-        assert abs(ours - float(printed)) <= 8 * EPS * max(1.0, abs(float(printed)))
-
-
 # ----------------------------------------------------------------------------------------- double against 50 digits
 
 

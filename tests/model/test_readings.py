@@ -27,8 +27,8 @@ def test_axis_energy_and_momentum_have_the_bits_of_a_view(failed, chart, monkeyp
         states = np.concatenate([charts.axis_from_quaternion(states[:, :4]), states[:, 4:]], axis=1)
     view = View(chart, scene("spheroid").top, states, np.full(401, form.p_phi), np.full(401, form.p_psi))
     charts._reader.compile()
-    seen = [*charts.readings(view), charts.axes(chart, states)]
-    for ours, theirs in zip(seen, (view.axis, view.energy, view.p_theta, view.axis), strict=True):
+    readings = [*charts.readings(view), charts.axes(chart, states)]
+    for ours, theirs in zip(readings, (view.axis, view.energy, view.p_theta, view.axis), strict=True):
         np.testing.assert_array_equal(ours, theirs)
     moved = View(chart, view.top, states * (1.0 + 2e-16), view.p_phi, view.p_psi)
     assert not np.array_equal(charts.readings(moved)[1], view.energy, equal_nan=True)
@@ -39,9 +39,9 @@ def test_continuous_angles_have_the_bits_of_numpy(failed):
     _, phi, psi = charts.angles_from_quaternion(states[:, :4])
     charts._unwrapper.compile()
     angles, guides = np.array([phi, psi]), form.turns(TIMES)
-    found = charts.continuous(angles, guides)
-    np.testing.assert_array_equal(found, charts.unwrapped(angles, guides))
-    assert not np.array_equal(found, angles, equal_nan=True)  # there is something to undo
+    angles_out = charts.continuous(angles, guides)
+    np.testing.assert_array_equal(angles_out, charts.unwrapped(angles, guides))
+    assert not np.array_equal(angles_out, angles, equal_nan=True)  # there is something to undo
 
 
 @pytest.mark.parametrize("turn", [np.pi, -np.pi, np.nextafter(np.pi, 4.0), 7.0 * np.pi, 1e6])

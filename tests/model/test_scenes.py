@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.model.scenes import _Scenes, closed_form, grazing, sleeping, spinning, steady
+from symtop.model.scenes import Catalogue, closed_form, grazing, sleeping, spinning, steady
 
 
 def test_the_scenes_are_a_dict_that_a_notebook_shows_as_a_table():
@@ -20,7 +20,7 @@ def test_the_scenes_are_a_dict_that_a_notebook_shows_as_a_table():
 def test_what_users_write_is_escaped_and_whole():
     purpose = "a < b & <script>, and a sentence that is longer than the fifty characters a table has by default"
     scene = symtop.Scene("mine", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0), 1.0, purpose)
-    html = _Scenes({"mine": scene})._repr_html_()
+    html = Catalogue({"mine": scene})._repr_html_()
     assert "a &lt; b &amp; &lt;script&gt;, and a sentence that is longer than the fifty characters" in html
     assert "<script>" not in html
 
@@ -40,12 +40,12 @@ def test_a_tag_that_no_study_knows_is_refused(tags):
 
 @pytest.mark.parametrize("delta", [1e-1, 1e-3, -1e-3, 1e-6])
 def test_grazing_misses_the_pole_by_eleven_tenths_of_its_gap(delta):
-    where = grazing(delta)
-    momenta = where.top.momenta(where.start)
+    scene = grazing(delta)
+    momenta = scene.top.momenta(scene.start)
     assert momenta.north == pytest.approx(delta, rel=1e-9)
     assert momenta.p_psi == pytest.approx(1.0, rel=1e-15)
-    assert closed_form(where).theta_range[0] == pytest.approx(1.105 * abs(delta), rel=0.05)
-    assert where.nutation_period == pytest.approx(where.horizon, rel=0.03)
+    assert closed_form(scene).theta_range[0] == pytest.approx(1.105 * abs(delta), rel=0.05)
+    assert scene.nutation_period == pytest.approx(scene.horizon, rel=0.03)
 
 
 def test_a_top_sleeps_above_the_threshold_and_falls_below_it():
@@ -65,9 +65,9 @@ def test_steady_precession_is_steady_and_impossible_below_its_spin():
 
 
 def test_the_separatrix_never_comes_back():
-    where = symtop.scene("separatrix")
+    scene = symtop.scene("separatrix")
     times = np.array([1.0, 5.0, 15.0])
-    cosine = np.cos(closed_form(where)(times).theta)
+    cosine = np.cos(closed_form(scene)(times).theta)
     assert cosine == pytest.approx(1.0 / (1.0 + 1.0 / np.cosh(times)), abs=1e-12)  # g = 1
 
 
@@ -81,33 +81,33 @@ def test_families_carry_their_parameter_in_their_name():
 @pytest.mark.parametrize("name", ["spheroid", "goldstein", "fast", "simo-wong", "bruls-cardona-arnold", "separatrix"])
 def test_energies_are_measured_by_the_nutation_and_not_by_the_spin(name):
     """Over the true motion the kinetic energy of theta goes from 0 to E0 - min V, where V is least."""
-    where = symtop.scene(name)
-    end = min(where.nutation_period, where.horizon)
-    motion = closed_form(where)(np.linspace(0.0, end, 20_001))
-    assert np.max(0.5 * where.top.I1 * motion.theta_dot**2) == pytest.approx(where.energy_scale, rel=1e-5)
+    scene = symtop.scene(name)
+    end = min(scene.nutation_period, scene.horizon)
+    motion = closed_form(scene)(np.linspace(0.0, end, 20_001))
+    assert np.max(0.5 * scene.top.I1 * motion.theta_dot**2) == pytest.approx(scene.energy_scale, rel=1e-5)
 
 
 def test_on_a_fast_top_the_energy_of_the_spin_hides_the_nutation():
-    where = symtop.scene("fast")
-    kinetic = where.top.energy(where.start) + where.top.mgl
-    assert where.energy_scale == pytest.approx(9.2e-5, rel=0.01)
-    assert kinetic / where.energy_scale > 5e7
-    assert where.energy_grain == pytest.approx(kinetic / where.energy_scale, rel=1e-3)
+    scene = symtop.scene("fast")
+    kinetic = scene.top.energy(scene.start) + scene.top.mgl
+    assert scene.energy_scale == pytest.approx(9.2e-5, rel=0.01)
+    assert kinetic / scene.energy_scale > 5e7
+    assert scene.energy_grain == pytest.approx(kinetic / scene.energy_scale, rel=1e-3)
 
 
 @pytest.mark.parametrize("spin", [4.0, 20.0])
 def test_a_steady_precession_measures_energies_by_a_nutation_of_one_radian(spin):
-    where = steady(spin)
-    top, amplitude = where.top, 1e-3
-    momenta = top.momenta(where.start)
-    raised = top.potential(where.start.theta + amplitude, momenta) - top.potential(where.start.theta, momenta)
-    assert raised / where.energy_scale == pytest.approx(amplitude**2, rel=0.01)
+    scene = steady(spin)
+    top, amplitude = scene.top, 1e-3
+    momenta = top.momenta(scene.start)
+    raised = top.potential(scene.start.theta + amplitude, momenta) - top.potential(scene.start.theta, momenta)
+    assert raised / scene.energy_scale == pytest.approx(amplitude**2, rel=0.01)
 
 
 @pytest.mark.parametrize("start", [{"theta": 0.0, "psi_dot": 3.0}, {"theta": 0.0, "psi_dot": 1.0}, {"theta": 1.0},
                                    {"theta": math.pi, "psi_dot": 1.0}])  # fmt: skip
 @pytest.mark.parametrize("mgl", [1.0, 0.0, -1.0])
 def test_every_start_has_an_energy_scale(start, mgl):
-    where = symtop.Scene("any", symtop.SymmetricTop(1.0, 1.0, mgl), symtop.Angles(**start), 1.0)
-    assert 0.0 < where.energy_scale < math.inf
-    assert where.energy_grain >= 1.0
+    scene = symtop.Scene("any", symtop.SymmetricTop(1.0, 1.0, mgl), symtop.Angles(**start), 1.0)
+    assert 0.0 < scene.energy_scale < math.inf
+    assert scene.energy_grain >= 1.0

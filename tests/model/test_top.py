@@ -13,12 +13,12 @@ from tests.conftest import random_scenes
 def test_energy_and_momenta_of_the_thirty_digit_scenes(truth):
     for name in ("spheroid_ieee", "goldstein_at_rest_ieee"):
         entry = truth[name]
-        where = scene("spheroid" if name.startswith("spheroid") else "goldstein")
-        momenta = where.top.momenta(where.start)
-        assert where.top.energy(where.start) == pytest.approx(float(entry["E"]), rel=3e-16)
+        chosen = scene("spheroid" if name.startswith("spheroid") else "goldstein")
+        momenta = chosen.top.momenta(chosen.start)
+        assert chosen.top.energy(chosen.start) == pytest.approx(float(entry["E"]), rel=3e-16)
         assert momenta.p_phi == pytest.approx(float(entry["p_phi"]), rel=3e-16)
         assert momenta.p_psi == pytest.approx(float(entry["p_psi"]), rel=3e-16)
-        assert where.nutation_period == pytest.approx(float(entry["nutation_period"]), rel=1e-13)
+        assert chosen.nutation_period == pytest.approx(float(entry["nutation_period"]), rel=1e-13)
 
 
 def test_spheroid_has_the_notebooks_inertia_and_a_physical_reading():
@@ -30,9 +30,9 @@ def test_spheroid_has_the_notebooks_inertia_and_a_physical_reading():
     assert hung.mgl == pytest.approx(2.0 * 10.0 * 0.5)
 
 
-@pytest.mark.parametrize("where", random_scenes(8, seed=1), ids=lambda s: s.name)
-def test_slope_and_curvature_are_the_derivatives_of_the_potential(where):
-    top, momenta = where.top, where.top.momenta(where.start)
+@pytest.mark.parametrize("chosen", random_scenes(8, seed=1), ids=lambda s: s.name)
+def test_slope_and_curvature_are_the_derivatives_of_the_potential(chosen):
+    top, momenta = chosen.top, chosen.top.momenta(chosen.start)
     with mpmath.workdps(40):
         n, s, I1, mgl = (mpmath.mpf(v) for v in (momenta.north, momenta.south, top.I1, top.mgl))
 
@@ -74,14 +74,14 @@ def test_the_potential_keeps_its_digits_at_a_pole_where_the_textbook_form_does_n
 
 
 def test_nutation_frequency_is_the_limit_of_small_nutations():
-    where = scene("steady")
-    momenta = where.top.momenta(where.start)
-    assert where.top.steady_theta(momenta) == pytest.approx(math.pi / 3, abs=1e-8)
+    chosen = scene("steady")
+    momenta = chosen.top.momenta(chosen.start)
+    assert chosen.top.steady_theta(momenta) == pytest.approx(math.pi / 3, abs=1e-8)
     # V'' at the precession Omega = 1: omega^2 = (p_psi - 2 I1 Omega c)^2/I1^2 + Omega^2 s^2 + c [...]/I1 = 1
-    assert where.top.nutation_frequency(momenta) == pytest.approx(1.0, rel=1e-8)
-    nudged = Angles(theta=where.start.theta + 1e-4, phi_dot=where.start.phi_dot, psi_dot=where.start.psi_dot)
-    period = where.top.nutation_period(nudged)
-    assert 2.0 * math.pi / period == pytest.approx(where.top.nutation_frequency(where.top.momenta(nudged)), rel=1e-6)
+    assert chosen.top.nutation_frequency(momenta) == pytest.approx(1.0, rel=1e-8)
+    nudged = Angles(theta=chosen.start.theta + 1e-4, phi_dot=chosen.start.phi_dot, psi_dot=chosen.start.psi_dot)
+    period = chosen.top.nutation_period(nudged)
+    assert 2.0 * math.pi / period == pytest.approx(chosen.top.nutation_frequency(chosen.top.momenta(nudged)), rel=1e-6)
 
 
 def test_nutation_frequency_of_sleeping_tops_has_the_classical_threshold():
@@ -124,8 +124,8 @@ def test_a_top_that_moves_or_falls_from_rest_does_not():
 
 
 def test_arrays_and_floats_give_the_same_potential():
-    where = scene("spheroid")
-    momenta = where.top.momenta(where.start)
+    chosen = scene("spheroid")
+    momenta = chosen.top.momenta(chosen.start)
     thetas = np.linspace(0.1, 3.0, 7)
-    one_by_one = [where.top.potential(float(theta), momenta) for theta in thetas]
-    assert np.array_equal(where.top.potential(thetas, momenta), one_by_one)
+    one_by_one = [chosen.top.potential(float(theta), momenta) for theta in thetas]
+    assert np.array_equal(chosen.top.potential(thetas, momenta), one_by_one)

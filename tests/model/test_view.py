@@ -20,38 +20,28 @@ def shown(chart, steps=800, h=0.005):
 
 @pytest.mark.parametrize("chart", CHARTS)
 def test_every_quantity_is_that_of_the_true_motion(chart):
-    seen = shown(chart)
+    view = shown(chart)
     truth = reference("spheroid", 0.2 * np.arange(21), "closed-form")
-    assert seen.states.shape == (21, DIMENSIONS[chart])
-    assert seen.axis == pytest.approx(truth["axis"].values, abs=1e-7)
-    assert seen.theta == pytest.approx(truth["theta"].values, abs=1e-7)
-    assert seen.energy == pytest.approx(truth["energy"].values, rel=1e-8)
-    assert np.cos(seen.phi - truth["phi"].values) == pytest.approx(1.0, abs=1e-12)
+    assert view.states.shape == (21, DIMENSIONS[chart])
+    assert view.axis == pytest.approx(truth["axis"].values, abs=1e-7)
+    assert view.theta == pytest.approx(truth["theta"].values, abs=1e-7)
+    assert view.energy == pytest.approx(truth["energy"].values, rel=1e-8)
+    assert np.cos(view.phi - truth["phi"].values) == pytest.approx(1.0, abs=1e-12)
     if chart == "axis":
-        assert seen.psi is None
-        assert seen.quaternion is None
+        assert view.psi is None
+        assert view.quaternion is None
     else:
-        assert np.cos(seen.psi - truth["psi"].values) == pytest.approx(1.0, abs=1e-12)
-        assert np.abs(np.sum(seen.quaternion * truth["quaternion"].values, axis=1)) == pytest.approx(1.0, abs=1e-12)
+        assert np.cos(view.psi - truth["psi"].values) == pytest.approx(1.0, abs=1e-12)
+        assert np.abs(np.sum(view.quaternion * truth["quaternion"].values, axis=1)) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_the_charts_agree_on_the_momentum_of_the_nutation_and_on_the_energy_without_constants():
     momenta = TOP.momenta(START)
     angles, *space = (shown(chart) for chart in CHARTS)
-    for seen in space:
-        assert seen.p_theta == pytest.approx(angles.p_theta, abs=1e-6)
-        constant = seen.nutation_energy(momenta) - angles.nutation_energy(momenta)  # p_psi^2/2 I1 is in one alone
+    for view in space:
+        assert view.p_theta == pytest.approx(angles.p_theta, abs=1e-6)
+        constant = view.nutation_energy(momenta) - angles.nutation_energy(momenta)  # p_psi^2/2 I1 is in one alone
         assert np.ptp(constant) < 1e-7
-
-
-@pytest.mark.parametrize("chart", CHARTS)
-def test_a_stack_of_runs_is_read_as_its_runs(chart):
-    one = shown(chart)
-    both = View(
-        chart, TOP, np.stack([one.states, one.states[::-1]]), *(np.stack([p, p[::-1]]) for p in (one.p_phi, one.p_psi))
-    )
-    for name in ("axis", "theta", "p_theta", "energy"):
-        np.testing.assert_array_equal(getattr(both, name)[1], getattr(one, name)[::-1])
 
 
 def test_momenta_are_read_in_the_precision_of_the_states():

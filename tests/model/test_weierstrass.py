@@ -11,8 +11,8 @@ from symtop.model.exact.elliptic import differences, half_period, r_j, roots
 
 def exact_roots(g2, g3):
     """e1 >= e2 >= e3 to 40 digits."""
-    found = polyroots([-mpf(g3), -mpf(g2), 0, 4], maxsteps=300, extraprec=200, asc=True)
-    return sorted((root.real for root in found), reverse=True)
+    zeros = polyroots([-mpf(g3), -mpf(g2), 0, 4], maxsteps=300, extraprec=200, asc=True)
+    return sorted((root.real for root in zeros), reverse=True)
 
 
 def exact_differences(e, h):

@@ -41,27 +41,27 @@ def test_methods_that_choose_their_steps_run_as_well():
 
 
 def test_scenes_and_a_population_are_the_same_members_and_threads_change_nothing(monkeypatch, tmp_path):
-    asked = {"step_size": 0.05, "horizon": 3.0, "samples": 5, "quiet": True}
-    data = symtop.ensemble(bodies(), "strang", **asked)
-    others = symtop.ensemble(scenes(), "strang", **asked)
+    settings = {"step_size": 0.05, "horizon": 3.0, "samples": 5, "quiet": True}
+    data = symtop.ensemble(bodies(), "strang", **settings)
+    others = symtop.ensemble(scenes(), "strang", **settings)
     xr.testing.assert_identical(data.drop_vars("stratum").drop_attrs(), others.drop_vars("scene").drop_attrs())
     monkeypatch.setattr(chunks, "LEAST_STEPS", 100)
-    xr.testing.assert_identical(symtop.ensemble(bodies(), "strang", threads=3, **asked), data)
-    with symtop.ensemble(bodies(), "strang", path=tmp_path / "runs.nc", **asked) as written:
+    xr.testing.assert_identical(symtop.ensemble(bodies(), "strang", threads=3, **settings), data)
+    with symtop.ensemble(bodies(), "strang", path=tmp_path / "runs.nc", **settings) as written:
         xr.testing.assert_equal(written.load(), data)
 
 
 def test_errors_are_those_of_each_member_against_its_own_truth():
     some = [scenes()[i] for i in (0, 2, 4, 12)]  # free
-    asked = {"nutations": 3, "samples": 5, "quiet": True}
-    data = symtop.ensemble(some, "strang", per_nutation=[100, 100, 100, 20], **asked)
-    found = symtop.errors(data, some)
+    settings = {"nutations": 3, "samples": 5, "quiet": True}
+    data = symtop.ensemble(some, "strang", per_nutation=[100, 100, 100, 20], **settings)
+    errors = symtop.errors(data, some)
     for i, scene in enumerate(some):
         run = symtop.simulate(scene, "strang", step_size=float(data.step_size[i]), horizon=float(data.horizon[i]),
                               samples=5, guard=False)  # fmt: skip
-        np.testing.assert_array_equal(found.attitude[i], symtop.errors(run).attitude)
-    fine = symtop.errors(symtop.ensemble(some, "strang", per_nutation=100, **asked), some).attitude.max("time")
-    ratio = found.attitude.max("time") / fine
+        np.testing.assert_array_equal(errors.attitude[i], symtop.errors(run).attitude)
+    fine = symtop.errors(symtop.ensemble(some, "strang", per_nutation=100, **settings), some).attitude.max("time")
+    ratio = errors.attitude.max("time") / fine
     assert ratio[:3].values.tolist() == [1.0] * 3
     assert 20.0 < ratio[3] < 30.0  # five times the step: order 2
     assert symtop.errors(data, some[::-1]).attitude.max() > 1.0  # of other members: the negative control

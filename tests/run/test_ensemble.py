@@ -29,10 +29,11 @@ def assert_alone(members, name, data, samples, **setting):
         members = [symtop.Scene("one", *pair, 1.0) for pair in members_of(numbers_of(members))]
     for i, scene in enumerate(members):
         one = data.isel(member=i)
-        asked = {"samples": samples, "horizon": float(one.horizon), "guard": False} | setting
+        settings = {"samples": samples, "horizon": float(one.horizon), "guard": False} | setting
         if not setting:
-            asked["step_size"] = float(one.step_size)
-        run = symtop.simulate(scene, name, observe="attitude" if {"psi", "quaternion"} & {*data} else "axis", **asked)
+            settings["step_size"] = float(one.step_size)
+        observe = "attitude" if {"psi", "quaternion"} & {*data} else "axis"
+        run = symtop.simulate(scene, name, observe=observe, **settings)
         shown = run.sizes["time"]
         for variable in run.variables:
             if variable not in ("component", "part"):
@@ -44,7 +45,7 @@ def assert_alone(members, name, data, samples, **setting):
 
 
 @pytest.mark.parametrize(
-    ("name", "asked", "samples"),
+    ("name", "settings", "samples"),
     [("strang[axis]", {"per_nutation": 40, "nutations": 10}, 101),
      ("strang[attitude]", {"per_nutation": 40.5, "nutations": 10.3}, 33),
      ("strang[axis]", {"step_size": 0.02, "horizon": 2.0}, 60),
@@ -52,20 +53,20 @@ def assert_alone(members, name, data, samples, **setting):
      ("cayley-tuned[axis]", {"per_nutation": 12, "nutations": 3}, 20),
      ("gauss-4[attitude]", {"per_nutation": 12, "nutations": 5.5}, 50)],
 )  # fmt: skip
-def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, asked, samples):
-    data = symtop.ensemble(SOME, name, samples=samples, quiet=True, **asked)
+def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, settings, samples):
+    data = symtop.ensemble(SOME, name, samples=samples, quiet=True, **settings)
     assert_alone(SOME, name, data, samples)
     assert data.sizes["time"] == samples
 
 
 @pytest.mark.parametrize(
-    ("name", "setting", "asked"),
-    [("rk45-compiled[axis]", {"tolerance": 1e-8}, {}), ("rk45-compiled[angles]", {"tolerance": 1e-6}, {}),
-     ("rk45", {"tolerance": 1e-4}, {}), ("exact", {}, {})],
+    ("name", "setting"),
+    [("rk45-compiled[axis]", {"tolerance": 1e-8}), ("rk45-compiled[angles]", {"tolerance": 1e-6}),
+     ("rk45", {"tolerance": 1e-4}), ("exact", {})],
 )  # fmt: skip
-def test_methods_that_choose_their_steps_run_as_well(name, setting, asked):
+def test_methods_that_choose_their_steps_run_as_well(name, setting):
     some = SOME.isel(member=slice(0, 8))
-    data = symtop.ensemble(some, name, nutations=2.7, samples=20, quiet=True, **setting, **asked)
+    data = symtop.ensemble(some, name, nutations=2.7, samples=20, quiet=True, **setting)
     assert_alone(some, name, data, 20, **(setting or {"tolerance": None}))
     assert data.attrs["execution"] == (chunks.IN_PYTHON if name == "rk45" else chunks.IN_TURN)
 
@@ -77,19 +78,19 @@ def test_every_method_runs_and_every_member_is_the_run_of_simulate():
         for chart in method.charts():
             row = method.variant(chart)
             setting = {"tolerance": max(1e-6, row.least_tolerance)} if row.adaptive else {}
-            asked = {"per_nutation": 30} if row.fixed_step else setting
-            data = symtop.ensemble(few, row, nutations=1.3, samples=11, quiet=True, **asked)
+            settings = {"per_nutation": 30} if row.fixed_step else setting
+            data = symtop.ensemble(few, row, nutations=1.3, samples=11, quiet=True, **settings)
             if row.speed > 0.1:
                 assert_alone(few, row, data, 11, **(setting or ({} if row.fixed_step else {"tolerance": None})))
 
 
 def test_threads_and_pieces_change_nothing(monkeypatch):
-    asked = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
-    one = symtop.ensemble(SOME, "strang[axis]", threads=1, **asked)
+    settings = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
+    one = symtop.ensemble(SOME, "strang[axis]", threads=1, **settings)
     monkeypatch.setattr(chunks, "CHUNK", 21 * 5)
-    assert symtop.ensemble(SOME, "strang[axis]", threads=3, **asked).identical(one)
+    assert symtop.ensemble(SOME, "strang[axis]", threads=3, **settings).identical(one)
     monkeypatch.setattr(chunks, "CHUNK_STEPS", 100)
-    assert symtop.ensemble(SOME, "strang[axis]", threads=2, **asked).identical(one)
+    assert symtop.ensemble(SOME, "strang[axis]", threads=2, **settings).identical(one)
 
 
 @pytest.mark.parametrize(
@@ -148,9 +149,9 @@ def test_a_member_that_fails_fails_alone():
     members = symtop.population(40, seed=3)
     moved = members.copy(deep=True)
     moved.theta[4] = 0.0
-    asked = {"per_nutation": 30, "nutations": 2.2, "samples": 21, "quiet": True}
+    settings = {"per_nutation": 30, "nutations": 2.2, "samples": 21, "quiet": True}
     for name in ("stormer-verlet", "rk4[angles]"):
-        data, other = (symtop.ensemble(some, name, **asked) for some in (members, moved))
+        data, other = (symtop.ensemble(some, name, **settings) for some in (members, moved))
         assert {"ok", "left_chart"} <= set(data.outcome.values.tolist())
         failed = data.isel(member=data.outcome.values == "left_chart")
         assert (failed.reached_time < failed.horizon).all()
@@ -180,7 +181,7 @@ FIXED = {"step_size": 0.1, "horizon": 2.0}
 
 
 @pytest.mark.parametrize(
-    ("name", "asked", "reason"),
+    ("name", "settings", "reason"),
     [(STRANG, {"horizon": 2.0}, "needs step_size or per_nutation"), (STRANG, FIXED | {"per_nutation": 9}, "not both"),
      (STRANG, FIXED | {"nutations": 2}, "not both"), (STRANG, {"step_size": 0.1}, "no horizon of their own"),
      (STRANG, FIXED | {"tolerance": 1e-6}, "fixed step"),
@@ -204,9 +205,9 @@ FIXED = {"step_size": 0.1, "horizon": 2.0}
      ("exact", {"horizon": 1e300}, r"horizon must be at most 1e\+100, not 1e\+300"),
      ("strong", FIXED, "did you mean strang")],
 )  # fmt: skip
-def test_settings_that_make_no_sense_are_refused_as_they_were_given(name, asked, reason):
+def test_settings_that_make_no_sense_are_refused_as_they_were_given(name, settings, reason):
     with pytest.raises(symtop.SymtopError, match=reason):
-        symtop.ensemble(SOME, name, quiet=True, **asked)
+        symtop.ensemble(SOME, name, quiet=True, **settings)
 
 
 def test_a_member_without_a_nutation_has_no_steps_per_nutation():
@@ -260,32 +261,32 @@ def test_the_dataset_says_how_members_were_run_and_they_are_the_same(execution):
     if execution == chunks.IN_TURN:
         change = {"loop": dataclasses.replace(solver.loop, lanes=lambda _: None)}
     changed = dataclasses.replace(strang, name="mine[axis]", solvers={"axis": dataclasses.replace(solver, **change)})
-    asked = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
-    one, other = (symtop.ensemble(SOME, method, **asked) for method in (strang, changed))
+    settings = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
+    one, other = (symtop.ensemble(SOME, method, **settings) for method in (strang, changed))
     assert (one.attrs["execution"], other.attrs["execution"]) == (chunks.IN_LANES, execution)
     xr.testing.assert_identical(one.drop_attrs(), other.drop_attrs())
 
 
 def test_variables_are_those_of_all_and_need_no_closed_form(monkeypatch):
-    asked = {"per_nutation": 20, "nutations": 3, "quiet": True}
-    wanted = symtop.ensemble(SOME, "strang[attitude]", **asked)
+    settings = {"per_nutation": 20, "nutations": 3, "quiet": True}
+    whole = symtop.ensemble(SOME, "strang[attitude]", **settings)
     monkeypatch.setattr(chunks, "ClosedForms", None)
-    data = symtop.ensemble(SOME, "strang[attitude]", variables=("energy", "axis"), **asked)
+    data = symtop.ensemble(SOME, "strang[attitude]", variables=("energy", "axis"), **settings)
     assert [name for name in data if "time" in data[name].dims] == ["axis", "energy"]
-    xr.testing.assert_identical(data.axis, wanted.axis)
-    xr.testing.assert_identical(data.energy, wanted.energy)
-    data = symtop.ensemble(SOME, "strang[attitude]", **asked)  # nor does phi, before it is read
-    xr.testing.assert_identical(data.theta, wanted.theta)
+    xr.testing.assert_identical(data.axis, whole.axis)
+    xr.testing.assert_identical(data.energy, whole.energy)
+    data = symtop.ensemble(SOME, "strang[attitude]", **settings)  # nor does phi, before it is read
+    xr.testing.assert_identical(data.theta, whole.theta)
     with pytest.raises(TypeError):
         data.phi.values  # noqa: B018
 
 
 @pytest.mark.parametrize("name", ["strang[axis]", "strang[attitude]"])
 def test_angles_are_made_when_they_are_read_with_the_bits_of_a_file(name, tmp_path, monkeypatch):
-    asked = {"per_nutation": 20, "nutations": 3, "samples": 7, "quiet": True}
-    data, again = (symtop.ensemble(SOME, name, **asked) for _ in range(2))
+    settings = {"per_nutation": 20, "nutations": 3, "samples": 7, "quiet": True}
+    data, again = (symtop.ensemble(SOME, name, **settings) for _ in range(2))
     angles = [angle for angle in ("phi", "psi") if angle in data]
-    with symtop.ensemble(SOME, name, path=tmp_path / "runs.nc", **asked) as written:
+    with symtop.ensemble(SOME, name, path=tmp_path / "runs.nc", **settings) as written:
         whole = {angle: written[angle].values for angle in angles}
     assert any(np.abs(values).max() > np.pi for values in whole.values())  # more than a turn
     for angle in angles:
@@ -311,8 +312,8 @@ def raising(error, *bad):
 
 
 def test_numbers_that_leave_the_range_fail_alone():
-    asked = {"step_size": 0.1, "horizon": 2.0, "quiet": True}
-    one, other = (symtop.ensemble(SOME, method, **asked) for method in ("rk4[axis]", raising(ZeroDivisionError, 3)))
+    settings = {"step_size": 0.1, "horizon": 2.0, "quiet": True}
+    one, other = (symtop.ensemble(SOME, method, **settings) for method in ("rk4[axis]", raising(ZeroDivisionError, 3)))
     rest = np.arange(36) != 3
     xr.testing.assert_identical(one.isel(member=rest).drop_attrs(), other.isel(member=rest).drop_attrs())
     assert (other.outcome[3], other.reached_time[3]) == ("not_finite", 0.0)
@@ -324,14 +325,14 @@ def test_numbers_that_leave_the_range_fail_alone():
 def test_a_member_on_which_a_solver_raises_is_lost_alone_and_told(path, tmp_path, monkeypatch):
     monkeypatch.setattr(chunks, "CHUNK", 21 * 5)
     more = {} if path is None else {"path": tmp_path / path}
-    asked = {"step_size": 0.1, "horizon": 2.0, "samples": 21, "quiet": True, **more}
-    one = symtop.ensemble(SOME, "rk4[axis]", **asked).load()
+    settings = {"step_size": 0.1, "horizon": 2.0, "samples": 21, "quiet": True, **more}
+    one = symtop.ensemble(SOME, "rk4[axis]", **settings).load()
     one.close()
     labelled = SOME.assign_coords(member=[f"m{i}" for i in range(36)])
     for members, name in ((SOME, "3"), (labelled, "m3")):
         first = rf"rk4-python\[axis\] on member {name} failed: TypeError: a reason"
         with pytest.warns(symtop.SymtopWarning, match=f"2 of 36 members raised an exception, the first: .*{first}"):
-            other = symtop.ensemble(members, raising(TypeError, 3, 30), **asked).load()
+            other = symtop.ensemble(members, raising(TypeError, 3, 30), **settings).load()
         other.close()
         assert ("raised" in other.attrs) == (path is None)
         assert np.flatnonzero(other.outcome == "raised").tolist() == [3, 30]
@@ -371,33 +372,33 @@ def test_a_solver_that_raises_on_every_member_is_refused_and_leaves_nothing(tmp_
      ("phi_dto", "phi_dot")],
 )  # fmt: skip
 def test_a_misspelled_variable_of_members_is_refused(name, meant):
-    asked = {"per_nutation": 20, "nutations": 2, "quiet": True}
+    settings = {"per_nutation": 20, "nutations": 2, "quiet": True}
     for members in (SOME.rename({meant: name}), SOME.assign({name: 1.0}), SOME.assign_coords({name: SOME.theta})):
         if meant == "theta" and meant not in members:
             continue  # it is needed, and its lack is told
         with pytest.raises(symtop.SymtopError, match=rf"members have no variable '{name}'; did you mean {meant}\?"):
-            symtop.ensemble(members, "strang[axis]", **asked)
+            symtop.ensemble(members, "strang[axis]", **settings)
 
 
 def test_members_may_have_labels_of_any_other_name():
-    asked = {"per_nutation": 20, "nutations": 2, "quiet": True}
+    settings = {"per_nutation": 20, "nutations": 2, "quiet": True}
     names = ("period", "weight", "phase", "p_phi", "theta_max", "group", "steps")
     members = SOME.assign(dict.fromkeys(names, SOME.I1)).assign(curve=("place", [1.0, 2.0]))
-    plain = symtop.ensemble(SOME, "strang[axis]", **asked)
-    assert symtop.ensemble(members, "strang[axis]", **asked).identical(plain)
+    plain = symtop.ensemble(SOME, "strang[axis]", **settings)
+    assert symtop.ensemble(members, "strang[axis]", **settings).identical(plain)
 
 
 def test_rows_are_taken_by_label_and_labels_are_kept():
-    counts, asked = np.linspace(10.0, 45.0, 36), {"nutations": 2, "quiet": True}
-    plain = symtop.ensemble(SOME, "strang[axis]", per_nutation=counts, **asked)
+    counts, settings = np.linspace(10.0, 45.0, 36), {"nutations": 2, "quiet": True}
+    plain = symtop.ensemble(SOME, "strang[axis]", per_nutation=counts, **settings)
     for labels in ([f"m{i}" for i in range(36)], list(range(100, 136))):
         members = SOME.assign_coords(member=labels)
         row = xr.DataArray(counts, {"member": labels}, "member")
         for given in (row, row[::-1], counts):
-            data = symtop.ensemble(members, "strang[axis]", per_nutation=given, **asked)
+            data = symtop.ensemble(members, "strang[axis]", per_nutation=given, **settings)
             assert data.member.values.tolist() == labels
             assert data.drop_vars("member").identical(plain)
-    reverse = symtop.ensemble(SOME, "strang[axis]", per_nutation=counts[::-1], **asked)
+    reverse = symtop.ensemble(SOME, "strang[axis]", per_nutation=counts[::-1], **settings)
     assert not reverse.identical(plain)
 
 
@@ -430,21 +431,21 @@ def test_tolerances_are_taken_by_label():
 
 def test_times_that_all_share_are_one_row_where_runs_are_short():
     members = xr.Dataset({"I1": 2.0, "I3": 1.0, "mgl": 2.0, "theta": ("member", [0.3, 0.8, 1.2])})
-    asked = {"step_size": 0.5, "horizon": 2.0, "samples": 9, "quiet": True}
-    data = symtop.ensemble(members, "strang[axis]", **asked)
+    settings = {"step_size": 0.5, "horizon": 2.0, "samples": 9, "quiet": True}
+    data = symtop.ensemble(members, "strang[axis]", **settings)
     assert data["time"].dims == ("time",)
     np.testing.assert_array_equal(data["time"], [0.0, 0.5, 1.0, 1.5, 2.0, *[np.nan] * 4])
-    other = symtop.ensemble(members, "strang[axis]", **asked | {"step_size": [0.5, 0.5, 0.4]})
+    other = symtop.ensemble(members, "strang[axis]", **settings | {"step_size": [0.5, 0.5, 0.4]})
     assert other["time"].dims == ("member", "time")
 
 
 def test_an_ensemble_for_a_cluster_is_refused_before_it_is_sent(tmp_path):
-    asked = {"step_size": 0.1, "horizon": 2.0, "quiet": True, "path": tmp_path / "runs.nc"}
+    settings = {"step_size": 0.1, "horizon": 2.0, "quiet": True, "path": tmp_path / "runs.nc"}
     with pytest.raises(symtop.SymtopError, match=r"scheduler must be the address of a dask scheduler.* not 5"):
-        symtop.ensemble(SOME, "strang", scheduler=5, **asked)
+        symtop.ensemble(SOME, "strang", scheduler=5, **settings)
     own = symtop.composition("own-split", [0.5, 0.5], [0.25, 0.5, 0.25])
     with pytest.raises(symtop.SymtopError, match=r"own-split.* cannot be sent to other processes: register it"):
-        symtop.ensemble(SOME, own, scheduler="tcp://127.0.0.1:1", **asked)
+        symtop.ensemble(SOME, own, scheduler="tcp://127.0.0.1:1", **settings)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -459,8 +460,8 @@ def test_a_member_of_enormous_inertia_is_refused_without_a_warning():
 def test_a_path_may_begin_at_home(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.chdir(tmp_path)
-    asked = {"per_nutation": 20, "nutations": 2, "quiet": True}
-    with symtop.ensemble(SOME, "strang[axis]", path="~/runs.nc", **asked) as data:
+    settings = {"per_nutation": 20, "nutations": 2, "quiet": True}
+    with symtop.ensemble(SOME, "strang[axis]", path="~/runs.nc", **settings) as data:
         assert data.sizes["member"] == 36
     symtop.sweep("spheroid", "strang", step_size=[0.1], horizon=0.5, path="~/sweep.nc", quiet=True)
     symtop.sweep("spheroid", "strang", step_size=[0.1], horizon=0.5, path="~nobody-of-this-name", quiet=True)
@@ -470,6 +471,6 @@ def test_a_path_may_begin_at_home(tmp_path, monkeypatch):
 def test_a_fast_top_has_as_many_swings_as_simulate_says():
     """Its nutations count, where gravity alone would let it run."""
     fast = symtop.Scene("fast-one", symtop.SymmetricTop(1.0, 0.5, 1e-6), symtop.Angles(0.5, psi_dot=200.0), 2e7)
-    for run in (symtop.simulate, lambda one, name, **asked: symtop.ensemble([one], name, quiet=True, **asked)):
+    for run in (symtop.simulate, lambda one, name, **settings: symtop.ensemble([one], name, quiet=True, **settings)):
         with pytest.raises(symtop.SymtopError, match=r"3\.18e\+08 swings"):
             run(fast, "rk45-compiled[axis]", tolerance=1e-3)

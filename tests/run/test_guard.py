@@ -26,11 +26,11 @@ from symtop.run.simulation import make_plan
 REMEDIED = ("spheroid", "goldstein", "cusp", "loop", "fast", "hairer-lubich-wanner", "grazing")
 
 
-def said(scene, name, **controls):
+def caution(scene, name, **controls):
     """What the guard says of a run."""
-    heard = []
-    symtop.simulate(scene, name, guard=heard.append, samples=11, **controls)
-    return heard[0] if heard else ""
+    sentences = []
+    symtop.simulate(scene, name, guard=sentences.append, samples=11, **controls)
+    return sentences[0] if sentences else ""
 
 
 # ---- silence, and the run untouched ----------------------------------------------------------------------------------
@@ -49,7 +49,7 @@ def said(scene, name, **controls):
     ],
 )
 def test_a_good_run_is_met_with_silence_and_any_run_with_the_same_bits(name, control):
-    assert said("spheroid", name, **control) == ""
+    assert caution("spheroid", name, **control) == ""
     quiet, watched = (symtop.simulate("spheroid", name, samples=41, guard=guard, **control) for guard in (False, True))
     assert quiet.attrs.pop("guard") == "off"
     assert watched.attrs.pop("guard") == ""
@@ -111,15 +111,16 @@ def test_the_limits_of_verlet_and_rk4_are_found():
     """F1: Verlet loses small nutations at h omega = 2, rk4 at 2 sqrt 2, the midpoint rule and Gauss methods never."""
     scene = steady(20.0)
     frequency = landmarks(scene).frequency
+    settings = {"observe": "nutation", "horizon": 2000.0}
     for name, limit in (("stormer-verlet", 2.0), ("rk4", 2.0 * math.sqrt(2.0))):
-        warned = said(scene, name, step_size=1.02 * limit / frequency, observe="nutation", horizon=2000.0)
+        warned = caution(scene, name, step_size=1.02 * limit / frequency, **settings)
         assert float(re.search(r"h omega = ([\d.]+)\)", warned).group(1)) == pytest.approx(limit, abs=3e-3)
         assert "grow" in warned
-        assert "grow" not in said(scene, name, step_size=0.98 * limit / frequency, observe="nutation", horizon=2000.0)
-    assert said(scene, "midpoint", step_size=3.0 / frequency) == ""
+        assert "grow" not in caution(scene, name, step_size=0.98 * limit / frequency, **settings)
+    assert caution(scene, "midpoint", step_size=3.0 / frequency) == ""
     for name in ("gauss-2", "gauss-4", "gauss-12"):
         for phase in (2.0, 5.0, 10.0):
-            assert "grow" not in said(scene, name, step_size=phase / frequency, observe="nutation")
+            assert "grow" not in caution(scene, name, step_size=phase / frequency, observe="nutation")
 
 
 def test_landmarks_are_those_of_the_closed_form():
@@ -139,18 +140,18 @@ def test_landmarks_are_those_of_the_closed_form():
 def test_each_cause_is_named():
     fast = steady(20.0)
     frequency = landmarks(fast).frequency
-    assert "the upper pole" in said(grazing(1e-3), "stormer-verlet", step_size=0.02)
-    assert said(grazing(1e-3), "strang", step_size=2e-3) == ""  # no pole in its chart
-    assert "separatrix" in said("separatrix", "gauss-8", step_size=0.01, horizon=150.0)
-    assert said("separatrix", "gauss-8", step_size=0.01, horizon=15.0) == ""
-    assert "jumps over the nutation" in said("goldstein", "gauss-4", step_size=2.0)
-    assert "1/3 of a turn, a resonance" in said(nutating(), "stormer-verlet", step_size=math.sqrt(3.0) / frequency)
-    assert "errors add up over" in said("goldstein", "midpoint", step_size=0.1, horizon=1000.0)
-    assert "it has no order" in said("goldstein", "no-gyro", step_size=0.01)
-    assert "take a step of about" in said("goldstein", "mujoco-euler", step_size=0.01)
-    assert "tolerance" in said("goldstein", "rk45-compiled", tolerance=1e-5, horizon=1000.0)
-    assert "stopped at t =" in said("sleeping", "trapezoidal", step_size=2.0, horizon=4000.0)
-    assert "a step is 1/2.36 of a nutation" in said("spheroid", "gauss-2", step_size=0.5, observe="axis")  # it goes on
+    assert "the upper pole" in caution(grazing(1e-3), "stormer-verlet", step_size=0.02)
+    assert caution(grazing(1e-3), "strang", step_size=2e-3) == ""  # no pole in its chart
+    assert "separatrix" in caution("separatrix", "gauss-8", step_size=0.01, horizon=150.0)
+    assert caution("separatrix", "gauss-8", step_size=0.01, horizon=15.0) == ""
+    assert "jumps over the nutation" in caution("goldstein", "gauss-4", step_size=2.0)
+    assert "1/3 of a turn, a resonance" in caution(nutating(), "stormer-verlet", step_size=math.sqrt(3.0) / frequency)
+    assert "errors add up over" in caution("goldstein", "midpoint", step_size=0.1, horizon=1000.0)
+    assert "it has no order" in caution("goldstein", "no-gyro", step_size=0.01)
+    assert "take a step of about" in caution("goldstein", "mujoco-euler", step_size=0.01)
+    assert "tolerance" in caution("goldstein", "rk45-compiled", tolerance=1e-5, horizon=1000.0)
+    assert "stopped at t =" in caution("sleeping", "trapezoidal", step_size=2.0, horizon=4000.0)
+    assert "a step is 1/2.36 of a nutation" in caution("spheroid", "gauss-2", step_size=0.5, observe="axis")  # goes on
 
 
 @pytest.mark.parametrize(
@@ -166,7 +167,7 @@ def test_each_cause_is_named():
 )
 def test_a_remedy_is_a_remedy(scene, name, control, horizon):
     """What the sentence advises silences the guard and makes the run right, and is not ten times too careful."""
-    warned = said(scene, name, horizon=horizon, **control)
+    warned = caution(scene, name, horizon=horizon, **control)
     advice = float(re.search(r"(?:step of about|tolerance) ([\d.e-]+)$", warned).group(1))
     control = dict.fromkeys(control, advice)
     run = symtop.simulate(scene, name, horizon=horizon, **control)
@@ -185,8 +186,8 @@ def advised(draw, methods):
     if advice is None:
         return None
     errors = []
-    for tried in (step, float(advice[1])):
-        plan, _ = make_plan(on, row, tried, horizon=horizon, samples=201)
+    for setting in (step, float(advice[1])):
+        plan, _ = make_plan(on, row, setting, horizon=horizon, samples=201)
         run = row.solvers[chart](on.top, on.start, plan)
         with np.errstate(all="ignore"):  # a run may have blown up
             error = charts.axis_distance(axes(chart, run.states), closed_form(on).axis(plan.times))
@@ -196,11 +197,9 @@ def advised(draw, methods):
 
 def test_the_step_that_is_advised_works_whatever_the_cause():
     """Poles, resonances, steps beyond the stability limit and errors that add up; 2 of 600 were wrong, by 0.0125."""
-    draw, named = (
-        random.Random(5),
-        ("midpoint", "stormer-verlet", "strang", "rk4[axis]", "gauss-4", "generalised-alpha"),
-    )
-    pairs = [pair for _ in range(220) if (pair := advised(draw, named)) is not None]
+    draw = random.Random(5)
+    names = ("midpoint", "stormer-verlet", "strang", "rk4[axis]", "gauss-4", "generalised-alpha")
+    pairs = [pair for _ in range(220) if (pair := advised(draw, names)) is not None]
     assert len(pairs) > 100
     before, after = np.array(pairs).T
     assert np.mean(after > EXPECTED) <= 0.02
@@ -211,7 +210,7 @@ def test_the_step_that_is_advised_works_whatever_the_cause():
 def test_no_step_is_advised_that_a_run_may_not_have():
     """Past a pole at 1e-12 rad a step that follows the axis is 1e-13: more steps than `simulate` takes."""
     for gap, steps in ((1e-4, True), (1e-12, False)):
-        sentence = said(grazing(gap), "stormer-verlet", step_size=0.02)
+        sentence = caution(grazing(gap), "stormer-verlet", step_size=0.02)
         assert ("take a step of about" in sentence) is steps
         assert "an integrator whose chart has no poles, such as strang" in sentence
     assert "more than 2e+10 steps would be needed" in sentence
@@ -219,15 +218,15 @@ def test_no_step_is_advised_that_a_run_may_not_have():
 
 def test_every_method_can_be_probed_and_is_told_what_it_can_do():
     """One forecast a method that comparisons choose from: finite, and silent at a fine setting."""
-    where = symtop.scene("goldstein")
+    scene = symtop.scene("goldstein")
     for method in methods().values():
         control = {"step_size": 0.01} if method.control == "step_size" else {}
         if method.control == "tolerance" and method.default_tolerance is None:
             control = {"tolerance": 1e-6 if method.implementation == "compiled" else 1e-5}
-        plan, _ = make_plan(where, method, **control, horizon=3.0, samples=11)
-        found = guard.forecast(where, method, method.charts()[0], plan)
-        assert found.outcome == "ok"
-        assert found.axis_error < 1e-2
+        plan, _ = make_plan(scene, method, **control, horizon=3.0, samples=11)
+        expected = guard.forecast(scene, method, method.charts()[0], plan)
+        assert expected.outcome == "ok"
+        assert expected.axis_error < 1e-2
 
 
 def needle():
@@ -246,7 +245,7 @@ def test_nutations_that_grow_out_of_single_precision_are_announced(step, grows):
     scene = symtop.Scene("fast", top, start, 2.7371364869033403)
     run = symtop.simulate(scene, "jolt-float32", step_size=step, guard=False)
     assert (float(symtop.errors(run)["axis"].max()) > EXPECTED) is grows
-    assert ("small nutations" in said(scene, "jolt-float32", step_size=step)) is grows
+    assert ("small nutations" in caution(scene, "jolt-float32", step_size=step)) is grows
 
 
 def test_what_passages_of_a_pole_add_is_seen_over_many_of_them():
@@ -255,7 +254,7 @@ def test_what_passages_of_a_pole_add_is_seen_over_many_of_them():
     for step, lost in ((0.004708058490997893, True), (0.0015, False)):
         run = symtop.simulate(scene, name, step_size=step, guard=False)
         assert (float(symtop.errors(run)["axis"].max()) > EXPECTED) is lost
-        assert bool(said(scene, name, step_size=step)) is lost
+        assert bool(caution(scene, name, step_size=step)) is lost
 
 
 def test_an_end_at_a_pole_after_many_passages_is_announced(monkeypatch):
@@ -265,10 +264,10 @@ def test_an_end_at_a_pole_after_many_passages_is_announced(monkeypatch):
     start = symtop.Angles(1.2174251215796315, 2.418827152562061, 0.7304406217729724, **rates)
     scene = symtop.Scene("through-upright", top, start, 1365.0500094145345)
     controls = {"tolerance": 4.772194832341897e-08, "observe": "attitude"}
-    assert "stopped at t = 250.083" in said(scene, "adams", **controls)
-    assert said(scene, "vern9", **controls) == ""
+    assert "stopped at t = 250.083" in caution(scene, "adams", **controls)
+    assert caution(scene, "vern9", **controls) == ""
     monkeypatch.setattr(guard, "THROUGH", 1.0)
-    assert said(scene, "adams", **controls) == ""  # the control: of the first nutations it sees nothing
+    assert caution(scene, "adams", **controls) == ""  # the control: of the first nutations it sees nothing
     top = symtop.SymmetricTop(0.21139120105289147, 0.17433412715295638, -0.10207649271382181)
     rates = -1.3442613475029312, 2.15157297712127, 2.483867050263369
     start = symtop.Angles(1.8477525261144405, -2.366700800344101, -0.25147517216375936, *rates)
@@ -276,7 +275,7 @@ def test_an_end_at_a_pole_after_many_passages_is_announced(monkeypatch):
         scene = symtop.Scene("aimed", top, start, horizon)
         run = symtop.simulate(scene, "extrapolation[angles]", tolerance=0.0012096342552818213, guard=False)
         assert (run.attrs["outcome"] == "left_chart") is ends
-        assert bool(said(scene, "extrapolation[angles]", tolerance=0.0012096342552818213)) is ends
+        assert bool(caution(scene, "extrapolation[angles]", tolerance=0.0012096342552818213)) is ends
 
 
 def test_the_end_of_a_run_at_the_limit_of_its_work_is_announced():
@@ -305,11 +304,11 @@ BODIES = [
 
 @pytest.mark.parametrize(("scene", "name", "step", "wrong"), BODIES)
 def test_a_run_of_a_body_is_warned_of_where_its_attitude_is_lost(scene, name, step, wrong):
-    heard = []
-    run = symtop.simulate(scene, name, step_size=step, guard=heard.append)
+    sentences = []
+    run = symtop.simulate(scene, name, step_size=step, guard=sentences.append)
     assert run.attrs["outcome"] != "ok" or bool(symtop.errors(run)["attitude"].max() > EXPECTED) is wrong
-    assert bool(heard) is wrong
-    assert not wrong or re.search("expect an attitude error|expect the run to be", heard[0])
+    assert bool(sentences) is wrong
+    assert not wrong or re.search("expect an attitude error|expect the run to be", sentences[0])
 
 
 @pytest.mark.parametrize("name", ["rk4", "strang", "gauss-4", "midpoint"])
@@ -360,12 +359,12 @@ def fastest(scene, periods=40.0):
 def test_no_body_turns_much_faster_than_the_watch_takes_it_to():
     """By what the start says alone, the natural period and its own rate, some turn a fifth faster or more."""
     drawn = [one for one in scenes_of(body_population(48, seed=29)) if math.isfinite(one.nutation_period)]
-    found = np.array([fastest(one) for one in drawn])
+    rates = np.array([fastest(one) for one in drawn])
     bounds = np.array([Integrated(one).fast for one in drawn])
     starts = [math.hypot(2.0 * math.pi / one.nutation_period, *one.start.omega_body) for one in drawn]
-    assert (found / bounds).max() < 1.1
-    assert np.median(found / bounds) > 0.8
-    assert (found / np.array(starts)).max() > 1.2  # the control
+    assert (rates / bounds).max() < 1.1
+    assert np.median(rates / bounds) > 0.8
+    assert (rates / np.array(starts)).max() > 1.2  # the control
 
 
 def test_a_body_at_rest_that_falls_into_chaos_is_watched_with_steps_short_enough(monkeypatch):
@@ -382,8 +381,8 @@ def test_a_body_at_rest_that_falls_into_chaos_is_watched_with_steps_short_enough
     fine = Integrated(scene).states(np.array([scene.horizon]), 1e-15)
     coarse = symtop.simulate(scene, method, step_size=step, guard=False, samples=2)
     assert charts.attitude_distance(coarse.quaternion.values[-1:], fine[:, :4])[0] > 10.0 * EXPECTED
-    assert "rounding alone decides" in said(scene, method, step_size=step)
-    assert said(scene, method, step_size=step, horizon=48.0) == ""  # right to 1e-5
+    assert "rounding alone decides" in caution(scene, method, step_size=step)
+    assert caution(scene, method, step_size=step, horizon=48.0) == ""  # right to 1e-5
     monkeypatch.setattr("symtop.run.motion.PAIR_STEPS", 4)
     assert Integrated(scene).amplification(scene.horizon, scene.horizon) < 1e11  # the control
 

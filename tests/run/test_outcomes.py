@@ -46,12 +46,12 @@ def test_every_outcome_is_produced_said_and_timed(scene, name, controls, outcome
 
 def test_an_early_end_is_announced_and_a_run_that_ends_well_is_not():
     for gap, tolerance, outcome in ((1e-14, 1e-9, "step_too_small"), (1e-6, 1e-6, "ok")):
-        told, controls = [], {"observe": "nutation", "samples": 11}
-        run = symtop.simulate(grazing(gap), "radau", tolerance=tolerance, guard=told.append, **controls)
+        sentences, controls = [], {"observe": "nutation", "samples": 11}
+        run = symtop.simulate(grazing(gap), "radau", tolerance=tolerance, guard=sentences.append, **controls)
         assert run.attrs["outcome"] == outcome
-        assert len(told) == (outcome != "ok")
+        assert len(sentences) == (outcome != "ok")
         reached = f"expect the run to be stopped at t = {run.attrs['reached_time']:.6g} "
-        assert all(reached in sentence and "step size fell below" in sentence for sentence in told)
+        assert all(reached in sentence and "step size fell below" in sentence for sentence in sentences)
 
 
 def test_a_budget_is_no_failure_for_a_run_that_ends_within_it():
@@ -108,15 +108,15 @@ def test_implicit_steps_are_solved_where_nothing_moves_but_rounding(name, turn):
 )
 def test_absurd_runs_end_at_once_with_a_sentence(scene, name, controls):
     symtop.simulate("spheroid", name, guard=False, **({"step_size": 0.1} if "step_size" in controls else _fine(name)))
-    start, heard = time.process_time(), []  # of this process: others may be busy
+    start, sentences = time.process_time(), []  # of this process: others may be busy
     try:
-        run = symtop.simulate(scene, name, guard=heard.append, **controls)
-        said = run.attrs["outcome_message"] if run.attrs["outcome"] != "ok" else heard[0]
+        run = symtop.simulate(scene, name, guard=sentences.append, **controls)
+        sentence = run.attrs["outcome_message"] if run.attrs["outcome"] != "ok" else sentences[0]
     except symtop.SymtopError as error:
-        said = str(error)
+        sentence = str(error)
     assert time.process_time() - start < 2.0
-    assert len(said) > 20
-    assert "\n" not in said
+    assert len(sentence) > 20
+    assert "\n" not in sentence
 
 
 def _fine(name):

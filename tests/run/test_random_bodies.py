@@ -8,14 +8,13 @@ from symtop.core.netcdf import content_hash
 from symtop.run.ensemble.bodies import CHAOS, FREE, STRATA, body_population, growth, scenes_of
 
 HASH = "db868dbc6447cfc999cf348d04fb7e241827773bc77f595a9064c2a658f8b795"  # of 64 members of seed 1
-GIVEN = ("I1", "I2", "I3", "mgl", "centre", "quaternion", "omega_body")
 
 
 class Bodies:
     """Members of one kind with their moments in order, momenta along those axes, and 2 E I2/L^2 without weight."""
 
-    def __init__(self, kind, count=400, **asked):
-        self.data = body_population(count, seed=3, kind=kind, **asked)
+    def __init__(self, kind, count=400):
+        self.data = body_population(count, seed=3, kind=kind)
         moments = np.stack([self.data[name].values for name in ("I1", "I2", "I3")], axis=1)
         order = np.argsort(moments, axis=1)
         rates = np.take_along_axis(self.data.omega_body.values, order, axis=1)

@@ -21,29 +21,29 @@ from symtop.model.exact import closed_form
 from symtop.model.exact.constants import RATE
 from symtop.model.exact.digits import PreciseForm
 from symtop.run.reference.independent_checks import check_times, integrate, integrate_with_checks, precise_attitude
-from symtop.run.reference.truth import UNCERTIFIED, Certificate, _cache_path, closed_bounds, closed_values
+from symtop.run.reference.truth import UNCERTIFIED, Certificate, closed_bounds, closed_values
 
 
 @functools.cache
-def true_values(where, times):
+def true_values(scene, times):
     """Quaternion and theta of the closed form in 50 digits, at each time."""
-    precise = PreciseForm(where.top, where.start, digits=50)
+    precise = PreciseForm(scene.top, scene.start, digits=50)
     return [(precise.quaternion(t), precise(t).theta) for t in times]
 
 
-def true_errors(where, data):
+def true_errors(scene, data):
     """Attitude, axis and theta errors of each value, hi + lo, against the closed form in 50 digits."""
     rows = []
     with workdps(60):
-        for k, (q, theta) in enumerate(true_values(where, tuple(data["time"].values.tolist()))):
+        for k, (q, theta) in enumerate(true_values(scene, tuple(data["time"].values.tolist()))):
 
             def value(name, *part, k=k):
                 low = data[f"{name}_lo"].values[(k, *part)] if f"{name}_lo" in data else 0.0
                 return mpf(float(data[name].values[(k, *part)])) + mpf(float(low))
 
-            found = [value("quaternion", j) for j in range(4)]
-            sign = 1 if sum(a * b for a, b in zip(found, q, strict=True)) > 0 else -1
-            attitude = 2 * mp.norm([sign * a - b for a, b in zip(found, q, strict=True)])
+            quaternion = [value("quaternion", j) for j in range(4)]
+            sign = 1 if sum(a * b for a, b in zip(quaternion, q, strict=True)) > 0 else -1
+            attitude = 2 * mp.norm([sign * a - b for a, b in zip(quaternion, q, strict=True)])
             w, x, y, z = q
             axis = [2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z]
             tilt = mp.norm([value("axis", j) - axis[j] for j in range(3)])
@@ -60,14 +60,14 @@ def check_bounds(count, precision, seed):
     draw = random.Random(seed)
     ratios = []
     for k, (top, start) in enumerate(tops(count, seed, KINDS)):
-        where = symtop.Scene(f"{KINDS[k // count]}-{k}".replace(" ", "-"), top, start, 1.0)
+        scene = symtop.Scene(f"{KINDS[k // count]}-{k}".replace(" ", "-"), top, start, 1.0)
         horizon = draw.choice((1.0, 30.0, 1000.0)) * draw.uniform(0.3, 1.0) / max(1.0, abs(start.psi_dot) / 90.0)
         times = np.sort([draw.uniform(0.0, horizon) for _ in range(4)] + [horizon])
-        data = symtop.reference(where, times, precision)
-        for name, error in zip(("attitude", "axis", "theta"), true_errors(where, data), strict=True):
+        data = symtop.reference(scene, times, precision)
+        for name, error in zip(("attitude", "axis", "theta"), true_errors(scene, data), strict=True):
             bound = data[f"{name}_error_bound"].values
             worst = int(np.argmax(error / bound))
-            assert np.all(error <= bound), f"{where.name} {name} at {times[worst]}: {error[worst]} > {bound[worst]}"
+            assert np.all(error <= bound), f"{scene.name} {name} at {times[worst]}: {error[worst]} > {bound[worst]}"
             ratios += list(bound / np.maximum(error, 1e-40))
     return float(np.median(ratios))
 
@@ -83,30 +83,33 @@ def test_bounds_hold_on_random_tops_and_are_tight(precision, count, seed):
 
 @pytest.mark.parametrize("name", ["spheroid", "goldstein", "fast", "cusp"])
 def test_the_bound_of_the_closed_form_holds_the_rounding_and_the_rates(name):
-    """Twice what `benchmarks/accuracy.py` finds; the error of a rate times the time and the angular velocity."""
-    where, times = symtop.scene(name), np.array([0.0, 1e14])
-    motion = scenes.closed_form(where)(np.linspace(0.0, where.nutation_period, 400))
+    """Twice what `benchmarks/accuracy.py` finds; the error of a rate times the time and the angular velocity.
+
+    And no more than ten times that: a bound is of use.
+    """
+    scene, times = symtop.scene(name), np.array([0.0, 1e14])
+    motion = scenes.closed_form(scene)(np.linspace(0.0, scene.nutation_period, 400))
     across = motion.phi_dot * np.sin(motion.theta)
     along = motion.psi_dot + motion.phi_dot * np.cos(motion.theta)
     fastest = np.sqrt(motion.theta_dot**2 + across**2 + along**2).max()
-    bounds = closed_bounds(where, times, closed_values(where, times))
+    bounds = closed_bounds(scene, times, closed_values(scene, times))
     for quantity, rounding in {"theta": 7.1e-16, "axis": 8.8e-16, "attitude": 8.8e-16}.items():
         assert bounds[quantity][0] >= 2.0 * rounding
-        assert np.diff(bounds[quantity]) >= RATE * times[1] * fastest
+        assert 1.0 <= np.diff(bounds[quantity]) / (RATE * times[1] * fastest) < 10.0
     assert min(bounds["phi"][0], bounds["psi"][0]) >= 2.0 * 4.8e-16
 
 
 def test_a_bound_that_is_too_small_would_be_seen():
     """The negative control: the same check with the bound of a method a thousand times better fails."""
-    where = symtop.scene("spheroid")
-    data = symtop.reference(where, [3.0, 500.0, 1000.0], "longdouble")
-    errors = true_errors(where, data)
+    scene = symtop.scene("spheroid")
+    data = symtop.reference(scene, [3.0, 500.0, 1000.0], "longdouble")
+    errors = true_errors(scene, data)
     assert not np.all(errors[0] <= data["attitude_error_bound"].values / 1000.0)
 
 
 def test_an_integration_that_differs_from_the_closed_form_has_the_distance_as_its_bound(monkeypatch):
     module = sys.modules["symtop.run.reference.truth"]
-    where, times = symtop.scene("goldstein"), np.array([1.0, 2.0, 3.0])
+    scene, times = symtop.scene("goldstein"), np.array([1.0, 2.0, 3.0])
     honest = module.closed_values
 
     def off(scene, moments):
@@ -114,9 +117,9 @@ def test_an_integration_that_differs_from_the_closed_form_has_the_distance_as_it
         return {**values, "theta": values["theta"] + 1e-9}
 
     monkeypatch.setattr(module, "closed_values", off)
-    assert np.all(module._integration(where, times, "longdouble")["theta_error_bound"] >= 0.99e-9)
+    assert np.all(module._integration(scene, times, "longdouble")["theta_error_bound"] >= 0.99e-9)
     monkeypatch.setattr(module, "closed_values", honest)
-    assert np.all(module._integration(where, times, "longdouble")["theta_error_bound"] < 1e-15)
+    assert np.all(module._integration(scene, times, "longdouble")["theta_error_bound"] < 1e-15)
 
 
 def test_the_times_at_which_an_integration_is_read_change_no_bit():
@@ -134,40 +137,38 @@ def test_a_certificate_that_contradicts_the_bounds_raises_them(monkeypatch, cach
     module, times = sys.modules["symtop.run.reference.truth"], [1.0, 2.0, 3.0]
     quantities = ("axis", "attitude", "theta", "phi", "psi")
     plain = symtop.reference("goldstein", times)
-    for found, floor, factor in (
+    for record, floor, factor in (
         (Certificate(1e6, 30, 0.3, 100.0, 0.0, 1e-6), 1e-6, 1.0),
         (Certificate(1e6, 30, 0.3, 100.0, 1e-6, math.nan), 1e-6, 1.0),
         (Certificate(1e6, 30, 3.0, math.nan, math.nan, math.nan), 0.0, 24.0),
         (Certificate(1e6, 30, 0.9, 100.0, 1e-15, 1e-15), 0.0, 1.0),
     ):
-        monkeypatch.setattr(module, "certificate", lambda *_, found=found: found)
+        monkeypatch.setattr(module, "certificate", lambda *_, record=record: record)
         data = symtop.reference("goldstein", times)
         for name in quantities:
             expected = factor * plain[f"{name}_error_bound"].values + floor
             np.testing.assert_allclose(data[f"{name}_error_bound"], expected, rtol=1e-12)
-        assert data.attrs["certificate"] == str(found)
+        assert data.attrs["certificate"] == str(record)
 
 
 @pytest.mark.parametrize("name", ["spheroid_ieee", "goldstein_at_rest_ieee"])
 def test_quadruple_precision_has_24_digits_at_t_8(truth, name):
-    where = symtop.scene("spheroid" if name.startswith("spheroid") else "goldstein")
-    data = symtop.reference(where, [8.0], "quad")
+    scene = symtop.scene("spheroid" if name.startswith("spheroid") else "goldstein")
+    data = symtop.reference(scene, [8.0], "quad")
     with workdps(40):
         for quantity in ("theta", "phi", "psi"):
-            found = mpf(float(data[quantity][0])) + mpf(float(data[f"{quantity}_lo"][0]))
-            assert abs(found - mpf(truth[name]["state"][quantity])) < 1e-24
+            value = mpf(float(data[quantity][0])) + mpf(float(data[f"{quantity}_lo"][0]))
+            assert abs(value - mpf(truth[name]["state"][quantity])) < 1e-24
     assert float(data["theta_error_bound"][0]) < 1e-24
 
 
 def test_the_published_grazing_benchmark_agrees_between_both_methods():
-    """Bruls, Cardona and Arnold's top passes 4.15e-5 degrees from theta = 180: both agree on the axis to 1e-13."""
-    where = symtop.scene("bruls-cardona-arnold")
+    """Bruls, Cardona and Arnold's top passes 4.15e-5 degrees from theta = 180 (`test_guard` measures it)."""
+    scene = symtop.scene("bruls-cardona-arnold")
     times = np.linspace(0.0, 2.0, 401)
-    integrated = symtop.reference(where, times, "longdouble")
-    closed = symtop.reference(where, times, "closed-form")
-    assert float(symtop.model.charts.axis_distance(integrated["axis"].values, closed["axis"].values).max()) < 1e-13
-    lowest = math.degrees(symtop.ClosedForm(where.top, where.start).theta_range[1])
-    assert 180.0 - lowest == pytest.approx(4.15e-5, rel=0.01)
+    integrated = symtop.reference(scene, times, "longdouble")
+    closed = symtop.reference(scene, times, "closed-form")
+    assert float(charts.axis_distance(integrated["axis"].values, closed["axis"].values).max()) < 1e-13
 
 
 def test_a_long_reference_takes_milliseconds_and_states_what_it_rests_on(cache):
@@ -186,9 +187,9 @@ def test_a_long_reference_takes_milliseconds_and_states_what_it_rests_on(cache):
     assert certified.attrs["certificate"].startswith("40 digits at 32 times up to t = 1.18e+06")
     assert "long double integration up to t = 118" in certified.attrs["certificate"]
     assert len(list(cache.glob("reference/*.nc"))) == 1
-    told = symtop.reference("spheroid", times)
-    assert told.identical(certified)
-    assert told.equals(plain)
+    again = symtop.reference("spheroid", times)
+    assert again.identical(certified)
+    assert again.equals(plain)
     seconds = min(timeit.repeat(lambda: symtop.reference("spheroid", times), number=1, repeat=7))
     assert seconds < 0.01
 
@@ -214,7 +215,7 @@ def test_a_damaged_cache_file_is_noticed_said_and_computed_again(cache, damage):
 
     times = np.linspace(0.0, 5.0, 21)
     good = symtop.reference("spheroid", times, "longdouble")
-    path = _cache_path(symtop.scene("spheroid"), times, "longdouble")
+    (path,) = cache.glob("reference/*.nc")
     content = path.read_bytes()
     if damage == "one value changed":
         with xr.open_dataset(path) as data:
@@ -298,12 +299,12 @@ def test_without_heyoka_the_closed_form_stands_in_and_says_so(monkeypatch, cache
 
 
 def test_checks_reach_the_horizon_and_the_fastest_moments():
-    where = symtop.scene("spheroid")
-    checks = check_times(where, 17.0)
+    scene = symtop.scene("spheroid")
+    checks, form = check_times(scene, 17.0), scenes.closed_form(scene)
     assert checks[-1] == 17.0
     assert np.all(np.diff(checks) > 0.0)
-    speed = np.abs(symtop.ClosedForm(where.top, where.start)(np.linspace(0.0, 1.2, 500)).theta_dot).max()
-    assert np.abs(symtop.ClosedForm(where.top, where.start)(checks).theta_dot).max() > 0.98 * speed
+    speed = np.abs(form(np.linspace(0.0, 1.2, 500)).theta_dot).max()
+    assert np.abs(form(checks).theta_dot).max() > 0.98 * speed
 
 
 def test_a_certificate_is_of_a_kind_that_is_known_and_of_the_closed_form():

@@ -36,9 +36,9 @@ def test_the_dataset_is_the_one_that_is_promised():
 
 
 def test_energy_and_momenta_start_at_their_exact_values():
-    where = symtop.scene("goldstein-rising")
+    scene = symtop.scene("goldstein-rising")
     for name, control in (("midpoint", {"step_size": 0.1}), ("rk45", {"tolerance": 1e-6}), ("taylor", {})):
-        run = symtop.simulate(where, name, horizon=1.0, **control)
+        run = symtop.simulate(scene, name, horizon=1.0, **control)
         assert float(run["energy"][0]) == pytest.approx(14.1, rel=1e-15)
         assert float(run["p_phi"][0]) == pytest.approx(3.4, rel=1e-15)
         assert float(run["p_psi"][0]) == pytest.approx(5.0, rel=1e-15)
@@ -57,12 +57,12 @@ def test_the_chart_follows_what_is_observed():
 
 def test_samples_commensurate_with_the_nutation_are_dithered_and_said_to_be():
     """F11: sampled at multiples of the nutation period, Verlet's energy error reads a thousand times too small."""
-    where = symtop.scene("spheroid")
-    period = where.nutation_period
-    run = symtop.simulate(where, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=51)
+    scene = symtop.scene("spheroid")
+    period = scene.nutation_period
+    run = symtop.simulate(scene, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=51)
     assert run.attrs["sampling"] == "dithered"
     honest = float(np.max(np.abs(run["energy"] - run["energy"][0])))
-    dense = symtop.simulate(where, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=10_001)
+    dense = symtop.simulate(scene, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=10_001)
     assert dense.attrs["sampling"] == "uniform"
     every = np.abs(dense["energy"].values - dense["energy"].values[0])
     assert honest > 0.3 * every.max()
@@ -175,10 +175,10 @@ def test_a_folder_is_no_file_to_write(tmp_path):
 
 @pytest.mark.parametrize("theta", [0.0, math.pi])
 def test_a_start_on_a_pole_is_refused_by_the_angles_chart_and_welcome_elsewhere(theta):
-    where = symtop.Scene("pole", symtop.SymmetricTop(2.0, 1.0, 1.0), symtop.Angles(theta=theta, psi_dot=9.0), 1.0)
+    scene = symtop.Scene("pole", symtop.SymmetricTop(2.0, 1.0, 1.0), symtop.Angles(theta=theta, psi_dot=9.0), 1.0)
     with pytest.raises(symtop.SymtopError, match=r"inside \(0, pi\)"):
-        symtop.simulate(where, "midpoint", step_size=0.01)
-    run = symtop.simulate(where, "taylor", samples=5)
+        symtop.simulate(scene, "midpoint", step_size=0.01)
+    run = symtop.simulate(scene, "taylor", samples=5)
     assert run["theta"].values == pytest.approx(theta, abs=1e-15)
 
 
@@ -186,9 +186,9 @@ def test_the_two_readings_of_the_notebooks_second_top_differ_as_they_should():
     """alpha = 1.6 is not a release at rest: u'^2 there is 0.0473752579827533, and at rest alpha = 1.4981443962885."""
     rest, rising = symtop.scene("goldstein"), symtop.scene("goldstein-rising")
 
-    def alpha(where):
-        momenta = where.top.momenta(where.start)
-        return 2.0 * (where.top.energy(where.start) - momenta.p_psi**2 / (2.0 * where.top.I3)) / where.top.I1
+    def alpha(scene):
+        momenta = scene.top.momenta(scene.start)
+        return 2.0 * (scene.top.energy(scene.start) - momenta.p_psi**2 / (2.0 * scene.top.I3)) / scene.top.I1
 
     assert alpha(rest) == pytest.approx(1.4981443962885, abs=1e-12)
     assert alpha(rising) == pytest.approx(1.6, abs=1e-14)
@@ -199,8 +199,8 @@ def test_the_two_readings_of_the_notebooks_second_top_differ_as_they_should():
 def test_the_three_kinds_of_nutation_are_what_they_are_called():
     """At the upper turning point phi' vanishes (cusp), turns back (loop) or goes on (wave)."""
     for name, sign in (("cusp", 0.0), ("loop", -1.0), ("wave", 1.0)):
-        where = symtop.scene(name)
-        motion = symtop.ClosedForm(where.top, where.start)(np.linspace(0.0, where.nutation_period, 2001))
+        scene = symtop.scene(name)
+        motion = symtop.ClosedForm(scene.top, scene.start)(np.linspace(0.0, scene.nutation_period, 2001))
         assert np.sign(np.round(motion.phi_dot.min(), 9)) == sign
         assert motion.phi_dot.max() > 0.0
 

@@ -29,18 +29,18 @@ def test_a_run_costs_what_it_computes(name):
     steps = bare_run(chosen, row, "angles", h, horizon)
     plan, _ = make_plan(chosen, row, h, horizon=horizon, samples=501)
     form, warned = closed_form(chosen), list[str]()
-    asked = {"step_size": h, "horizon": horizon}
+    settings = {"step_size": h, "horizon": horizon}
     calls = [
         steps,
-        lambda: symtop.simulate(chosen, row, **asked, guard=False),
-        lambda: symtop.simulate(chosen, row, **asked, guard=warned.append),
+        lambda: symtop.simulate(chosen, row, **settings, guard=False),
+        lambda: symtop.simulate(chosen, row, **settings, guard=warned.append),
         lambda: form.axis(plan.times[:300]),
         lambda: forecast(chosen, row, "angles", plan._replace(step_size=0.5 * h)),
     ]
-    kernel, bare, whole, truth, tried = (timing.best for timing in timings(calls, batches=80, batch=2e-3))
+    kernel, bare, whole, truth, finer = (timing.best for timing in timings(calls, batches=80, batch=2e-3))
     assert bool(warned) == (name == "spheroid")
     assert bare / kernel < 12.0
-    assert (whole - truth - (tried if warned else 0.0)) / kernel < 24.0
+    assert (whole - truth - (finer if warned else 0.0)) / kernel < 24.0
 
 
 @pytest.mark.slow
@@ -81,7 +81,7 @@ def test_the_guard_watches_two_motions_in_the_time_of_one():
         solver(body.top, body.start, plan)
 
     def both():
-        watched.known.clear()
+        watched.growths.clear()
         watched.growth(watched.scene.horizon)
 
     one, two, twice = (timing.best for timing in timings([alone, both, lambda: (alone(), alone())], 40, 2e-3))

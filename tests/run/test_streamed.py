@@ -18,7 +18,7 @@ from symtop.run.ensemble import chunks, ensemble, ensemble as ensembles
 from tests.commands import printed_by
 
 SOME = symtop.population(60, seed=5)
-ASKED = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
+SETTINGS = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
 MILLION = """
 import resource, sys
 import symtop
@@ -34,30 +34,30 @@ def small_pieces(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("name", "asked"),
+    ("name", "settings"),
     [("strang[attitude]", {}), ("stormer-verlet", {}), ("strang[axis]", {"variables": ["energy", "p_phi"]}),
      ("midpoint", {"nutations": None, "horizon": 0.7, "per_nutation": None, "step_size": 0.01}),
      ("exact", {"per_nutation": None, "nutations": None, "horizon": 2.0})],
 )  # fmt: skip
-def test_the_file_holds_the_ensemble_in_memory(tmp_path, small_pieces, name, asked):
-    wanted = symtop.ensemble(SOME, name, **ASKED | asked)
-    with symtop.ensemble(SOME, name, path=tmp_path / "runs.nc", **ASKED | asked) as data:
-        assert data.load().identical(wanted)
+def test_the_file_holds_the_ensemble_in_memory(tmp_path, small_pieces, name, settings):
+    whole = symtop.ensemble(SOME, name, **SETTINGS | settings)
+    with symtop.ensemble(SOME, name, path=tmp_path / "runs.nc", **SETTINGS | settings) as data:
+        assert data.load().identical(whole)
     assert [file.name for file in tmp_path.iterdir()] == ["runs.nc"]
 
 
-@pytest.mark.parametrize("asked", [{"step_size": 0.05}, {"step_size": 0.25, "horizon": 2.0}], ids=["many steps", "few"])
-def test_times_that_all_share_are_a_row_in_the_file_as_well(tmp_path, small_pieces, asked):
-    scenes, asked = ["spheroid"] * 40, {**asked, "samples": 21, "quiet": True}
-    with symtop.ensemble(scenes, "strang", path=tmp_path / "runs.nc", **asked) as data:
+@pytest.mark.parametrize("step", [{"step_size": 0.05}, {"step_size": 0.25, "horizon": 2.0}], ids=["many steps", "few"])
+def test_times_that_all_share_are_a_row_in_the_file_as_well(tmp_path, small_pieces, step):
+    scenes, settings = ["spheroid"] * 40, {**step, "samples": 21, "quiet": True}
+    with symtop.ensemble(scenes, "strang", path=tmp_path / "runs.nc", **settings) as data:
         assert data["time"].dims == ("time",)
-        assert data.load().identical(symtop.ensemble(scenes, "strang", **asked))
+        assert data.load().identical(symtop.ensemble(scenes, "strang", **settings))
 
 
 @pytest.mark.parametrize("threads", [1, 3])
 def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_path, small_pieces, monkeypatch, threads):
     calm, path = tmp_path / "calm.nc", tmp_path / "runs.nc"
-    symtop.ensemble(SOME, "strang[axis]", path=calm, **ASKED).close()
+    symtop.ensemble(SOME, "strang[axis]", path=calm, **SETTINGS).close()
     made, keep = [], ensemble.Stream.keep
 
     def interrupted(stream, piece, columns):
@@ -68,14 +68,14 @@ def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_pa
 
     monkeypatch.setattr(ensemble.Stream, "keep", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        symtop.ensemble(SOME, "strang[axis]", path=path, threads=threads, **ASKED)
+        symtop.ensemble(SOME, "strang[axis]", path=path, threads=threads, **SETTINGS)
     assert {file.name for file in (tmp_path / "runs.nc.parts").glob("*.npz")} == {
         f"{first}-{first + 7}.npz" for first in made
     }
     assert not path.exists()
     again = []
     monkeypatch.setattr(ensemble.Stream, "keep", lambda *given: again.append(given[1].start) or keep(*given))
-    symtop.ensemble(SOME, "strang[axis]", path=path, threads=threads, **ASKED).close()
+    symtop.ensemble(SOME, "strang[axis]", path=path, threads=threads, **SETTINGS).close()
     assert (made, again) == ([0, 7, 14, 21], [28, 35, 42, 49, 56])
     assert path.read_bytes() == calm.read_bytes()
 
@@ -84,47 +84,47 @@ def test_the_beginning_of_another_ensemble_and_a_damaged_piece_are_refused(tmp_p
     path, folder = tmp_path / "runs.nc", tmp_path / "runs.nc.parts"
     with monkeypatch.context() as patch:
         patch.setattr(ensemble.Stream, "finish", lambda *_: xr.Dataset())
-        symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
+        symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
     for changed in ({"samples": 20}, {"per_nutation": 21}, {"variables": ["axis"]}):
         with pytest.raises(symtop.SymtopError, match="beginning of another ensemble"):
-            symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED | changed)
+            symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS | changed)
     with pytest.raises(symtop.SymtopError, match="beginning of another ensemble"):
-        symtop.ensemble(SOME, "cayley[axis]", path=path, **ASKED)
+        symtop.ensemble(SOME, "cayley[axis]", path=path, **SETTINGS)
     (folder / "7-14.npz").write_bytes((folder / "7-14.npz").read_bytes()[:-300])
     with pytest.raises(symtop.SymtopError, match=r"7-14.npz is damaged .*: remove it"):
-        symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
+        symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
     (folder / "7-14.npz").unlink()
-    with symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED) as data:
-        assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **ASKED))
+    with symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS) as data:
+        assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **SETTINGS))
 
 
 def test_what_a_process_has_computed_before_does_not_make_it_another_ensemble(tmp_path, monkeypatch):
     monkeypatch.setattr(ensemble.Stream, "finish", lambda *_: xr.Dataset())
     for name in ("strang[attitude]", "gauss-4[axis]", "rk45-compiled[axis]"):
-        asked = {"nutations": 2, "samples": 11, "quiet": True}
-        asked |= {"tolerance": 1e-6} if name.startswith("rk45") else {"per_nutation": 20}
+        settings = {"nutations": 2, "samples": 11, "quiet": True}
+        settings |= {"tolerance": 1e-6} if name.startswith("rk45") else {"per_nutation": 20}
         for _ in range(3):
-            symtop.ensemble(SOME, name, path=tmp_path / f"{name}.nc", **asked)
-            symtop.ensemble(SOME, name, **asked)
+            symtop.ensemble(SOME, name, path=tmp_path / f"{name}.nc", **settings)
+            symtop.ensemble(SOME, name, **settings)
             symtop.simulate("spheroid", "rk4[axis]", step_size=0.1, guard=False)
 
 
 def test_one_process_at_a_time_writes_a_file(tmp_path, small_pieces, monkeypatch):
     """A second one on the same path is told so in a sentence; another path, and the same one later, are free."""
-    path, keep, told = tmp_path / "runs.nc", ensemble.Stream.keep, []
+    path, keep, once = tmp_path / "runs.nc", ensemble.Stream.keep, []
 
     def disturbed(stream, piece, columns):
-        if piece.start == 7 and not told:
-            told.append(1)
+        if piece.start == 7 and not once:
+            once.append(1)
             with pytest.raises(symtop.SymtopError, match=f"another process is writing {path}: wait until it has"):
-                symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
-            symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "other.nc", **ASKED).close()
+                symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
+            symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "other.nc", **SETTINGS).close()
         keep(stream, piece, columns)
 
     monkeypatch.setattr(ensemble.Stream, "keep", disturbed)
-    with symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED) as data:
-        assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **ASKED))
-    assert told
+    with symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS) as data:
+        assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **SETTINGS))
+    assert once
     assert {file.name for file in tmp_path.iterdir()} == {"runs.nc", "other.nc"}
 
 
@@ -138,37 +138,37 @@ def test_a_piece_that_was_removed_is_not_called_damaged(tmp_path, small_pieces, 
     with monkeypatch.context() as patch:
         patch.setattr(ensemble.Stream, "finish", robbed)
         with pytest.raises(symtop.SymtopError, match=r"7-14.npz is not there any more, so somebody has removed it"):
-            symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
-    with symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED) as data:
-        assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **ASKED))
+            symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
+    with symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS) as data:
+        assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **SETTINGS))
 
 
 def test_pieces_that_do_not_say_whose_they_are_belong_to_nobody(tmp_path, small_pieces, monkeypatch):
     """Such as those of an ensemble that was ended while it removed them."""
-    path, asked = tmp_path / "runs.nc", {**ASKED, "path": tmp_path / "runs.nc"}
+    path, settings = tmp_path / "runs.nc", {**SETTINGS, "path": tmp_path / "runs.nc"}
     unlink = Path.unlink
 
-    def killed(file, **asked):
+    def killed(file, **settings):
         if file.name == "28-35.npz":
             raise KeyboardInterrupt
-        unlink(file, **asked)
+        unlink(file, **settings)
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "unlink", killed)
         with pytest.raises(KeyboardInterrupt):
-            symtop.ensemble(SOME, "strang[axis]", **asked)
+            symtop.ensemble(SOME, "strang[axis]", **settings)
     others = symtop.population(60, seed=6)
     with pytest.raises(symtop.SymtopError, match="holds the beginning of another ensemble"):
-        symtop.ensemble(others, "strang[axis]", **asked)
+        symtop.ensemble(others, "strang[axis]", **settings)
     made = path.read_bytes()
-    symtop.ensemble(SOME, "strang[axis]", **asked).close()  # the same goes on, to the same file
+    symtop.ensemble(SOME, "strang[axis]", **settings).close()  # the same goes on, to the same file
     assert path.read_bytes() == made
     assert [file.name for file in tmp_path.iterdir()] == ["runs.nc"]
     folder = tmp_path / "runs.nc.parts"
     folder.mkdir()
     (folder / "0-7.npz").write_bytes(b"somebody's")
     with pytest.raises(symtop.SymtopError, match="does not say which ensemble it is of"):
-        symtop.ensemble(SOME, "strang[axis]", **asked)
+        symtop.ensemble(SOME, "strang[axis]", **settings)
     assert (folder / "0-7.npz").read_bytes() == b"somebody's"
     assert path.read_bytes() == made
 
@@ -177,12 +177,12 @@ def test_nothing_is_replaced_that_is_no_netcdf_file(tmp_path, small_pieces):
     path = tmp_path / "mine.py"
     path.write_text("print(1)")
     with pytest.raises(symtop.SymtopError, match="it is there, and no netCDF file"):
-        symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
+        symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
     assert path.read_text() == "print(1)"
     assert [file.name for file in tmp_path.iterdir()] == ["mine.py"]
     other = tmp_path / "runs.nc"
-    symtop.ensemble(SOME, "strang[axis]", path=other, **ASKED).close()
-    symtop.ensemble(SOME, "rk4[axis]", path=other, **ASKED).close()
+    symtop.ensemble(SOME, "strang[axis]", path=other, **SETTINGS).close()
+    symtop.ensemble(SOME, "rk4[axis]", path=other, **SETTINGS).close()
     with xr.open_dataset(other) as data:
         assert data.attrs["integrator"] == "rk4[axis]"
 
@@ -198,11 +198,11 @@ def test_what_a_killed_writer_left_is_swept_and_a_library_without_room_says_so(t
     with monkeypatch.context() as patch:
         patch.setattr(ensemble, "_lay_out", no_room)
         with pytest.raises(symtop.SymtopError, match="is the disk full"):
-            symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
+            symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
     assert not left.exists()
     assert {file.name for file in tmp_path.iterdir()} == {"runs.nc.parts"}
     monkeypatch.setattr(ensemble.Stream, "keep", no_room)  # nothing is left to be computed
-    symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED).close()
+    symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS).close()
     assert path.exists()
 
 
@@ -212,21 +212,21 @@ def test_a_file_system_without_locks_is_written_to(tmp_path, monkeypatch):
             files.fcntl, "flock", lambda *_, number=number: (_ for _ in ()).throw(OSError(number, "no"))
         )
         with pytest.raises(OSError, match="no") if fails else contextlib.nullcontext():
-            symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "runs.nc", **ASKED).close()
+            symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "runs.nc", **SETTINGS).close()
 
 
 def test_a_place_that_cannot_be_written_is_refused_before_any_step(tmp_path):
     for path in (tmp_path, "/proc/no/such/runs.nc"):
         with pytest.raises(symtop.SymtopError, match="cannot write"):
-            symtop.ensemble(SOME, "strang[axis]", path=path, **ASKED)
+            symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
 
 
 def test_what_does_not_fit_into_memory_needs_a_path(tmp_path, monkeypatch):
     monkeypatch.setattr(ensembles, "MOST_VALUES", 60 * 21 * 4)
-    symtop.ensemble(SOME, "strang[axis]", variables=["axis"], **ASKED)
+    symtop.ensemble(SOME, "strang[axis]", variables=["axis"], **SETTINGS)
     with pytest.raises(symtop.SymtopError, match="give a path to stream them to a netCDF file"):
-        symtop.ensemble(SOME, "strang[axis]", variables=["axis", "energy"], **ASKED)
-    symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "runs.nc", **ASKED).close()
+        symtop.ensemble(SOME, "strang[axis]", variables=["axis", "energy"], **SETTINGS)
+    symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "runs.nc", **SETTINGS).close()
 
 
 @pytest.mark.slow
@@ -234,9 +234,9 @@ def test_a_million_members_take_little_memory_and_survive_a_kill(tmp_path):
     """Memory beyond that of the population (132 bytes a member) and of what is asked for does not grow with members."""
     calm, path, peak = tmp_path / "calm.nc", tmp_path / "runs.nc", {}
     for n, file in ((100_000, tmp_path / "few.nc"), (1_000_000, calm)):
-        begun = time.monotonic()
+        begin = time.monotonic()
         peak[n] = int(printed_by(MILLION, n, file)) / 1024
-        print(f"{n} members: {time.monotonic() - begun:.1f} s, {peak[n]:.0f} MB at most")
+        print(f"{n} members: {time.monotonic() - begin:.1f} s, {peak[n]:.0f} MB at most")
     assert peak[1_000_000] - peak[100_000] < 500
     killed = subprocess.Popen([sys.executable, "-c", MILLION, "1000000", str(path)], stdout=subprocess.DEVNULL)
     while len(list((tmp_path / "runs.nc.parts").glob("*.npz"))) < 15:
@@ -287,7 +287,7 @@ except KeyboardInterrupt:
 def test_an_interrupt_is_heard_within_a_second(name, setting, long, threads):
     code = INTERRUPTED.replace("NAME", repr(name)).replace("THREADS", str(threads))
     code = code.replace("SETTING", setting).replace("LONG", str(long))
-    heard, ended = map(float, printed_by(code).split())
-    print(f"{name}: heard after {heard:.2f} s, ended after {ended:.2f} s")
-    assert heard < 1.0
+    raised, ended = map(float, printed_by(code).split())
+    print(f"{name}: heard after {raised:.2f} s, ended after {ended:.2f} s")
+    assert raised < 1.0
     assert ended < 4.0

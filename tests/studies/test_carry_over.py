@@ -137,14 +137,14 @@ def test_tau_is_kendalls_with_ties():
 
 def test_a_planted_difference_of_rankings_is_seen_and_scatter_is_none():
     medians, rows = 1e-6 * 1.6 ** np.arange(20), ([*range(20)],) * 2
-    same = by._bootstrapped(costs_of(medians), costs_of(3.0 * medians, seed=1), rows, paired=False)
+    same = by.bootstrap_tau(costs_of(medians), costs_of(3.0 * medians, seed=1), rows, paired=False)
     assert by.ranking_verdict(same) == by.YES
     mixed = medians.copy()
     mixed[[0, 5, 10, 15]] = mixed[[15, 0, 5, 10]]
-    partly = by._bootstrapped(costs_of(medians), costs_of(mixed, seed=1), rows, paired=True)
+    partly = by.bootstrap_tau(costs_of(medians), costs_of(mixed, seed=1), rows, paired=True)
     assert by.ranking_verdict(partly) == by.NO
     assert partly.low <= partly.value <= partly.high < same.low
-    turned = by._bootstrapped(costs_of(medians), costs_of(medians[::-1], seed=1), rows, paired=True)
+    turned = by.bootstrap_tau(costs_of(medians), costs_of(medians[::-1], seed=1), rows, paired=True)
     assert turned.value < -0.9
 
 

@@ -249,6 +249,7 @@ def _reported(
     return Difference(name, size / scene.momentum_scale, REPORTED, f"of the larger momentum in {run.steps} steps")
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a run may blow up
 def constants(scene: Scene, run: Trajectory) -> Rows:
     """Relative change of every constant that the run's chart has, at its samples."""
     changes = residuals(scene, run)
@@ -345,7 +346,7 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
     why = constant.words(f"in {run.span}, {constant.a_step:.0e} in one step at most")
     why += f", drifting by {changed.rise / max(run.steps, 1):.1e} a step" if kind == "drift" else ""
     finding = constant.finding(claim, claimed, why)
-    finding = finding if run.steps else finding._replace(measured=NOTHING)
+    finding = finding if run.steps and not (ended and run.nutations < 1.0) else finding._replace(measured=NOTHING)
     # an error that returns with the nutation cannot exceed the largest change of a step, all one way
     most = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
     if claim == "energy" and run.blown_up > 0.0:

@@ -30,6 +30,7 @@ from symtop.core.errors import SymtopError, SymtopWarning, one_of, shown, words_
 from symtop.core.signals import is_of_user
 from symtop.methods.framework.plan import Plan, Run
 from symtop.model.charts import BODY, DIMENSIONS, View
+from symtop.model.scenes import Catalogue
 from symtop.model.top import Angles, Momenta, SymmetricTop
 
 Array = NDArray[np.float64]
@@ -284,20 +285,15 @@ def is_built_in(name: str) -> bool:
     return split_name(name)[0] in _shipped
 
 
-class _Integrators(dict[str, Integrator]):
+class _Integrators(Catalogue):
     """The registry as a dict; a notebook shows it as a table. A variant is found by its name, too, but not listed."""
 
     def __missing__(self, name: str) -> Integrator:
         method, chart = _method_and_chart(name, self)
         if not chart or method not in self:
             raise KeyError(name)
-        return self[method].variant(chart)
-
-    def _repr_html_(self) -> str:
-        import pandas as pd  # 0.2 s
-
-        with pd.option_context("display.max_colwidth", None):
-            return str(pd.DataFrame([entry.record() for entry in self.values()]).to_html(index=False))
+        variant: Integrator = self[method].variant(chart)
+        return variant
 
 
 def _method_and_chart(name: str, registered: Collection[str]) -> tuple[str, str]:

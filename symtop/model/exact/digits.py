@@ -294,9 +294,9 @@ class PreciseForm:
 
     def _state(self, time: Any) -> tuple[Any, Any, Any, Any, Any]:
         """sqrt((1 + u)/2) and sqrt((1 - u)/2), signed, phi + psi, phi - psi and theta', all in the upright picture."""
-        asked, last = rational("time", time), self._last
-        if last is None or last[0] != asked:  # angles, axis and attitude of one time are asked for one after the other
-            self._last = last = asked, self._after(self._real(asked))
+        exact, last = rational("time", time), self._last
+        if last is None or last[0] != exact:  # angles, axis and attitude of one time are asked for one after the other
+            self._last = last = exact, self._after(self._real(exact))
         return last[1]
 
     def _after(self, elapsed: Any) -> tuple[Any, Any, Any, Any, Any]:

@@ -461,13 +461,12 @@ class FreeBody:
         return BodyMotion(out[:, :4], np.zeros((row.size, 4)), out[:, 4:], bound)
 
 
-def checked_body(
-    inertia: ArrayLike, quaternion: ArrayLike, momentum_body: ArrayLike, momentum_lo: ArrayLike = (0.0, 0.0, 0.0)
-) -> Array:
+def checked_body(inertia: ArrayLike, quaternion: ArrayLike, momentum_body: ArrayLike, momentum_lo: ArrayLike) -> Array:
     """The numbers of a body in a row (13,)."""
-    parts = {"inertia": (inertia, 3), "quaternion": (quaternion, 4), "momentum_body": (momentum_body, 3)}
     row = []
-    for name, (values, size) in (parts | {"momentum_lo": (momentum_lo, 3)}).items():
+    parts = {"inertia": inertia, "quaternion": quaternion, "momentum_body": momentum_body, "momentum_lo": momentum_lo}
+    for name, values in parts.items():
+        size = 4 if name == "quaternion" else 3
         numbers = real_numbers(name, values)
         if numbers.shape != (size,) or not np.isfinite(numbers).all():
             raise SymtopError(f"{name} must be {size} finite numbers, not {values!r}")

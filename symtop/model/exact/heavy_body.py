@@ -62,9 +62,8 @@ def _stepper(run: int) -> Any:
 
     kind = np.longdouble if run < 3 else hy.real128
     zero, tolerance = [kind("0")] * 7, kind(repr(TOLERANCES[run]))
-    return hy.taylor_adaptive(
-        equations(), zero, tol=tolerance, fp_type=kind, compact_mode=True
-    )  # unrolled: 5 s to compile
+    # compact, as it takes 5 s to compile what is unrolled
+    return hy.taylor_adaptive(equations(), zero, tol=tolerance, fp_type=kind, compact_mode=True)
 
 
 class HeavyBody:

@@ -88,11 +88,11 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
 def scenes_of(members: xr.Dataset) -> list[Scene]:
     """Members as scenes over `PERIODS` natural periods, named by stratum and number within it."""
     rows = np.column_stack([members[name].values for name in PARTS])
-    seen: dict[str, int] = {}
+    counts: dict[str, int] = {}
     scenes = list[Scene]()
     for one, kind in zip(members_of(rows), members["stratum"].values.tolist(), strict=True):
-        seen[kind] = seen.get(kind, -1) + 1
-        scenes.append(_scene(*one, f"{kind}-{seen[kind]}", f"a random body, {kind}"))
+        counts[kind] = counts.get(kind, -1) + 1
+        scenes.append(_scene(*one, f"{kind}-{counts[kind]}", f"a random body, {kind}"))
     return scenes
 
 
@@ -103,17 +103,17 @@ def _scene(body: RigidBody, start: Attitude, name: str = "drawn", purpose: str =
 def _members(kind: str, seed: int, count: int, epsilon: float | None) -> Array:
     """The first members of one stratum, (count, 14)."""
     generator = np.random.Philox(key=[seed % 2**64, KINDS.index(kind)])
-    found, left = list[Array](), count
-    while left:
-        integers = generator.random_raw(DRAWS * left) >> np.uint64(11)
+    parts, missing = list[Array](), count
+    while missing:
+        integers = generator.random_raw(DRAWS * missing) >> np.uint64(11)
         uniform = np.ascontiguousarray((integers * 2.0**-53).reshape(-1, DRAWS).T)
-        drawn = _free(kind, uniform) if kind in FREE else _heavy(uniform, 0.0 if kind == "lagrange" else epsilon)
+        rows = _free(kind, uniform) if kind in FREE else _heavy(uniform, 0.0 if kind == "lagrange" else epsilon)
         if kind in ("regular", "chaotic"):
-            chaotic = np.array([growth(_scene(*one)) > CHAOS for one in members_of(drawn)])
-            drawn = drawn[chaotic == (kind == "chaotic")]
-        found.append(drawn)
-        left -= len(drawn)
-    return np.concatenate(found)
+            chaotic = np.array([growth(_scene(*one)) > CHAOS for one in members_of(rows)])
+            rows = rows[chaotic == (kind == "chaotic")]
+        parts.append(rows)
+        missing -= len(rows)
+    return np.concatenate(parts)
 
 
 def _direction(first: Array, second: Array) -> Array:

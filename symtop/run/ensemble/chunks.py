@@ -12,7 +12,7 @@ import contextlib
 import functools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -91,8 +91,8 @@ def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -
         times[rows] = marks[rows] * h[rows, None]
 
     lay_out(np.arange(n), dithered=False)
-    judged = np.isfinite(period) & (horizon > 2.0 * period)
-    rows = np.flatnonzero(judged if steps is None else judged & (steps >= samples))  # others show every step
+    long_enough = np.isfinite(period) & (horizon > 2.0 * period)
+    rows = np.flatnonzero(long_enough if steps is None else long_enough & (steps >= samples))  # others show every step
     lay_out(rows[unseen(times[rows], period[rows, None]) >= WIDEST_GAP], dithered=True)
     times[np.arange(samples) >= plan.counts[:, None]] = np.nan
     return plan
@@ -167,19 +167,21 @@ class Job:
     tolerance: Array | None
     samples: int
     budget: float | None
-    shown: tuple[str, ...]  # of `SHOWN`
+    observables: tuple[str, ...]  # of `SHOWN`
     period: Array | None = None  # of nutation, where it is known
     names: Any = None  # what members are called (n,), where they have labels
     continuous: bool = True  # are angles; otherwise modulo a turn where that takes the closed form (`Turns`)
     first: int = 0  # number of the first member
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __getstate__(self) -> dict[str, Any]:
         """For workers elsewhere, which know integrators by their names; one that they do not know goes as it is."""
-        values = {part.name: getattr(self, part.name) for part in fields(self)}
         with contextlib.suppress(SymtopError):
             if find_integrator(self.method.name) == self.method:
-                values["method"] = self.method.name
-        return _received, (values,)
+                return vars(self) | {"method": self.method.name}
+        return vars(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, method=find_integrator(state["method"]))
 
     @property
     def execution(self) -> str:
@@ -289,14 +291,14 @@ class Job:
 
     def _observables(self, view: View, times: Array) -> dict[str, Array]:
         """Of what a `Trajectory` shows of one run, what is asked for, of all."""
-        columns = {name: getattr(view, name) for name in self.shown}
+        columns = {name: getattr(view, name) for name in self.observables}
         turned = self.turned if self.continuous else ()
         return columns | Turns(self.numbers, times, {name: columns[name] for name in turned}).of(slice(None))
 
     @property
     def turned(self) -> tuple[str, ...]:
         """The angles that are shown and that the chart knows modulo a turn."""
-        return tuple(name for name in ("phi", "psi") if name in self.shown and self.chart in ("axis", "attitude"))
+        return tuple(name for name in ("phi", "psi") if name in self.observables and self.chart in ("axis", "attitude"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,11 +346,6 @@ class Later(BackendArray):
         layers: Any = indexing  # whose types know no array but NumPy's
         data = layers.MemoryCachedArray(layers.CopyOnWriteArray(layers.LazilyIndexedArray(self)))
         return xr.Variable(("member", "time"), data)
-
-
-def _received(values: dict[str, Any]) -> Job:
-    """A job as it was before it was sent."""
-    return Job(**values | {"method": find_integrator(values["method"])})
 
 
 def together(numbers: Array) -> Any:

@@ -32,7 +32,7 @@ from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.scenes import Scene, horizon_of
 from symtop.run import cluster
 from symtop.run.ensemble.chunks import CHUNK, CHUNK_STEPS, RAISED, SHOWN, Job, as_dataset, nutation_periods, same_times
-from symtop.run.ensemble.inputs import Members, called, for_each, read_members
+from symtop.run.ensemble.inputs import Members, for_each, member_name, read_members
 from symtop.run.guard import MOST_STEPS
 from symtop.run.simulation import MOST_SAMPLES, MOST_SWINGS, chart_of, check_control
 
@@ -87,13 +87,13 @@ def ensemble(
     count, silent = whole("samples", samples, 2, MOST_SAMPLES), boolean("quiet", quiet)
     workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
     chart = chart_of(method, read.observes, observe)
-    shown, n = _shown(variables, chart), len(read.numbers)
+    observables, n = _observables(variables, chart), len(read.numbers)
     if path is None:
-        _check_memory(n, count, shown)
+        _check_memory(n, count, observables)
     limit = None if budget is None else positive("budget", budget)
     names, values = ("step_size", "per_nutation", "horizon", "nutations"), (step_size, per_nutation, horizon, nutations)
     settings = {name: value for name, value in zip(names, values, strict=True) if value is not None}
-    job = _job(read, method, chart, settings, tolerance, count, limit, shown)
+    job = _job(read, method, chart, settings, tolerance, count, limit, observables)
     if scheduler is not None:
         cluster.check_sent(scheduler, job.of(slice(0, 1)), method.name)
     order = job.order() if path is None else None
@@ -160,22 +160,22 @@ def _fill(columns: dict[str, Any], part: dict[str, Any], chunk: Any, n: int) -> 
         columns[name][chunk] = values
 
 
-def _shown(variables: Iterable[str] | None, chart: str) -> tuple[str, ...]:
+def _observables(variables: Iterable[str] | None, chart: str) -> tuple[str, ...]:
     """Which variables a dataset has, in their usual order."""
     if variables is None:
         return SHOWN[chart]
     if isinstance(variables, str) or not isinstance(variables, Iterable):
         raise SymtopError(f"variables must be a list of names, not {variables!r}", "variables")
-    wanted, known = list(variables), SHOWN[chart]
-    for name in wanted:
-        if name not in known:
-            raise SymtopError(f"variables in the {chart} chart are {', '.join(known)}, not {name!r}", "variables")
-    return tuple(name for name in known if name in wanted)
+    names, possible = list(variables), SHOWN[chart]
+    for name in names:
+        if name not in possible:
+            raise SymtopError(f"variables in the {chart} chart are {', '.join(possible)}, not {name!r}", "variables")
+    return tuple(name for name in possible if name in names)
 
 
-def _check_memory(n: int, samples: int, shown: tuple[str, ...]) -> None:
+def _check_memory(n: int, samples: int, observables: tuple[str, ...]) -> None:
     """Refuse a dataset that does not fit into memory."""
-    values = n * samples * (1 + sum({"axis": 3, "momentum": 3, "quaternion": 4}.get(name, 1) for name in shown))
+    values = n * samples * (1 + sum({"axis": 3, "momentum": 3, "quaternion": 4}.get(name, 1) for name in observables))
     if values > MOST_VALUES:
         size = f"{n} members with {samples} samples are {values:.3g} numbers, more than the {MOST_VALUES:.3g} that are"
         remedy = "give a path to stream them to a netCDF file, fewer samples, or fewer variables"
@@ -183,52 +183,52 @@ def _check_memory(n: int, samples: int, shown: tuple[str, ...]) -> None:
 
 
 def _job(
-    members: Members, method: Integrator, chart: str, given: dict[str, Any], tolerance: object, samples: int,
-    budget: float | None, shown: tuple[str, ...],
+    members: Members, method: Integrator, chart: str, settings: dict[str, Any], tolerance: object, samples: int,
+    budget: float | None, observables: tuple[str, ...],
 ) -> Job:  # fmt: skip
     """The job of an integrator, from settings that are checked here."""
     for one, other in (("step_size", "per_nutation"), ("horizon", "nutations")):
-        if one in given and other in given:
+        if one in settings and other in settings:
             raise SymtopError(f"give {one} or {other}, not both", one, other)
-    control = "per_nutation" if "per_nutation" in given else "step_size"
-    check_control(method, given.get(control), tolerance, control)
-    if method.fixed_step and control not in given:
+    control = "per_nutation" if "per_nutation" in settings else "step_size"
+    check_control(method, settings.get(control), tolerance, control)
+    if method.fixed_step and control not in settings:
         words = "has a fixed step and needs step_size or per_nutation"
         raise SymtopError(f"{method.name} {words}", "step_size", "per_nutation")
     numbers, names, n = members.numbers, members.names, len(members.numbers)
-    period = nutation_periods(numbers) if "per_nutation" in given or "nutations" in given else None
+    period = nutation_periods(numbers) if "per_nutation" in settings or "nutations" in settings else None
     for i in np.flatnonzero(~np.isfinite(period))[:1] if period is not None else ():
-        words = f"per_nutation and nutations count nutation periods, and that of {called(names, i)} is endless"
+        words = f"per_nutation and nutations count nutation periods, and that of {member_name(names, i)} is endless"
         raise SymtopError(words, "per_nutation", "nutations")
-    horizon = _horizons(members, given, period)
+    horizon = _horizons(members, settings, period)
     steps = bounds = None
     if method.fixed_step:
-        step = for_each(control, given[control], n, names)
+        step = for_each(control, settings[control], n, names)
         step = step if period is None or control == "step_size" else _parts(period, step, horizon, names)
         steps = _steps(step, horizon, budget or MOST_STEPS, names)
     elif method.adaptive:
         period = nutation_periods(numbers) if period is None else period
         bounds = _tolerances(method, tolerance, members, horizon, period)
-    return Job(method, chart, numbers, horizon, steps, bounds, samples, budget, shown, period, names)
+    return Job(method, chart, numbers, horizon, steps, bounds, samples, budget, observables, period, names)
 
 
-def _horizons(members: Members, given: dict[str, Any], period: Array | None) -> Array:
+def _horizons(members: Members, settings: dict[str, Any], period: Array | None) -> Array:
     """The horizon of each member: given, so many periods, or its own."""
     horizon, names, n = members.horizon, members.names, len(members.numbers)
-    if "horizon" in given:
-        horizon = for_each("horizon", given["horizon"], n, names)
-    elif period is not None and "nutations" in given:
+    if "horizon" in settings:
+        horizon = for_each("horizon", settings["horizon"], n, names)
+    elif period is not None and "nutations" in settings:
         with np.errstate(over="ignore"):  # an infinite horizon is refused below
-            horizon = for_each("nutations", given["nutations"], n, names) * period
+            horizon = for_each("nutations", settings["nutations"], n, names) * period
     if horizon is None:
         words = "give horizon or nutations: these members have no horizon of their own"
         raise SymtopError(words, "horizon", "nutations")
     horizon_of(float(horizon.min()))
     for i in np.flatnonzero(horizon > LONGEST_TIME)[:1]:
-        if "nutations" in given:
-            words = f"they take {called(names, i)} beyond a time of {LONGEST_TIME:g}"
+        if "nutations" in settings:
+            words = f"they take {member_name(names, i)} beyond a time of {LONGEST_TIME:g}"
             raise SymtopError(f"nutations must be fewer: {words}", "nutations")
-        words = f"not {horizon[i]!s} as of {called(names, i)}"
+        words = f"not {horizon[i]!s} as of {member_name(names, i)}"
         raise SymtopError(f"horizon must be at most {LONGEST_TIME:g}, {words}", "horizon")
     return horizon
 
@@ -239,7 +239,7 @@ def _parts(period: Array, counted: Array, horizon: Array, names: Any) -> Array:
         step: Array = period / counted
     for i in np.flatnonzero(step > horizon)[:1]:
         least = f"{period[i] / horizon[i]:.4g}, a step within the horizon"
-        words = f"not {counted[i]:.4g} as of {called(names, i)}"
+        words = f"not {counted[i]:.4g} as of {member_name(names, i)}"
         raise SymtopError(f"per_nutation must be at least {least}, {words}", "per_nutation")
     return step
 
@@ -249,11 +249,11 @@ def _steps(step: Array, horizon: Array, most: float, names: Any) -> Whole:
     with np.errstate(over="ignore"):
         ratio = horizon / step
     for i in np.flatnonzero(step > horizon)[:1]:
-        words = f"not {step[i]!s} of {horizon[i]!s} as of {called(names, i)}"
+        words = f"not {step[i]!s} of {horizon[i]!s} as of {member_name(names, i)}"
         raise SymtopError(f"step_size must be at most the horizon, {words}", "step_size")
     for i in np.flatnonzero(ratio > most)[:1]:
         words = f"{ratio[i]:.3g} steps; the limit is {most:.3g} (see budget)"
-        raise SymtopError(f"{called(names, i)} asks for {words}", "budget")
+        raise SymtopError(f"{member_name(names, i)} asks for {words}", "budget")
     return np.maximum(1, np.rint(ratio)).astype(np.int64)
 
 
@@ -265,7 +265,7 @@ def _tolerances(method: Integrator, tolerance: object, members: Members, horizon
     swings = horizon * np.maximum(1.0 / period, pendulum)
     for i in np.flatnonzero(swings > MOST_SWINGS)[:1]:
         words = f"{swings[i]:.3g} swings of the top; an adaptive method may take {MOST_SWINGS:.3g}"
-        raise SymtopError(f"the horizon of {called(names, i)} is {words}")
+        raise SymtopError(f"the horizon of {member_name(names, i)} is {words}")
     if np.ndim(tolerance) == 0:  # type: ignore[arg-type]
         return np.broadcast_to(method.check_tolerance(tolerance), len(numbers))
     row = for_each("tolerance", tolerance, len(numbers), names)
@@ -321,19 +321,23 @@ class Stream:
 
     def finish(self, chunks: list[slice]) -> xr.Dataset:
         """Put the chunks together; the dataset reads from the file what it is asked for."""
-        with self._writing(), netcdf.one_thread, netcdf.replacing(self.path) as partial:
+        with netcdf.one_thread, netcdf.replacing(self.path) as partial:
             first = self._columns(chunks[0])
             shared = all(same_times(self._columns(chunk, "time")["time"], first["time"][0]) for chunk in chunks)
             labels = {name: values[: chunks[0].stop] for name, values in self.labels.items()}
             pattern = netcdf.describe(as_dataset(first, labels, shared=shared), **self.attributes)
-            with contextlib.closing(netCDF4.Dataset(partial, "w")) as file:
-                _lay_out(file, pattern, self.n)
-                for chunk in chunks:
-                    columns = self._columns(chunk) | {name: values[chunk] for name, values in self.labels.items()}
-                    if shared:
-                        del columns["time"]
-                    for name, values in columns.items():
-                        file[name][chunk] = values.astype(object) if values.dtype.kind == "U" else values
+            try:
+                with contextlib.closing(netCDF4.Dataset(partial, "w")) as file:
+                    _lay_out(file, pattern, self.n)
+                    for chunk in chunks:
+                        columns = self._columns(chunk) | {name: values[chunk] for name, values in self.labels.items()}
+                        if shared:
+                            del columns["time"]
+                        for name, values in columns.items():
+                            file[name][chunk] = values.astype(object) if values.dtype.kind == "U" else values
+            except RuntimeError as error:  # the netCDF library's own word for a disk that is full
+                words = f"What was computed is in {self.folder}, and the same call goes on from there"
+                raise SymtopError(f"cannot write {self.path}: {error}; is the disk full? {words}") from error
         self.forget(chunks)
         return xr.open_dataset(self.path, engine="netcdf4")
 
@@ -343,15 +347,6 @@ class Stream:
             file.unlink(missing_ok=True)
         with contextlib.suppress(OSError):  # something of somebody else's is in it
             self.folder.rmdir()
-
-    @contextlib.contextmanager
-    def _writing(self) -> Iterator[None]:
-        """The netCDF library has an error of its own for a disk that is full."""
-        try:
-            yield
-        except RuntimeError as error:
-            words = f"What was computed is in {self.folder}, and the same call goes on from there"
-            raise SymtopError(f"cannot write {self.path}: {error}; is the disk full? {words}") from error
 
     def _part(self, chunk: slice) -> Path:
         return self.folder / f"{chunk.start}-{chunk.stop}.npz"
@@ -388,7 +383,7 @@ def _lay_out(file: Any, pattern: xr.Dataset, n: int) -> None:
 def _identity(job: Job, labels: dict[str, Any]) -> str:
     """A hash of all that decides the bytes of the file: code, and what it is given."""
     arrays = job.numbers, job.horizon, job.steps, job.tolerance
-    limits = job.chart, job.samples, job.budget, job.shown, CHUNK, CHUNK_STEPS
+    limits = job.chart, job.samples, job.budget, job.observables, CHUNK, CHUNK_STEPS
     return digest({
         **code().reasons("integrator", job.method, Job), **packages(),
         "numbers": hashed(*(netcdf.array_hash(values) for values in (*arrays, *labels.values()))),

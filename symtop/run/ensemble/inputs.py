@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
@@ -42,32 +43,32 @@ class Members(NamedTuple):
         return self.labels.get("member")
 
 
-def read_members(given: "xr.Dataset | Iterable[str | Scene]") -> Members:
+def read_members(members: "xr.Dataset | Iterable[str | Scene]") -> Members:
     """Members from a dataset over ``member`` (scalars count for all) or from scenes or their names.
 
     A dataset with ``I2`` is of bodies, as `symtop.body_population` has them. Raises SymtopError for a variable that is
     missing or has another dimension, for one that looks like a misspelled one of theirs, for tops beside bodies, and
     for members that are no top, no body or no start: by label or number, and reason.
     """
-    if isinstance(given, xr.Dataset):
-        return _from_dataset(given)
-    if isinstance(given, (str, bytes, Scene)) or not isinstance(given, Iterable):
-        raise SymtopError(f"members must be a dataset or a list of scenes, not {shown(given)}")
-    tables = type(given).__module__.startswith("pandas")
-    if tables or isinstance(given, (dict, xr.DataArray)):  # which go through their names or numbers
-        raise SymtopError(f"members must be an xarray.Dataset or a list of scenes, not a {type(given).__name__}")
+    if isinstance(members, xr.Dataset):
+        return _from_dataset(members)
+    if isinstance(members, (str, bytes, Scene)) or not isinstance(members, Iterable):
+        raise SymtopError(f"members must be a dataset or a list of scenes, not {shown(members)}")
+    tables = type(members).__module__.startswith("pandas")
+    if tables or isinstance(members, (dict, xr.DataArray)):  # which go through their names or numbers
+        raise SymtopError(f"members must be an xarray.Dataset or a list of scenes, not a {type(members).__name__}")
     try:
-        chosen = [scene(entry, bodies=True) for entry in given]
+        scenes = [scene(entry, bodies=True) for entry in members]
     except TypeError:  # an array without dimensions
-        raise SymtopError(f"members must be a dataset or a list of scenes, not {shown(given)}") from None
-    if not chosen:
+        raise SymtopError(f"members must be a dataset or a list of scenes, not {shown(members)}") from None
+    if not scenes:
         raise SymtopError("members must be at least one")
-    if len({entry.of_body for entry in chosen}) > 1:
+    if len({entry.of_body for entry in scenes}) > 1:
         raise SymtopError("members must be all tops or all bodies without symmetry, not some of each")
-    numbers = np.array([flat(entry.top, entry.start) for entry in chosen])
-    horizons, names = (np.array([getattr(entry, name) for entry in chosen]) for name in ("horizon", "name"))
-    observes = max((entry.observes for entry in chosen), key=(*OBSERVABLES, BODY).index)
-    units = "SI" if all(entry.units == "SI" for entry in chosen) else ""
+    numbers = np.array([flat(entry.top, entry.start) for entry in scenes])
+    horizons, names = (np.array([getattr(entry, name) for entry in scenes]) for name in ("horizon", "name"))
+    observes = max((entry.observes for entry in scenes), key=(*OBSERVABLES, BODY).index)
+    units = "SI" if all(entry.units == "SI" for entry in scenes) else ""
     return Members(numbers, horizons, observes, units, {"scene": names})
 
 
@@ -84,19 +85,19 @@ def _from_dataset(data: xr.Dataset) -> Members:
     for name, width in parts.items():
         column = np.broadcast_to(np.reshape(USUAL.get(name, 0.0), (1, -1)), (n, width))
         if name in data:
-            given, vector = data[name], width > 1
-            over = given.dims[:-1] if vector else given.dims
-            fits = not vector or given.shape[-1:] == (width,)
-            if over not in ((), ("member",)) or given.dtype.kind not in "fiu" or not fits:
-                wrong = f"{given.dtype} {given.shape} over {', '.join(map(str, given.dims)) or 'nothing'}"
+            values, vector = data[name], width > 1
+            over = values.dims[:-1] if vector else values.dims
+            fits = not vector or values.shape[-1:] == (width,)
+            if over not in ((), ("member",)) or values.dtype.kind not in "fiu" or not fits:
+                wrong = f"{values.dtype} {values.shape} over {', '.join(map(str, values.dims)) or 'nothing'}"
                 each = f"rows of {width} numbers" if vector else "numbers"
                 raise SymtopError(f"{name} of members must be {each} over member, or one for all, not {wrong}")
-            column = np.broadcast_to(given.values.reshape(-1, width), (n, width))
+            column = np.broadcast_to(values.to_numpy().reshape(-1, width), (n, width))
         columns.append(column)
     numbers = np.concatenate(columns, axis=1, dtype=float)
     _check_names(data, parts)
     named = [name for name in ("scene", "stratum") if name in data]
-    labels = {name: np.broadcast_to(data[name].values.astype(str, copy=False), n) for name in named}
+    labels = {name: np.broadcast_to(data[name].to_numpy().astype(str, copy=False), n) for name in named}
     if "member" in data.indexes and "member" in data.dims:
         labels["member"] = _plain(data.indexes["member"])
     check = _checked_bodies if observes == BODY else checked_numbers
@@ -111,26 +112,26 @@ def _checked_bodies(numbers: Array, names: NDArray[Any] | None) -> Array:
             top, start = from_flat(row)
             numbers[i] = replace(top).flat(replace(start))  # which checks what they hold
         except SymtopError as error:
-            raise SymtopError(f"{called(names, i)}: {error}") from None
+            raise SymtopError(f"{member_name(names, i)}: {error}") from None
     return numbers
 
 
 def _check_names(data: xr.Dataset, parts: dict[str, int]) -> None:
     """Refuse a variable that looks like one of theirs, in case, letters, underscores or another word for a rate."""
-    known = {name.lower(): name for name in parts}
+    usual = {name.lower(): name for name in parts}
     for name in (name for name in map(str, data.variables) if name not in parts and name not in WRITTEN):
-        near = [known[like] for like in difflib.get_close_matches(name.lower(), known, n=1, cutoff=NEAR)]
+        near = [usual[like] for like in difflib.get_close_matches(name.lower(), usual, n=1, cutoff=NEAR)]
         if parts is TOP and (rate := RATE.fullmatch(name.lower())) is not None:
             near = [f"{rate[2] or rate[4]}_dot"]
         if near:
             raise SymtopError(f"members have no variable {name!r}; did you mean {near[0]}?")
 
 
-def refuse_others(given: Members, runs: xr.Dataset) -> None:
+def refuse_others(members: Members, runs: xr.Dataset) -> None:
     """Refuse members that are not those of an ensemble, by their number or their labels."""
-    if len(given.numbers) != (n := runs.sizes["member"]):
-        raise SymtopError(f"members must be the {n} of the ensemble, not {len(given.numbers)}")
-    labels = [[*map(str, row)] for row in (given.names, runs.indexes.get("member")) if row is not None]
+    if len(members.numbers) != (n := runs.sizes["member"]):
+        raise SymtopError(f"members must be the {n} of the ensemble, not {len(members.numbers)}")
+    labels = [[*map(str, row)] for row in (members.names, runs.indexes.get("member")) if row is not None]
     if len(labels) == 2 and labels[0] != labels[1]:
         raise SymtopError("members must be those of the ensemble in their order, and their labels are others")
 
@@ -141,7 +142,7 @@ def _plain(index: Any) -> NDArray[Any]:
     return values if values.dtype.kind in "iuf" else np.array([str(label) for label in values])
 
 
-def called(names: NDArray[Any] | None, i: int) -> str:
+def member_name(names: NDArray[Any] | None, i: int) -> str:
     """A member in a sentence: by its label where it has one, otherwise by its number."""
     return f"member {i if names is None else names[i]}"
 
@@ -152,13 +153,12 @@ def _aligned(name: str, value: xr.DataArray, n: int, names: NDArray[Any] | None)
         raise SymtopError(f"{name} must be one number or a row over member, not over {', '.join(map(str, value.dims))}")
     if names is None or value.dims != ("member",) or "member" not in value.indexes:
         return value
-    given, wanted = _plain(value.indexes["member"]), names
-    if np.array_equal(given, wanted):
+    labels = pd.Index(_plain(value.indexes["member"]))
+    if labels.equals(pd.Index(names)):
         return value
-    places = {label: place for place, label in enumerate(given.tolist())}
-    if len(places) < len(given) or len(given) != n or places.keys() != {*wanted.tolist()}:
+    if len(labels) != n or not labels.is_unique or not labels.isin(names).all():
         raise SymtopError(f"{name} must have the labels of the {n} members, each once, not others along member")
-    return value.isel(member=[places[label] for label in wanted.tolist()])
+    return value.isel(member=labels.get_indexer(names))
 
 
 def for_each(name: str, value: object, n: int, names: NDArray[Any] | None = None) -> Array:
@@ -175,5 +175,5 @@ def for_each(name: str, value: object, n: int, names: NDArray[Any] | None = None
     row = array.astype(float)
     bad = np.flatnonzero(~(np.isfinite(row) & (row > 0.0)))
     if bad.size:
-        positive(f"{name} of {called(names, bad[0])}", row[bad[0]])
+        positive(f"{name} of {member_name(names, bad[0])}", row[bad[0]])
     return row

@@ -123,20 +123,14 @@ def largest_errors(scene: Scene, times: Array, quaternions: Any, phis: Any, psis
     mp, rows = context(DIGITS + 10), []
     for t, *numbers in zip(times, *quaternions.T, phis, psis, strict=True):
         precise = precise_attitude(scene.top, scene.start, DIGITS, float(t))
-        true = w, x, y, z = tuple(map(mp.convert, precise))  # all digits, in this arithmetic
-        *attitude, phi, psi = [mp.mpf(float(one) if isinstance(one, float) else str(one)) for one in numbers]
-        if sum(a * b for a, b in zip(attitude, true, strict=True)) < 0:
-            attitude = [-value for value in attitude]
-        turn = 2.0 * float(mp.norm([a - b for a, b in zip(attitude, true, strict=True)]))
-        tilt = float(mp.norm([a - b for a, b in zip(_axis(attitude), _axis(true), strict=True)]))
+        w, x, y, z = true = np.array([mp.convert(value) for value in precise])  # all digits, in this arithmetic
+        *parts, phi, psi = [mp.mpf(float(one) if isinstance(one, float) else str(one)) for one in numbers]
+        attitude = np.array(parts) if true @ parts >= 0 else -np.array(parts)
+        turn = 2.0 * float(mp.norm(attitude - true))
+        tilt = float(mp.norm(charts.axis_from_quaternion(attitude) - charts.axis_from_quaternion(true)))
         total, difference = mp.atan2(z, w), mp.atan2(y, x)
         rows.append((turn, tilt, _turn(mp, phi, total + difference), _turn(mp, psi, total - difference)))
     return Checks(times, *np.maximum.accumulate(np.array(rows), axis=0).T)
-
-
-def _axis(quaternion: Any) -> tuple[Any, Any, Any]:
-    w, x, y, z = quaternion
-    return 2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z
 
 
 def _turn(mp: Any, angle: Any, true: Any) -> float:

@@ -124,12 +124,12 @@ def reference(
     motion is not known to 1e-9 rad.
     """
     chosen = find_scene(scene, bodies=True)
-    wanted = real_numbers("times", times)
-    if wanted.ndim != 1 or wanted.size == 0 or not np.isfinite(wanted).all() or wanted.min() < 0.0:
+    moments = real_numbers("times", times)
+    if moments.ndim != 1 or moments.size == 0 or not np.isfinite(moments).all() or moments.min() < 0.0:
         raise SymtopError(f"times must be a row of finite numbers of at least 0, not {short(times)}")
     one_of("precision", precision, PRECISIONS)
     if chosen.of_body:
-        return _of_body(chosen, wanted, precision, certify)
+        return _of_body(chosen, moments, precision, certify)
     if certify is not None:
         one_of("certify", certify, KINDS)
         if precision != "closed-form":
@@ -141,9 +141,9 @@ def reference(
         sentence = f"heyoka is not installed: the closed form in double {missing}"
         warnings.warn(sentence, SymtopWarning, stacklevel=2)
     if source == "closed-form":
-        data, words = _by_closed_form(chosen, wanted, certify)
+        data, words = _by_closed_form(chosen, moments, certify)
     else:
-        data, words = _by_integration(chosen, wanted, source)
+        data, words = _by_integration(chosen, moments, source)
     words = {"scene": chosen.name, "precision": source, "asked_for": precision} | words
     return netcdf.describe(data, f"reference motion of {chosen.name}", chosen.units, **words)
 
@@ -193,8 +193,8 @@ def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) ->
     source = "closed-form" if body.free else "quad" if precision == "quad" else "longdouble"
     words = "256 times the distance of two integrations that differ in order, steps and rounding"
     words = "from the arithmetic of the exact motion of a free body" if body.free else words
-    said = {"scene": scene.name, "precision": source, "asked_for": precision, "bound": words}
-    return netcdf.describe(data, f"reference motion of {scene.name}", scene.units, **said)
+    attributes = {"scene": scene.name, "precision": source, "asked_for": precision, "bound": words}
+    return netcdf.describe(data, f"reference motion of {scene.name}", scene.units, **attributes)
 
 
 def _by_closed_form(scene: Scene, times: Array, certify: str | None) -> tuple[xr.Dataset, dict[str, str]]:
@@ -218,7 +218,8 @@ def _by_integration(scene: Scene, times: Array, precision: str) -> tuple[xr.Data
     if distinct.size > MOST_CACHED:
         data = _integration(scene, distinct, precision)
     else:
-        data = cached(_cache_path(scene, distinct, precision), lambda: _integration(scene, distinct, precision), 5)
+        path = place(_integration, scene.top, scene.start, precision, CHECKS, DIGITS, SAFETY, data=distinct.tobytes())
+        data = cached(path, lambda: _integration(scene, distinct, precision), 5)
     if not np.array_equal(times, distinct):
         data = data.isel(time=order)
     words = {
@@ -242,10 +243,6 @@ def conditioned(scene: Scene, horizon: float) -> str:
         known = "nothing is known of the axis but from these very doubles"
         return f"at least {change}; {anew} {factor * EPSILON:.2g} rad or more: {known}"
     return f"{change}; {anew} {factor * EPSILON:.1g} rad" if factor > ILL else change
-
-
-def _cache_path(scene: Scene, times: Array, precision: str) -> Path:
-    return place(_integration, scene.top, scene.start, precision, CHECKS, DIGITS, SAFETY, data=times.tobytes())
 
 
 def _dataset(scene: Scene, times: Array, columns: dict[str, Array], bounds: dict[str, Array]) -> xr.Dataset:
