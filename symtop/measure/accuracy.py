@@ -77,7 +77,7 @@ def error_row(
     phases: bool = False,
     budget: float | None = None,
 ) -> dict[str, float | str]:
-    """One run's entries in an error table; with `phases` also its frequencies, shape error and lags (see `phase`).
+    """One run's entries in an error table; with `phases` also the errors of its frequencies (see `phase`).
 
     `budget` is that of `simulate`.
     """

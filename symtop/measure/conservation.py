@@ -43,6 +43,7 @@ LAWS = {0.0: "bounded", 0.5: "random walk", 1.0: "linear", 1.5: "t^3/2", 2.0: "q
 RUN_ROUNDING = 3e-13  # relative: the largest change that a million steps of rounding explain where sums are compensated
 WALK = 100.0  # times what rounding explains: a larger growth as t^1/2 is no walk of rounding
 BLOCKS = 24
+SLACK = 0.1  # an exponent this near to that of a law, beyond its interval, still is that law
 
 
 class Trend(NamedTuple):
@@ -109,8 +110,8 @@ def tops(
     return middles, largest
 
 
-def law(fit: Fit, slack: float = 0.1) -> str:
-    """The name of the exponent that a fit agrees with, within its interval or `slack`; otherwise the exponent.
+def law(fit: Fit) -> str:
+    """The name of the exponent that a fit agrees with, within its interval or `SLACK`; otherwise the exponent.
 
     "undecided" if another law lies within the interval as well.
     """
@@ -119,7 +120,7 @@ def law(fit: Fit, slack: float = 0.1) -> str:
     nearest = min(LAWS, key=lambda exponent: abs(exponent - fit.slope))
     if any(abs(exponent - fit.slope) <= fit.interval for exponent in LAWS if exponent != nearest):
         return "undecided"
-    agrees = abs(nearest - fit.slope) <= max(fit.interval, slack)
+    agrees = abs(nearest - fit.slope) <= max(fit.interval, SLACK)
     return LAWS[nearest] if agrees else f"t^{fit.slope:.2f}"
 
 

@@ -42,16 +42,16 @@ def _dense(cases: list[tuple[Any, xr.Dataset]]) -> xr.Dataset:
     scenes, methods = (list(dict.fromkeys(names)) for names in list(zip(*cells, strict=True))[:2])
     sizes, coordinates = _coordinates(cells)
     filled: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]] = {}
-    taken = set[tuple[str, str, str]]()
+    keys = set[tuple[str, str, str]]()
     for scene, method, data in cells:
         place = scenes.index(scene), methods.index(method)
         for name, variable in data.data_vars.items():
-            if (scene, method, str(name)) in taken:
+            if (scene, method, str(name)) in keys:
                 raise SymtopError(
                     f"two cases of {method} on {scene} measure {name}, and one would replace the other: "
                     "give each a group, or measure all settings in one case, over a dimension of the dataset"
                 )
-            taken.add((scene, method, str(name)))
+            keys.add((scene, method, str(name)))
             dims = tuple(str(dim) for dim in variable.dims)
             if str(name) not in filled:
                 blank = np.full((len(scenes), len(methods), *(sizes[dim] for dim in dims)), *_blank(variable.dtype))

@@ -244,8 +244,8 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
     time = _times(data)
     columns: dict[str, Any] = {name: _numbers(name, data[name]) for name in SHAPES if name in data}
     for name, values in columns.items():
-        if values.shape != (wanted := (time.size, *SHAPES[name])):
-            raise SymtopError(f"{name} must have the shape {wanted}, one row for each time, not {values.shape}")
+        if values.shape != (shape := (time.size, *SHAPES[name])):
+            raise SymtopError(f"{name} must have the shape {shape}, one row for each time, not {values.shape}")
     if not set(ENOUGH) & set(columns):
         raise SymtopError("data must hold one of axis, quaternion, theta beside time, to show where the top is")
     for name in ("axis", "quaternion"):

@@ -45,11 +45,8 @@ Array = Any
 
 
 class Phase(NamedTuple):
-    """Largest shape error and lags of a run, errors of its frequencies, and what the reference can judge of these."""
+    """Relative errors of the frequencies of a run, and what the reference can judge of these."""
 
-    shape: float
-    nutation_lag: float
-    precession_lag: float
     nutation_period: float
     precession_rate: float
     nutation_period_bound: float
@@ -148,9 +145,9 @@ def _slope(t: Array, values: Array, bound: Array, weights: Array) -> tuple[float
 
 
 def phase(scene: Scene, run: Trajectory, truth: xr.Dataset) -> Phase:
-    """Shape, lags and frequencies of a run; all NaN if it failed or has fewer than three samples."""
+    """Errors of the frequencies of a run; all NaN if it failed or has fewer than three samples."""
     if run.outcome != "ok" or run.time.size < 3:
-        return Phase(*[math.nan] * 7)
+        return Phase(*[math.nan] * 4)
     form, t = closed_form(scene), run.time
     sine = np.maximum(np.sin(run.theta), EPSILON)
     with np.errstate(over="ignore", invalid="ignore"):  # a run may be far from anything
@@ -169,9 +166,6 @@ def phase(scene: Scene, run: Trajectory, truth: xr.Dataset) -> Phase:
     turned, turn_doubt = _slope(t, parts.turn, grain / sine + EPSILON * np.abs(truth["phi"].values), sine * sine)
     turn_doubt += abs(mean_rate) * (doubt + EPSILON)
     return Phase(
-        shape=float(np.max(parts.shape)),
-        nutation_lag=omega * float(np.max(np.abs(parts.lag))) if swings else math.nan,
-        precession_lag=float(np.max(np.abs(sine * parts.turn))),
         nutation_period=abs(1.0 / (1.0 + faster) - 1.0) if swings else math.nan,
         precession_rate=abs(mean_rate * faster + turned) / scale,
         nutation_period_bound=doubt if swings else math.nan,

@@ -12,8 +12,7 @@ import numpy as np
 from symtop.model.scenes import closed_form, scene as find_scene
 from symtop.run.reference.truth import reference
 
-REMARK = "an asymmetric free body: tests the solver beside us, not symtop"
-TRAJECTORY, START, OTHER_BODY = "trajectory", "start", "another body"
+TRAJECTORY, START, OTHER_BODY = "trajectory", "start", "another body"  # the last tests SciPy beside us, not symtop
 
 
 class Published(NamedTuple):
@@ -25,7 +24,6 @@ class Published(NamedTuple):
     ours: float
     unit: float  # one unit of the last digit that is compared
     kind: str  # printed, formula or consistency
-    remark: str = ""
     tests: str = TRAJECTORY  # what the comparison tests: a trajectory of a top, its start, or another body
 
     @property
@@ -40,11 +38,11 @@ def published_values() -> list[Published]:
     energy = scene.top.energy(scene.start)
     values = [Published(source, "energy of the fast top", 1269.975, energy, 1e-3, "printed", tests=START)]
 
-    source, remark = "Bruls, Cardona & Arnold 2012", "regression data of public codes, h = 2e-6"
+    source = "Bruls, Cardona & Arnold 2012"  # regression data of public codes, h = 2e-6
     moved = reference("bruls-cardona-arnold", [1.0], "longdouble")["axis"].values[0] - np.array([0.0, 1.0, 0.0])
     for name, value, ours in zip("xyz", (0.17334, -0.35991, -0.74849), moved, strict=True):
         quantity = f"{name} displacement of the centre at t = 1"
-        values.append(Published(source, quantity, value, ours, 1e-5, "printed", remark))
+        values.append(Published(source, quantity, value, ours, 1e-5, "printed"))
 
     scene = find_scene("separatrix")
     g = math.sqrt(scene.top.mgl / scene.top.I1)
@@ -72,6 +70,6 @@ def published_values() -> list[Published]:
     )  # fmt: skip
     source, printed = "Enright & Pryce 1987, DETEST B5", (-0.93965707987, -0.34211777540, 0.74141265962)
     return values + [
-        Published(source, f"y{k + 1}(20)", value, float(done.y[k, -1]), 1e-11, "printed", REMARK, OTHER_BODY)
+        Published(source, f"y{k + 1}(20)", value, float(done.y[k, -1]), 1e-11, "printed", OTHER_BODY)
         for k, value in enumerate(printed)
     ]

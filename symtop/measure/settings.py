@@ -216,17 +216,17 @@ def search(
         guess = likely_step(scene, method, horizon, accuracy) if method.fixed_step else 0.1 * accuracy
     if method.fixed_step and horizon / min(guess, ends[1]) > patience:
         return BUDGET
-    tried: dict[float, Met] = {}
+    results: dict[float, Met] = {}
 
     def run(setting: float) -> tuple[float, float]:
-        met = tried[setting] = attempt(scene, method, setting, horizon, quantity)
+        met = results[setting] = attempt(scene, method, setting, horizon, quantity)
         return met.error, met.evaluations
 
     try:
         setting = seek(run, guess, accuracy, ends, power, fixed_step=method.fixed_step, patience=patience, least=least)
     except SymtopError as error:  # a start at a pole, for a method in the angles chart
         return f"Not run, as {error}"
-    return setting if isinstance(setting, str) else tried[setting]
+    return setting if isinstance(setting, str) else results[setting]
 
 
 def at_accuracy(method: Integrator, ratio: float) -> float:
@@ -250,5 +250,5 @@ def seconds(scene: Scene, mets: Sequence[Met], quantity: str, horizon: float, ba
     for met in mets:
         chart = chart_of(met.integrator, scene.observes, observed(quantity))
         runs.append(bare_run(scene, met.integrator, chart, met.setting, met.horizon))
-    taken = timings(runs, batches, batch=0.002, patience=0.06 * batches, exact=False)
-    return [timing.best * horizon / met.horizon for timing, met in zip(taken, mets, strict=True)]
+    results = timings(runs, batches, batch=0.002, patience=0.06 * batches, exact=False)
+    return [timing.best * horizon / met.horizon for timing, met in zip(results, mets, strict=True)]

@@ -230,8 +230,8 @@ def timed_rows(cells: "list[tuple[Scene, Integrator, float, list[dict[str, Any]]
         rows += (ended := [one for one in runs if one["outcome"] == "ok"])
         calls += [bare_run(scene, method, next(iter(method.solvers)), one["setting_value"], horizon) for one in ended]
     with foreign_code("a method that is timed"):
-        taken = timings(calls, BATCHES, BATCH, warm=True, patience=PATIENCE, close=CLOSE) if calls else []
-    for one, timing in zip(rows, taken, strict=True):
+        results = timings(calls, BATCHES, BATCH, warm=True, patience=PATIENCE, close=CLOSE) if calls else []
+    for one, timing in zip(rows, results, strict=True):
         one |= {"seconds": timing.best, "seconds_spread": timing.spread}
 
 

@@ -79,7 +79,6 @@ def timings(
     functions: Sequence[Callable[[], object]],
     batches: int = 5,
     batch: float = BATCH,
-    seed: int = 0,
     *,
     warm: bool = False,
     patience: float = math.inf,
@@ -105,14 +104,14 @@ def timings(
         count, long = _calibrate(function, batch)
         calls.append(count)
         samples.append([long] if warm and long is not None else [])
-    draw = random.Random(seed)  # noqa: S311
+    draw = random.Random(0)  # noqa: S311
     for number in range(batches):
         for index in draw.sample(range(len(functions)), len(functions)):
-            taken = samples[index]
-            done = (len(taken) >= least and calls[index] * sum(taken) >= patience) or agree(taken, close)
-            if len(taken) <= number and not done:
-                taken.append(_batch(functions[index], calls[index]) / calls[index])
-    return [Timing(tuple(taken), first) for taken, first in zip(samples, firsts, strict=True)]
+            row = samples[index]
+            done = (len(row) >= least and calls[index] * sum(row) >= patience) or agree(row, close)
+            if len(row) <= number and not done:
+                row.append(_batch(functions[index], calls[index]) / calls[index])
+    return [Timing(tuple(row), first) for row, first in zip(samples, firsts, strict=True)]
 
 
 def agree(samples: Sequence[float], close: float) -> bool:
@@ -125,12 +124,10 @@ def agree(samples: Sequence[float], close: float) -> bool:
 
 
 def bare_run(
-    scene: Scene, method: Integrator, chart: str, setting: float, horizon: float, samples: int = 2,
-    budget: float | None = None,
-) -> Callable[[], Run]:  # fmt: skip
-    """A call of one of a method's solvers, start to horizon, with nothing around it."""
-    control = method.given(setting)
-    plan, _ = make_plan(scene, method, **control, horizon=horizon, samples=samples, budget=budget)
+    scene: Scene, method: Integrator, chart: str, setting: float, horizon: float, budget: float | None = None
+) -> Callable[[], Run]:
+    """A call of one of a method's solvers, start to horizon, with two samples and nothing around it."""
+    plan, _ = make_plan(scene, method, **method.given(setting), horizon=horizon, samples=2, budget=budget)
     solve = method.solvers[chart]
     return lambda: solve(scene.top, scene.start, plan)
 

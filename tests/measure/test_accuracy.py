@@ -12,7 +12,6 @@ from symtop.measure.order import LARGEST_ERROR, order
 from symtop.measure.order_table import asymptotic_steps, extended_errors, extended_order_data
 from symtop.methods.framework.registry import integrator
 from symtop.model.charts import axis_from_angles, momentum_parts
-from symtop.model.scenes import scene
 from symtop.run.reference.independent_checks import have_heyoka
 from symtop.run.reference.truth import reference
 from symtop.run.simulation import integrate
@@ -23,9 +22,9 @@ HORIZONS = (10.037, 100.37, 1003.7)  # nutations
 
 
 def largest_errors(name, method, nutations, samples):
-    where = scene(name)
-    period = where.nutation_period
-    run = symtop.simulate(where, method, step_size=period / 40.0, horizon=nutations * period, samples=samples,
+    scene = symtop.scene(name)
+    period = scene.nutation_period
+    run = symtop.simulate(scene, method, step_size=period / 40.0, horizon=nutations * period, samples=samples,
                           observe="axis", guard=False)  # fmt: skip
     errors = symtop.errors(run)
     return np.array([float(errors[quantity].max()) for quantity in ("axis", "theta")])
@@ -34,9 +33,9 @@ def largest_errors(name, method, nutations, samples):
 @pytest.mark.parametrize("name", ["spheroid", "goldstein", "grazing"])
 @pytest.mark.parametrize("method", ["takahashi-imada", "rk4"])
 def test_the_largest_error_of_enough_samples_is_that_of_a_dense_run_to_five_percent(name, method):
-    period = scene(name).nutation_period
+    period = symtop.scene(name).nutation_period
     for nutations in HORIZONS:
-        samples = enough_samples(scene(name), nutations * period)
+        samples = enough_samples(symtop.scene(name), nutations * period)
         assert SAMPLES <= samples < 2 * SAMPLES
         share = largest_errors(name, method, nutations, samples) / largest_errors(name, method, nutations, DENSE)
         assert np.all(share > 0.95)
@@ -44,9 +43,9 @@ def test_the_largest_error_of_enough_samples_is_that_of_a_dense_run_to_five_perc
 
 def test_as_many_samples_at_one_phase_of_the_nutation_see_less():
     """1004 samples of 1003 nutations come at nearly the same phase of each, and their phase drifts once in the run."""
-    where = scene("goldstein")
-    horizon = 1003.7 * where.nutation_period
-    stride = np.mod(horizon / (enough_samples(where, horizon) - 1) / where.nutation_period, 1.0)
+    scene = symtop.scene("goldstein")
+    horizon = 1003.7 * scene.nutation_period
+    stride = np.mod(horizon / (enough_samples(scene, horizon) - 1) / scene.nutation_period, 1.0)
     assert min(abs(stride - 0.618), abs(stride - 0.382)) < 0.02
     shares = [largest_errors("goldstein", "takahashi-imada", 1003.7, count)[1] for count in (EVEN, SAMPLES, DENSE)]
     assert min(shares[:2]) < 0.95 * shares[2]
@@ -54,34 +53,34 @@ def test_as_many_samples_at_one_phase_of_the_nutation_see_less():
 
 @pytest.mark.skipif(not have_heyoka(), reason="long double needs heyoka")
 def test_errors_are_taken_from_both_halves_of_the_reference():
-    where = scene("goldstein")
-    truth = reference(where, np.linspace(0.0, 20.0, 41), "longdouble")
+    scene = symtop.scene("goldstein")
+    truth = reference(scene, np.linspace(0.0, 20.0, 41), "longdouble")
     rounded = Trajectory.of_data(truth[["axis", "quaternion", "theta"]])  # right to the last digit
-    with_low = errors_against(where, rounded, truth)
+    with_low = errors_against(scene, rounded, truth)
     for name, low in (("axis", "axis_lo"), ("attitude", "quaternion_lo"), ("theta", "theta_lo")):
         assert 1e-18 < float(with_low[name].max()) < EPSILON
         assert float(np.abs(truth[low].values).max()) > 1e-18
         dropped = truth.drop_vars([low])
-        assert float(errors_against(where, rounded, dropped)[name].max()) < 1e-20
+        assert float(errors_against(scene, rounded, dropped)[name].max()) < 1e-20
 
 
 def test_a_run_that_shows_its_quaternion_is_judged_without_the_rounding_of_its_angles():
-    where = scene("spheroid")
-    angles, attitude = (integrate(where, name, step_size=0.01, samples=101, observe="attitude")
+    scene = symtop.scene("spheroid")
+    angles, attitude = (integrate(scene, name, step_size=0.01, samples=101, observe="attitude")
                         for name in ("stormer-verlet", "gauss-12"))  # fmt: skip
-    truth = reference(where, angles.time, "closed-form")
+    truth = reference(scene, angles.time, "closed-form")
     turned = float(np.max(np.abs(truth["phi"].values) + np.abs(truth["psi"].values)))
-    wide, narrow = (float(error_bound(where, run, truth, "attitude").max()) for run in (angles, attitude))
+    wide, narrow = (float(error_bound(scene, run, truth, "attitude").max()) for run in (angles, attitude))
     assert wide - narrow == pytest.approx(0.5 * EPSILON * turned, rel=0.05)
-    assert errors_against(where, attitude, truth)["attitude"][1] < 3.0 * narrow
+    assert errors_against(scene, attitude, truth)["attitude"][1] < 3.0 * narrow
 
 
 def test_added_steps_lie_where_the_error_is_a_power_of_the_step():
-    where, method = scene("goldstein"), integrator("sofroniou-spaletta-10")
-    horizon = 5.0 * where.nutation_period
-    coarse = error_table(where, method, list(where.nutation_period / np.geomspace(6.0, 80.0, 9)), horizon, "attitude")
+    scene, method = symtop.scene("goldstein"), integrator("sofroniou-spaletta-10")
+    horizon = 5.0 * scene.nutation_period
+    coarse = error_table(scene, method, list(scene.nutation_period / np.geomspace(6.0, 80.0, 9)), horizon, "attitude")
     steps = asymptotic_steps(coarse, "attitude", 10)
-    table = error_table(where, method, steps, horizon, "attitude")
+    table = error_table(scene, method, steps, horizon, "attitude")
 
     def judged(part):
         return int(np.sum((part["attitude"] > 10.0 * part["attitude_bound"]) & (part["attitude"] < LARGEST_ERROR)))
@@ -96,21 +95,21 @@ def test_added_steps_lie_where_the_error_is_a_power_of_the_step():
 @pytest.mark.parametrize("name", ["goldstein", "spheroid"])
 def test_a_composition_in_long_double_has_its_order_where_double_runs_out(name):
     """Order 10 falls from 1e-10 to 1e-17: in double only the first decades of it are above round-off."""
-    where = scene(name)
-    data = extended_errors(where, integrator("sofroniou-spaletta-10"))
+    scene = symtop.scene(name)
+    data = extended_errors(scene, integrator("sofroniou-spaletta-10"))
     error = data["extended_error"].values
     assert error.min() < 1e-17 < EPSILON < 1e-11 < error.max()
-    omega = 2.0 * np.pi / where.nutation_period
+    omega = 2.0 * np.pi / scene.nutation_period
     fit = order(*extended_order_data(data), omega, 10, symmetric=True)
     assert abs(fit.slope - 10.0) <= fit.interval < 0.15
-    kept = error > 1e-13  # what double can judge
-    double = order(*(values[kept] for values in extended_order_data(data)), omega, 10, symmetric=True)
+    above = error > 1e-13  # what double can judge
+    double = order(*(values[above] for values in extended_order_data(data)), omega, 10, symmetric=True)
     assert not double.interval < 0.15  # NaN, or wide
 
 
-def alone(where, stages, horizon, count):
+def alone(scene, stages, horizon, count):
     """The axis after `count` steps of a composition, by vectors, one step at a time."""
-    top, at = where.top, where.start
+    top, at = scene.top, scene.start
     angles = [np.longdouble(value) for value in (at.theta, at.phi)]
     e = axis_from_angles(*angles)
     L = np.array(momentum_parts(np, top, *angles, at.theta_dot, at.phi_dot, at.psi_dot))
@@ -129,15 +128,15 @@ def alone(where, stages, horizon, count):
 
 @pytest.mark.parametrize("name", ["strang", "kahan-li-6"])
 def test_runs_side_by_side_in_long_double_are_those_alone(name):
-    where = scene("spheroid")
-    horizon, counts = 1.37 * where.nutation_period, np.array([7, 8, 40])
-    stages = order_table._composition(where, integrator(name))
-    together = order_table._ends(where, stages, horizon, counts)
+    scene = symtop.scene("spheroid")
+    horizon, counts = 1.37 * scene.nutation_period, np.array([7, 8, 40])
+    stages = order_table._composition(scene, integrator(name))
+    together = order_table._ends(scene, stages, horizon, counts)
     for count, end in zip(counts, together, strict=True):
-        assert np.array_equal(end, order_table._ends(where, stages, horizon, np.array([count]))[0])
-        expected = alone(where, stages, horizon, count)
+        assert np.array_equal(end, order_table._ends(scene, stages, horizon, np.array([count]))[0])
+        expected = alone(scene, stages, horizon, count)
         assert np.abs(end - expected).max() < 1e-15
-        assert np.abs(end - alone(where, stages, horizon, count + 1)).max() > 1e-12  # the control
+        assert np.abs(end - alone(scene, stages, horizon, count + 1)).max() > 1e-12  # the control
 
 
 @pytest.mark.filterwarnings("error")
@@ -151,6 +150,6 @@ def test_a_free_top_is_run_in_long_double_without_a_warning(psi_dot):
 
 
 def test_only_plain_compositions_are_run_in_long_double():
-    where = scene("goldstein")
+    scene = symtop.scene("goldstein")
     for name in ("takahashi-imada", "cayley", "gauss-4", "stormer-verlet", "rk4", "rk45"):
-        assert extended_errors(where, integrator(name)) is None
+        assert extended_errors(scene, integrator(name)) is None

@@ -18,9 +18,9 @@ DISCRETE = {"midpoint": 1e-11, "trapezoidal": 1e-11, "stormer-verlet": 1e-11, "g
 @pytest.fixture(scope="module")
 def million():
     """10^6 steps of each discrete method on spheroid."""
-    where = symtop.scene("spheroid")
+    scene = symtop.scene("spheroid")
     return {
-        name: integrate(where, name, step_size=0.01, horizon=10_000.0, samples=4001, observe="nutation")
+        name: integrate(scene, name, step_size=0.01, horizon=10_000.0, samples=4001, observe="nutation")
         for name in DISCRETE
     }
 
@@ -52,8 +52,8 @@ def test_momenta_are_recomputed_and_not_copied():
     from symtop.methods.framework.loop import kernel_loop
     from symtop.methods.lagrangian import discrete_lagrangian as family
 
-    where = symtop.scene("spheroid")
-    par, state = on_angles(where.top, where.start)
+    scene = symtop.scene("spheroid")
+    par, state = on_angles(scene.top, scene.start)
     right = family.increment
 
     def wrong(par, rule, state, carry, h):
@@ -62,7 +62,7 @@ def test_momenta_are_recomputed_and_not_copied():
 
     loop = kernel_loop(family.begin, wrong, family.observe)
     done = loop(par, family.Quadrature((0.5,), (1.0,)), state, 0.01, np.array([0, 100]))
-    momenta = where.top.momenta(where.start)
+    momenta = scene.top.momenta(scene.start)
     assert abs(done.momenta[-1, 0] / momenta.p_phi - 1.0) > 1e-8
 
 
@@ -79,15 +79,15 @@ SPHEROID = symtop.scene("spheroid")
 PLAN = Plan.steps(SPHEROID.nutation_period / 118.02, [0, 40_000])
 
 
-@pytest.mark.parametrize("where", random_scenes(3, seed=77), ids=lambda s: s.name)
-def test_nine_states_of_the_motion_have_its_momenta(where):
-    h = where.time_scale() / 118.0
-    motion = closed_form(where)(np.arange(9) * h)
-    states = np.stack([motion.theta, where.top.I1 * motion.theta_dot, motion.phi, motion.psi], axis=-1)
-    momenta = where.top.momenta(where.start)
-    p_phi, p_psi = momenta_of(where.top, states[None], h)
-    assert abs(p_phi[0] - momenta.p_phi) < 1e-7 * where.momentum_scale
-    assert abs(p_psi[0] - momenta.p_psi) < 1e-7 * where.momentum_scale
+@pytest.mark.parametrize("scene", random_scenes(3, seed=77), ids=lambda s: s.name)
+def test_nine_states_of_the_motion_have_its_momenta(scene):
+    h = scene.time_scale() / 118.0
+    motion = closed_form(scene)(np.arange(9) * h)
+    states = np.stack([motion.theta, scene.top.I1 * motion.theta_dot, motion.phi, motion.psi], axis=-1)
+    momenta = scene.top.momenta(scene.start)
+    p_phi, p_psi = momenta_of(scene.top, states[None], h)
+    assert abs(p_phi[0] - momenta.p_phi) < 1e-7 * scene.momentum_scale
+    assert abs(p_psi[0] - momenta.p_psi) < 1e-7 * scene.momentum_scale
 
 
 @pytest.mark.parametrize("name", ["midpoint", "stormer-verlet", "rk4", "trapezoidal"])
@@ -100,12 +100,12 @@ def test_a_run_that_hides_its_drift_is_seen():
 
     def solve(top, start, plan):
         run = rk4.solvers["angles"](top, start, plan)
-        kept = top.momenta(start)
+        momenta = top.momenta(start)
         same = np.ones(plan.times.size)
-        return run._replace(p_phi=kept.p_phi * same, p_psi=kept.p_psi * same)
+        return run._replace(p_phi=momenta.p_phi * same, p_psi=momenta.p_psi * same)
 
-    found = from_increments(dataclasses.replace(rk4, name="copied", solvers={"angles": solve}), SPHEROID, PLAN)
-    assert found.size > 100.0 * found.floor
+    difference = from_increments(dataclasses.replace(rk4, name="copied", solvers={"angles": solve}), SPHEROID, PLAN)
+    assert difference.size > 100.0 * difference.floor
 
 
 def test_a_run_of_few_steps_says_nothing():

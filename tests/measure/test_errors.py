@@ -85,12 +85,12 @@ def test_a_member_of_fewer_steps_than_samples_has_the_errors_of_its_run():
             symtop.simulate("spheroid", "strang", step_size=h, samples=101, guard=False),
         )
         assert bool(np.isnan(member["time"]).any()) is (k == 0)
-        wanted = symtop.errors(alone)
+        expected = symtop.errors(alone)
         labelled = member.assign_attrs({name: alone.attrs[name] for name in ("scene", "top", "start", "horizon")})
         for shown in (symtop.errors(member, "spheroid"), symtop.errors(labelled)):
             for name in ("time", "axis", "attitude", "energy", "axis_bound"):
-                np.testing.assert_array_equal(shown[name].values, wanted[name].values)
-        assert symtop.judge(member)["axis_error"].value == pytest.approx(float(wanted["axis"].max()))
+                np.testing.assert_array_equal(shown[name].values, expected[name].values)
+        assert symtop.judge(member)["axis_error"].value == pytest.approx(float(expected["axis"].max()))
     with pytest.raises(symtop.SymtopError, match="scene is missing"):
         symtop.errors(runs.isel(member=0))
     with pytest.raises(symtop.SymtopError, match="time must be finite"):  # a stranger's time that is no number
@@ -99,8 +99,8 @@ def test_a_member_of_fewer_steps_than_samples_has_the_errors_of_its_run():
 
 def test_a_run_that_was_written_and_read_gives_the_same(tmp_path):
     run = symtop.simulate("spheroid", "strang", step_size=0.01)
-    kept = netcdf.read(netcdf.write(run, tmp_path / "run.nc"))
-    xr.testing.assert_identical(symtop.errors(run), symtop.errors(kept))
+    again = netcdf.read(netcdf.write(run, tmp_path / "run.nc"))
+    xr.testing.assert_identical(symtop.errors(run), symtop.errors(again))
 
 
 def test_samples_after_a_failure_stay_nan():
@@ -231,11 +231,11 @@ def test_another_unit_of_time_is_asked_about():
     horizon = symtop.scene("spheroid").horizon
     for times, doubtful in ((np.linspace(0.0, 1e3 * horizon, 41), True), (np.linspace(0.0, 50 * horizon, 41), False)):
         data = {"time": times, "quaternion": reference("spheroid", times)["quaternion"].values}
-        with warnings.catch_warnings(record=True) as heard:
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             symtop.errors(data, "spheroid")
-        said = [str(one.message) for one in heard]
-        assert [("are they in the scene's unit of time" in one) for one in said] == [True] * doubtful
+        sentences = [str(one.message) for one in caught]
+        assert [("are they in the scene's unit of time" in one) for one in sentences] == [True] * doubtful
 
 
 def test_errors_of_an_ensemble_are_those_of_its_members_alone():

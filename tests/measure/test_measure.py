@@ -67,28 +67,28 @@ def test_false_alarms_of_the_trend_are_as_rare_as_it_says():
 
 
 def test_errors_of_momenta_and_energy_are_relative_to_their_documented_scales():
-    where = symtop.scene("goldstein")
-    run = symtop.simulate(where, "exact", samples=5)
-    found = symtop.errors(run.assign(p_phi=run["p_phi"] + 0.5, energy=run["energy"] + 0.16))
-    assert found["p_phi"].values == pytest.approx(0.5 / 5.0, rel=1e-12)  # the larger momentum is p_psi = 5
-    assert found["energy"].values == pytest.approx(0.16 / 0.24705927, rel=1e-6)  # E0 - p_psi^2/2 I3 - min V
+    scene = symtop.scene("goldstein")
+    run = symtop.simulate(scene, "exact", samples=5)
+    errors = symtop.errors(run.assign(p_phi=run["p_phi"] + 0.5, energy=run["energy"] + 0.16))
+    assert errors["p_phi"].values == pytest.approx(0.5 / 5.0, rel=1e-12)  # the larger momentum is p_psi = 5
+    assert errors["energy"].values == pytest.approx(0.16 / 0.24705927, rel=1e-6)  # E0 - p_psi^2/2 I3 - min V
 
 
 def test_a_table_stops_for_good_once_a_run_took_too_much_work():
-    where = symtop.scene("spheroid")
+    scene = symtop.scene("spheroid")
     method = symtop.integrator("rk45")
-    table = error_table(where, method, [1e-3, 1e-12, 1e-13, 1e-4], 12.0)
+    table = error_table(scene, method, [1e-3, 1e-12, 1e-13, 1e-4], 12.0)
     assert list(table["outcome"].values) == ["ok", "ok", "not_run", "not_run"]
 
 
 def test_ladders_end_at_the_largest_number_of_steps_and_the_least_tolerance():
-    where = symtop.scene("spheroid")
+    scene = symtop.scene("spheroid")
     for name in ("midpoint", "kahan-li-8", "gauss-12"):
-        steps = ladder(symtop.integrator(name), where, 8.0, 6, most=1e4)
+        steps = ladder(symtop.integrator(name), scene, 8.0, 6, most=1e4)
         assert len(steps) == 6
         assert all(np.diff(steps) < 0.0)
         assert 8.0 / steps[-1] <= 1.001e4
-    tolerances = ladder(symtop.integrator("rk45"), where, 8.0, 6)
+    tolerances = ladder(symtop.integrator("rk45"), scene, 8.0, 6)
     assert tolerances[-1] >= symtop.integrator("rk45").least_tolerance
 
 
@@ -124,8 +124,8 @@ def taking(clock, each):
 def test_a_function_that_has_taken_long_is_asked_no_more_but_so_often_at_least(clock):
     for patience, least, counts in ((math.inf, 2, [4, 4, 4]), (0.05, 2, [4, 3, 2]), (0.05, 1, [4, 3, 1])):
         naps = [taking(clock, itertools.repeat(seconds)) for seconds in (1e-3, 0.02, 0.06)]
-        taken = timings(naps, 4, 5e-3, warm=True, patience=patience, least=least, exact=False)
-        assert [len(timing.samples) for timing in taken] == counts
+        results = timings(naps, 4, 5e-3, warm=True, patience=patience, least=least, exact=False)
+        assert [len(timing.samples) for timing in results] == counts
 
 
 def test_a_function_whose_three_least_samples_agree_is_asked_no_more(clock):

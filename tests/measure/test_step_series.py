@@ -21,10 +21,10 @@ def test_a_coefficient_that_is_slightly_off_shows_in_the_term_that_it_spoils(off
     outer = 1.3512071919596577 + off
     inner = 1.0 - 2.0 * outer
     kick = (outer / 2, (outer + inner) / 2, (outer + inner) / 2, outer / 2)
-    found = series(symtop.composition("off", (outer, inner, outer), kick, chart="space", order=4), "axis")
-    assert found.order == 2
-    assert 0.05 * off < found.defect[3] < 20.0 * off
-    assert found.noise[3] < 0.01 * off
+    result = series(symtop.composition("off", (outer, inner, outer), kick, chart="space", order=4), "axis")
+    assert result.order == 2
+    assert 0.05 * off < result.defect[3] < 20.0 * off
+    assert result.noise[3] < 0.01 * off
 
 
 def test_a_solver_that_makes_no_step_backwards_is_seen_forwards():
@@ -35,9 +35,9 @@ def test_a_solver_that_makes_no_step_backwards_is_seen_forwards():
             raise symtop.SymtopError("forward only")
         return rk4.solvers["axis"](top, start, plan)
 
-    found = series(dataclasses.replace(rk4, name="forward", solvers={"axis": solve}), "axis")
-    assert (found.order, found.backward) == (4, False)
-    assert found.resolved >= 4
+    result = series(dataclasses.replace(rk4, name="forward", solvers={"axis": solve}), "axis")
+    assert (result.order, result.backward) == (4, False)
+    assert result.resolved >= 4
 
 
 def test_the_terms_of_known_functions_are_found():
@@ -47,11 +47,11 @@ def test_the_terms_of_known_functions_are_found():
     def step(h):
         return motion(h) + np.array([1e-6 * h**2, 0.25 * h**5])
 
-    found = compared(step, motion, 4.0)
-    assert found.order == 1
-    assert found.defect[2] == pytest.approx(2e-6, rel=1e-3)  # beside 1/2
-    assert found.defect[5] == pytest.approx(30.0, rel=1e-3)  # beside 1/120
-    assert np.all(found.defect[[0, 1, 3, 4]] < 10.0 * found.noise[[0, 1, 3, 4]])
+    result = compared(step, motion, 4.0)
+    assert result.order == 1
+    assert result.defect[2] == pytest.approx(2e-6, rel=1e-3)  # beside 1/2
+    assert result.defect[5] == pytest.approx(30.0, rel=1e-3)  # beside 1/120
+    assert np.all(result.defect[[0, 1, 3, 4]] < 10.0 * result.noise[[0, 1, 3, 4]])
     assert compared(motion, motion, 4.0).order == compared(motion, motion, 4.0).resolved >= 6
 
 

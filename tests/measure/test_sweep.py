@@ -13,12 +13,12 @@ from symtop.measure.accuracy import error_row
 
 STEPS = [0.02, 0.01, 0.005]
 METHODS = ["strang", "rk4[axis]", "rk45-compiled", "exact"]
-ASKED = {"step_size": STEPS, "tolerance": [1e-4, 1e-6], "horizon": 2.0, "quiet": True}
+ARGUMENTS = {"step_size": STEPS, "tolerance": [1e-4, 1e-6], "horizon": 2.0, "quiet": True}
 
 
 @pytest.fixture(scope="module")
 def data():
-    return symtop.sweep(["spheroid", "goldstein"], METHODS, **ASKED)
+    return symtop.sweep(["spheroid", "goldstein"], METHODS, **ARGUMENTS)
 
 
 def test_each_entry_is_that_of_one_run(data):
@@ -44,7 +44,7 @@ def test_settings_belong_to_those_who_have_them(data):
 def test_one_thread_and_many_and_a_file_give_the_same(data, tmp_path):
     file = tmp_path / "sweep.nc"
     for options in ({"threads": 1}, {"path": file}):
-        again = symtop.sweep(["spheroid", "goldstein"], METHODS, **ASKED, **options)
+        again = symtop.sweep(["spheroid", "goldstein"], METHODS, **ARGUMENTS, **options)
         xr.testing.assert_identical(again.drop_attrs(), data.drop_attrs())
     xr.testing.assert_identical(netcdf.read(file).drop_attrs(), data.drop_attrs())
 
@@ -62,7 +62,7 @@ def test_a_sweep_that_was_stopped_goes_on_from_its_file(tmp_path, monkeypatch):
             raise KeyboardInterrupt
         return counted(cell)
 
-    call = {**ASKED, "path": file, "threads": 1}
+    call = {**ARGUMENTS, "path": file, "threads": 1}
     monkeypatch.setattr(module, "_table", stopping)
     with pytest.raises(KeyboardInterrupt):
         symtop.sweep(["spheroid", "goldstein"], METHODS, **call)
@@ -97,8 +97,8 @@ def test_failures_are_rows():
 
 def test_a_file_with_other_cells_is_refused_and_left_as_it_is(tmp_path, monkeypatch):
     """Fewer cells than the file holds, or others, would destroy what is there; more of them, in any order, do not."""
-    file, asked = tmp_path / "sweep.nc", {"step_size": [0.02], "horizon": 1.0, "quiet": True}
-    symtop.sweep("spheroid", ["rk4[axis]", "strang"], path=file, **asked)
+    file, arguments = tmp_path / "sweep.nc", {"step_size": [0.02], "horizon": 1.0, "quiet": True}
+    symtop.sweep("spheroid", ["rk4[axis]", "strang"], path=file, **arguments)
     before, table = file.read_bytes(), module._table
     monkeypatch.setattr(module, "_table", lambda _: pytest.fail("it computes"))
     for scene, names, left in (
@@ -107,12 +107,12 @@ def test_a_file_with_other_cells_is_refused_and_left_as_it_is(tmp_path, monkeypa
         ("goldstein", ["rk4[axis]", "strang"], r"rk4\[axis\] on spheroid, strang on spheroid"),
     ):
         with pytest.raises(symtop.SymtopError, match=f"holds what was not asked for, {left}: ask for these as well"):
-            symtop.sweep(scene, names, path=file, **asked)
+            symtop.sweep(scene, names, path=file, **arguments)
     assert file.read_bytes() == before
-    turned = symtop.sweep("spheroid", ["strang", "rk4[axis]"], path=file, **asked)
+    turned = symtop.sweep("spheroid", ["strang", "rk4[axis]"], path=file, **arguments)
     xr.testing.assert_identical(netcdf.read(file).drop_attrs(), turned.drop_attrs())
     monkeypatch.setattr(module, "_table", table)
-    more = symtop.sweep(["goldstein", "spheroid"], ["midpoint", "strang", "rk4[axis]"], path=file, **asked)
+    more = symtop.sweep(["goldstein", "spheroid"], ["midpoint", "strang", "rk4[axis]"], path=file, **arguments)
     xr.testing.assert_identical(netcdf.read(file).drop_attrs(), more.drop_attrs())
     for name in ("strang", "rk4[axis]"):
         one = {"scene": "spheroid", "variant": name}
@@ -136,8 +136,8 @@ def test_a_cell_that_raised_is_tried_again_and_one_that_ended_early_is_not(tmp_p
         (["ok", "ok"], ["moody"]),
         (["ok"] * 2, []),
     ):
-        asked = {"step_size": [1.0, 0.02], "path": file, "threads": 1, "quiet": True}
-        data = symtop.sweep("spheroid", ["stormer-verlet", method], **asked)
+        arguments = {"step_size": [1.0, 0.02], "path": file, "threads": 1, "quiet": True}
+        data = symtop.sweep("spheroid", ["stormer-verlet", method], **arguments)
         assert data["outcome"].sel(variant="moody").values[0].tolist() == outcomes
         assert data["outcome"].sel(variant="stormer-verlet").values[0].tolist() == ["left_chart", "ok"]
         assert ran == again

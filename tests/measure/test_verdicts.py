@@ -30,20 +30,20 @@ def judged(scene, name, **controls):
     ],
 )
 def test_each_fate_is_judged_with_its_time_and_cause(scene, name, controls, word, says):
-    found = judged(scene, name, **controls)
-    assert found.verdict == word, found
-    assert says in found.sentence
-    assert 0.0 <= found.time <= controls.get("horizon", symtop.scene(scene).horizon) * (1.0 + 1e-12)
+    result = judged(scene, name, **controls)
+    assert result.verdict == word, result
+    assert says in result.sentence
+    assert 0.0 <= result.time <= controls.get("horizon", symtop.scene(scene).horizon) * (1.0 + 1e-12)
 
 
 def test_a_pole_passed_on_the_wrong_side_is_a_wrong_regime():
-    where = grazing(1e-3)
-    good = symtop.simulate(where, "exact", samples=201)
+    scene = grazing(1e-3)
+    good = symtop.simulate(scene, "exact", samples=201)
     error = np.full(201, 0.5)
-    assert judgement(where, good, error).verdict == "bounded_but_wrong"
+    assert judgement(scene, good, error).verdict == "bounded_but_wrong"
     beyond = good.assign(p_phi=good["p_phi"] - np.where(good["time"] > 2.0, 2e-3, 0.0))
-    assert judgement(where, beyond, error).verdict == "wrong_regime"
-    assert "passed a pole" in judgement(where, beyond, error).sentence
+    assert judgement(scene, beyond, error).verdict == "wrong_regime"
+    assert "passed a pole" in judgement(scene, beyond, error).sentence
 
 
 def test_the_command_line_judges_a_run():
@@ -53,7 +53,7 @@ def test_the_command_line_judges_a_run():
 
 def test_accurate_is_measured_against_the_width_of_the_nutation():
     """`fast` nutates over 4e-4 rad: half a thousandth of a radian is not accurate there."""
-    where = symtop.scene("fast")
-    run = symtop.simulate(where, "exact", samples=101)
-    assert judgement(where, run, np.full(101, 1e-5)).verdict == "accurate"
-    assert judgement(where, run, np.full(101, 5e-4)).verdict != "accurate"
+    scene = symtop.scene("fast")
+    run = symtop.simulate(scene, "exact", samples=101)
+    assert judgement(scene, run, np.full(101, 1e-5)).verdict == "accurate"
+    assert judgement(scene, run, np.full(101, 5e-4)).verdict != "accurate"

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 
-def _cross(v):
-    x, y, z = v
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+def hat(v):
+    """The matrix of v x."""
+    return np.cross(np.eye(3), v)
 
 
 def _moved(attitude, w, h):
@@ -35,7 +35,7 @@ def _rates(attitude, b, inertia, tau):
 
 
 def _jacobian(b, inertia, h):
-    return inertia + h * (_cross(b) @ inertia - _cross(inertia @ b))
+    return inertia + h * (hat(b) @ inertia - hat(inertia @ b))
 
 
 def _rescaled(attitude, w, h, inertia):
@@ -96,7 +96,7 @@ def ode(attitude, w, h, inertia, tau):
     R = attitude.as_matrix()
     there = R @ inertia @ R.T
     L = there @ w
-    w = np.linalg.solve(there - h * _cross(L), L) + h * _inverse(attitude, inertia, tau(attitude))
+    w = np.linalg.solve(there - h * hat(L), L) + h * _inverse(attitude, inertia, tau(attitude))
     return _moved(attitude, w, h), w
 
 

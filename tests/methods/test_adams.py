@@ -22,6 +22,7 @@ from symtop.methods.runge_kutta.adams import (
     SIGMA,
     G,
 )
+from symtop.model.top import flat
 
 
 def prepared(steps, h, k):
@@ -121,11 +122,11 @@ def steps_of(tolerance):
     scene = symtop.scene("spheroid")
     solver = symtop.integrator("adams").solvers["axis"]
     kernel, place, times = solver.loop(tolerance), np.zeros(solver.room), np.array([8.0])
-    numbers = (scene.top.I1, scene.top.I3, scene.top.mgl, *(getattr(scene.start, n) for n in scene.start.__slots__))
-    seen, made = -1, []
+    numbers = flat(scene.top, scene.start)
+    samples, made = -1, []
     states, momenta = np.empty((1, 6)), np.empty((1, 2))
-    while seen < 1:
-        seen, *_ = kernel(numbers, tolerance, times, 1, seen, place, states, momenta)
+    while samples < 1:
+        samples, *_ = kernel(numbers, tolerance, times, 1, samples, place, states, momenta)
         made.append((place[6 + 6 * LAST + LENGTH], int(place[6 + 6 * LAST + ORDER_THEN])))
     return made[1:]  # the first call evaluates f at the start
 

@@ -71,20 +71,20 @@ for k in range(count):
 @pytest.mark.slow
 def test_kernels_return_the_same_bits_whichever_way_they_were_made(tmp_path):
     """By numba alone, compiled here, from bitcode, and from that for a processor without this one's instructions."""
-    plain, said, count = {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": ""}, {}, 36
+    plain, output, count = {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": ""}, {}, 36
     ways = {"numba alone": {}, "compiled": {}, "bitcode": {}, "bitcode, x86-64": plain}
     for way, processor in ways.items():
         made = {file: file.read_bytes() for file in tmp_path.rglob("*.code")}
         for file in made:
             file.unlink()
-        said[way] = printed_by(BITS, way.partition(",")[0], count, SYMTOP_CACHE=tmp_path, **processor).splitlines()
-        assert len(said[way]) == count + -(-count // 3)
-        assert said[way] == said["numba alone"], way
+        output[way] = printed_by(BITS, way.partition(",")[0], count, SYMTOP_CACHE=tmp_path, **processor).splitlines()
+        assert len(output[way]) == count + -(-count // 3)
+        assert output[way] == output["numba alone"], way
         if way == "bitcode":  # mostly the same machine code, and so as fast
             assert np.mean([file.read_bytes() == code for file, code in made.items()]) > 0.8
         if way == "bitcode, x86-64":
             assert not any(file.exists() for file in made)
-    assert all(any(f"[{chart}]" in line for line in said["compiled"]) for chart in ("angles", "axis", "attitude"))
+    assert all(any(f"[{chart}]" in line for line in output["compiled"]) for chart in ("angles", "axis", "attitude"))
 
 
 def _doubled(x):
@@ -195,14 +195,14 @@ def test_kernels_of_two_processes_do_not_call_each_others_inner_functions(tmp_pa
     script.write_text(CLASH, encoding="utf-8")
     environment = {**os.environ, "SYMTOP_CACHE": str(tmp_path / "cache")}
 
-    def said(*numbers):
+    def output(*numbers):
         command = [sys.executable, str(script), *numbers]
         return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
 
-    alone = [*said("0.1"), *said("0.2")]
+    alone = [*output("0.1"), *output("0.2")]
     assert alone[0] != alone[1]
-    assert said("0.1", "0.2") == alone
+    assert output("0.1", "0.2") == alone
     for file in (tmp_path / "cache").rglob("*.code"):
         file.unlink()  # and once more from bitcode
-    assert said("0.2", "0.1") == alone[::-1]
+    assert output("0.2", "0.1") == alone[::-1]
     assert len(list((tmp_path / "cache").rglob("*.bitcode"))) == 2

@@ -42,8 +42,7 @@ def axis_error(row, steps, scene=GOLDSTEIN, horizon=10.0, against=None):
     )  # fmt: skip
     if against is None:
         return float(symtop.errors(run)["axis"].max())
-    there, true = run["axis"].values, against.axis(run["time"].values)
-    return float(np.arctan2(np.linalg.norm(np.cross(there, true), axis=1), np.sum(there * true, axis=1)).max())
+    return float(charts.axis_distance(run["axis"].values, against.axis(run["time"].values)).max())
 
 
 def one_step(name, scene, h, chart="attitude"):

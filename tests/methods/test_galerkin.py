@@ -16,12 +16,6 @@ NAME = "galerkin-simpson"
 SIMPSON = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 
 
-def point_of(where):
-    """(theta, phi, psi, p_theta, p_phi, p_psi) at a scene's start."""
-    at, momenta = where.start, where.top.momenta(where.start)
-    return np.array([at.theta, at.phi, at.psi, where.top.I1 * at.theta_dot, momenta.p_phi, momenta.p_psi])
-
-
 def derivatives(top, theta, rate):
     """dL/dq' and dL/dq of the Lagrangian in three angles."""
     s, c = np.sin(theta), np.cos(theta)
@@ -51,26 +45,26 @@ def independent_step(top, point, h, weights=SIMPSON):
 
     at = angles_at(top, point)
     rate = np.array([at.theta_dot, at.phi_dot, at.psi_dot])
-    found = root(equations, np.concatenate([q0 + 0.5 * h * rate, q0 + h * rate]), tol=1e-14)
-    assert np.max(np.abs(found.fun)) < 1e-12
-    return np.concatenate([found.x[3:], slopes(found.x)[2]])
+    solution = root(equations, np.concatenate([q0 + 0.5 * h * rate, q0 + h * rate]), tol=1e-14)
+    assert np.max(np.abs(solution.fun)) < 1e-12
+    return np.concatenate([solution.x[3:], slopes(solution.x)[2]])
 
 
-@pytest.mark.parametrize("where", random_scenes(8, seed=21), ids=lambda s: s.name)
-def test_one_step_is_the_stationary_parabola(where):
+@pytest.mark.parametrize("scene", random_scenes(8, seed=21), ids=lambda s: s.name)
+def test_one_step_is_the_stationary_parabola(scene):
     """The reduction to two unknowns, and all six results of a step, against six equations solved as they stand."""
-    method, point = symtop.integrator(NAME), point_of(where)
     for h in (0.1, 0.02):
-        found = StepMap(method, "angles", where.top, 1.0, h).image(point)
-        assert np.max(np.abs(found - independent_step(where.top, point, h))) < 2e-12
+        step = StepMap(symtop.integrator(NAME), "angles", scene.top, 1.0, h)
+        point = step.point(scene.start)
+        assert np.max(np.abs(step.image(point) - independent_step(scene.top, point, h))) < 2e-12
 
 
 def test_other_weights_are_another_method():
-    where = random_scenes(1, seed=21)[0]
-    point = point_of(where)
-    found = StepMap(symtop.integrator(NAME), "angles", where.top, 1.0, 0.1).image(point)
-    wrong = independent_step(where.top, point, 0.1, weights=(0.17, 0.66, 0.17))
-    assert not np.max(np.abs(found - wrong)) < 2e-12
+    scene = random_scenes(1, seed=21)[0]
+    step = StepMap(symtop.integrator(NAME), "angles", scene.top, 1.0, 0.1)
+    point = step.point(scene.start)
+    wrong = independent_step(scene.top, point, 0.1, weights=(0.17, 0.66, 0.17))
+    assert not np.max(np.abs(step.image(point) - wrong)) < 2e-12
 
 
 def test_a_step_without_its_last_force_is_neither_symplectic_nor_symmetric():
@@ -84,15 +78,15 @@ def test_a_step_without_its_last_force_is_neither_symplectic_nor_symmetric():
         return run._replace(states=states)
 
     wrong = symtop.Integrator(name="wrong", family="other", summary="", solvers={"angles": solve})
-    where = random_scenes(1, seed=22)[0]
-    assert symplectic_defect(one_step(wrong, "angles", where, 0.02), where.start).size > 1e-5
-    assert return_miss(one_step(wrong, "angles", where, 0.02), where.start) > 1e-5
+    scene = random_scenes(1, seed=22)[0]
+    assert symplectic_defect(one_step(wrong, "angles", scene, 0.02), scene.start).size > 1e-5
+    assert return_miss(one_step(wrong, "angles", scene, 0.02), scene.start) > 1e-5
 
 
-@pytest.mark.parametrize("where", random_scenes(4, seed=24), ids=lambda s: s.name)
-def test_slopes_at_a_node_are_those_of_the_effective_potential(where):
+@pytest.mark.parametrize("scene", random_scenes(4, seed=24), ids=lambda s: s.name)
+def test_slopes_at_a_node_are_those_of_the_effective_potential(scene):
     """V' and V'' as the model has them, and the derivatives by the momenta by differences (V' is quadratic in them)."""
-    par, (theta, *_) = on_angles(where.top, where.start)
+    par, (theta, *_) = on_angles(scene.top, scene.start)
     south, north, e = par.south, par.north, 0.5
 
     def V(south, north):
@@ -105,10 +99,10 @@ def test_slopes_at_a_node_are_those_of_the_effective_potential(where):
     assert pull.north == pytest.approx((V(south, north + e) - V(south, north - e)) / (2 * e), rel=1e-12)
 
 
-@pytest.mark.parametrize("where", random_scenes(4, seed=25), ids=lambda s: s.name)
-def test_every_derivative_of_a_trial_is_right(where):
+@pytest.mark.parametrize("scene", random_scenes(4, seed=25), ids=lambda s: s.name)
+def test_every_derivative_of_a_trial_is_right(scene):
     """The analytic Jacobian against central differences; one that is off by a thousandth is seen."""
-    par, (theta, *_) = on_angles(where.top, where.start)
+    par, (theta, *_) = on_angles(scene.top, scene.start)
     start, m, d, e = kernel._node(par, theta), 0.03, 0.07, 1e-5
 
     def trial(shift_m, shift_1):
@@ -128,13 +122,13 @@ def test_every_derivative_of_a_trial_is_right(where):
 
 
 def test_the_recomputed_momenta_see_a_wrong_increment():
-    """The negative control of the last test: a phi that moved 1e-10 too far shows in p_phi."""
-    where = symtop.scene("spheroid")
-    par, state = on_angles(where.top, where.start)
+    """A phi that moved 1e-10 too far shows in p_phi."""
+    scene = symtop.scene("spheroid")
+    par, state = on_angles(scene.top, scene.start)
     carry = kernel.begin(par, kernel.Iteration(), state, 0.01)
     step, *_ = kernel.increment(par, kernel.Iteration(), state, carry, 0.01)
     right = kernel.observe(par, kernel.Iteration(), state, step, 0.01)
-    assert right == pytest.approx(where.top.momenta(where.start)[:2], rel=1e-14)
+    assert right == pytest.approx(scene.top.momenta(scene.start)[:2], rel=1e-14)
     moved = (step[0], step[1], step[2] + 1e-10, step[3])
     assert abs(kernel.observe(par, kernel.Iteration(), state, moved, 0.01)[0] - right[0]) > 1e-9
 
@@ -142,9 +136,9 @@ def test_the_recomputed_momenta_see_a_wrong_increment():
 @pytest.mark.parametrize("scene_name", SCENES)
 def test_the_iteration_ends_soon(scene_name):
     """At 200 steps a nutation the cubic predictor leaves two iterations; at 2000, one."""
-    where = symtop.scene(scene_name)
+    scene = symtop.scene(scene_name)
     for resolution, most in ((200.0, 2.1), (2000.0, 1.3)):
-        run = symtop.simulate(where, NAME, step_size=where.nutation_period / resolution)
+        run = symtop.simulate(scene, NAME, step_size=scene.nutation_period / resolution)
         assert run.attrs["newton_iterations"] / run.attrs["steps"] < most
 
 
@@ -152,9 +146,9 @@ def test_near_a_pole_nothing_cancels():
     """theta swings through 1e-4 of the pole: the momenta of every step are still those of the start."""
     top = symtop.SymmetricTop(1.0, 1.0, 1.0)
     point = (1e-4, 0.0, 0.0, 1e-4, 1.0 + 1e-8, 1.0)
-    where = symtop.Scene("grazing", top, angles_at(top, point), 1.0)
-    run = symtop.simulate(where, NAME, step_size=0.01, samples=101)
+    scene = symtop.Scene("grazing", top, angles_at(top, point), 1.0)
+    run = symtop.simulate(scene, NAME, step_size=0.01, samples=101)
     assert run.attrs["outcome"] == "ok"
-    momenta = top.momenta(where.start)
+    momenta = top.momenta(scene.start)
     drift = np.abs((run["p_phi"] - run["p_psi"]).values - momenta.north)
     assert np.max(drift) < 4e-16

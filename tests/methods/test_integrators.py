@@ -18,10 +18,10 @@ from tests.conftest import random_scenes
 
 def fitted(scene_name, method, coarsest, column):
     """The fitted order over ten steps, from so many a nutation to 160 times as many."""
-    where = symtop.scene(scene_name)
-    steps = [where.nutation_period / (coarsest * 10 ** (2.2 * k / 9)) for k in range(10)]
-    table = error_table(where, method, steps, 8.0, observe="attitude")
-    return order(table["step_size"], table[column], table["attitude_bound"], 2 * math.pi / where.nutation_period)
+    scene = symtop.scene(scene_name)
+    steps = [scene.nutation_period / (coarsest * 10 ** (2.2 * k / 9)) for k in range(10)]
+    table = error_table(scene, method, steps, 8.0, observe="attitude")
+    return order(table["step_size"], table[column], table["attitude_bound"], 2 * math.pi / scene.nutation_period)
 
 
 @pytest.mark.parametrize(("name", "constant"), [("stormer-verlet", 35.3), ("midpoint", 137.3), ("trapezoidal", 127.9)])
@@ -56,19 +56,19 @@ def test_starting_from_q0_plus_h_v0_costs_an_order():
 def test_a_rule_that_is_not_symmetric_misses_the_start():
     lopsided = symtop.discrete_lagrangian("left", (0.0, 2.0 / 3.0), (0.25, 0.75))
     assert lopsided.symmetric is False
-    where = random_scenes(1, seed=5)[0]
-    assert return_miss(one_step(lopsided, "angles", where, 0.02), where.start) > 5e-9  # of the largest coordinate
+    scene = random_scenes(1, seed=5)[0]
+    assert return_miss(one_step(lopsided, "angles", scene, 0.02), scene.start) > 5e-9  # of the largest coordinate
 
 
 def test_midpoint_is_the_implicit_midpoint_rule_of_the_reduced_hamiltonian():
     """theta1 - theta0 = h p_mid/I1, p1 - p0 = -h V'(theta_mid): reduction and discretisation commute."""
-    where = symtop.scene("spheroid")
-    run = symtop.simulate(where, "midpoint", step_size=0.01, horizon=0.05, samples=6)
-    momenta = where.top.momenta(where.start)
+    scene = symtop.scene("spheroid")
+    run = symtop.simulate(scene, "midpoint", step_size=0.01, horizon=0.05, samples=6)
+    momenta = scene.top.momenta(scene.start)
     theta, p = run["theta"].values, run["p_theta"].values
     middle = 0.5 * (theta[1:] + theta[:-1])
-    assert np.diff(theta) == pytest.approx(0.01 * 0.5 * (p[1:] + p[:-1]) / where.top.I1, abs=5e-16)
-    assert np.diff(p) == pytest.approx(-0.01 * where.top.potential_slope(middle, momenta), abs=2e-14)
+    assert np.diff(theta) == pytest.approx(0.01 * 0.5 * (p[1:] + p[:-1]) / scene.top.I1, abs=5e-16)
+    assert np.diff(p) == pytest.approx(-0.01 * scene.top.potential_slope(middle, momenta), abs=2e-14)
 
 
 @pytest.mark.parametrize(
@@ -76,9 +76,9 @@ def test_midpoint_is_the_implicit_midpoint_rule_of_the_reduced_hamiltonian():
 )
 def test_discrete_momenta_are_those_of_the_discrete_lagrangian(name, nodes, weights):
     """-D1 Ld and D2 Ld by numerical differentiation of the discrete Lagrangian itself, written out independently."""
-    where = symtop.scene("spheroid")
-    top, h = where.top, 0.01
-    run = symtop.simulate(where, name, step_size=h, horizon=0.03, samples=4, observe="attitude")
+    scene = symtop.scene("spheroid")
+    top, h = scene.top, 0.01
+    run = symtop.simulate(scene, name, step_size=h, horizon=0.03, samples=4, observe="attitude")
     q = np.stack([run["theta"], run["phi"], run["psi"]], axis=1)
 
     def discrete(q0, q1):
@@ -105,15 +105,15 @@ def test_discrete_momenta_are_those_of_the_discrete_lagrangian(name, nodes, weig
 
 def test_one_newton_iteration_is_not_enough_and_round_off_is_reached_with_more():
     """A loose stop rule shows as an error of the implicit equation; the default leaves rounding only."""
-    where = symtop.scene("spheroid")
-    par, state = on_angles(where.top, where.start)
+    scene = symtop.scene("spheroid")
+    par, state = on_angles(scene.top, scene.start)
     h, marks = 0.02, np.arange(0, 40)
 
     def residual(tolerance):
         done = march(par, Quadrature((0.5,), (1.0,), tolerance), state, h, marks)
         theta, p = done.states[:, 0], done.states[:, 1]
-        momenta = where.top.momenta(where.start)
-        return np.max(np.abs(np.diff(p) + h * where.top.potential_slope(0.5 * (theta[1:] + theta[:-1]), momenta)))
+        momenta = scene.top.momenta(scene.start)
+        return np.max(np.abs(np.diff(p) + h * scene.top.potential_slope(0.5 * (theta[1:] + theta[:-1]), momenta)))
 
     assert residual(1e-8) < 5e-14
     assert residual(1e3) > 1e-9

@@ -30,6 +30,7 @@ ENDS = {  # how members end that step too far: numbers overflow, theta passes a 
                                       "galerkin-simpson[angles]"),
 }  # fmt: skip
 ALONE = ("midpoint-unreduced[angles]", "gauss-12[axis]", "collective-gauss-4[axis]")  # one after another
+EXPLICIT = ("rkmk-se3-2", "rkmk-se3-4", "crouch-grossman-3", "commutator-free-4")
 ITERATED = ("lie-variational", "lie-variational-suzuki-4", "euler-poincare", "simo-wong", "generalised-alpha")
 FAR, LOST = slice(3, None, 17), slice(5, None, 41)  # members whose step turns too far for lanes; whose numbers overflow
 
@@ -103,8 +104,7 @@ def test_methods_that_have_lanes():
         "five-rotations[attitude]",  # the kernel is that of a body
     }
     assert {"rk4[angles]", "rk4[axis]", "rk4[attitude]"} <= IN_LANES
-    explicit = ("rkmk-se3-2", "rkmk-se3-4", "crouch-grossman-3", "commutator-free-4")
-    for name in ("exact-discrete", "series", *explicit, *ITERATED):
+    for name in ("exact-discrete", "series", *EXPLICIT, *ITERATED):
         assert {f"{name}[axis]", f"{name}[attitude]"} <= IN_LANES
     without = ("exact[", "rk45", "taylor", "series-adaptive", "collective-gauss", "gauss-12", "gauss-6[attitude]")
     assert not any(name.startswith(without) or "unreduced" in name for name in IN_LANES)

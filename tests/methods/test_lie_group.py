@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import optimize
 from scipy.spatial.transform import Rotation
 
 import symtop
@@ -19,6 +20,7 @@ from symtop.methods.lie_group.generalised_alpha import generalised_alpha
 from symtop.model import charts
 from tests.conftest import random_scenes
 from tests.judging.blind.right import product
+from tests.methods.engine_formulas import hat
 
 LIE_TABLES = ("rkmk-se3-2", "rkmk-se3-4", "crouch-grossman-3", "commutator-free-4")
 VARIATIONAL = ("lie-variational", "lie-variational-suzuki-4", "euler-poincare")
@@ -36,24 +38,14 @@ def matrices(rows):
     return Rotation.from_quat(np.roll(rows[:, :4], -1, axis=1)).as_matrix()
 
 
-def hat(v):
-    """The matrix of v x."""
-    return np.cross(np.eye(3), v)
-
-
 def moments(top):
     """The inertia in body axes."""
     return np.diag([top.I1, top.I1, top.I3])
 
 
 def root(function, guess):
-    """A root by Newton's iteration to rounding, with differences for derivatives."""
-    x = np.array(guess, dtype=float)
-    for _ in range(15):
-        value = function(x)
-        slope = np.stack([(function(x + step) - value) / 1e-7 for step in 1e-7 * np.eye(x.size)], axis=1)
-        x = x - np.linalg.solve(slope, value)
-    return x
+    """A root to rounding by a general solver."""
+    return optimize.root(function, guess, tol=1e-15).x
 
 
 def energies(scene, rows):

@@ -12,9 +12,8 @@ from symtop.methods.lie_group.runge_kutta import LieTable, lie_runge_kutta
 from symtop.methods.lie_group.variational import EULER_POINCARE, Variational, lie_variational
 from symtop.methods.runge_kutta.explicit import runge_kutta
 from symtop.methods.splitting.coefficients import SUZUKI_4
-from tests.methods.test_lanes import FAR, ITERATED, SOLVERS, assert_runs_alone, left_alone, members
+from tests.methods.test_lanes import EXPLICIT, FAR, ITERATED, SOLVERS, assert_runs_alone, left_alone, members
 
-EXPLICIT = ("rkmk-se3-2", "rkmk-se3-4", "crouch-grossman-3", "commutator-free-4")
 CHARTS = ("axis", "attitude")
 
 

@@ -13,7 +13,7 @@ from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
 from symtop.methods.runge_kutta import pairs
-from symtop.methods.runge_kutta.pair_tables import DOP853, TSIT5, VERN9
+from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5, VERN9
 from symtop.model import scenes as models
 from symtop.model.top import flat
 from symtop.run.simulation import make_plan
@@ -49,7 +49,11 @@ def test_tables_meet_the_order_conditions_of_every_tree_up_to_their_order_and_no
     assert conditions(wrong, b, order).order < order
 
 
-def test_the_table_of_order_eight_is_scipys():
+def test_the_tables_of_order_five_and_eight_are_scipys():
+    theirs, pair = integrate.RK45, DORMAND_PRINCE
+    np.testing.assert_array_equal(square(pair, 6)[:, :5], theirs.A)
+    for mine, other in ((pair.b, theirs.B), (pair.error, theirs.E), (pair.dense, theirs.P)):
+        np.testing.assert_array_equal(mine, other)
     theirs = integrate.DOP853
     np.testing.assert_array_equal(square(DOP853, 12), theirs.A)
     np.testing.assert_array_equal(DOP853.b, theirs.B)
@@ -132,8 +136,8 @@ def test_two_runs_in_one_register_have_the_bits_of_each_alone(name, chart):
     moved = replace(scene.start, **({"psi_dot": 1.0} if chart == "axis" else {"omega_body": (0.1, 0.2, 0.3)}))
     run, fixed = pairs.two_runs(chart, pairs.DOP8, number), integrator("dop853-compiled-fixed").solvers[chart]
     near, far = (fixed(scene.top, start, Plan.steps(h, marks)).states for start in (scene.start, moved))
-    seen = np.empty((near.shape[1] + far.shape[1], marks.size))
-    for which, row in enumerate(seen):
+    out = np.empty((near.shape[1] + far.shape[1], marks.size))
+    for which, row in enumerate(out):
         run(flat(scene.top, scene.start), flat(scene.top, moved), h, marks, which, row)
-    np.testing.assert_array_equal(seen.T, np.hstack([near, far]))
+    np.testing.assert_array_equal(out.T, np.hstack([near, far]))
     assert not np.array_equal(near, far)

@@ -121,9 +121,9 @@ def test_a_run_that_fails_shows_nothing_after_its_failure():
     solver = symtop.integrator("stormer-verlet").solvers["angles"]
     run = solver(scene.top, scene.start, Plan.steps(0.3, np.arange(0, 15)))
     assert run.outcome == "left_chart"
-    seen = np.isfinite(run.states).all(axis=1)
-    assert seen.sum() == run.steps + 1
-    np.testing.assert_array_equal(seen, np.isfinite(run.p_phi))
+    finite = np.isfinite(run.states).all(axis=1)
+    assert finite.sum() == run.steps + 1
+    np.testing.assert_array_equal(finite, np.isfinite(run.p_phi))
     assert (run.p_phi[0], run.p_psi[0]) == scene.top.momenta(scene.start)[:2]
 
 

@@ -41,8 +41,8 @@ def test_two_threads_that_make_the_very_first_call_together_see_every_integrator
     for name, empty in (("_registry", {}), ("_loaded", []), ("_announced", []), ("_shipped", set())):
         monkeypatch.setattr(registry, name, empty)
     with ThreadPoolExecutor(4) as pool:
-        seen = list(pool.map(first_call, range(4)))
-    assert seen == [shipped] * 4
+        results = list(pool.map(first_call, range(4)))
+    assert results == [shipped] * 4
 
 
 @pytest.mark.parametrize(

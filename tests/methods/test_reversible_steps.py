@@ -100,8 +100,8 @@ def test_both_momenta_stay():
     for name in ("spheroid", "goldstein", "grazing"):
         scene = symtop.scene(name)
         done, momenta = run(scene, 0.003, np.arange(0, 100_001, 500)), scene.top.momenta(scene.start)
-        for values, begun in ((done.p_phi, momenta.p_phi), (done.p_psi, momenta.p_psi)):
-            assert np.abs(values / begun - 1.0).max() < 1e-12
+        for values, first in ((done.p_phi, momenta.p_phi), (done.p_psi, momenta.p_psi)):
+            assert np.abs(values / first - 1.0).max() < 1e-12
 
 
 # ---- structure -------------------------------------------------------------------------------------------------------
@@ -160,12 +160,12 @@ def test_the_energy_stays_bounded_where_that_of_steps_read_off_drifts():
     marks = np.arange(0, 400_001, 200)
     done = run(scene, eps, marks)
     assert done.outcome == "ok"
-    kept = energies(scene, done.states) - energies(scene, done.states)[0]
+    errors = energies(scene, done.states) - energies(scene, done.states)[0]
     lost = energies(scene, read_off(scene, eps, marks)[0])
     lost -= lost[0]
-    assert np.abs(kept).max() < 1.1 * np.abs(kept[:200]).max()
-    assert abs(trend(marks, kept).rise) < 0.01 * np.abs(kept).max()
-    assert trend(marks, lost).rise > 100.0 * np.abs(kept).max()
+    assert np.abs(errors).max() < 1.1 * np.abs(errors[:200]).max()
+    assert abs(trend(marks, errors).rise) < 0.01 * np.abs(errors).max()
+    assert trend(marks, lost).rise > 100.0 * np.abs(errors).max()
 
 
 # ---- poles -----------------------------------------------------------------------------------------------------------
@@ -173,18 +173,18 @@ def test_the_energy_stays_bounded_where_that_of_steps_read_off_drifts():
 
 def forces_for(scene, method, error):
     """The least force evaluations from which on finer steps keep the axis within that error, over one nutation."""
-    form, found = closed_form(scene), 0
+    form, forces = closed_form(scene), 0
     for h in scene.nutation_period * np.geomspace(0.05, 1e-7, 300):
         done = symtop.simulate(
             scene, method, step_size=h, horizon=scene.nutation_period, samples=101, observe="axis", guard=False
         )
         gap = charts.axis_distance(done["axis"].values, form.axis(done["time"].values)).max()
         if not gap < error:
-            found = 0
-        elif not found:
-            found = done.attrs["force_evaluations"]
+            forces = 0
+        elif not forces:
+            forces = done.attrs["force_evaluations"]
         elif gap < error / 4.0:
-            return found
+            return forces
     raise AssertionError(method)
 
 

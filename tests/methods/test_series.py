@@ -61,19 +61,19 @@ def test_vectors_compute_what_scalars_compute():
 
         return types.UniTuple(types.float64, 4)(a, b), emit
 
-    seen = called(intrinsic(everything), 3.0, 5.0)
+    result = called(intrinsic(everything), 3.0, 5.0)
     x, other = np.array([3.0, 5.0, 3.0, 5.0]), np.array([5.0, 3.0, 5.0, 3.0])
     total = x * 5.0 + 2.0 * other + x * x + x + np.array([1.0, 2.0, 3.0, 4.0])
-    assert seen == tuple(total * 5.0 + x)
+    assert result == tuple(total * 5.0 + x)
 
 
 @pytest.mark.parametrize(("of_order", "size"), [(axis_sum, 6), (attitude_sum, 7)])
 def test_components_compute_what_vectors_compute(of_order, size):
     """To the last bit, as lanes need it; another order is another sum."""
     state = tuple(np.random.default_rng(2).normal(size=size).tolist())
-    seen = called(of_order(16, Components), state, 0.1, 0.2)
-    assert seen == called(of_order(16), state, 0.1, 0.2)
-    assert seen != called(of_order(12), state, 0.1, 0.2)
+    result = called(of_order(16, Components), state, 0.1, 0.2)
+    assert result == called(of_order(16), state, 0.1, 0.2)
+    assert result != called(of_order(12), state, 0.1, 0.2)
 
 
 # ---- coefficients ----------------------------------------------------------------------------------------------------
@@ -90,12 +90,12 @@ def test_the_sum_of_the_axis_is_that_of_the_first_terms_of_the_equations(order):
         turned = sum(np.cross(L[k], e[n - k]) for k in range(n + 1))
         L.append(h * mgl * np.array([-e[n][1], e[n][0], 0.0]) / (n + 1))
         e.append(h / I1 * turned / (n + 1))
-    seen = called(axis_sum(order), tuple(state.tolist()), h / I1, h * mgl)
-    assert seen[:3] == pytest.approx(sum(e[1 : order + 1]), rel=1e-11)
-    assert seen[3:5] == pytest.approx(sum(L[1 : order + 1])[:2], rel=1e-11)
-    for n, square in ((order, seen[5]), (order - 1, seen[6])):
+    result = called(axis_sum(order), tuple(state.tolist()), h / I1, h * mgl)
+    assert result[:3] == pytest.approx(sum(e[1 : order + 1]), rel=1e-11)
+    assert result[3:5] == pytest.approx(sum(L[1 : order + 1])[:2], rel=1e-11)
+    for n, square in ((order, result[5]), (order - 1, result[6])):
         assert math.sqrt(square) == pytest.approx(np.linalg.norm([*e[n - 1][:2], e[n][2]]), rel=1e-9)
-    assert seen[:3] != pytest.approx(sum(e[1:order]), rel=1e-10)
+    assert result[:3] != pytest.approx(sum(e[1:order]), rel=1e-10)
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -103,12 +103,12 @@ def test_the_attitudes_sum_shows_the_axis_of_the_axis_sum(order):
     scene = symtop.scene("hairer-lubich-wanner")
     h, (I1, mgl) = 0.02, (scene.top.I1, scene.top.mgl)
     state = charts.space_state("attitude", scene.top, scene.start)
-    seen = called(attitude_sum(order), tuple(state.tolist()), h / I1, h * mgl)
+    result = called(attitude_sum(order), tuple(state.tolist()), h / I1, h * mgl)
     axis = charts.space_state("axis", scene.top, scene.start)
     theirs = called(axis_sum(order), tuple(axis.tolist()), h / I1, h * mgl)
-    moved = state[:4] + np.array(seen[:4])
+    moved = state[:4] + np.array(result[:4])
     assert charts.axis_from_quaternion(moved) == pytest.approx(axis[:3] + np.array(theirs[:3]), abs=1e-13)
-    assert seen[4:6] == pytest.approx(theirs[3:5], rel=1e-12)
+    assert result[4:6] == pytest.approx(theirs[3:5], rel=1e-12)
     assert np.linalg.norm(moved) == pytest.approx(1.0, abs=1e-13)
 
 

@@ -24,21 +24,21 @@ def test_the_terms_of_a_step_are_those_of_the_motion_up_to_its_order(name):
     """And of one that is exact up to all that are resolved; of engines that leave out a term, no further than to h."""
     method = METHODS[name]
     for chart in method.charts():
-        found, step = series(method, chart), one_step(method, chart, SPHEROID, 0.01)
+        terms, step = series(method, chart), one_step(method, chart, SPHEROID, 0.01)
         assert restart_gap(step, generic_start(SPHEROID)) < 1e-6 or name in RUNS
         if method.exact_steps:
-            assert not found.is_exact
+            assert not terms.is_exact
         elif method.order is None:
-            assert found.is_exact
-            assert found.order <= 1
+            assert terms.is_exact
+            assert terms.order <= 1
         elif name in RUNS:
             assert_order("spheroid", method.variant(chart), method.order, 0.08, RUNS[name], chart)
-        elif method.order > 8 and not found.is_exact:
-            assert found.order > 8
+        elif method.order > 8 and not terms.is_exact:
+            assert terms.order > 8
         else:
-            assert found.order == method.order
-            assert found.backward
-            assert found.defect[method.order + 1] > 3.0 * found.worst(method.order)
+            assert terms.order == method.order
+            assert terms.backward
+            assert terms.defect[method.order + 1] > 3.0 * terms.worst(method.order)
 
 
 def test_without_the_bracket_munthe_kaas_loses_two_orders():

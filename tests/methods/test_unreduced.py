@@ -20,8 +20,8 @@ SCENES = ("spheroid", "goldstein")
 
 def largest_gap(scene_name, first, second, steps=10_000):
     """Largest difference of any angle between two methods over a run of the scene."""
-    where = symtop.scene(scene_name)
-    runs = [symtop.simulate(where, name, step_size=where.horizon / steps, samples=401) for name in (first, second)]
+    scene = symtop.scene(scene_name)
+    runs = [symtop.simulate(scene, name, step_size=scene.horizon / steps, samples=401) for name in (first, second)]
     return max(float(np.max(np.abs(runs[0][angle] - runs[1][angle]))) for angle in ("theta", "phi", "psi"))
 
 
@@ -40,8 +40,8 @@ def test_another_rule_is_another_trajectory(scene_name):
 
 def test_every_twin_is_of_a_registered_method_and_its_history_is_rounding():
     assert {name: name + TWIN for name in PAIRS}.items() <= unreduced_forms().items()
-    where = symtop.scene("goldstein")
-    history = unreduced_gaps(where, "midpoint", where.nutation_period, 500, samples=51)
+    scene = symtop.scene("goldstein")
+    history = unreduced_gaps(scene, "midpoint", scene.nutation_period, 500, samples=51)
     assert float(history["psi_gap"].max()) < 1e-12
     assert float(history["p_phi_drift"].max()) < 1e-13
 
@@ -55,22 +55,22 @@ def test_a_map_that_invents_its_momenta_is_not_symplectic():
         return run._replace(p_phi=run.p_phi + 1e-4 * np.sin(run.states[:, 0]))
 
     wrong = symtop.Integrator(name="wrong", family="other", summary="", solvers={"angles": solve})
-    where = random_scenes(1, seed=11)[0]
-    step = one_step(wrong, "angles", where, 0.02)
-    assert symplectic_defect(step, where.start).size * step.unit > 1e-5
+    scene = random_scenes(1, seed=11)[0]
+    step = one_step(wrong, "angles", scene, 0.02)
+    assert symplectic_defect(step, scene.start).size * step.unit > 1e-5
 
 
 def test_a_lopsided_rule_misses_the_start():
     lopsided = unreduced(symtop.discrete_lagrangian("left", (0.3,), (1.0,)))
     assert lopsided.symmetric is False
-    where = random_scenes(1, seed=12)[0]
-    assert return_miss(one_step(lopsided, "angles", where, 0.02), where.start) > 1e-7
+    scene = random_scenes(1, seed=12)[0]
+    assert return_miss(one_step(lopsided, "angles", scene, 0.02), scene.start) > 1e-7
 
 
 def momentum_walk(scene_name, loop, steps=1_000_000):
     """Largest relative change of p_phi and p_psi, and the larger of their trends, with the midpoint rule."""
-    where = symtop.scene(scene_name)
-    par, state = with_momenta(where.top, where.start)
+    scene = symtop.scene(scene_name)
+    par, state = with_momenta(scene.top, scene.start)
     marks = np.arange(0, steps + 1, 997)
     done = loop(par, Quadrature((0.5,), (1.0,)), state, 0.01, marks)
     scale = max(abs(state[4]), abs(state[5]))
@@ -108,8 +108,8 @@ def test_one_iteration_a_step_lets_the_momenta_go(scene_name):
 @pytest.mark.parametrize("rule", RULES)
 def test_newtons_jacobian_is_that_of_the_discrete_legendre_transform(rule):
     """A correction misses the root by the square of the distance to it; with one wrong entry, by the distance."""
-    where, h = random_scenes(1, seed=13)[0], 0.05
-    par, state = with_momenta(where.top, where.start)
+    scene, h = random_scenes(1, seed=13)[0], 0.05
+    par, state = with_momenta(scene.top, scene.start)
     table = Quadrature(*RULES[rule][:2])
     root = np.array(kernel._rates(par, state))
 
@@ -137,23 +137,23 @@ def test_the_three_by_three_solver_is_exact():
     for _ in range(50):
         matrix = rng.normal(size=(3, 3)) + 4.0 * np.eye(3)
         right = rng.normal(size=3)
-        found = kernel._solve(*(tuple(row) for row in matrix), tuple(right))
-        assert np.array(found) == pytest.approx(np.linalg.solve(matrix, right), rel=1e-12, abs=1e-14)
+        solution = kernel._solve(*(tuple(row) for row in matrix), tuple(right))
+        assert np.array(solution) == pytest.approx(np.linalg.solve(matrix, right), rel=1e-12, abs=1e-14)
 
 
 @pytest.mark.parametrize("scene_name", SCENES)
 def test_the_iteration_ends_within_a_handful(scene_name):
-    where = symtop.scene(scene_name)
-    cost = unreduced_cost(where, "midpoint", [where.nutation_period / 300.0], batches=1)
+    scene = symtop.scene(scene_name)
+    cost = unreduced_cost(scene, "midpoint", [scene.nutation_period / 300.0], batches=1)
     assert (cost["iterations_per_step"] < 5.0).all()
     assert (cost["iterations_per_step"] >= 1.0).all()
 
 
 def test_long_horizons_do_not_slow_it_down():
     """phi beyond 1e4 rad has an ulp of 2e-12: a stop rule on the angle itself would run into its limit."""
-    where = symtop.scene("spheroid")
+    scene = symtop.scene("spheroid")
     short, long = (
-        symtop.simulate(where, "midpoint-unreduced", step_size=0.01, horizon=T, samples=11, guard=False)
+        symtop.simulate(scene, "midpoint-unreduced", step_size=0.01, horizon=T, samples=11, guard=False)
         for T in (10.0, 2000.0)
     )
     assert abs(float(long["phi"][-1])) > 5e3

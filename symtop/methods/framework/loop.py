@@ -280,8 +280,8 @@ class FixedStep:
         states, momenta = np.empty((samples, size)), np.empty((2, samples))
         steps, work, outcome = run(numbers, rule, h, marks, states, momenta)
         spent, ended = work * evaluations + steps * each_step, OUTCOMES[outcome]
-        seen = states, momenta[0], momenta[1], steps, spent, work * counted, ended, steps * h
-        return tuple.__new__(Run, seen)
+        fields = states, momenta[0], momenta[1], steps, spent, work * counted, ended, steps * h
+        return tuple.__new__(Run, fields)
 
     def _in_stretches(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         """The same with the preparation in Python, and a return to Python after every `BLOCK` steps."""

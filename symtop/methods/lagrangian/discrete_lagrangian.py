@@ -340,15 +340,15 @@ def is_midpoint(method: Integrator) -> bool:
     return rule is not None and (rule.nodes, rule.weights) == RULES["midpoint"][:2]
 
 
-def midpoint_energy(seen: View, momenta: Momenta, h: float) -> Array:
+def midpoint_energy(view: View, momenta: Momenta, h: float) -> Array:
     """What the midpoint rule conserves to O(h^4), less the energy: -h^2 (p^2 V''/I1^2 + V'^2/I1)/24.
 
     Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
     """
-    top, p = seen.top, seen.p_theta
-    slope = top.potential_slope(seen.theta, momenta)
+    top, p = view.top, view.p_theta
+    slope = top.potential_slope(view.theta, momenta)
     return np.asarray(
-        -h * h / 24 * ((p / top.I1) ** 2 * top.potential_curvature(seen.theta, momenta) + slope**2 / top.I1)
+        -h * h / 24 * ((p / top.I1) ** 2 * top.potential_curvature(view.theta, momenta) + slope**2 / top.I1)
     )
 
 

@@ -77,7 +77,7 @@ def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solve
         par, y0 = form.prepare(top, start)
         rhs = RightHandSide(form.field, par, compiled_field(chart) if compiled else None)
         states = np.full((plan.times.size, len(y0)), np.nan)
-        steps = seen = 0
+        steps = row = 0
         outcome = OK
         with np.errstate(all="ignore"), warnings.catch_warnings():
             # LSODA's failures, which are in its status as well. Nothing else is silenced: filters belong to all threads
@@ -92,9 +92,9 @@ def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solve
                         break
                     steps += 1
                     now = int(np.searchsorted(plan.times, stepper.t, side="right"))
-                    if now > seen:
-                        states[seen:now] = stepper.dense_output()(plan.times[seen:now]).T  # DOP853 evaluates f here too
-                        seen = now
+                    if now > row:
+                        states[row:now] = stepper.dense_output()(plan.times[row:now]).T  # DOP853 evaluates f here too
+                        row = now
                 except (OverflowError, ZeroDivisionError, ValueError):  # sin of infinity, or no finite Jacobian
                     outcome = NOT_FINITE
                     break

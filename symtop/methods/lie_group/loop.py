@@ -139,9 +139,9 @@ def in_both_charts(loop: Loop, rule: Any, carried: Carried, forces: int, *, impl
     }
 
 
-def on_body(loop: Loop, rule: Any, forces: int, *, implicit: bool) -> dict[str, FixedStep]:
+def on_body(loop: Loop, rule: Any, *, implicit: bool) -> dict[str, FixedStep]:
     """The solver of a body without symmetry around a map of Gamma and M, whose loop has `observe_turned`."""
-    return {BODY: FixedStep(loop, rule, turned, forces, implicit=implicit, present=turned_back)}
+    return {BODY: FixedStep(loop, rule, turned, 1, implicit=implicit, present=turned_back)}
 
 
 @register_jitable

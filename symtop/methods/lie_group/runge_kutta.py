@@ -264,7 +264,7 @@ def lie_runge_kutta(
         name=name, family="lie-group", summary=summary, reference=reference, order=order, explicit=True,
         symplectic=False, symmetric=False, conserves=frozenset({"p_psi", "axis_length"}),
         solvers=in_both_charts(march, rule, UNSPUN, 1, implicit=False)
-        | loop.on_body(march_body, rule, 1, implicit=False),
+        | loop.on_body(march_body, rule, implicit=False),
         needs="group", general=True,
     )  # fmt: skip
 

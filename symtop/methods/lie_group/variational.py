@@ -175,7 +175,7 @@ def lie_variational(name: str, rule: Variational, order: int, summary: str, refe
         name=name, family="discrete-lagrangian", summary=summary, reference=reference, order=order, explicit=False,
         symplectic=True, symmetric=True, conserves=frozenset({"p_phi", "p_psi", "axis_length"}),
         solvers=in_both_charts(MARCH[rule.kind], rule, SPUN, 1, implicit=True)
-        | loop.on_body(march_body, rule, 1, implicit=True),
+        | loop.on_body(march_body, rule, implicit=True),
         needs="kicks", general=True,
     )  # fmt: skip
 

@@ -100,12 +100,12 @@ _LANES = composed(force_angles, kick_angles, _drift_in_lanes, _ended, top=Reduce
 march = kernel_loop(_begin, _increment, observe, lanes=lambda _: _LANES)
 
 
-def verlet_energy(seen: View, momenta: Momenta, h: float) -> Array:
+def verlet_energy(view: View, momenta: Momenta, h: float) -> Array:
     """What kick-drift-kick conserves to O(h^4), less the energy: h^2 (p^2 V''/12 I1^2 - V'^2/24 I1).
 
     Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
     """
-    top, p = seen.top, seen.p_theta
-    slope = top.potential_slope(seen.theta, momenta)
-    bend = (p / top.I1) ** 2 * top.potential_curvature(seen.theta, momenta)
+    top, p = view.top, view.p_theta
+    slope = top.potential_slope(view.theta, momenta)
+    bend = (p / top.I1) ** 2 * top.potential_curvature(view.theta, momenta)
     return np.asarray(h * h * (bend / 12 - slope**2 / (24 * top.I1)))

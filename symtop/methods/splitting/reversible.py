@@ -34,7 +34,7 @@ from symtop.methods.splitting.loop import Stages, compose
 from symtop.methods.vectors import accumulate
 from symtop.model.top import Angles, SymmetricTop
 
-BLOCK, STEPS, SHARE = 5_000_000, 200_000_000, 10_000  # steps between returns to Python, of a run (10 s), for one asked
+BLOCK, STEPS, SHARE = 5_000_000, 200_000_000, 10_000  # steps between returns to Python, of a run (10 s), per plan step
 NONE = (0.0, 0.0, 0.0, 0.0)
 BEGIN, RETRACE, ONWARD = 0.5, 1.0, 0.0  # updates of rho before the first step
 
@@ -76,16 +76,16 @@ def march(par, k, eps, turn, times, budget, seen, place, states, momenta):  # ty
     return seen, steps, outcome, (state, low, force, clock, rest, rho)
 
 
-def _limit(asked: int) -> int:
-    """The steps at which a run is stopped that was asked for so many."""
-    return max(min(BLOCK + SHARE * asked, STEPS), 8 * asked)
+def _limit(count: int) -> int:
+    """The steps at which a run is stopped for so many of a plan."""
+    return max(min(BLOCK + SHARE * count, STEPS), 8 * count)
 
 
-def _run(top: SymmetricTop, start: Angles, k: float, parts: Sequence[tuple[float, Array]], asked: int) -> Run:
+def _run(top: SymmetricTop, start: Angles, k: float, parts: Sequence[tuple[float, Array]], count: int) -> Run:
     """The samples of the last part, each part with an eps and times of its own."""
     par, state = on_angles(top, start)
     place: Any = (state, NONE, NONE[:3], NONE[:1], NONE[:1], 1.0 / math.sin(start.theta) ** k)
-    done, outcome, before, turn, most = 0, OK, 0.0, BEGIN, _limit(asked)
+    done, outcome, before, turn, most = 0, OK, 0.0, BEGIN, _limit(count)
     for eps, times in parts:
         seen, before, turn = 0, eps, RETRACE if eps * before < 0.0 else turn
         states, momenta = np.full((times.size, 4), np.nan), np.full((2, times.size), np.nan)

@@ -217,21 +217,21 @@ march_axis = kernel_loop(*AXIS[:2], observe_axis, *AXIS[2:4], lanes=AXIS.lanes)
 march_attitude = kernel_loop(*ATTITUDE[:2], observe_attitude, *ATTITUDE[2:4], lanes=ATTITUDE.lanes)
 
 
-def strang_energy(seen: View, momenta: Momenta, h: float) -> Array:
+def strang_energy(view: View, momenta: Momenta, h: float) -> Array:
     """What kick-drift-kick with the exact drift conserves to O(h^4), less the energy: h^2 (V_tt/12 - |grad V|^2/24).
 
     V_tt = mgl (L_z (L.e) - u |L|^2)/I1^2 is the second derivative of V along free motion, u = e_z, and |grad V|^2 =
     mgl^2 (1 - u^2)/I1. Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
     """
-    top, e, L = seen.top, seen.axis, seen.momentum
+    top, e, L = view.top, view.axis, view.momentum
     u, square = e[:, 2], np.sum(L * L, axis=1)
     bent = top.mgl * (L[:, 2] * np.sum(L * e, axis=1) - u * square) / top.I1**2
     return np.asarray(h * h * (bent / 12 - top.mgl**2 * (1.0 - u) * (1.0 + u) / (24 * top.I1)))
 
 
-def cayley_correction(seen: View, momenta: Momenta, h: float) -> Array:
+def cayley_correction(view: View, momenta: Momenta, h: float) -> Array:
     """What kick-drift-kick with a Cayley drift conserves exactly (`cayley_energy` / I1), less the energy."""
-    top, e, L = seen.top, seen.axis, seen.momentum
+    top, e, L = view.top, view.axis, view.momentum
     return np.asarray(cayley_energy(top, h, 0.5 * h / top.I1, e, L) / top.I1 - space_energy(top, e, L, 0.0))
 
 
