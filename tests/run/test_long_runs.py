@@ -136,9 +136,7 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
             child.kill()  # it is waited for even if the machine was too slow for the minute
     assert code == (-signal.SIGKILL if blow == signal.SIGKILL else 128 + signal.SIGTERM)
     monkeypatch.setattr(longrun, "LONGEST", 200_000)
-    from symtop.core import netcdf
-
-    reached = netcdf.read(file)["steps_done"].item()
+    reached = longrun.netcdf.read(file)["steps_done"].item()
     steps = 4_000_000
     assert 10_000 <= reached < steps
     positions = []

@@ -2,6 +2,7 @@
 
 import json
 import math
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -158,10 +159,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_scraps(tmp_path, monkeypatch)
     path = netcdf.write(run, tmp_path / "run.nc")
     before = path.read_bytes()
 
-    def full(*_args, **_kwargs):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(type(run), "to_netcdf", full)
+    monkeypatch.setattr(type(run), "to_netcdf", Mock(side_effect=OSError(28, "No space left on device")))
     with pytest.raises(symtop.SymtopError, match="No space left"):
         netcdf.write(run, path)
     assert path.read_bytes() == before

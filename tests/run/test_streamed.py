@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -190,11 +191,7 @@ def test_nothing_is_replaced_that_is_no_netcdf_file(tmp_path, small_pieces):
 def test_what_a_killed_writer_left_is_swept_and_a_library_without_room_says_so(tmp_path, small_pieces, monkeypatch):
     path, left = tmp_path / "runs.nc", tmp_path / ".runs.nc.abc.part"
     left.write_bytes(b"half")
-    full = RuntimeError("NetCDF: HDF error")
-
-    def no_room(*_):
-        raise full
-
+    no_room = Mock(side_effect=RuntimeError("NetCDF: HDF error"))
     with monkeypatch.context() as patch:
         patch.setattr(ensemble, "_lay_out", no_room)
         with pytest.raises(symtop.SymtopError, match="is the disk full"):
@@ -208,9 +205,7 @@ def test_what_a_killed_writer_left_is_swept_and_a_library_without_room_says_so(t
 
 def test_a_file_system_without_locks_is_written_to(tmp_path, monkeypatch):
     for number, fails in ((errno.ENOLCK, False), (errno.EIO, True)):
-        monkeypatch.setattr(
-            files.fcntl, "flock", lambda *_, number=number: (_ for _ in ()).throw(OSError(number, "no"))
-        )
+        monkeypatch.setattr(files.fcntl, "flock", Mock(side_effect=OSError(number, "no")))
         with pytest.raises(OSError, match="no") if fails else contextlib.nullcontext():
             symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "runs.nc", **SETTINGS).close()
 
