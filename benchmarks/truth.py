@@ -92,7 +92,7 @@ def _free() -> dict[str, tuple[Callable[[], object], int]]:
     build, fill, random = free_body._build.compiled, free_body._fill.compiled, np.random.default_rng(2)
     shares = random.uniform(0.2, 1.0, (COUNT, 3))  # of the mass along each axis, squared
     moments, momenta = shares.sum(axis=1, keepdims=True) - shares, random.normal(size=(COUNT, 3))
-    rows = [free_body.checked_body(one, (1, 0, 0, 0), L) for one, L in zip(moments, momenta, strict=True)]
+    rows = [free_body.checked_body(one, (1, 0, 0, 0), L, (0, 0, 0)) for one, L in zip(moments, momenta, strict=True)]
     constants, times, out = np.zeros(free_body.SIZE), np.linspace(0.0, 1e3, MANY), np.empty((MANY, 7))
     return {
         "constants of a free body": (lambda: [build(row, constants) for row in rows], COUNT),

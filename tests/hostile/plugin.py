@@ -88,6 +88,12 @@ def changes_arguments(top, start, plan):
     return run
 
 
+def changes_and_raises(top, start, plan):
+    """Writes into the top, and does not return."""
+    object.__setattr__(top, "I1", 1e9)
+    raise ValueError("no")
+
+
 def recurses(top, start, plan):
     """Never comes to an end of its own calls."""
     return recurses(top, start, plan)
@@ -164,6 +170,7 @@ REFUSED = {
     "recurses": recurses,
     "takes-two": lambda top, start: None,
     "changes-arguments": changes_arguments,
+    "changes-and-raises": changes_and_raises,
 }  # each must end in one sentence and code 2
 TOLERATED = {
     "states-float32": changed(states=lambda states: states.astype(np.float32)),

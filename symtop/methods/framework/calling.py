@@ -35,16 +35,17 @@ def solve(method: Integrator, chart: str, top: Any, start: Any, plan: Plan, cont
         )
         given = plan if own else plan._replace(times=plan.times.copy(), marks=plan.marks.copy())
         backwards = not own and plan.step_size < 0.0  # a loop that counts on a step forwards never ends
-        with np.errstate(all="ignore"), at_most(PATIENCE) if backwards else contextlib.nullcontext():
-            run = solver(top, start, given)
-        if not own:
+        try:
+            with np.errstate(all="ignore"), at_most(PATIENCE) if backwards else contextlib.nullcontext():
+                run = solver(top, start, given)
+        finally:  # also where it raises: others use the top and the start, too
             _restore(method, fields)
         checked = _checked(method, (plan.times.size, DIMENSIONS[chart]), plan, run, copy=not own)
         return _of_length_one(plan, checked, chart) if chart in QUATERNIONS else checked
 
 
 def _restore(method: Integrator, fields: list[tuple[Any, str, Any]]) -> None:
-    """Refuse a solver that has changed the top or the start, which others use, too."""
+    """Undo what a solver has changed of the top or the start, and refuse it."""
     if any(getattr(record, name) != value for record, name, value in fields):
         for record, name, value in fields:
             object.__setattr__(record, name, value)
