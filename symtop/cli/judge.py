@@ -122,8 +122,9 @@ def _draw_beside(
         if stepper.chart not in (*CHARTS, BODY):
             raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
         methods = [integrator(stepper, order=options["order"]), *BESIDE]
-        most = min(MOST_BESIDE, LONGEST_BESIDE / max(seconds_a_step, 1e-9))  # a step evaluates the force at least once
-        data = compare(on, methods, cost="evaluations", nutations=NUTATIONS, budget=most, quiet=True)
+        # `compare` counts a step as one force evaluation at least
+        budget = min(MOST_BESIDE, LONGEST_BESIDE / max(seconds_a_step, 1e-9))
+        data = compare(on, methods, cost="evaluations", nutations=NUTATIONS, budget=budget, quiet=True)
         draw_compare(data, file)
     most, errors = ranked(data)
     if not quiet and errors:
