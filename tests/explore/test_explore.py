@@ -383,6 +383,7 @@ def test_a_link_with_a_second_method_that_is_not_known_shows_the_first(site, sec
     with Browser() as browser:
         browser.open(address(site) + link)
         browser.wait_for("document.querySelector('#status').textContent.startsWith('rk4: reached t = 8')")
+        browser.wait_for("document.querySelector('#now').textContent.endsWith(' s')", 5.0)  # the clock goes
         assert browser.evaluate("document.querySelector('#second').value") == shown
         assert browser.problems == []
 
