@@ -102,6 +102,8 @@ class StudyCases:
                 post(f"{self.study.name}: {count} of {len(tasks)} cases")
                 bar.update()
 
+            if tasks:
+                post(f"{self.study.name}: 0 of {len(tasks)} cases, after kernels that no file holds are compiled")
             pool.run(self.study, tasks, on_result)
 
     def combined(self) -> Combined:
