@@ -85,7 +85,7 @@ def whole(name: str, value: object, least: int, most: float = math.inf) -> int:
         raise SymtopError(f"{name} must be a whole number of at least {least}, not {shown(value)}", name)
     if number > most:
         raise SymtopError(f"{name} must be at most {most:g}, not {shown(value)}", name)
-    return int(number)
+    return int(value)  # type: ignore[call-overload,no-any-return]  # beyond 2^53 a float is another number
 
 
 def boolean(name: str, value: object) -> bool:
