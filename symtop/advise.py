@@ -215,6 +215,8 @@ def recommend(
         raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}", "accuracy")
     horizon = scene.horizon if horizon is None else horizon_of(horizon)
     limit = settings.judgeable(scene, quantity, horizon)
+    if math.isnan(limit):
+        raise SymtopError(f"quantity must be one that the motion of {scene.name} has, not {quantity!r}", "quantity")
     step = None if step_size is None else positive("step_size", step_size)
     if step is not None and not horizon / MOST_STEPS <= step < horizon:
         words = f"below the horizon {horizon:g}, of which at most {MOST_STEPS:g} steps are run, not {step:g}"
@@ -407,7 +409,7 @@ def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]
     timed = sorted((one._replace(seconds=time) for one, time in pairs), key=lambda one: one.seconds)
     slow = [one.run.integrator.name for one in timed if one.a_step > question.pace]
     if slow:
-        fails[f"A step takes over {question.pace:g} s"] = slow
+        fails.setdefault(f"A step takes over {question.pace:g} s", []).extend(slow)
     return [one for one in timed if one.a_step <= question.pace]
 
 
@@ -567,7 +569,7 @@ class EngineAdvice:
         ]
         near = self.errors[self.best] <= WORST
         if self.best != default and near:
-            times = self.errors[default] / self.errors[self.best]
+            times = self.errors[default] / (self.errors[self.best] or math.nan)
             nearer = f", {times:.3g} times nearer than {default}" if self.errors[default] < math.pi else ""
             lines.append(f"Its best setting is {self.best}{nearer}.")
         if not near:
@@ -620,7 +622,7 @@ def i_use(
     elif limits.get("quantity") not in (None, "axis"):
         raise SymtopError(f"quantity must be axis where there is no accuracy, not {limits['quantity']!r}", "quantity")
     target = error if accuracy is None else accuracy
-    has_target = accuracy is not None or error <= WORST
+    has_target = accuracy is not None or 0.0 < error <= WORST
     advice = recommend(start, accuracy=target, horizon=end, **limits) if has_target else None
     gain = math.nan
     if advice is not None and advice.integrator is not None:

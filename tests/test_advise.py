@@ -348,6 +348,27 @@ def test_limits_leave_out_what_a_user_cannot_use():
     assert any(words.startswith("A step takes over 1e-12 s") for words in slow.fails)
 
 
+def test_a_step_that_takes_too_long_stays_named_when_another_does_later(monkeypatch):
+    question = advise._Question(symtop.scene("spheroid"), 1e-3, "axis", 2.0, (), 0.002, pace=1e-6)
+    mets = [settings.Met(symtop.integrator(name), 0.002, 1e-4, 0.0, 2.0, 1e3) for name in ("rk4", "strang", "cayley")]
+    trials, fails = [advise._Trial(one, 1e-4, math.nan, "checked", 2.0) for one in mets], {}
+    for seconds in ([1e-2, 1e-4, 1e-4], [1e-2, 1e-4]):  # 1e-5, and 1e-7 s a step
+        monkeypatch.setattr(settings, "seconds", lambda *_, seconds=seconds: seconds)
+        trials = advise._timed(question, trials, fails)
+    assert fails == {"A step takes over 1e-06 s": ["rk4", "strang"]}
+    assert [one.run.integrator.name for one in trials] == ["cayley"]
+
+
+@pytest.mark.parametrize(("name", "has"), [("steady", False), ("goldstein", True)])
+def test_a_quantity_that_the_motion_has_not_is_refused(name, has, monkeypatch):
+    few(monkeypatch, 1)
+    if has:
+        assert symtop.recommend(name, accuracy=1e-2, quantity="nutation_period", horizon=20.0).integrator is not None
+        return
+    with pytest.raises(symtop.SymtopError, match="must be one that the motion of steady has, not 'nutation_period'"):
+        symtop.recommend(name, accuracy=1e-2, quantity="nutation_period")
+
+
 def test_the_command_of_a_plug_in_loads_it(tmp_path, monkeypatch):
     file = tmp_path / "my scene.py"
     monkeypatch.setattr(advise, "loaded", lambda: (str(file),))

@@ -93,7 +93,8 @@ def _numbers(count: int) -> Callable[[click.Context, click.Parameter, str | None
         except ValueError:
             values = ()
         if values is not None and len(values) != count:
-            raise SymtopError(f"--{option.name} must be {count} numbers with commas between, not {text!r}")
+            must = "a number" if count == 1 else f"{count} numbers with commas between"
+            raise SymtopError(f"--{option.name} must be {must}, not {text!r}")
         return values
 
     return read

@@ -83,6 +83,7 @@ def judge(
 
     check_outputs(output=output, card=card, badge=badge, figure=figure)
     ledger = judged(target, scene=scene, tell=None if as_json else tell, **options)
+    _refuse_of_trajectory(ledger, card, figure)
     if as_json:
         click.echo(as_text([finding.plain() for finding in ledger.findings]))
     else:
@@ -101,6 +102,11 @@ def judge(
     say_written(output, card, badge, figure, err=as_json)
     if ledger.refuted:
         sys.exit(1)
+
+
+def _refuse_of_trajectory(ledger: Any, *files: str | None) -> None:
+    if not ledger.about.chart and any(files):
+        raise SymtopError("a card or a figure shows a method: there is none of a trajectory")
 
 
 def _draw_beside(
@@ -159,10 +165,11 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
 
         problem = scenes.scene(scene, bodies=True)
         added = [name for name in registry.integrators() if not registry.is_built_in(name)]
+        methods = [registry.integrator(name) for name in names or added or registry.integrators()]
     refuted, entries = False, []
-    for name in names or added or registry.integrators():
-        with ticking(f"measuring {name}"):
-            ledger = judge_separately(registry.integrator(name), problem, quick=quick)
+    for method in methods:
+        with ticking(f"measuring {method.name}"):
+            ledger = judge_separately(method, problem, quick=quick)
         verdicts = {finding.verdict for finding in ledger.findings}
         refuted |= "refuted" in verdicts or not verdicts & {"confirmed", "measured"}
         if as_json:

@@ -66,21 +66,24 @@ def run(
     with ticking("loading"):
         from symtop.core import netcdf
         from symtop.measure.errors import OF_BODY, QUANTITIES, errors
+        from symtop.measure.settings import judgeable
         from symtop.measure.verdicts import judgement
         from symtop.model import scenes
         from symtop.run.reference.truth import reference
         from symtop.run.simulation import simulate
 
         settings["step_size"] = h = common.step_of(scene, settings)
+        problem = scenes.scene(scene, bodies=True)
+        horizon = problem.horizon if settings["horizon"] is None else scenes.horizon_of(settings["horizon"])
+        if problem.of_body:  # one to which its motion is not known is refused before the run, and not after it
+            judgeable(problem, "attitude", horizon)
     if h is not None and h > 0.0:
         few_steps = partial(simulate, scene, integrator, step_size=h, samples=2, guard=False)
-        horizon = settings["horizon"] or scenes.scene(scene, bodies=True).horizon
         estimate(horizon / h, lambda few: few_steps(horizon=few * h))
     with ticking("running"):
         data = simulate(scene, integrator, guard={"on": True, "off": False}.get(guard, guard), **settings)
         if output is not None:
             netcdf.write(data, output)
-        problem = scenes.scene(scene, bodies=True)
         truth = reference(problem, data["time"].values, precision="closed-form")
         error = errors(data)
         verdict = judgement(problem, data, error["attitude" if problem.of_body else "axis"].values)

@@ -77,7 +77,7 @@ def study(
     try:
         with ending_on_sigterm(), Pool(jobs, scheduler) as pool:
             if check:
-                code = check_all(pool, studies, folder, as_json, grid, everything=fresh)
+                code = check_all(pool, studies, folder, as_json, grid, everything=fresh, limit=limit)
             else:
                 code = run_all(pool, studies, folder, as_json, grid, fresh=fresh, limit=limit)
     except (KeyboardInterrupt, TerminatedError) as stop:
@@ -214,12 +214,12 @@ def show_status(studies: "list[Study]", results: Path, why: bool, as_json: bool,
 
 
 def check_all(
-    pool: "Pool", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], *, everything: bool
+    pool: "Pool", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], **options: Any
 ) -> int:
     """Compute stored cases again and compare; 1 if anything is different."""
     from symtop.runner.cases import check
 
-    checks = [check(study, results, pool, everything=everything, **grid) for study in studies]
+    checks = [check(study, results, pool, **options, **grid) for study in studies]
     if not any(entry["stored"] for entry in checks):
         names = ", ".join(study.name for study in studies)
         raise SymtopError(f"no case of {names} is up to date in {results}; run it first")
@@ -253,7 +253,7 @@ def report(results: str, embed: bool) -> None:
 
 
 @click.command(short_help="Bundle all results for a repository of data.")
-@click.option("--output", type=File(dir_okay=False), help="The zip to write; in the results folder by default.")
+@click.option("--output", type=File(), help="The zip to write; in the results folder by default.")
 @click.option("--test-set", is_flag=True, help="Write the test set of rigid bodies instead, a folder; takes a minute.")
 @results_option
 @plugin_option

@@ -12,10 +12,11 @@ that it names, attributes of modules among them, and to what it imports when it 
 bases; from an instance to its class and attributes. Comments, docstrings and line numbers are no part of code. By name
 alone count functions that look up what they are given (`by_name`), `PLUMBING`, which moves numbers without making any,
 and libraries, with their version (`packages`). Lists, dicts and sets under a module's lower-case names, the state of a
-process, do not count, nor fields of a dataclass with the metadata ``words``; a file of a known package that a constant
-names by its path counts as a whole.
+process, do not count, or in a user's file by what the file says outside of functions; nor do fields of a dataclass with
+the metadata ``words``; a file of a known package that a constant names by its path counts as a whole.
 """
 
+import ast
 import contextlib
 import dis
 import functools
@@ -141,6 +142,7 @@ Parts = Callable[[Any], Iterable[Any]]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 STATE = (list, dict, set)  # under a module's lower-case name
+SHIPPED = ("symtop.", "symtop_studies.")
 PLAIN = (type(None), bool, int, float, complex, str, bytes, np.generic)
 _IMPORT = dis.opmap["IMPORT_NAME"]
 _by_name: set[Callable[..., Any]] = set()
@@ -323,6 +325,18 @@ class Code:
                 self._note(f"{name} = {value!r}")
             elif not (isinstance(value, STATE) and name == name.lower()):
                 self._lead_to("constant", name, file, value)
+            elif not (function.__module__ or "").startswith(SHIPPED):
+                self._note(f"{name} of {_statements(_path(function.__code__.co_filename))}")
+
+
+def _statements(file: Path) -> str:
+    """Hash of what a user's file says outside of functions and classes: what its lists begin with."""
+    with contextlib.suppress(OSError, SyntaxError, ValueError):  # no file, as at a prompt
+        lines = ast.parse(file.read_bytes()).body
+        apart = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
+        words = [one for one in lines if isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant)]
+        return hashed(*(ast.dump(one) for one in lines if not isinstance(one, apart) and one not in words))
+    return ""
 
 
 def by_file(parts: Iterable[Part]) -> Reasons:

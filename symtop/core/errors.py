@@ -7,7 +7,6 @@ errors beside `Exception` included; Ctrl-C and SIGTERM pass.
 import contextlib
 import difflib
 import math
-import operator
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -86,9 +85,7 @@ def whole(name: str, value: object, least: int, most: float = math.inf) -> int:
         raise SymtopError(f"{name} must be a whole number of at least {least}, not {shown(value)}", name)
     if number > most:
         raise SymtopError(f"{name} must be at most {most:g}, not {shown(value)}", name)
-    with contextlib.suppress(TypeError):
-        return operator.index(value)  # type: ignore[arg-type]  # all digits of an int, which a double may not hold
-    return int(number)
+    return int(value)  # type: ignore[call-overload,no-any-return]  # beyond 2^53 a float is another number
 
 
 def boolean(name: str, value: object) -> bool:

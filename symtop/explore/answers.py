@@ -200,6 +200,7 @@ def answer(config: Setup) -> dict[str, Any]:
         "steps": int(run.steps),
         "force_evaluations": int(run.force_evaluations),
         "period": period,
+        "steps_per_nutation": run.steps * period / run.reached_time if run.reached_time > 0.0 else 0.0,
         "run_ms": 1e3 * (end - began),
         "all_ms": 1e3 * (time.perf_counter() - began),
         "largest": largest,

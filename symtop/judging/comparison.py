@@ -17,7 +17,7 @@ from symtop.core.errors import SymtopError, boolean, one_of, positive
 from symtop.core.parallel import cores, in_threads
 from symtop.core.progress import post, progress_bar
 from symtop.judging.adapters.adapter import integrator as adapted
-from symtop.judging.claims.subject import open_target
+from symtop.judging.claims.subject import LIBRARIES, open_target
 from symtop.measure import columns, settings
 from symtop.measure.accuracy import as_table, blank_row
 from symtop.measure.errors import QUANTITIES
@@ -42,8 +42,8 @@ def compare(
     """Error against run time, or against force evaluations, of some methods on one scene.
 
     `methods` are names, variants such as ``rk4[axis]`` or records; a method without a chart runs in the smallest one
-    that shows the `quantity` (axis, attitude, theta, energy, p_phi or p_psi). A function, a class, ``FILE.py:NAME``, a
-    library or a command is a step in the chart of the axis, or of a body, as `judge` takes it. Runs go to the
+    that shows the `quantity` (axis, attitude, theta, energy, p_phi or, of a top, p_psi). A function, a class,
+    ``FILE.py:NAME`` or a library is a step in the chart of the axis, or of a body, as `judge` takes it. Runs go to the
     `horizon`, the scene's own by default, or over so many `nutations`. With the `cost` "evaluations" nothing is timed.
     `budget` is the most force evaluations of a run, by default 3e6, for plain Python 5e4.
 
@@ -61,7 +61,7 @@ def compare(
     Raises SymtopError for arguments that make no sense. `symtop.plot` draws the dataset.
     """
     problem = find_scene(scene, bodies=True)
-    one_of("quantity", quantity, QUANTITIES)
+    one_of("quantity", quantity, settings.OF_BODY if problem.of_body else QUANTITIES)
     one_of("cost", cost, COSTS)
     if horizon is not None and nutations is not None:
         raise SymtopError("compare takes horizon or nutations, not both", "horizon", "nutations")
@@ -128,7 +128,8 @@ def find(method: Any, on: Scene) -> Integrator:
     """A method by its name, its record, or as what `judge` takes: a step in the chart of the axis, or of a body."""
     if isinstance(method, Integrator):
         return method
-    if isinstance(method, str) and not (set(method) & set("/ ") or ".py" in method):
+    file = set("/ ") & set(str(method)) or ".py" in str(method) or str(method).partition(":")[0].endswith(LIBRARIES)
+    if isinstance(method, str) and not file:
         return find_integrator(method)
     return adapted(open_target(method, None, "axis", on=on))
 

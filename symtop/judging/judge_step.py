@@ -171,12 +171,19 @@ def read(target: Any) -> dict[str, Any]:
         raise SymtopError(f"the trajectory {path} cannot be read: {reason}") from None
     names = head.lstrip("# ").split()
     fields = (*SCALARS, *(part for parts in VECTORS.values() for part in parts))
+    for parts in VECTORS.values():
+        if lacking := {*parts} - {*names} if {*parts} & {*names} else ():
+            raise SymtopError(
+                f"{path.name} must have all of {', '.join(parts)}, and lacks {', '.join(sorted(lacking))}"
+            )
     if not set(names) <= set(fields) or "time" not in names or len(set(names)) < len(names):
         raise SymtopError(
             f"{path.name} must begin with a line of names, time and of {', '.join(fields[1:])}, not {head[:60]!r}"
         )
+    if not any(lines):
+        raise SymtopError(f"{path.name} must have a line of numbers below its names, and has none")
     try:
-        columns = dict(zip(names, np.loadtxt(lines or [""] * 2, ndmin=2, unpack=True), strict=True))
+        columns = dict(zip(names, np.loadtxt(lines, ndmin=2, unpack=True), strict=True))
     except ValueError as error:
         why = str(error).partition(";")[0]
         raise SymtopError(f"{path.name} must have {len(names)} numbers in each line: {why}") from None
@@ -263,7 +270,7 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     """What became of a constant of the motion, beside what is claimed of it."""
     scale, grain = (scene.energy_scale, scene.energy_grain) if name == "energy" else (scene.momentum_scale, 1.0)
     true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)
-    change = constant_of(time, (values - values[0]) / scale)
+    change = constant_of(time if time[-1] else [1.0], (values - values[0]) / scale)  # of a start alone nothing grows
     if time.size < FEWEST:
         change = change._replace(exponent=math.nan)
     constant = Constant(change, math.nan, KEPT * grain, grain)

@@ -54,7 +54,7 @@ def _series(name: str, points: Sequence[tuple[float | None, float | None, str]])
         "marker": style.marker,
         "dashed": method is not None and method.implementation == "python",
         "points": [
-            list(point)
+            [None if isinstance(value, float) and not math.isfinite(value) else value for value in point]
             for point in points
             if len(point) > 3 or all(0.0 < (value or 0.0) < math.inf for value in point[:2])
         ],
@@ -73,7 +73,7 @@ def gather(results: Path) -> list[dict[str, Any]]:
     others = sorted({file.stem for file in results.glob("*.json")} - set(studies))
     for name in [*studies, *others]:
         findings = netcdf.read_json(results / f"{name}.json")
-        if findings is None or (name in others and not (isinstance(findings, dict) and "pictures" in findings)):
+        if not isinstance(findings, dict) or (name in others and "pictures" not in findings):
             continue
         shipped = runner.file_beside(name, "page.md") if name in studies else None
         try:

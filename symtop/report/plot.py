@@ -93,7 +93,9 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         if quantity not in wrong:
             shows = ", ".join(str(other) for other in wrong.data_vars if other in QUANTITIES)
             raise SymtopError(f"this run does not show the {quantity}; it shows {shows}")
-        ax.plot(wrong["time"].values[1:], np.maximum(wrong[quantity].values[1:], SMALLEST), color=color, lw=1.2)
+        marker = "o" if times.size == 2 else None  # a line has two points at least
+        later = np.maximum(wrong[quantity].values[1:], SMALLEST)
+        ax.plot(wrong["time"].values[1:], later, color=color, lw=1.2, marker=marker)
         if has_bounds:
             ax.plot(times, np.maximum(data[f"{quantity}_bound"].values, SMALLEST), color="0.6", lw=0.8, ls=":")
         ax.set(yscale="log", ylabel=QUANTITIES[quantity])
@@ -164,6 +166,8 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
 def _ensemble(ax: "Axes", data: xr.Dataset, quantity: str, members: Any) -> None:
     if not isinstance(members, xr.Dataset):
         raise SymtopError("plot needs members, the tops of the ensemble, to compare it with the exact motion")
+    if "horizon" not in data or "chart" not in data.attrs:
+        raise SymtopError("data over member must be a dataset of ensemble, with its horizons and attributes")
     _bands(ax, data, quantity, spread.member_errors(members, data, quantity))
     ax.set_title(f"{data.attrs['integrator']} on {data.sizes['member']} {spread.kind_of(data)}")
 
@@ -192,7 +196,10 @@ def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Datase
 
 
 def _line(axis: Any, times: Any, values: Any, color: str, label: str) -> None:
-    axis.plot(times[1:], np.maximum(values[1:], SMALLEST), color=color, lw=1.0, label=label)
+    later = np.isfinite(values[1:])
+    if later.any():  # a logarithmic axis has no place for a line without a number
+        marker = "o" if later.sum() == 1 else None  # a line has two points at least
+        axis.plot(times[1:], np.maximum(values[1:], SMALLEST), color=color, lw=1.0, label=label, marker=marker)
 
 
 def draw_ensemble(data: xr.Dataset, errors: dict[str, spread.Array], path: str | Path) -> None:

@@ -159,14 +159,15 @@ def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
 
-    metadata = {UNDATED.get(target.suffix, "Software"): None}
+    kind = target.suffix.lower()
+    metadata = {UNDATED.get(kind, "Software"): None}
     netcdf.sweep(target)
     with netcdf.replacing(target, target.suffix) as path:
-        if target.suffix not in {".png", ".pdf"}:
+        if kind not in {".png", ".pdf"}:
             figure.savefig(path, metadata=metadata, dpi=dpi)
             return
         figure.set_dpi(dpi)
-        if target.suffix == ".pdf":
+        if kind == ".pdf":
             FigureCanvasPdf(figure).print_pdf(path, metadata=metadata)
         else:
             FigureCanvasAgg(figure).print_png(path, metadata=metadata)

@@ -98,7 +98,7 @@ def rendered(template: str | None, name: str, context: Mapping[str, Any]) -> str
     try:
         ready = ours.get_template(PLAIN) if template is None else ours.from_string(template)
         text = ready.render(**context)
-    except (TemplateError, TypeError, ValueError) as error:
+    except (TemplateError, TypeError, ValueError, LookupError, ArithmeticError) as error:
         place = f", line {error.lineno}" if getattr(error, "lineno", None) else ""  # type: ignore[union-attr]
         raise SymtopError(f"{name}{place}: {error}") from error
     return "\n\n".join(map(_unwrapped, re.split(r"\n{2,}", text.strip()))) + "\n"

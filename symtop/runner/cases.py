@@ -163,8 +163,9 @@ def _attribute(path: Path, name: str) -> dict[str, Any]:
 
 
 def check(
-    study: Study, results: Path, pool: Pool, *, quick: bool = False, full: bool = False, everything: bool = False
-) -> dict[str, Any]:
+    study: Study, results: Path, pool: Pool, *, quick: bool = False, full: bool = False, everything: bool = False,
+    limit: float | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """Compute `SAMPLE` stored cases again, or every one, and compare; likewise the dataset that they make together.
 
     Returns how many are ``stored`` and up to date, how many were ``compared``, and the ``differences`` in words.
@@ -176,7 +177,7 @@ def check(
     with tempfile.TemporaryDirectory(prefix="symtop-check-") as folder:
         again = StudyCases(study, Path(folder).resolve())
         missing = again.add(case for path, case in cases.cases.items() if path.name in sample)
-        again.compute(missing, pool, study.limit, fresh=False, quiet=True)
+        again.compute(missing, pool, limit or study.limit, fresh=False, quiet=True)
         again.read(missing)
     differing = again.failures
     for path, data in again.data.items():

@@ -85,6 +85,8 @@ OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --bod
         ("study convergence --status --limit -5", ["--limit", "above zero", "-5.0"]),
         ("study convergence --jobs 0", ["--jobs", "0"]),
         ("report --results nothing-here", ["nothing-here", "symtop study"]),
+        ("scenes body --body 1,2,3 --mgl x", ["--mgl must be a number, not 'x'"]),
+        ("scenes body --body 1,2,x", ["--body must be 3 numbers with commas between, not '1,2,x'"]),
     ],
 )
 def test_a_refusal_names_the_argument_its_value_and_what_is_allowed(words, parts, tmp_path, monkeypatch):
@@ -285,3 +287,13 @@ def test_a_command_whose_threads_work_or_whose_code_is_a_text_ends_as_python_doe
     assert result.returncode == 3
     result = ending(code="'a text'")
     assert (result.returncode, result.stderr) == (1, "a text\n")
+
+
+def test_a_body_whose_motion_is_not_known_to_the_horizon_is_refused_before_the_run(tmp_path):
+    words = ("run", "heavy-chaotic", "rk4", "--step-size", 0.01, "--no-guard", "--output", tmp_path / "run.nc")
+    result = call(*words, "--horizon", 400, code=2)
+    assert "symtop: --horizon must be below " in result.stderr
+    assert "not 400: its motion is not known" in result.stderr
+    assert list(tmp_path.iterdir()) == []
+    call(*words, "--horizon", 5)
+    assert netcdf.read(tmp_path / "run.nc").attrs["reached_time"] == 5.0

@@ -43,6 +43,14 @@ def test_an_engine_without_a_gyroscopic_term_has_nothing_to_match():
     assert "nothing to match" in str(advice)
 
 
+def test_an_engine_without_an_error_has_nothing_to_match_either():
+    upright = symtop.Scene("upright", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(theta=0.0, psi_dot=5.0), 10.0)
+    advice = i_use("mujoco", upright)
+    assert (set(advice.errors.values()), advice.advice) == ({0.0}, None)
+    assert "the axis is off by\n    0.00e+00 rad  Euler" in str(advice)
+    assert i_use("mujoco", upright, accuracy=1e-3).advice is not None
+
+
 @pytest.mark.parametrize(
     ("engine", "step", "message"),
     [("frostbite", 0.01, "mujoco"), ("mujoco", -1.0, "step_size"), ("mujoco", 20.0, "below the horizon")],

@@ -103,7 +103,7 @@ def test_a_proposed_step_is_of_use():
 
 def test_figures_come_in_three_kinds_and_are_the_same_again(tmp_path):
     """The bytes of an SVG; those of a PNG and a PDF have a test with the figures."""
-    files = [tmp_path / name for name in ("a.png", "a.pdf", "a.svg", "b.svg")]
+    files = [tmp_path / name for name in ("a.png", "A.PDF", "a.svg", "B.SVG")]
     for file, head in zip(files, (b"\x89PNG", b"%PDF", b"<?xml", b"<?xml"), strict=True):
         call("run", "spheroid", "strang", "--step-size", "0.005", "--figure", file)
         assert file.read_bytes().startswith(head)

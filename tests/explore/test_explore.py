@@ -93,6 +93,9 @@ def test_a_failing_run_is_an_answer_with_its_sentence():
     assert answer["outcome"] == "left_chart"
     assert "theta left (0, pi)" in answer["message"]
     assert np.isnan(unpacked(answer["arrays"]["theta"])[-1])
+    assert answer["steps"] < 5  # of 13 to the horizon
+    assert answer["steps_per_nutation"] == pytest.approx(answer["period"] / 0.6, rel=0.05)
+    assert answers.answer(answers.setup(fields()))["steps_per_nutation"] == pytest.approx(answer["period"] / 0.02)
     json.loads(json.dumps(answer, allow_nan=False))
 
 
@@ -372,6 +375,17 @@ def test_a_person_can_use_it(site, tmp_path):
         assert browser.screenshot(tmp_path / "narrow.png", whole=True).stat().st_size > 30_000
         assert browser.problems == []
         assert browser.outside() == []
+
+
+@pytest.mark.parametrize(("second", "shown"), [("gone", ""), ("strang", "strang")])
+def test_a_link_with_a_second_method_that_is_not_known_shows_the_first(site, second, shown):
+    link = f"#base=spheroid&scene=spheroid&integrator=rk4&second={second}"
+    with Browser() as browser:
+        browser.open(address(site) + link)
+        browser.wait_for("document.querySelector('#status').textContent.startsWith('rk4: reached t = 8')")
+        browser.wait_for("document.querySelector('#now').textContent.endsWith(' s')", 5.0)  # the clock goes
+        assert browser.evaluate("document.querySelector('#second').value") == shown
+        assert browser.problems == []
 
 
 def test_a_warning_is_shown_on_the_page(site, monkeypatch):

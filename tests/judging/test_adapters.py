@@ -171,6 +171,20 @@ def test_a_program_that_writes_anything_else_is_told_so(tmp_path, body, words, m
         stepper.march(SPHEROID.top, None, np.full(6, 5.0), 0.1, np.array([0, 1, 2, 3]))
 
 
+def test_a_slow_program_has_the_time_that_earlier_runs_took_also_after_a_short_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(heartbeat, "patience", 0.6)
+    body = STILL.replace("for k", "import time; time.sleep(0.004 * n)\nfor k")
+    for before in ([100], [100, 1]):
+        stepper = open_target(program(tmp_path, body), "program", "axis")
+        for steps in [*before, 200]:
+            states, _ = stepper.march(SPHEROID.top, None, np.full(6, 5.0), 0.1, np.array([0, steps]))
+            assert (states == 5.0).all()
+    with pytest.raises(symtop.SymtopError, match="had not ended 1 s after it was asked for 200 steps"):  # the control
+        open_target(program(tmp_path, body), "program", "axis").march(
+            SPHEROID.top, None, np.full(6, 5.0), 0.1, np.array([0, 200])
+        )
+
+
 # ---- what does not fit -----------------------------------------------------------------------------------------------
 
 

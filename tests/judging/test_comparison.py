@@ -147,6 +147,7 @@ def test_another_quantity_takes_the_chart_that_shows_it(quantity):
         ({"methods": []}, "one or more, each once"),
         ({"methods": ["rk4", "rk4[axis]"]}, "one or more, each once"),
         ({"methods": ["rk4[axis]"], "quantity": "attitude"}, "cannot show the attitude"),
+        ({"scene": "tennis-racket", "methods": "gauss-4", "quantity": "p_psi"}, "quantity 'p_psi' is unknown"),
         ({"horizon": -1.0}, "horizon must be"),
         ({"horizon": 1.0, "nutations": 2.0}, "not both"),
     ],
@@ -202,3 +203,23 @@ def test_times_are_those_of_timeit_by_hand():
         if gaps[-1] < 0.15:
             return
     pytest.fail(f"off by {statistics.median(gaps):.0%}")
+
+
+def test_a_step_that_is_called_as_a_method_of_ours_is_told_apart(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("rk4", "mine"):
+        (tmp_path / f"{name}.py").write_text("def step(f, t, y, h):\n    return y + h * f(t, y)\n", encoding="utf-8")
+    words = {"nutations": 0.2, "cost": "evaluations", "budget": 1e3, "quiet": True}
+    data = symtop.compare("spheroid", ["rk4.py", "rk4", "mine.py"], **words)
+    assert data["variant"].values.tolist() == ["own-rk4[axis]", "rk4[axis]", "mine[axis]"]
+    error = data["error"].isel(setting=-1).values
+    assert error[0] == error[2] != error[1]
+
+
+def test_a_library_needs_no_folder_in_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for target in ("my.so", "my.so:other", "./my.so"):
+        with pytest.raises(symtop.SymtopError, match="a shared object must be a file that is there"):
+            symtop.compare("spheroid", target, quiet=True)
+    with pytest.raises(symtop.SymtopError, match="integrator 'my-so' is unknown"):
+        symtop.compare("spheroid", "my-so", quiet=True)

@@ -8,6 +8,7 @@ from symtop.judging.battery import judge
 from symtop.judging.remote import Process, separated, solvers_of
 from symtop.methods.framework.plan import Run
 from tests import commands
+from tests.commands import call
 
 
 def seeing(below):
@@ -77,3 +78,11 @@ def test_a_run_that_is_returned_is_one_of_numbers():
         run = symtop.simulate("spheroid", separated(method, process), step_size=0.1, guard=False)
     assert run.attrs["outcome"] == "not_finite"
     assert np.isnan(run["energy"].values).all()
+
+
+def test_a_name_that_is_unknown_is_told_before_anything_is_measured(monkeypatch):
+    measured = []
+    monkeypatch.setattr("symtop.judging.judge_step.judge_separately", lambda *one, **_: measured.append(one))
+    result = call("claims", "midpoint", "midpont", code=2)
+    assert "integrator 'midpont' is unknown" in result.output
+    assert measured == []

@@ -127,7 +127,11 @@ def test_the_command_takes_a_file(table, tmp_path):
     file.write_text(text(table), encoding="utf-8")
     result = call("judge", file, "--energy", "kept", "--json", code=1)
     assert {row["claim"]: row["verdict"] for row in json.loads(result.output)}["energy"] == "refuted"
-    assert "a card shows a method" in call("judge", file, "--card", tmp_path / "card.html", code=2).output
+    for option in ("card", "figure"):
+        words = (f"--{option}", tmp_path / f"a.{'html' if option == 'card' else 'png'}", "--output", tmp_path / "a.nc")
+        assert "a card or a figure shows a method: there is none" in call("judge", file, *words, code=2).output
+    assert [path.name for path in tmp_path.iterdir()] == ["run.csv"]
+    call("judge", file, "--output", tmp_path / "a.nc", "--badge", tmp_path / "a.svg")
 
 
 @pytest.mark.parametrize(
@@ -138,6 +142,8 @@ def test_the_command_takes_a_file(table, tmp_path):
         ("time,theta\n0,0.4\n1\n", "2 numbers in each line: the number of columns changed from 2 to 1"),
         ("time,theta\n0,high\n", "numbers in each line: could not convert string 'high' to float64"),
         ("time,energy\n0,1\n", "one of axis, quaternion, theta"),
+        ("time,theta\n\n", "run.csv must have a line of numbers below its names, and has none"),
+        ("time,theta,Lx,Ly\n0,0.4,1,1\n", "run.csv must have all of Lx, Ly, Lz, and lacks Lz"),
         ("", "it is no text, or empty"),
     ],
 )
@@ -213,3 +219,12 @@ def test_rates_of_a_top_are_its_momentum():
     energy = symtop.judge(columns)["energy"]
     moving = 0.5 * (top.I1 * 0.13 + top.I3 * 0.25) + top.mgl * axis[:, 2]
     assert energy.value == pytest.approx(np.abs(moving - moving[0]).max() / SPHEROID.energy_scale, rel=1e-9)
+
+
+@pytest.mark.parametrize("time", [0.0, 0.5])
+def test_one_sample_is_judged(time, tmp_path):
+    theta = symtop.reference(SPHEROID, [time])["theta"].item() + 0.05
+    (tmp_path / "one.csv").write_text(f"time,theta,energy\n{time},{theta!r},1\n", encoding="utf-8")
+    ledger = symtop.judge(tmp_path / "one.csv", energy="bounded")
+    assert ledger["theta_error"].value == pytest.approx(0.05)
+    assert (ledger["energy"].value, ledger["energy"].verdict) == (0.0, "confirmed")

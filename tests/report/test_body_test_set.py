@@ -89,6 +89,22 @@ def test_a_sign_in_the_inertia_is_found_by_both_checkers(bodies, tmp_path):
         assert result == answer if answer else result.count(" 0 beyond the bound") == len(scenes)
 
 
+@pytest.mark.parametrize("lost", ["qw", "qz", "Lx", "Lz"])
+def test_a_number_that_is_lost_is_beyond_the_bound(lost, bodies, tmp_path):
+    folder, scenes = bodies
+    rows = read(folder / "states-17.csv")
+    for row in rows[: test_set.TIMES]:
+        row[lost] = "nan"
+    with (tmp_path / "lost.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+    beyond = [row[2] for row in checked(folder, tmp_path / "lost.csv")[0].values()]
+    assert beyond == [test_set.TIMES] + [0] * (len(scenes) - 1)
+    result = subprocess.run([sys.executable, str(folder / "check.py")], capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stderr) == (1, "usage: python check.py MINE.csv states-17.csv\n")
+
+
 def test_the_digits_are_those_of_other_ways(bodies):
     """A free body by its closed form in 50 digits, heavy ones in quadruple precision; the pairs of doubles likewise."""
     pytest.importorskip("heyoka")
@@ -130,8 +146,15 @@ def test_a_start_that_is_moved_by_a_rounding_is_another_motion(monkeypatch):
         body_digits(scene.top, scene.start, [1000.0])
 
 
-def test_the_command_refuses_a_folder_that_holds_something(tmp_path):
+def test_the_command_refuses_a_folder_that_holds_something(tmp_path, monkeypatch):
     (tmp_path / "test-set").mkdir()
     (tmp_path / "test-set" / "mine").touch()
     result = call("archive", "--test-set", "--results", tmp_path, code=2)
     assert "the test set needs a folder that is new or empty" in result.stderr
+    result = call("archive", "--test-set", "--output", tmp_path / "test-set", code=2)
+    assert "the test set needs a folder that is new or empty" in result.stderr
+    (tmp_path / "test-set" / "mine").unlink()
+    monkeypatch.setattr(test_set, "problems", lambda: scenes_of(body_population(1, seed=3, kind="lagrange")))
+    monkeypatch.setattr(test_set, "PERIODS", 0.1)
+    call("archive", "--test-set", "--output", tmp_path / "test-set")
+    assert len(read(tmp_path / "test-set" / "problems.csv")) == 1

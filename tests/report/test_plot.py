@@ -6,6 +6,8 @@ import pytest
 
 import symtop
 from symtop.core.errors import SymtopError
+from symtop.report.style import save
+from tests.commands import call
 
 
 @pytest.fixture(scope="module")
@@ -102,3 +104,35 @@ def test_one_integrator_or_scene_of_a_sweep_is_drawn(sweep):
     with pytest.raises(SymtopError, match="a sweep must have the scenes that it compares"):
         symtop.plot(sweep.isel(scene=0, drop=True), plt.figure().gca())
     plt.close("all")
+
+
+@pytest.mark.parametrize(("step", "shown"), [(8.0, 0), (1.0, 0), (0.5, 6)])
+def test_a_run_that_fails_in_its_first_step_is_drawn(step, shown, tmp_path, monkeypatch):
+    """Lines without a number are left out, and one with a single one has a marker."""
+    drawn = []
+    monkeypatch.setattr("symtop.report.plot.save", lambda figure, path: (save(figure, path), drawn.append(figure)))
+    call("run", "spheroid", "midpoint", "--step-size", step, "--no-guard", "--figure", tmp_path / "f.png", code=3)
+    errors = [line for line in drawn[0].axes[1].get_lines() if line.get_label() != "stopped here"]
+    assert [np.isfinite(line.get_ydata()).sum() for line in errors] == [shown] * (3 if shown else 0)
+
+
+@pytest.mark.parametrize(("samples", "marker"), [(2, "o"), (3, "None")])
+def test_a_single_sample_is_a_point(samples, marker, tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr("symtop.report.plot.save", lambda figure, _: drawn.append(figure))
+    words = ("run", "spheroid", "rk4", "--step-size", 0.01, "--samples", samples)
+    call(*words, "--figure", tmp_path / "f.png")
+    assert {line.get_marker() for axis in drawn[0].axes[1:] for line in axis.get_lines()} == {marker}
+    assert (
+        symtop.plot(symtop.simulate("spheroid", "rk4", step_size=0.01, samples=samples)).lines[0].get_marker() == marker
+    )
+    plt.close("all")
+
+
+def test_what_is_no_ensemble_over_members_is_refused():
+    tops = symtop.population(3, seed=1)
+    runs = symtop.ensemble(tops, "strang", per_nutation=20, nutations=1, samples=5, quiet=True)
+    for data in (tops, symtop.errors(runs, tops), runs.drop_attrs(), runs.drop_vars("horizon")):
+        with pytest.raises(SymtopError, match="data over member must be a dataset of ensemble"):
+            symtop.plot(data, members=tops)
+    plt.close(symtop.plot(runs, members=tops).figure)

@@ -1,5 +1,7 @@
 """All templates together: short, few figures, no sentence twice, links that lead somewhere, what is not measured."""
 
+import json
+import math
 import re
 from collections import Counter
 
@@ -7,7 +9,7 @@ import pytest
 
 from symtop.core.errors import SymtopError
 from symtop.report import template
-from symtop.report.page import TEMPLATES
+from symtop.report.page import TEMPLATES, gather, prepared
 from symtop.runner import run as runner
 
 OTHERS = {name: TEMPLATES / f"{name}.md" for name in ("front", "measured", "equations")}
@@ -91,3 +93,18 @@ def test_a_sentence_about_what_was_not_measured_is_left_out_and_the_page_says_so
     assert "- two 2 and more" in whole
     with pytest.raises(SymtopError, match="page of mine"):
         template.filled(findings | {"facts": {"a": 1}}, tmp_path)
+
+
+def test_points_of_a_chart_without_a_number_are_null_and_others_stay():
+    chart = {"title": "c", "panels": {"one": [("rk4", [(1.0, math.nan, 1e-3, "w"), (2.0, math.inf, 1e-4, "v")])]}}
+    points = json.loads(prepared(chart))["panels"]["one"][0]["points"]
+    assert points == [[1.0, None, 1e-3, "w"], [2.0, None, 1e-4, "v"]]
+
+
+def test_findings_of_another_kind_are_none(tmp_path):
+    (tmp_path / "drift.json").write_text("[]", encoding="utf-8")
+    with pytest.raises(SymtopError, match="no study has left findings"):
+        gather(tmp_path)
+    (tmp_path / "drift.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(SymtopError, match=r"the findings of drift in .* are incomplete"):
+        gather(tmp_path)

@@ -103,6 +103,7 @@ def test_a_population_is_the_beginning_of_a_larger_one(monkeypatch):
     large = population(3000, seed=7)
     assert population(1000, seed=7).drop_attrs().identical(large.isel(member=slice(0, 1000)).drop_attrs())
     assert not np.array_equal(population(1000, seed=8).theta, large.theta[:1000])
+    assert [population(1, seed=2**53 + k).attrs["seed"] - 2**53 for k in range(3)] == [0, 1, 2]  # more than a double
     monkeypatch.setattr(populations, "BLOCK", 128)
     assert population(3000, seed=7).identical(large)
 

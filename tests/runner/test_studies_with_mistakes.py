@@ -149,9 +149,12 @@ def test_a_page_that_is_wrong_is_told_of(tmp_path):
         ("{{ f.wrost | number }}", "page of mine: 'types.SimpleNamespace object' has no attribute 'wrost'"),
         ("# Q\n{{ f.worst | numbr }}", "page of mine, line 2: No filter named 'numbr'"),
         ("{% if f.worst %}", "page of mine, line 1: Unexpected end of template"),
+        ("# Q\n{{ table('one', columns=['b']) }}", "page of mine: \"None of [Index(['b']"),
+        ("# Q\n{{ f.endless | power }}", "page of mine: cannot convert float infinity to integer"),
+        ("# Q\n{{ 1 / (f.worst - 0.25) }}", "page of mine: float division by zero"),
     ):
         (tmp_path / "mine.md").write_text(page)
-        code, output = run_study(tmp_path, "")
+        code, output = run_study(tmp_path, "facts = lambda data: {'worst': 0.25, 'endless': np.inf}")
         assert code == 2, output
         assert says in output
     (tmp_path / "mine.md").write_text("# {{ question }}\n\nThe worst is {{ f.worst | number }}.\n\n{{ table('one') }}")
@@ -160,3 +163,27 @@ def test_a_page_that_is_wrong_is_told_of(tmp_path):
     assert "0 of 2 cases computed" in output
     assert "  The worst is 0.25.\n" in output
     assert (tmp_path / "results" / "tables" / "mine-one.csv").read_text() == "a\n1.5\n"
+
+
+@pytest.mark.parametrize("name", ["sizes", "SIZES"])
+def test_an_edited_list_of_a_study_of_ones_own_is_computed_again(name, tmp_path):
+    """Whatever its name: lower-case ones may change while a study runs, which makes nothing stale."""
+    for size, computed in ((1.0, 2), (1.0, 0), (2.0, 2)):
+        text = f"{name} = [{size}]\nmemo = {{}}\n"
+        text += f"measure = lambda case: xr.Dataset({{'err': memo.setdefault(1, {name}[0])}})"
+        code, output = run_study(tmp_path, text)
+        assert code == 0, output
+        assert f"{computed} of 2 cases computed" in output
+        assert float(xr.load_dataset(tmp_path / "results" / "mine.nc")["err"].max()) == size
+
+
+def test_a_limit_holds_for_cases_that_are_checked_too(tmp_path):
+    slow = "import os, time\ndef measure(case):\n    time.sleep(float(os.environ.get('LATE', '0')))\n"
+    slow += "    return xr.Dataset({'err': 1.0})"
+    assert run_study(tmp_path, slow)[0] == 0
+    code, output = run_study(tmp_path, slow, "--check", "--limit", 30)
+    assert (code, "2 of 2 cases computed again, the same" in output) == (0, True)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("LATE", "3")
+        code, output = run_study(tmp_path, slow, "--check", "--limit", 0.2)
+    assert (code, output.count("it was not done after 0.2 s")) == (1, 2)

@@ -125,7 +125,8 @@ function restore() {
   $("scene").value = kept.base;
   chooseScene(kept.base);
   $("integrator").value = kept.integrator;
-  $("second").value = values.second = kept.second || "";
+  $("second").value = kept.second || "";
+  values.second = $("second").value;  // nothing, of a method that is not known here
   chooseIntegrator(kept.integrator);
   for (const [name, row] of Object.entries(rows)) if (name in kept && values[name] !== null && Number.isFinite(+kept[name])) row.set(+kept[name]);
   if (kept.scene !== kept.base) edited("start");
@@ -277,7 +278,7 @@ function show(answer, other, began) {
     const largest = answer.largest[name];
     $(`largest-${name}`).textContent = largest == null ? "" : largest === 0 ? "always zero" : `largest ${largest.toExponential(1)}`;
   }
-  const a = answer.period && answer.steps ? `, ${Math.round((answer.steps * answer.period) / run.time[last])} a ${ofBody() ? "natural period" : "nutation"}` : "";
+  const a = answer.steps_per_nutation ? `, ${Math.round(answer.steps_per_nutation)} a ${ofBody() ? "natural period" : "nutation"}` : "";
   $("status").textContent = `${values.integrator}: ${answer.message}; ${answer.steps} steps${a}, ${answer.force_evaluations} force evaluations, ${answer.run_ms.toFixed(0)} ms`;
   $("status").className = answer.outcome === "ok" ? "" : "failed";
   $("other").hidden = !other;

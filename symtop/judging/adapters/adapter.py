@@ -21,7 +21,7 @@ from symtop.core.errors import SymtopError, words_of
 from symtop.measure.step_map import reversed_rates
 from symtop.methods.framework.equations import Formulation, as_run
 from symtop.methods.framework.plan import NOT_FINITE, OK, Array, Plan, Run
-from symtop.methods.framework.registry import Integrator, Solver
+from symtop.methods.framework.registry import Integrator, Solver, integrators
 from symtop.model.top import Angles, SymmetricTop
 
 Marks = NDArray[np.int64]
@@ -149,11 +149,12 @@ class AdapterSolver:
 
 
 def integrator(stepper: Stepper, **claims: Any) -> Integrator:
-    """The record of a stepper with the claims that are made for it."""
+    """The record of a stepper with the claims that are made for it; ``own-rk4`` of one that is called as ours is."""
     chart = "angles" if stepper.chart == "nutation" else stepper.chart
+    name = f"own-{stepper.name}"[:64] if stepper.name in integrators() else stepper.name
     solvers = {chart: stepper.adaptive or AdapterSolver(stepper)}
     claims |= {"control": "tolerance" if stepper.adaptive else "step_size", "implementation": stepper.implementation}
-    return Integrator(stepper.name, "other", "given through an adapter", solvers, **claims)
+    return Integrator(name, "other", "given through an adapter", solvers, **claims)
 
 
 class Heartbeat(ctypes.Structure):

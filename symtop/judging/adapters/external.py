@@ -139,8 +139,8 @@ class Program(Stepper):
         if result.returncode != 0:
             words = " ".join(result.stderr.decode(errors="replace").split())[-WORDS:]
             raise SymtopError(f"{self.name} ended with code {result.returncode}: {words or 'it said nothing'}")
-        if steps > 0:
-            self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps) if steps > 50 else 0.0
+        if steps > 50:  # in fewer its start is most of the time
+            self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps)
         return result.stdout
 
 
