@@ -130,9 +130,12 @@ def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree
 
 
 def attributes_of(title: str, **attributes: Any) -> dict[str, Any]:
-    """The attributes of a dataset: conventions, title, those given, as strings or numbers, and provenance."""
+    """The attributes of a dataset: conventions, title, those given, as strings or numbers, and provenance.
+
+    An int of more than the 64 bits that a file holds is a string.
+    """
     plain = {
-        key: value if isinstance(value, (str, int, float)) and not isinstance(value, bool) else
+        key: value if isinstance(value, (str, float)) or (type(value) is int and abs(value) < 2**63) else
         json.dumps(value, sort_keys=True, default=str)
         for key, value in attributes.items()
     }  # fmt: skip

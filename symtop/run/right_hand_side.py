@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError, finite, foreign_code, one_of, positive, row
-from symtop.core.numbers import EPSILON, TINY
+from symtop.core.numbers import EPSILON, TINY, real_numbers
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import integrator, integrators
 from symtop.methods.runge_kutta.explicit import Tableau
@@ -29,6 +29,7 @@ from symtop.run.motion import Growth
 SCIPY = {"rk45": ("RK45", 6), "dop853": ("DOP853", 12), "radau": ("Radau", 0), "bdf": ("BDF", 0), "lsoda": ("LSODA", 0)}
 FINE, WATCHED, PROBED = 1e-13, 4000, 5000  # tolerance of the truth; steps of DOP853, and of the method on a piece
 PERIODS, SHARE, POINTS = 10.0, 0.2, 400  # of the motion and of the run in a piece, at least; times that are compared
+TIGHTEST, LOOSEST = 2.3e-14, 0.1  # tolerances: the least of SciPy's solvers, the largest that is advised
 MOVED, SATURATED = 1e-7, 1e-2  # of the extent of the motion: how far two motions are apart, and the most
 UNSTABLE, STIFF = 10.0, 20.0  # times that A grows in the second half; times the rate of the motion
 
@@ -54,7 +55,7 @@ def guard(
 
     `method` is an explicit Runge-Kutta method of symtop with a `step_size`, or rk45, dop853, radau, bdf or lsoda of
     SciPy with a `tolerance`, relative and absolute. `accuracy` is the error that the run may have, in units of y.
-    Raises SymtopError for arguments that make no sense and for an f that fails.
+    Raises SymtopError for arguments that make no sense, for an f that fails and for a motion that ends before.
     """
     rules = {name: getattr(next(iter(one.solvers.values())), "rule", None) for name, one in integrators().items()}
     tables = {name: rule for name, rule in rules.items() if isinstance(rule, Tableau)}
@@ -64,9 +65,17 @@ def guard(
         raise SymtopError(f"{method} takes {names[rule is None]}, not {names[rule is not None]}", *names)
     start, setting = np.array(row("y0", y0)), positive(names[rule is None], values[rule is None])
     begin, end, accuracy = finite("t0", t0), positive("horizon", horizon), positive("accuracy", accuracy)
+    if start.size == 0:
+        raise SymtopError("y0 must be at least one number, not none", "y0")
+    if begin + end / PROBED == begin:
+        raise SymtopError(f"horizon must be longer than what t0 = {begin!r} is rounded by, not {end!r}", "horizon")
+    if rule is None and not TIGHTEST <= setting < 1.0:
+        raise SymtopError(f"tolerance must be at least {TIGHTEST:g} and below 1, not {setting!r}", "tolerance")
+    if rule is not None and setting > end:
+        raise SymtopError(f"step_size must be at most the horizon {end!r}, not {setting!r}", "step_size")
 
     def rate(t: float, y: Array) -> Array:
-        value = np.asarray(f(t, y), dtype=float)
+        value = real_numbers("what f returns", f(t, y.copy())).copy()  # f may write to y and return one array again
         if value.shape != start.shape:
             raise SymtopError(f"f must return {start.size} numbers, not an array of shape {value.shape}")
         return value
@@ -96,7 +105,7 @@ def _finite(f: Any) -> Any:
     def rate(t: float, y: Array) -> Array:
         value: Array = f(t, y)
         if not np.isfinite(value).all():
-            raise SymtopError(f"f must be finite, not {value.tolist()} at t = {t!r}")
+            raise SymtopError(f"f must be finite, not {value.tolist()} at t = {float(t)!r}")
         return value
 
     return rate
@@ -106,7 +115,9 @@ def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
     """The solution by DOP853, a function of the time, and how long it is."""
     from scipy.integrate import DOP853, OdeSolution  # 0.2 s
 
-    solver = DOP853(_finite(f), t, y, t + end, rtol=FINE, atol=FINE * float(np.abs(y).max()))
+    # a start at zero has no size, and is given one that is lost in what the motion leads to
+    size = float(np.abs(y).max()) or EPSILON * (end * float(np.abs(f(t, y)).max()) or 1.0)
+    solver = DOP853(_finite(f), t, y, t + end, rtol=FINE, atol=FINE * size)
     times, parts = [t], list[Any]()
     while solver.status == "running" and len(parts) < WATCHED and solver.step() is None:
         times.append(solver.t)
@@ -121,6 +132,9 @@ def _outlook(
     from scipy.integrate import solve_ivp
 
     near, watched = _motion(f, t, y, end)
+    if near.t_max < t + end and len(near.interpolants) < WATCHED:
+        words = f"below {watched:.6g}, not {end!r}: the motion goes beyond all bounds there, as far as DOP853 can tell"
+        raise SymtopError(f"horizon must be {words}", "horizon")
     elapsed = watched * np.arange(1.0, POINTS + 1.0) / POINTS
     true = near(t + elapsed)
     spread, extent = np.std(true, axis=1), float(np.linalg.norm(np.ptp(true, axis=1))) or 1.0
@@ -149,6 +163,7 @@ def _outlook(
     expected = max(grown(Probe(times, error, "ok", end, 0), end, straight=False), float(error.max()) * total / since)
     expected = math.inf if ended else min(expected, 2.0 * extent)
     better = setting * (accuracy / max(expected, TINY)) ** (1.0 / ((rule and integrator(method).order) or 1))
+    better = min(better, end if rule else LOOSEST)
     change = math.sqrt(EPSILON) * extent
     slopes = [(f(t, y + change * unit) - f(t, y)) / change for unit in np.eye(y.size)]
     fastest, cause = float(np.abs(np.linalg.eigvals(np.array(slopes))).max()), "step"

@@ -6,6 +6,7 @@ import pytest
 from symtop.core.netcdf import content_hash
 from symtop.model.exact.closed_form import NUMBERS, ClosedForms
 from symtop.run.ensemble import population as populations
+from symtop.run.ensemble.bodies import body_population
 from symtop.run.ensemble.population import STRATA, population, sine_cosine
 
 COUNT = 3000
@@ -110,6 +111,18 @@ def test_a_population_is_the_beginning_of_a_larger_one(monkeypatch):
 def test_the_same_seed_is_the_same_population_everywhere():
     """A hash that was written down: nothing hangs on the machine's sine, its vectors or NumPy's distributions."""
     assert content_hash(population(1000, seed=1)) == HASH
+
+
+@pytest.mark.parametrize("draw", [population, body_population])
+def test_a_seed_has_all_its_digits_however_large_it_is(draw, tmp_path):
+    """A double holds none of these; the control: seeds that are the same number draw the same."""
+    for seed in (2**53 + 1, 2**127 + 1):
+        data = draw(3, seed=seed)
+        assert int(data.attrs["seed"]) == seed
+        assert not data.equals(draw(3, seed=seed - 1))
+        assert data.equals(draw(3, seed=np.int64(seed) if seed < 2**63 else seed))
+        data.to_netcdf(tmp_path / "drawn.nc")
+    assert draw(3, seed=4.0).attrs["seed"] == 4
 
 
 def test_sine_and_cosine_by_series_are_those_of_the_library():

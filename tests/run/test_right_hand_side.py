@@ -98,6 +98,49 @@ def test_each_cause_is_named(f, y0, horizon, name, control, cause):
     assert "\n" not in str(expected)
 
 
+def test_a_motion_may_begin_at_zero():
+    """Its size is that of what drives it: z'' = c sin t - 2 z is c (sin t - sin(t sqrt 2)/sqrt 2)."""
+    c, h, z = 1e-9, 0.1, np.zeros(2)
+
+    def driven(t, y):
+        return np.array([y[1], c * math.sin(t) - 2.0 * y[0]])
+
+    error = 0.0
+    for k in range(500):
+        z, t = rk4(driven, k * h, z, h), (k + 1) * h
+        slope = c * (math.cos(t) - math.cos(t * math.sqrt(2.0)))
+        error = max(
+            error, math.hypot(z[0] - c * (math.sin(t) - math.sin(t * math.sqrt(2.0)) / math.sqrt(2.0)), z[1] - slope)
+        )
+    expected = symtop.guard(driven, 0.0, [0.0, 0.0], 50.0, step_size=h, accuracy=1e-12)
+    assert 1.0 / 3.0 < expected.error / error < 3.0
+    assert symtop.guard(stiff, 0.0, [0.0], 10.0, step_size=0.01).cause == "stiffness"
+    still = symtop.guard(lambda _t, y: 0.0 * y, 0.0, [0.0], 10.0, step_size=0.1)
+    assert (still.error, still.setting) == (0.0, 10.0)  # no step is longer than the run
+
+
+def test_f_may_return_one_array_again_and_write_to_its_argument():
+    one = np.empty(2)
+
+    def swing_in_place(_, y):
+        one[:] = y[1], -y[0]
+        y[:] = math.nan
+        return one
+
+    for name, control in (("rk4", {"step_size": 0.1}), ("rk45", {"tolerance": 1e-4})):
+        expected = symtop.guard(swing, 0.0, [1.0, 0.0], 100.0, name, **control)
+        assert symtop.guard(swing_in_place, 0.0, [1.0, 0.0], 100.0, name, **control) == expected
+
+
+def test_a_horizon_beyond_the_end_of_a_motion_is_refused():
+    """y' = y^2 from 1 is 1/(1 - t)."""
+    with pytest.raises(symtop.SymtopError, match=r"horizon must be below 1, not 2\.0: the motion goes beyond"):
+        symtop.guard(lambda _t, y: y * y, 0.0, [1.0], 2.0, step_size=0.01)
+    assert symtop.guard(lambda _t, y: y * y, 0.0, [1.0], 0.9, step_size=0.01).error < 1e-3
+    for start in (0.1, 0.3, 0.7, 1e10):  # where the rounded end of a run is not its horizon
+        assert symtop.guard(swing, start, [1.0, 0.0], 0.6, step_size=0.1).error < 1e-3
+
+
 def test_the_step_that_is_advised_keeps_the_accuracy():
     horizon = 20.0 * math.pi
     expected = symtop.guard(kepler, 0.0, at_pericentre(0.3), horizon, step_size=0.1, accuracy=1e-3)
@@ -112,14 +155,20 @@ def test_the_step_that_is_advised_keeps_the_accuracy():
         (swing, [1.0, 0.0], {}, "step_size must be a finite number, not None"),
         (swing, [1.0, 0.0], {"method": "taylor", "tolerance": 1e-9}, "method 'taylor' is unknown"),
         (swing, [1.0, 0.0], {"method": "rk45", "step_size": 0.1}, "rk45 takes tolerance, not step_size"),
+        (swing, [1.0, 0.0], {"step_size": 1.5}, "step_size must be at most the horizon 1.0, not 1.5"),
+        (swing, [1.0, 0.0], {"method": "bdf", "tolerance": 1e-20}, "tolerance must be at least 2.3e-14 and below 1"),
+        (swing, [1.0, 0.0], {"step_size": 0.1, "t0": 1e20}, "horizon must be longer than what t0 = 1e+20 is"),
+        (swing, [], {"step_size": 0.1}, "y0 must be at least one number, not none"),
         (swing, "ab", {"step_size": 0.1}, "y0 must be a row of numbers, not 'ab'"),
         (swing, [1.0, 0.0, 2.0], {"step_size": 0.1}, "f must return 3 numbers, not an array of shape (2,)"),
         (lambda _t, _y: 1 / 0, [1.0], {"step_size": 0.1}, "f failed: ZeroDivisionError"),
+        (lambda _t, y: 1j * y, [1.0], {"step_size": 0.1}, "what f returns must be real numbers, not array([0.+1.j])"),
         (lambda _t, _y: [math.nan], [1.0], {"step_size": 0.1}, "f must be finite, not [nan] at t = 0.0"),
+        (lambda t, y: y if t < 0.5 else y * math.nan, [1.0], {"step_size": 0.1}, "not [nan] at t = 0."),
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_refused_in_one_sentence(f, y0, control, words):
     with pytest.raises(symtop.SymtopError) as refused:
-        symtop.guard(f, 0.0, y0, 1.0, **control)
+        symtop.guard(f, control.pop("t0", 0.0), y0, 1.0, **control)
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
