@@ -43,6 +43,9 @@ WIDTHS = 5
 COARSE = 3e-3  # a step is coarse enough to show its structure if two halves of it differ by this
 LOOSE = 1e-3  # tolerance at which an adaptive method shows its structure
 UNIT = 1e-12  # |e| = 1 and |q| = 1 within this
+APART = 0.01  # rad from a pole: nearer, angles know a state to 2e-16 over their square, and a term would look wrong
+UPRIGHT = 1e-15  # rad: no more than rounding leaves of pi
+LEAST_UNIT = 1e-3  # of 2 pi I1 over the nutation period
 SHARE = 0.37  # of a nutation: what an adaptive method is run for
 
 
@@ -139,21 +142,29 @@ class StepMap:
 def angles_at(top: SymmetricTop, z: Array) -> Angles:
     """The start at a point (theta, phi, psi, p_theta, p_phi, p_psi), not at a pole."""
     theta, phi, psi, p_theta, p_phi, p_psi = (float(value) for value in z)
+    if abs(math.sin(theta)) < UPRIGHT:
+        raise SymtopError("a step is looked at beside a start of the scene, and its axis stays upright")
     phi_dot = (p_phi - p_psi * math.cos(theta)) / (top.I1 * math.sin(theta) ** 2)
     return Angles(theta, phi, psi, p_theta / top.I1, phi_dot, p_psi / top.I3 - phi_dot * math.cos(theta))
 
 
 def one_step(method: Integrator, chart: str, scene: Scene, h: float) -> StepMap:
     """The map of a step of a given h."""
-    return StepMap(method, chart, scene.top, scene.momentum_scale, h)
+    return StepMap(method, chart, scene.top, unit_of(scene), h)
+
+
+def unit_of(scene: Scene) -> float:
+    """The larger of the momenta; of a motion that has next to none, a part of that of a nutation."""
+    return float(max(scene.momentum_scale, LEAST_UNIT * scene.top.I1 * 2.0 * math.pi / scene.time_scale()))
 
 
 def generic_start(scene: Scene) -> Angles:
-    """A point of the scene's true motion where nothing is special: no turning point, no phase of zero."""
+    """A point of the scene's true motion where nothing is special: no turning point, no phase of zero, no pole."""
+    start: Angles = scene.start
     if scene.of_body or not math.isfinite(scene.nutation_period):
-        start: Angles = scene.start
         return start
-    return Angles(*map(float, closed_form(scene)(0.3711 * scene.nutation_period)))
+    point = Angles(*map(float, closed_form(scene)(0.3711 * scene.nutation_period)))
+    return start if math.sin(point.theta) < APART else point
 
 
 def drawn(scene: Scene, count: int, seed: int, *, same_top: bool) -> Iterator[Scene]:
@@ -173,7 +184,7 @@ def drawn(scene: Scene, count: int, seed: int, *, same_top: bool) -> Iterator[Sc
 
 def moved(step: StepMap, scene: Scene) -> StepMap:
     """The map on another scene's top, of a step that is coarse there."""
-    other = replace(step, top=scene.top, unit=scene.momentum_scale, h=SHARE * scene.time_scale())
+    other = replace(step, top=scene.top, unit=unit_of(scene), h=SHARE * scene.time_scale())
     return coarsest(other, scene.start)
 
 

@@ -27,7 +27,7 @@ from symtop.judging.claims.subject import FORMS, open_target
 from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Measured, line, undecided
 from symtop.judging.remote import clock
 from tests.commands import answer
-from tests.judging.blind.right import midpoint, product, rates, turn, verlet
+from tests.judging.blind.right import midpoint, product, rates, rk4, turn, verlet
 from tests.judging.conftest import shorten
 
 SPHEROID = symtop.scene("spheroid")
@@ -256,6 +256,45 @@ def test_the_order_that_is_there_is_found_whatever_is_claimed(claimed, only):
     assert (finding.verdict, finding.declared) == ("refuted", str(claimed))
     assert finding.value == pytest.approx(2.0, abs=0.02)
     assert "another power of the step" in finding.why
+
+
+def _keeps_its_slope(f, t, y, h, memory=[np.zeros(6)]):  # noqa: B006, B008  (what it keeps)
+    before, memory[0] = memory[0], f(t, y)
+    return y + h * memory[0] + 1e-3 * h * before
+
+
+PENDULUM = symtop.Scene("pendulum", symtop.SymmetricTop(1.0, 0.5, 1.0), symtop.Angles(theta=2.0), 20.0)
+
+
+@pytest.mark.parametrize("scene", ["sleeping", "separatrix", PENDULUM])
+def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, only):
+    """Beside a pole angles know a state badly; a pendulum has momenta of zero, which are no unit."""
+    only("calls", "order")
+    right = symtop.judge(rk4, order=4, scene=scene, quick=True)
+    assert (right.refuted, right["order"].verdict, right["calls"].measured.kind) == ([], "confirmed", "a function")
+    assert symtop.judge(midpoint, order=3, scene=scene, quick=True).refuted == ["order"]
+    assert symtop.judge(_keeps_its_slope, scene=scene, quick=True)["calls"].verdict == "refuted"
+
+
+def test_a_method_of_order_2_goes_to_the_motion_of_a_separatrix_too(only):
+    """Its runs do not within these steps: the motion grows their errors a millionfold."""
+    only("order")
+    ledger = symtop.judge(midpoint, order=2, scene="separatrix", quick=True)
+    assert ledger["order"].verdict == "confirmed"
+    wrong = symtop.judge(lambda f, t, y, h: midpoint(f, t, y, 1.001 * h), order=2, scene="separatrix", quick=True)
+    assert wrong.refuted == ["order"]
+
+
+def test_an_axis_that_stays_upright_is_refused_in_a_sentence_and_one_that_hangs_is_judged(only):
+    upright, hanging = (
+        symtop.Scene("still", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(theta=theta, psi_dot=5.0), 20.0)
+        for theta in (0.0, np.pi)
+    )
+    only("calls")
+    assert symtop.judge(midpoint, scene=hanging, quick=True)["calls"].measured.kind == "a function"
+    assert symtop.judge(_keeps_its_slope, scene=hanging, quick=True)["calls"].verdict == "refuted"
+    with pytest.raises(symtop.SymtopError, match="its axis stays upright"):
+        symtop.judge(midpoint, scene=upright, quick=True)
 
 
 @pytest.mark.parametrize("claimed", [pytest.param(2, marks=pytest.mark.slow), 12])

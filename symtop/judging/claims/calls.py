@@ -117,7 +117,8 @@ def _repeated(
 def _cut(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, int]]) -> tuple[float, str]:
     """How far the last m steps of a run of n + m are from those asked again, in steps, and a clause; the largest."""
     start, run = stepper.from_start(scene.top, generic_start(scene), h)
-    a_step, worst, words = _gap(run(start, 1)[0], start) or 1.0, 0.0, "after few steps"
+    a_step, worst, words = _gap(run(start, 1)[0], start), 0.0, "after few steps"
+    a_step = a_step if a_step > SAME * (size := np.abs(start).max()) else size  # it stays where it is
     for k, (n, m) in enumerate(parts):
         middle, end = run(start, n, n + m)
         if stepper.own_loop:

@@ -47,7 +47,7 @@ from symtop.measure.order import BESIDE, CLEARLY, LARGEST_ERROR, Fit, order_verd
 from symtop.measure.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
-from symtop.measure.step_map import StepMap, aligned, generic_start, one_step, restart_gap
+from symtop.measure.step_map import APART, StepMap, aligned, generic_start, one_step, restart_gap, unit_of
 from symtop.measure.step_series import Series, compared, step_series
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.loop import FixedStep
@@ -59,6 +59,7 @@ from symtop.methods.splitting.loop import Composition
 from symtop.methods.splitting.rotor import EXACT
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.model.top import Angles
+from symtop.run.reference.sensitivity import conditioning
 
 NUTATIONS = 1.37  # length of the runs that the slope is fitted to
 FALLBACK, LONGER = "goldstein", (8.37, 40.0)
@@ -74,6 +75,7 @@ LOWER, JUMP = 0.6, 3.0  # an order is lower by so much, or jumps by so much
 LARGE, SEEN = 1e-3, 1e-11  # a miss beyond the first is of no power, below the second rounding
 UNEVEN, WAVES = 0.6, 0.7  # a, and waves of the clock in a nutation
 BEGIN = 0.23  # of a nutation: t0
+UNSTABLE = 1e4  # times that the motion of the scene grows a change: errors of runs are no power of the step there
 CLEAR = 1e-9  # noise of the h^1 term: a step that is rounded to single precision leaves 1e-8
 CONVERGES, ROUNDED, FALLS = "converges", 1e-10, (1e4, 10.0)  # an error that falls to a tenth over four decades
 STAYS, FEWEST = 0.5, 3  # an error that falls by less over the last decade of steps, of so many runs, does not fall
@@ -174,12 +176,12 @@ def _terms(series: Series) -> Measured:
 
 
 def series_of(subject: Subject) -> Series | None:
-    """The series of the chart with the lowest order; None where no step is one map of the state."""
+    """The series of the chart with the lowest order; None where no step is one map of the state, or beside a pole."""
     candidates = []
     for chart in subject.charts if subject.method.fixed_step else ():
         with contextlib.suppress(SymtopError):
             step, start = map_of(subject, chart)
-            if restart_gap(step, start) <= ONE_MAP:
+            if math.sin(start.theta) > APART and restart_gap(step, start) <= ONE_MAP:
                 candidates.append(step_series(step, start, subject.scene.time_scale()))
     return min(candidates, key=lambda one: one.order, default=None)
 
@@ -249,7 +251,8 @@ def _by_steps(subject: Subject) -> Finding:
     power = method.order or 1
     # runs of a step that has the motion's terms up to h^power, beyond doubt, go to the motion
     follows = series and series.order >= max(power, 1) and float(series.noise[1]) < CLEAR
-    if method.fixed_step and not (subject.in_plane or (measured and follows)):
+    settled = measured or conditioning(scene, SHARE * scene.time_scale()) > UNSTABLE
+    if method.fixed_step and not (subject.in_plane or (settled and follows)):
         power = max(1, min(method.order or 99, round(main.slope))) if measured else power
         wrong, doubt = limit(method, scene, power, finest)
         if wrong > max(TRUE_LIMIT, 10.0 * doubt):
@@ -423,7 +426,7 @@ class Hastened:
 def series_by_clock(subject: Subject, uneven: float) -> tuple[Series, set[float]]:
     """The series of a step by a clock that is so `uneven`, and the times at which it asks for f."""
     scene, start, scale = subject.scene, generic_start(subject.scene), subject.scene.time_scale()
-    begin, rate, unit = BEGIN * scale, 2.0 * math.pi * WAVES / scale, np.repeat([1.0, scene.momentum_scale], 3)
+    begin, rate, unit = BEGIN * scale, 2.0 * math.pi * WAVES / scale, np.repeat([1.0, unit_of(scene)], 3)
     par, state = FORMULATIONS["axis"].prepare(scene.top, start)
     true, f = one_step(subject.method, "axis", scene, scale).motion(start), Hastened(par, uneven, rate, begin)
 

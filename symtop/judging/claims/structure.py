@@ -102,7 +102,7 @@ def map_of(subject: Subject, chart: str) -> tuple[maps.StepMap, Angles]:
         return maps.step_map(subject.method, chart, subject.scene)
     scene, start = subject.scene, maps.generic_start(subject.scene)
     h, momenta = maps.SHARE * scene.time_scale(), scene.top.momenta(start)
-    return maps.coarsest(Plane(subject.method, "angles", scene.top, scene.momentum_scale, h, momenta), start), start
+    return maps.coarsest(Plane(subject.method, "angles", scene.top, maps.unit_of(scene), h, momenta), start), start
 
 
 def _badness(one: Finding) -> tuple[int, float]:
