@@ -29,6 +29,7 @@ from symtop.runner.scripts import file_of
 from symtop.runner.study import Case, Study, StudyError, failing
 
 DONE, FAILED, STALE, MISSING = STATES = ("done", "failed", "stale", "missing")
+LONGEST = 1e9  # seconds of a case: the timers of a process count no more than ten times as many
 SAMPLE = 5  # cases of each study that are checked
 
 
@@ -87,7 +88,9 @@ class StudyCases:
     def compute(self, missing: dict[Path, Case], pool: Pool, limit: float, *, fresh: bool, quiet: bool) -> None:
         """Have cases computed, with a progress bar where somebody is watching."""
         script = str(file_of(self.study.name))
-        tasks = [Task(script, case, path, plugins.loaded(), limit, fresh) for path, case in missing.items()]
+        tasks = [
+            Task(script, case, path, plugins.loaded(), min(limit, LONGEST), fresh) for path, case in missing.items()
+        ]
         before = self.computed + len(self.failures)
         with progress_bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case") as bar:
 

@@ -187,3 +187,9 @@ def test_a_limit_holds_for_cases_that_are_checked_too(tmp_path):
         patch.setenv("LATE", "3")
         code, output = run_study(tmp_path, slow, "--check", "--limit", 0.2)
     assert (code, output.count("it was not done after 0.2 s")) == (1, 2)
+
+
+@pytest.mark.parametrize("limit", ["1e8", "1e10", "1e300"])
+def test_a_limit_may_be_as_long_as_one_likes(limit, tmp_path):
+    code, output = run_study(tmp_path, "", "--limit", limit)
+    assert (code, "2 of 2 cases computed" in output) == (0, True), output
