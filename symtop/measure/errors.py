@@ -15,6 +15,7 @@ psi the same; theta and phi the axis; an axis shows theta. Vectors that are not 
 Samples that hold a NaN stay NaN.
 """
 
+import contextlib
 import json
 import warnings
 from collections.abc import Iterable, Mapping
@@ -98,11 +99,16 @@ def errors(
     refuse_other_scene(run, chosen)
     data = checked(run) if foreign else Trajectory.of_data(run)
     truth = reference(chosen, data.time, precision)
+    check_shapes({name: values for name in SHAPES if (values := getattr(data, name)) is not None}, data.time.size)
     if foreign and data.quaternion is not None:
         refuse_other_order(data.quaternion, truth)
-    data = completed(data) if foreign else data
+    data = completed(data) if foreign or data.theta is None else data
+    if data.theta is None or data.phi is None:  # psi alone shows no attitude
+        data = data._replace(psi=None)
     columns = errors_against(chosen, data, truth)
-    for sentence in doubts(data.time, columns, chosen.horizon) if foreign else ():
+    sure = scene is None or _stored(run, "start") is not None
+    doubtful = [] if sure else elsewhere(data.time, columns)
+    for sentence in [*doubtful, *(doubts(data.time, columns, chosen.horizon) if foreign else ())]:
         warnings.warn(f"on {chosen.name}: {sentence}", SymtopWarning, stacklevel=2)
     shown = dataset(data.time, columns | {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns})
     for name in columns:
@@ -210,15 +216,19 @@ def refuse_other_scene(run: xr.Dataset | Mapping[str, Any], scene: Scene) -> Non
     """Refuse data that say of which top and start they are, if those are not the scene's."""
     attributes = getattr(run, "attrs", {})
     for name, own in (("top", scene.top), ("start", scene.start)):
-        try:
-            stored = type(own)(**json.loads(attributes[name]))
-        except (KeyError, TypeError, ValueError):  # they do not say
-            continue
-        if stored != own:
+        if _stored(run, name) not in (None, own):
             raise SymtopError(
                 f"scene must be that of the data, {attributes.get('scene', 'of another name')}, whose {name} is "
                 f"{attributes[name]}, not {scene.name}; drop_attrs() makes them a trajectory that is compared with any"
             )
+
+
+def _stored(run: xr.Dataset | Mapping[str, Any], name: str) -> Any:
+    """The ``top`` or the ``start`` that data say that they are of; None if they do not say."""
+    for kind in (SymmetricTop, RigidBody) if name == "top" else (Angles, Attitude):
+        with contextlib.suppress(KeyError, TypeError, ValueError):
+            return kind(**json.loads(getattr(run, "attrs", {})[name]))
+    return None
 
 
 def sampled(run: xr.Dataset) -> xr.Dataset:
@@ -243,9 +253,7 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         )
     time = _times(data)
     columns: dict[str, Any] = {name: _numbers(name, data[name]) for name in SHAPES if name in data}
-    for name, values in columns.items():
-        if values.shape != (shape := (time.size, *SHAPES[name])):
-            raise SymtopError(f"{name} must have the shape {shape}, one row for each time, not {values.shape}")
+    check_shapes(columns, time.size)
     if not set(ENOUGH) & set(columns):
         raise SymtopError("data must hold one of axis, quaternion, theta beside time, to show where the top is")
     for name in ("axis", "quaternion"):
@@ -256,10 +264,17 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
                 raise SymtopError(f"{name} must be of length 1 within {LENGTH:g}, but its length is {place}")
             columns[name] = columns[name] / length[:, None]
     theta = columns.get("theta", np.zeros(1))
-    if (off := (theta < 0.0) | (theta > np.pi)).any():
+    if (off := (theta < 0.0) | (theta > float(np.float32(np.pi)))).any():  # which is above pi
         place = f"{theta[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
         raise SymtopError(f"theta must be radians from the vertical in [0, pi], but it is {place}")
     return Trajectory(time, **columns)
+
+
+def check_shapes(columns: Mapping[str, charts.Array], count: int) -> None:
+    """Refuse columns that have no row for each of so many times."""
+    for name, values in columns.items():
+        if values.shape != (shape := (count, *SHAPES[name])):
+            raise SymtopError(f"{name} must have the shape {shape}, one row for each time, not {values.shape}")
 
 
 def _times(data: Mapping[Any, Any]) -> charts.Array:
@@ -293,10 +308,11 @@ def completed(data: Trajectory) -> Trajectory:
 
 
 def _numbers(name: str, values: Any) -> charts.Array:
-    """Doubles of anything that holds real numbers, a table's text too; NaN where a sample is lost (None)."""
+    """Doubles of anything that holds real numbers, a table's text too; NaN where a sample is lost (None, masked)."""
     try:
-        given = np.asarray(values)
-        return given.astype(np.float64, casting="same_kind" if given.dtype.kind == "c" else "unsafe")
+        given = np.ma.filled(values.astype(float), np.nan) if np.ma.isMaskedArray(values) else np.asarray(values)
+        # complex numbers and dates are none
+        return given.astype(np.float64, casting="same_kind" if given.dtype.kind in "cmM" else "unsafe")
     except (TypeError, ValueError, OverflowError) as error:
         raise SymtopError(f"{name} must be an array of real numbers, not {type(values).__name__}") from error
 
@@ -320,18 +336,21 @@ def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
             )
 
 
+def elsewhere(time: charts.Array, errors: Mapping[str, charts.Array]) -> list[str]:
+    """Whether a trajectory starts as the scene does, in words if it does not."""
+    for name in ("attitude", "axis", "theta"):
+        if name in errors and errors[name][0] > FAR:
+            place = f"at t = {time[0]:.6g}, is {errors[name][0]:.2g} rad from the true {name}"
+            return [f"the first sample, {place}: is this the start of the scene, and is its time counted from there?"]
+    return []
+
+
 def doubts(time: charts.Array, errors: Mapping[str, charts.Array], horizon: float) -> list[str]:
-    """What is wrong with a foreign trajectory as a whole: another start, another clock, samples that are not numbers.
+    """What is wrong with a foreign trajectory as a whole: another clock, samples that are not numbers.
 
     `horizon` is that of the scene: times far beyond it may be in another unit.
     """
     sentences = []
-    name = "attitude" if "attitude" in errors else "axis" if "axis" in errors else "theta"
-    if errors[name][0] > FAR:
-        sentences.append(
-            f"the first sample, at t = {time[0]:.6g}, is {errors[name][0]:.2g} rad from the true {name}: is this the "
-            "start of the scene, and is its time counted from there?"
-        )
     if time[-1] > BEYOND * horizon:
         sentences.append(
             f"times reach to {time[-1]:.6g}, {time[-1] / horizon:.3g} times the horizon {horizon:.6g}: are they in the "

@@ -15,6 +15,7 @@ top of `symtop.model.top`, and M3 = p_psi is conserved, too. A start of a body i
 Units are any consistent set. Source: Goldstein, Classical Mechanics, chapter 5.
 """
 
+import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.errors import SymtopError, finite, positive
+from symtop.core.errors import SymtopError, finite, positive, row, shown
 from symtop.core.jit_functions import inlined, two_product
 from symtop.core.numbers import EPSILON
 from symtop.model.top import LARGEST, bounded, unit, vector
@@ -48,6 +49,13 @@ def _as_stored(given: Sequence[float], scaled: Sequence[float]) -> tuple[float, 
     """Numbers scaled to length one; as they are given if that is their rounding, so that a stored body is the same."""
     near = all(abs(float(old) - new) <= 2.0 * EPSILON for old, new in zip(given, scaled, strict=True))
     return tuple(float(number) for number in (given if near else scaled))
+
+
+def _rows(name: str, value: Any) -> list[Any]:
+    """The entries of a list; SymtopError for what has none."""
+    with contextlib.suppress(TypeError):
+        return list(value)
+    raise SymtopError(f"{name} must be rows of 3 numbers, not {shown(value)}", name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +126,7 @@ class RigidBody:
         if others:
             words = "mgl, which is mass times gravity times the distance of the centre from the fixed point"
             raise SymtopError(f"a heavy body by its inertia needs {words}, not {', '.join(others)}", "mgl")
-        rows = [vector("a row of matrix", row, 3) for row in matrix]
+        rows = [vector("a row of matrix", row, 3) for row in _rows("matrix", matrix)]
         if len(rows) != 3:
             raise SymtopError(f"matrix must have 3 rows, not {len(rows)}", "matrix")
         inertia = np.array(rows)
@@ -144,8 +152,8 @@ class RigidBody:
         cls, masses: Sequence[float], places: Sequence[Sequence[float]], gravity: float = 0.0
     ) -> "RigidBody":
         """Points of `masses` (n,) at `places` (n, 3) from the fixed point, in any body axes; free without `gravity`."""
-        weights = np.array([positive("masses", mass) for mass in masses])
-        points = np.array([vector("a place of places", place, 3) for place in places]).reshape(-1, 3)
+        weights = np.array([positive("masses", mass) for mass in row("masses", masses)])
+        points = np.array([vector("a place of places", place, 3) for place in _rows("places", places)]).reshape(-1, 3)
         if len(weights) != len(points):
             raise SymtopError(f"places must be as many as masses, {len(weights)}, not {len(points)}", "places")
         squares = (points * points).sum(axis=1)

@@ -39,6 +39,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, finite, positive, row
 from symtop.core.jit_functions import inlined, shared
+from symtop.core.numbers import EPSILON
 
 UNIT = 1e-6  # a quaternion or an axis may differ from unit length by this
 
@@ -72,14 +73,15 @@ def body_frame(quaternion: Sequence[float], space: Sequence[float]) -> list[floa
 def _euler_angles(theta: float, total: float, difference: float, rates: Sequence[float]) -> tuple[float, ...]:
     """Angles and rates from theta, phi + psi, phi - psi and the body's angular velocity."""
     w1, w2, w3 = rates
-    sine = math.sin(theta)
-    if theta in (0.0, math.pi) or sine == 0.0:
-        psi = -math.atan2(w2, w1)
+    sine, phi, psi = math.sin(theta), 0.5 * (total + difference), 0.5 * (total - difference)
+    c, s = math.cos(psi), math.sin(psi)
+    swing = w1 * s + w2 * c
+    # so near a pole that phi' and psi', which nearly cancel, would round w3 by more than the tilt: the tilt goes
+    if sine * sine * math.hypot(w1, w2, w3) < EPSILON * abs(swing) or theta in (0.0, math.pi):
+        theta, psi = 0.0 if theta < 1.0 else math.pi, -math.atan2(w2, w1)
         phi = total - psi if theta == 0.0 else difference + psi
         return theta, phi, psi, math.hypot(w1, w2), 0.0, w3
-    phi, psi = 0.5 * (total + difference), 0.5 * (total - difference)
-    c, s = math.cos(psi), math.sin(psi)
-    phi_dot = (w1 * s + w2 * c) / sine
+    phi_dot = swing / sine
     return theta, phi, psi, w1 * c - w2 * s, phi_dot, w3 - phi_dot * math.cos(theta)
 
 

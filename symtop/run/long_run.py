@@ -310,7 +310,7 @@ class _Checkpoint:
         """The file for the result, refused if it is a folder or the checkpoint, which is removed at the end."""
         if output.is_dir():
             raise SymtopError(f"output must be a file, not the folder {str(output)!r}", "output")
-        if self.file is not None and output.absolute() == self.file.absolute():
+        if self.file is not None and output.resolve() == self.file.resolve():
             words = f"output and checkpoint must be two files, not both {str(output)!r}"
             raise SymtopError(words, "output", "checkpoint")
         check_replaceable(output)

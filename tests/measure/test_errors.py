@@ -72,6 +72,11 @@ def test_a_run_is_compared_with_no_other_top_or_start_than_its_own():
             symtop.errors(run, other)
         with pytest.raises(symtop.SymtopError, match="scene must be that of the data, spheroid"):
             symtop.judge(run, scene=other)
+    body = symtop.simulate("heavy-brick", "rk4", step_size=0.05, guard=False)
+    for one, other, name in ((run, "heavy-brick", "spheroid"), (body, "spheroid", "heavy-brick")):
+        with pytest.raises(symtop.SymtopError, match=f"scene must be that of the data, {name}, whose top is"):
+            symtop.errors(one, other)
+    assert float(symtop.errors(body, "heavy-brick")["attitude"].max()) < 1e-3
     with pytest.warns(symtop.SymtopWarning, match="on goldstein"):
         assert float(symtop.errors(run.drop_attrs(), "goldstein")["axis"].max()) > 0.1
     assert symtop.judge(run)["axis_error"].value == pytest.approx(float(symtop.errors(run)["axis"].max()))
@@ -193,6 +198,33 @@ def test_a_tables_text_and_lost_samples_are_read_as_numbers():
     np.testing.assert_allclose(np.delete(shown.values, 7), np.delete(whole.values, 7), atol=1e-14)
 
 
+def test_a_part_of_a_run_is_judged_by_what_it_shows_and_no_other_shape_is_taken():
+    run = symtop.simulate("spheroid", "rk4", step_size=0.01, samples=41, guard=False)
+    whole = symtop.errors(run)
+    for part in (run.drop_vars("theta"), run.drop_vars("phi"), run[["axis", "psi"]]):
+        shown = symtop.errors(part)
+        assert ("attitude" in shown) is ("phi" in part)
+        xr.testing.assert_allclose(shown, whole[list(shown)], atol=1e-15)
+    for wrong in (run.transpose(), run.sel(component="z")):
+        with pytest.raises(symtop.SymtopError, match=r"axis must have the shape \(41, 3\), one row for each time, not"):
+            symtop.errors(wrong)
+
+
+def test_masked_samples_are_lost_and_single_precision_may_round_beyond_the_pole():
+    run = symtop.simulate("spheroid", "rk4", step_size=0.01, samples=41, guard=False)
+    axis, mask = run["axis"].values.copy(), np.zeros((41, 3), dtype=bool)
+    axis[7], mask[7] = (0.0, 0.0, 1.0), True
+    with pytest.warns(symtop.SymtopWarning, match="not a number from"):
+        shown = symtop.errors({"time": run["time"], "axis": np.ma.masked_array(axis, mask)}, "spheroid")["axis"].values
+    assert np.flatnonzero(np.isnan(shown)).tolist() == [7]
+    assert symtop.errors({"time": run["time"], "axis": axis}, "spheroid")["axis"].values[7] > 0.1
+    hanging = symtop.Scene("hanging", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(np.pi), 5.0)
+    single = {"time": [0.0, 1.0], "theta": np.full(2, np.pi, dtype=np.float32)}
+    assert float(symtop.errors(single, hanging)["theta"].max()) == pytest.approx(8.7e-8, rel=0.01)
+    with pytest.raises(symtop.SymtopError, match="theta must be radians"):
+        symtop.errors({"time": [0.0, 1.0], "theta": [np.pi, np.pi + 1e-6]}, hanging)
+
+
 AXIS = np.tile([0.0, 0.0, 1.0], (41, 1))
 
 
@@ -206,6 +238,7 @@ AXIS = np.tile([0.0, 0.0, 1.0], (41, 1))
         ({"time": TIMES - 1.0, "axis": AXIS}, "spheroid", "at least 0"),
         ({"time": TIMES[:, None], "axis": AXIS}, "spheroid", "time must be a row"),
         ({"time": ["a"] * 41, "axis": AXIS}, "spheroid", "time must be an array of real numbers"),
+        ({"time": TIMES.astype("timedelta64[s]"), "axis": AXIS}, "spheroid", "time must be an array of real numbers"),
         ({"time": TIMES, "axis": AXIS + 0j}, "spheroid", "axis must be an array of real numbers"),
         ({"time": TIMES, "axis": AXIS.T}, "spheroid", r"shape \(41, 3\)"),
         ({"time": TIMES, "quaternion": AXIS}, "spheroid", r"shape \(41, 4\)"),
@@ -269,3 +302,15 @@ def test_an_ensemble_and_other_members_are_refused():
     many = symtop.ensemble(labelled, "strang", step_size=0.01, horizon=0.1, samples=3, quiet=True)
     with pytest.raises(symtop.SymtopError, match="their labels are others"):
         symtop.errors(many, labelled.assign_coords(member=["b", "a"]))
+    assert float(symtop.errors(runs, ["spheroid", "goldstein"])["axis"].max()) < 0.1
+    with pytest.raises(symtop.SymtopError, match="their names are others"):
+        symtop.errors(runs, ["goldstein", "spheroid"])
+    drawn = symtop.population(4, seed=1)
+    many = symtop.ensemble(drawn, "strang", step_size=1e-4, horizon=1e-3, samples=3, quiet=True)
+    with pytest.raises(symtop.SymtopError, match="their strata are others"):
+        symtop.errors(many, symtop.population(4, seed=2))
+    with pytest.warns(symtop.SymtopWarning, match="is this the start of the scene"):
+        symtop.errors(many.drop_vars("stratum"), symtop.population(4, seed=2))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        symtop.errors(many, drawn)

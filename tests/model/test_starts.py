@@ -58,6 +58,31 @@ def test_a_start_on_a_pole_keeps_its_motion(quaternion, theta):
     np.testing.assert_allclose(state[3:], L, atol=1e-14)
 
 
+@pytest.mark.parametrize("pole", [0.0, math.pi])
+def test_a_start_next_to_a_pole_keeps_its_motion(pole):
+    """A quaternion that was computed is off the pole by a rounding, and phi' would round the spin away.
+
+    The control: where nothing turns the axis the tilt stays, and that of a millionth in any case.
+    """
+    omega, top = np.array([0.1, 0.7, 50.3]), symtop.SymmetricTop(1.0, 0.8, 1.0)
+    for tilt in (1e-17, 1.2e-16, 1e-15, 1e-12, 1e-10, 1e-9, 1e-8, 1e-6):
+        x = 0.5 * tilt
+        q = (math.cos(x), math.sin(x), 0.0, 0.0) if pole == 0.0 else (math.sin(x), math.cos(x), 0.0, 0.0)
+        at = symtop.Angles.from_quaternion(q, omega_body=omega)
+        made = charts.quaternion_from_angles(at.theta, at.phi, at.psi)
+        assert float(charts.attitude_distance(made, np.array(q))) < 3e-9
+        np.testing.assert_allclose(body_rates(at), omega, atol=3e-7)
+        assert abs(at.spin - omega[2]) < 3e-7
+        e, L = matrix(q)[:, 2], matrix(q) @ (omega * [1.0, 1.0, 0.8])
+        np.testing.assert_allclose(
+            charts.space_state("axis", top, symtop.Angles.from_axis(top, e, L))[3:], L, atol=1e-6
+        )
+        for rates in ([0.0, 0.0, 50.3], None):
+            still = symtop.Angles.from_quaternion(q, omega_body=rates)
+            assert still.theta == pytest.approx(abs(pole - tilt), rel=1e-15)
+    assert at.theta == pytest.approx(abs(pole - 1e-6), abs=1e-15)
+
+
 def test_a_foreign_run_is_judged_from_its_first_sample():
     """What an own simulator has: a quaternion and a body rate. The run that follows is the scene's."""
     scene = symtop.scene("spheroid")
@@ -89,6 +114,9 @@ def test_a_body_from_its_moments_about_the_centre_is_the_spheroid():
         ),
         (lambda: symtop.Angles.from_axis(symtop.SymmetricTop(1, 1, 1), [0, 0, 2], [0, 0, 1]), "axis must have unit"),
         (lambda: symtop.SymmetricTop.from_inertia(1, 1, 3, 1), "axial must be at most 2 at_centre"),
+        (lambda: symtop.RigidBody.from_inertia(5.0), "matrix must be rows of 3 numbers, not 5.0"),
+        (lambda: symtop.RigidBody.from_points(2.0, [[0, 0, 1]]), "masses must be a row of numbers, not 2.0"),
+        (lambda: symtop.RigidBody.from_points([2.0], 1.0), "places must be rows of 3 numbers, not 1.0"),
         (lambda: symtop.RigidBody.from_inertia(np.eye(3), mass=2.0), "needs mgl, which is mass times gravity times"),
         (lambda: symtop.SymmetricTop.from_inertia(1, 1, 1, 1, gravity=-9.81), "gravity must be at least 0"),
     ],

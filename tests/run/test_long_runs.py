@@ -52,6 +52,7 @@ def test_the_energy_is_that_of_simulate_whether_or_not_the_momenta_are_kept(name
         ({"output": ""}, "output must be a file, not the folder"),
         ({"checkpoint": ""}, "checkpoint must be a file, not the folder"),
         ({"output": "a.nc", "checkpoint": "a.nc"}, "output and checkpoint must be two files"),
+        ({"output": "a.nc", "checkpoint": "b/../a.nc"}, "output and checkpoint must be two files"),
     ],
 )
 def test_a_file_that_would_replace_something_else_is_refused_before_a_step(tmp_path, monkeypatch, files, words):

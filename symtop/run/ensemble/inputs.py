@@ -97,6 +97,10 @@ def _from_dataset(data: xr.Dataset) -> Members:
     numbers = np.concatenate(columns, axis=1, dtype=float)
     _check_names(data, parts)
     named = [name for name in ("scene", "stratum") if name in data]
+    for name in named:
+        if data[name].dims not in ((), ("member",)):
+            dims = ", ".join(map(str, data[name].dims))
+            raise SymtopError(f"{name} of members must be names over member, or one for all, not over {dims}")
     labels = {name: np.broadcast_to(data[name].to_numpy().astype(str, copy=False), n) for name in named}
     if "member" in data.indexes and "member" in data.dims:
         labels["member"] = _plain(data.indexes["member"])
@@ -131,9 +135,11 @@ def refuse_others(members: Members, runs: xr.Dataset) -> None:
     """Refuse members that are not those of an ensemble, by their number or their labels."""
     if len(members.numbers) != (n := runs.sizes["member"]):
         raise SymtopError(f"members must be the {n} of the ensemble, not {len(members.numbers)}")
-    labels = [[*map(str, row)] for row in (members.names, runs.indexes.get("member")) if row is not None]
-    if len(labels) == 2 and labels[0] != labels[1]:
-        raise SymtopError("members must be those of the ensemble in their order, and their labels are others")
+    known = {name: row.to_numpy() for name, row in runs.variables.items() if row.dims == ("member",)}
+    for name, labels in members.labels.items():
+        if name in known and [*map(str, labels)] != [*map(str, known[name])]:
+            words = "names" if name == "scene" else "strata" if name == "stratum" else "labels"
+            raise SymtopError(f"members must be those of the ensemble in their order, and their {words} are others")
 
 
 def _plain(index: Any) -> NDArray[Any]:
