@@ -143,6 +143,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 STATE = (list, dict, set)  # under a module's lower-case name
 SHIPPED = ("symtop.", "symtop_studies.")
+DEFINING = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
 PLAIN = (type(None), bool, int, float, complex, str, bytes, np.generic)
 _IMPORT = dis.opmap["IMPORT_NAME"]
 _by_name: set[Callable[..., Any]] = set()
@@ -332,10 +333,7 @@ class Code:
 def _statements(file: Path) -> str:
     """Hash of what a user's file says outside of functions and classes: what its lists begin with."""
     with contextlib.suppress(OSError, SyntaxError, ValueError):  # no file, as at a prompt
-        lines = ast.parse(file.read_bytes()).body
-        apart = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
-        words = [one for one in lines if isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant)]
-        return hashed(*(ast.dump(one) for one in lines if not isinstance(one, apart) and one not in words))
+        return hashed(*(ast.dump(one) for one in ast.parse(file.read_bytes()).body if not isinstance(one, DEFINING)))
     return ""
 
 

@@ -99,12 +99,6 @@ def by_length(*functions: tuple[int, Callable[..., Any]]) -> Callable[..., Any]:
     return chosen
 
 
-def _register_parts() -> None:
-    """Register what modules without numba have marked so far."""
-    for function, is_inlined in marked:
-        register_jitable(function, INLINED if is_inlined else OPTIONS | WITHIN)
-
-
 def _overloads(function: FunctionType) -> Iterator[object]:
     """What numba compiles where a function is called: the functions that overload it, and their options."""
     entries = builtin_registry.globals
@@ -119,7 +113,8 @@ def _overloads(function: FunctionType) -> Iterator[object]:
 
 def code_of(thing: object) -> list[Part]:
     """What a kernel, or anything that holds kernels, is compiled from; the same whatever a process has run before."""
-    _register_parts()
+    for function, is_inlined in marked:  # by modules without numba, so far
+        register_jitable(function, INLINED if is_inlined else OPTIONS | WITHIN)
     return Code(_overloads).reached("kernel", thing, OPTIONS, sys.version_info[:2], numba.__version__)
 
 

@@ -130,10 +130,7 @@ def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree
 
 
 def attributes_of(title: str, **attributes: Any) -> dict[str, Any]:
-    """The attributes of a dataset: conventions, title, those given, as strings or numbers, and provenance.
-
-    An int of more than the 64 bits that a file holds is a string.
-    """
+    """The attributes of a dataset: conventions, title, those given, as text or numbers of 64 bits, and provenance."""
     plain = {
         key: value if isinstance(value, (str, float)) or (type(value) is int and abs(value) < 2**63) else
         json.dumps(value, sort_keys=True, default=str)
@@ -148,8 +145,7 @@ def replacing(path: str | os.PathLike[str], suffix: str = "") -> Iterator[Path]:
 
     Raises SymtopError if the disk is full, the folder cannot be written to, or `path` is a folder.
     """
-    target = Path(path)
-    partial = ""
+    target, partial = Path(path), ""
     if "\0" in str(target):
         raise SymtopError(f"a path must not hold a null character, as {str(target)!r} does")
     try:
@@ -189,10 +185,9 @@ def write_json(path: Path, content: Any) -> None:
 
 def read_json(path: Path) -> Any:
     """The content of a JSON file, or None if there is none or it is damaged."""
-    try:
+    with contextlib.suppress(OSError, ValueError):
         return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
+    return None
 
 
 def _encoding(data: xr.Dataset) -> dict[Any, dict[str, Any]]:
@@ -238,13 +233,11 @@ def content_hash(data: xr.Dataset) -> str:
     """Hash of all values and their dimensions, so that a damaged or foreign file cannot pass for a good one."""
     digest = hashlib.sha256()
     for name in sorted(str(name) for name in data.variables):
-        variable = data.variables[name]
-        values = np.ascontiguousarray(variable.values)
-        digest.update(f"{name}{variable.dims}{values.shape}".encode())
-        if values.dtype.kind in "OUT":  # text: kept as it is written, however it is stored
-            digest.update("\0".join(map(str, values.ravel())).encode())
-        else:
-            digest.update(values.dtype.kind.encode() + values.tobytes())
+        values = np.ascontiguousarray(data.variables[name].values)
+        digest.update(f"{name}{data.variables[name].dims}{values.shape}".encode())
+        text = values.dtype.kind in "OUT"  # kept as it is written, however it is stored
+        digest.update("\0".join(map(str, values.ravel())).encode() if text else values.dtype.kind.encode())
+        digest.update(b"" if text else values.tobytes())
     return digest.hexdigest()
 
 
