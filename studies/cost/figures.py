@@ -33,7 +33,7 @@ BESIDE = ("rk4[axis]", "strang[axis]", "dop853-compiled-fixed[axis]")  # named i
 MARKS, LATEST = 9, 0.995
 HALF = 0.5
 HATCH, LETTER, UNREACHED = "////", 0.62, "#F0F0F0"
-MOST_KEYS, REST = 10, "#F0E442"  # methods with a colour of their own, and the colour of others
+MOST_KEYS, REST = 6, "#F0E442"  # methods without room for their name inside that have a key, and the colour of others
 PALE = 0.62  # of white in the colour of a predicted cell
 LEFT = (style.SKY, style.ORANGE, style.VERMILLION, style.YELLOW, style.BLUE, style.LEAF)
 TITLES = {
@@ -114,15 +114,18 @@ def draw_map(data: xr.DataTree) -> Any:
     """Three panels: the cheapest variant for every allowed error and run length."""
     each = {quantity: far.diagram(data, quantity) for quantity in far.QUANTITIES}
     won = Counter(panel.names[k] for panel in each.values() for k in panel.winner.ravel() if k >= 0)
-    names = [name for name, _ in won.most_common()]
-    colors = _colors(names[:MOST_KEYS]) | dict.fromkeys(names[MOST_KEYS:], REST)
+    inside = {name for panel in each.values() for name in panel.names
+              if any(_places(panel.winner == panel.names.index(name), split_name(name)[0]))}  # fmt: skip
+    below = [name for name, _ in won.most_common() if name not in inside]
+    named = [name for name, _ in won.most_common() if name not in below[MOST_KEYS:]]
+    colors = _colors(named) | dict.fromkeys(below[MOST_KEYS:], REST)
     figure, axes = panels(1, len(far.QUANTITIES), height=3.6, sharex=True, sharey=True)
     for axis, (quantity, panel) in zip(axes[0], each.items(), strict=True):
         _panel(axis, panel, colors)
         axis.set(title=TITLES[quantity], xlabel="run length (nutations)")
     axes[0][0].set_ylabel("largest error allowed")
-    keys = [Patch(facecolor=colors[name], label=name) for name in names[:MOST_KEYS]]
-    keys += [Patch(facecolor=REST, label="another method")] if names[MOST_KEYS:] else []
+    keys = [Patch(facecolor=colors[name], label=name) for name in below[:MOST_KEYS]]
+    keys += [Patch(facecolor=REST, label="another method")] if below[MOST_KEYS:] else []
     keys.append(Patch(facecolor=UNREACHED, edgecolor="#BBBBBB", label="reached by no method"))
     figure.legend(handles=keys, loc="outside lower center", ncols=3, frameon=False)
     return figure
