@@ -28,7 +28,7 @@ def test_every_study_leaves_a_dataset_figures_and_findings(quick_results):
         findings = json.loads((quick_results / f"{name}.json").read_text())
         assert findings["facts"]
         assert findings["failures"] == []
-        assert findings["pictures"]
+        assert findings["pictures"] or findings["facts"]["busy"]  # times of a busy machine are not drawn
         for picture in findings["pictures"]:
             assert (quick_results / "figures" / picture["file"]).stat().st_size > 5000
 
