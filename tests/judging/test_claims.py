@@ -17,9 +17,10 @@ from symtop.judging.findings import NOTHING, VERDICTS, Finding
 from symtop.measure.conservation import Changed, behaviour
 from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
 from symtop.methods.framework.plan import Run
-from symtop.methods.framework.registry import Integrator
+from symtop.methods.framework.registry import Integrator, integrator
 from symtop.methods.splitting import composition
 from symtop.model import charts
+from symtop.model.scenes import scene
 from tests.commands import answer
 from tests.conftest import random_scenes
 from tests.judging.blind.right import euler, implicit_euler
@@ -423,3 +424,13 @@ def test_no_registered_integrator_is_refuted_and_few_claims_stay_open():
 def test_a_finding_without_a_number_is_valid_json():
     plain = Finding("pole", "", NOTHING, "undecided", "nothing was seen").plain()
     assert json.loads(json.dumps(plain, allow_nan=False))["value"] is None
+
+
+def test_the_series_of_a_step_beside_a_pole_is_not_taken():
+    """There angles know a state badly: without the rule this step of order 2 has a series of order 16."""
+    near = symtop.Angles(theta=0.001389, phi=0.966212, psi=0.842727, theta_dot=0.000981, phi_dot=-26.156396,
+                         psi_dot=-1323.792023)  # fmt: skip
+    upright = symtop.Scene("upright", symtop.SymmetricTop(0.1146, 0.0043, 65.3957), near, 20.0)
+    strang = integrator("strang")
+    assert order.series_of(Subject(strang, upright, quick=True)) is None
+    assert order.series_of(Subject(strang, scene("spheroid"), quick=True)).order == 2
