@@ -427,7 +427,7 @@ def test_a_finding_without_a_number_is_valid_json():
 
 
 def test_the_series_of_a_step_beside_a_pole_is_not_taken():
-    """There angles know a state badly: without the rule this step of order 2 has a series of order 16."""
+    """There angles know a state badly: without the rule this step of order 2 has a series of order 12."""
     near = symtop.Angles(theta=0.001389, phi=0.966212, psi=0.842727, theta_dot=0.000981, phi_dot=-26.156396,
                          psi_dot=-1323.792023)  # fmt: skip
     upright = symtop.Scene("upright", symtop.SymmetricTop(0.1146, 0.0043, 65.3957), near, 20.0)
