@@ -238,20 +238,20 @@ def safest(data: xr.DataTree, family: str, target: float, span: str = "short", w
 
 @of_one_dataset
 def step_factors(data: xr.DataTree, family: str, target: float, span: str = "short") -> dict[str, float]:
-    """By method of fixed step, safe steps a period over those at epsilon = 0; where both are known."""
+    """By method of fixed step that serves tops, safe steps over those at epsilon = 0; inf beyond the budget."""
     before, after = (safest(data, name, target, span) for name in (SYMMETRIC, family))
     return {name: one.setting / before[name].setting for name, one in after.items()
-            if integrator(name).fixed_step and np.isfinite([one.setting, before[name].setting]).all()}  # fmt: skip
+            if integrator(name).fixed_step and np.isfinite(before[name].setting)}  # fmt: skip
 
 
 @of_one_dataset
 def own_factors(data: xr.DataTree, family: str, target: float, without: str = "") -> dict[str, float]:
-    """By method, safe steps of a body over those of the top's own chart at epsilon = 0."""
+    """By method, safe steps of a body over those of the top's own chart at epsilon = 0; inf beyond the budget."""
     own = {integrator(name).method: one for name, one in safest(data, SYMMETRIC, target, "own").items()}
     after = safest(data, family, target, without=without)
     return {name: one.setting / own[label(name)].setting for name, one in after.items()
             if integrator(name).fixed_step and label(name) in own
-            and np.isfinite([one.setting, own[label(name)].setting]).all()}  # fmt: skip
+            and np.isfinite(own[label(name)].setting)}  # fmt: skip
 
 
 def price_factors(data: xr.DataTree) -> dict[str, float]:

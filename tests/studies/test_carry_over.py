@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.stats import kendalltau
-from symtop_studies.carry_over import comparison as by, facts
+from symtop_studies.carry_over import comparison as by, facts, figures
 from symtop_studies.carry_over.bodies import FAMILIES, FREE, SYMMETRIC, Bodies, as_tops, bodies_of, run_level
 from symtop_studies.carry_over.measures import ASYMPTOTE, observed_order, own_table, table, verdicts
 from symtop_studies.cost.ladder import LEVELS, Climb, setting_of
@@ -215,3 +215,21 @@ def test_planted_factors_of_steps_and_of_silent_runs_are_found():
         assert by.winner(data, FREE, 1e-6) == "gauss-4[body]"
         assert by.winner(data, FREE, 1e-6, "kicks") == "strang[body]"
         assert by.transferred(data, FREE, 1e-6).value == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("unserved", "words"), [(0, "3, up to 3 times"), (3, "3, up to 3 times, beyond the budget 1 of 9")]
+)
+def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved, words):
+    data = planted(3.0)
+    met = data["short"]["met_at"].copy()
+    at = {"variant": 1, "family": [*FAMILIES].index(FREE), "target": 0}
+    met[{**at, "member": slice(unserved)}] = np.inf  # 3 of 40 are more than 5 %
+    data["short"] = data["short"].to_dataset().assign(met_at=met)
+    assert facts.steps(data, FREE).words == words
+    assert facts.steps(data, "0.1").words == "1, up to 1 times"
+    assert by.step_factors(data, FREE, 1e-3).get("strang[body]") == pytest.approx(np.inf if unserved else 3.0)
+    drawn_texts = {one.get_text() for one in figures.draw_steps(data).axes[0].texts}
+    assert drawn_texts == ({"+1"} if unserved else set())
+    everyone_beyond = facts.pooled([{"strang[body]": np.inf}])
+    assert everyone_beyond.words == "beyond the budget 1 of 1"
