@@ -67,6 +67,12 @@ class Pooled(NamedTuple):
         within = [f"{number(self.middle, 3)}, up to {number(self.most, 3)} times"] if self.beyond < self.asked else []
         return ", ".join(within + [f"beyond the budget {self.beyond} of {self.asked}"] * (self.beyond > 0))
 
+    @property
+    def verdict(self) -> str:
+        """Of the upper end; in part at best where so many are beyond the budget that the end of all is not known."""
+        told = by.factor_verdict(self.most)
+        return by.worst((told, by.PARTLY)) if self.beyond > (1.0 - MOST_OF) * self.asked else told
+
 
 def pooled(each: list[dict[str, float]]) -> Pooled:
     """Factors of all methods and targets together."""
@@ -107,6 +113,11 @@ def silent_orders(data: xr.DataTree, family: str) -> tuple[float, float, float]:
     if not np.isfinite(two).any() or not np.isfinite(four).any():
         return (math.nan,) * 3
     return float(np.nanmin(two)), float(np.nanmax(two)), float(np.nanmax(four))
+
+
+def over(share: float, before: float) -> float:
+    """A share over that of tops; where tops have none, what it has beyond none in units of `LEAST`, and 1."""
+    return share / before if before else 1.0 + share / by.LEAST
 
 
 def silent_words(data: xr.DataTree, family: str) -> str:
@@ -168,9 +179,10 @@ def engine_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
     places = range(len(LEVELS))
     taus = [by.engine_tau(data, family, place) for place in places]
     lost = [(by.lost(data, family, place), by.lost(data, SYMMETRIC, place)) for place in places]
-    verdicts = [*map(by.ranking_verdict, taus),
-                *(by.factor_verdict(share / before if before else 1.0 + share / by.LEAST, SEVERAL)
-                  for share, before in lost)]  # fmt: skip
+    verdicts = [
+        *map(by.ranking_verdict, taus),
+        *(by.factor_verdict(over(share, before), SEVERAL) for share, before in lost),
+    ]
     shares = f"{percent(lost[0][0], 0)}, {percent(lost[0][1], 0)} of tops"
     return f"{tau_words(min(taus, key=lambda one: one.value))}; lost at once {shares}", by.worst(verdicts)
 
@@ -183,17 +195,15 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
     gap, order, first = exponent_gap(data, family)[0], order_gap(data, family)[0], first_steps(data, family)
     within, known = exponents_within(data, family)
     but = f"; without needles {own_steps(data, family, NEEDLE).words}" if family == FREE else ""
-    ratio = share / before if before > 0.0 else math.nan
     own_tau = least([by.own_tau(data, family, target) for target in ASKED])
     return {
         "ranking": (tau_words(tau), by.ranking_verdict(tau)),
         "own ranking": (f"tau {number(own_tau.value, 2)}", by.ranking_verdict(own_tau)),
         "winner": (f"costs {number(best.value, 3)} times the best", by.factor_verdict(best.value)),
-        "steps": (taken.words, by.factor_verdict(taken.most)),
-        "own": (own.words + but, by.factor_verdict(own.most)),
+        "steps": (taken.words, taken.verdict), "own": (own.words + but, own.verdict),
         "first": (("beyond the budget" if first == math.inf else f"up to {number(first, 3)} times") +
                   ", without needles" * (family == FREE), by.factor_verdict(first)),
-        "silent": (silent_words(data, family), by.factor_verdict(ratio, SEVERAL)),
+        "silent": (silent_words(data, family), by.factor_verdict(over(share, before), SEVERAL)),
         "growth": (f"{within} of {known} exponents within {by.EXPONENT}, all within {number(gap, 2)}",
                    YES if gap <= by.EXPONENT else NO),
         "order": (f"lower by at most {number(max(order, 0.0), 2)}, limit {by.LOWER}", YES if order <= by.LOWER else NO),

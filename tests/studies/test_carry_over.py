@@ -148,6 +148,31 @@ def test_a_planted_difference_of_rankings_is_seen_and_scatter_is_none():
     assert turned.value < -0.9
 
 
+def test_prices_do_not_rank_methods_that_reach_nothing():
+    half, rows = 1e-6 * 1.6 ** np.arange(20), ([*range(20)],) * 2
+    half[10:] = np.inf
+    first, second = costs_of(half), costs_of(np.roll(half, 5), seed=1)
+    free = by.bootstrap_tau(
+        first._replace(errors=np.zeros(20)), second._replace(errors=np.zeros(20)), rows, paired=True
+    )
+    noisy = by.bootstrap_tau(first._replace(errors=np.full(20, 0.02)), second._replace(errors=np.full(20, 0.02)), rows,
+                             paired=True)  # fmt: skip
+    assert free.low <= free.value <= free.high
+    assert (noisy.low, noisy.high) == pytest.approx((free.low, free.high), abs=0.02)
+
+
+def test_no_silent_run_of_tops_or_bodies_is_no_difference():
+    assert by.factor_verdict(facts.over(0.0, 0.0), by.SEVERAL) == by.YES
+    assert by.factor_verdict(facts.over(0.2, 0.0), by.SEVERAL) == by.NO
+    assert facts.over(0.06, 0.02) == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(("beyond", "verdict"), [(0, by.FACTOR), (1, by.FACTOR), (2, by.PARTLY)])
+def test_steps_beyond_the_budget_are_no_steps_that_carry_over(beyond, verdict):
+    each = {f"method {k}": np.inf if k < beyond else 1.5 for k in range(20)}  # one in twenty is allowed
+    assert facts.pooled([each]).verdict == verdict
+
+
 def test_verdicts_follow_the_limits_that_were_fixed_before():
     for ends, verdict in (((0.91, 0.99), by.YES), ((0.7, 0.95), by.PARTLY), ((0.6, 0.79), by.NO)):
         assert by.ranking_verdict(by.Interval(0.85, *ends)) == verdict
