@@ -251,6 +251,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         "bodies": data["short"].sizes["member"], "methods": data["short"].sizes["variant"],
         "long_bodies": data["long"].sizes["member"] if "long" in data.children else None,
         "long_methods": data["long"].sizes["variant"] if "long" in data.children else None,
+        "long_judged_3": float(data["bodies"]["judged"].isel(variant=0).sel(scene="long", family="0.3")),
         "same": by.SAME, "part": by.PART, "level": LEVEL, "double": by.DOUBLE, "several": SEVERAL, "steps": by.STEPS,
         "lower": by.LOWER,
         "off_bound": float(np.nanmax(about["off_bound"].values)),
