@@ -30,6 +30,7 @@ STEPS = 69.92  # a period, of the count of silent wrong runs
 LEAST = 0.01  # share of grown steps that counts where there are fewer
 CHAOS = 1000.0  # growth in ten periods
 DRAWS = 100
+UNREACHED = 1e300  # seconds, the median cost of what half of the bodies do not reach
 ANY = "any body"
 WITHIN = 2.5  # times the least median of a class: who comes as close runs over a hundred periods
 MOST_OF = 0.95  # of the methods
@@ -90,12 +91,12 @@ def judged_bodies(table: Costs) -> NDArray[np.int64]:
 
 def medians(values: Array) -> Array:
     """Over bodies, along the last axis; of ties that are not reached a number that ties as well."""
-    return np.minimum(np.nan_to_num(np.median(values, axis=-1), nan=1e300, posinf=1e300), 1e300)
+    return np.minimum(np.nan_to_num(np.median(values, axis=-1), nan=UNREACHED, posinf=UNREACHED), UNREACHED)
 
 
 def tau_of(first: Array, second: Array) -> float:
     """Kendall's tau-b of two rows; NaN of fewer than three methods."""
-    either = (first < 1e300) | (second < 1e300)
+    either = (first < UNREACHED) | (second < UNREACHED)
     if either.sum() < 3:
         return float("nan")
     one, other = (np.sign(row[either, np.newaxis] - row[either]) for row in (first, second))
@@ -121,7 +122,9 @@ def bootstrap_tau(
             pair = draw, draw
         else:
             pair = tuple(part[generator.integers(part.size, size=part.size)] for part in (bodies, others))
-        taus.append(tau_of(medians(a[:, pair[0]]) * price[0][k], medians(b[:, pair[1]]) * price[1][k]))
+        priced = (medians(part[:, drawn]) for part, drawn in zip((a, b), pair, strict=True))
+        # a price does not rank what is not reached
+        taus.append(tau_of(*(np.where(one < UNREACHED, one * p[k], one) for one, p in zip(priced, price, strict=True))))
     ends = np.nanquantile(taus, ENDS).tolist() if np.isfinite(taus).any() else (float("nan"),) * 2
     return Interval(value, *ends)
 
@@ -177,8 +180,8 @@ def winner(data: xr.DataTree, family: str, target: float, needs: str = ANY, span
     """The method of a class with the least median cost."""
     table = costs(data, family, target, span=span)
     rows, bodies = of_class(table, needs), judged_bodies(table)
-    middle = medians(table.values[np.ix_(rows, bodies)]) if bodies.size and rows else np.array([1e300])
-    return table.names[rows[int(np.argmin(middle))]] if middle.min() < 1e300 else None
+    middle = medians(table.values[np.ix_(rows, bodies)]) if bodies.size and rows else np.array([UNREACHED])
+    return table.names[rows[int(np.argmin(middle))]] if middle.min() < UNREACHED else None
 
 
 @of_one_dataset
@@ -207,7 +210,7 @@ def contenders(data: xr.DataTree) -> list[str]:
             for needs in classes(data) if bodies.size else ():
                 rows = of_class(table, needs)
                 middle = medians(table.values[np.ix_(rows, bodies)])
-                near = (middle <= WITHIN * middle.min()) & (middle < 1e300)
+                near = (middle <= WITHIN * middle.min()) & (middle < UNREACHED)
                 names |= {table.names[row] for row, close in zip(rows, near, strict=True) if close}
     return [str(name) for name in group_of(data, "short")["variant"].values if str(name) in names]
 
@@ -238,20 +241,20 @@ def safest(data: xr.DataTree, family: str, target: float, span: str = "short", w
 
 @of_one_dataset
 def step_factors(data: xr.DataTree, family: str, target: float, span: str = "short") -> dict[str, float]:
-    """By method of fixed step, safe steps a period over those at epsilon = 0; where both are known."""
+    """By method of fixed step that serves tops, safe steps over those at epsilon = 0; inf beyond the budget."""
     before, after = (safest(data, name, target, span) for name in (SYMMETRIC, family))
     return {name: one.setting / before[name].setting for name, one in after.items()
-            if integrator(name).fixed_step and np.isfinite([one.setting, before[name].setting]).all()}  # fmt: skip
+            if integrator(name).fixed_step and np.isfinite(before[name].setting)}  # fmt: skip
 
 
 @of_one_dataset
 def own_factors(data: xr.DataTree, family: str, target: float, without: str = "") -> dict[str, float]:
-    """By method, safe steps of a body over those of the top's own chart at epsilon = 0."""
+    """By method, safe steps of a body over those of the top's own chart at epsilon = 0; inf beyond the budget."""
     own = {integrator(name).method: one for name, one in safest(data, SYMMETRIC, target, "own").items()}
     after = safest(data, family, target, without=without)
     return {name: one.setting / own[label(name)].setting for name, one in after.items()
             if integrator(name).fixed_step and label(name) in own
-            and np.isfinite([one.setting, own[label(name)].setting]).all()}  # fmt: skip
+            and np.isfinite(own[label(name)].setting)}  # fmt: skip
 
 
 def price_factors(data: xr.DataTree) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """Facts and tables of the study."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,6 +15,7 @@ from . import comparison as by
 from .bodies import ASKED, CHAOTIC, FAMILIES, FREE, SYMMETRIC
 from .comparison import ANY, LEVEL, MOST_OF, NO, OTHERS, SEVERAL, YES, label
 from .limits import LEVELS, MOST
+from .measures import CHECKED
 
 SHOWN = ("0.1", "0.3", CHAOTIC, FREE)  # families of the short table
 NEEDLE = "needle"  # a stratum of free bodies whose spin the natural period does not tell
@@ -52,21 +53,42 @@ def worst_winner(data: xr.DataTree, family: str) -> by.Interval:
     return max((one for one in each if not math.isnan(one.value)), key=lambda one: one.value, default=each[0])
 
 
-def pooled(each: list[dict[str, float]]) -> tuple[float, float]:
-    """The median of factors of all methods and targets, and what `MOST_OF` of them stay below."""
+class Pooled(NamedTuple):
+    """Factors of all methods and targets: those within the budget, and how many are beyond it."""
+
+    middle: float  # median of those within
+    most: float  # what `MOST_OF` of those within stay below
+    beyond: int
+    asked: int
+
+    @property
+    def words(self) -> str:
+        """In a table."""
+        within = [f"{number(self.middle, 3)}, up to {number(self.most, 3)} times"] if self.beyond < self.asked else []
+        return ", ".join(within + [f"beyond the budget {self.beyond} of {self.asked}"] * (self.beyond > 0))
+
+    @property
+    def verdict(self) -> str:
+        """Of the upper end; in part at best where so many are beyond the budget that the end of all is not known."""
+        told = by.factor_verdict(self.most)
+        return by.worst((told, by.PARTLY)) if self.beyond > (1.0 - MOST_OF) * self.asked else told
+
+
+def pooled(each: list[dict[str, float]]) -> Pooled:
+    """Factors of all methods and targets together."""
     values = np.array([value for one in each for value in one.values()])
-    if not values.size:
-        return math.nan, math.nan
-    return float(np.median(values)), float(np.quantile(values, MOST_OF))
+    within = values[np.isfinite(values)]
+    ends = (float(np.median(within)), float(np.quantile(within, MOST_OF))) if within.size else (math.nan, math.nan)
+    return Pooled(*ends, values.size - within.size, values.size)
 
 
-def steps(data: xr.DataTree, family: str, span: str = "short") -> tuple[float, float]:
-    """Safe steps over those of epsilon = 0: median and upper end."""
+def steps(data: xr.DataTree, family: str, span: str = "short") -> Pooled:
+    """Safe steps over those of epsilon = 0."""
     return pooled([by.step_factors(data, family, target, span) for target in ASKED])
 
 
-def own_steps(data: xr.DataTree, family: str, without: str = "") -> tuple[float, float]:
-    """Safe steps over those of the top's own charts: median and upper end; `without` a stratum of free bodies."""
+def own_steps(data: xr.DataTree, family: str, without: str = "") -> Pooled:
+    """Safe steps over those of the top's own charts; `without` a stratum of free bodies."""
     return pooled([by.own_factors(data, family, target, without) for target in ASKED])
 
 
@@ -91,6 +113,11 @@ def silent_orders(data: xr.DataTree, family: str) -> tuple[float, float, float]:
     if not np.isfinite(two).any() or not np.isfinite(four).any():
         return (math.nan,) * 3
     return float(np.nanmin(two)), float(np.nanmax(two)), float(np.nanmax(four))
+
+
+def over(share: float, before: float) -> float:
+    """A share over that of tops; where tops have none, what it has beyond none in units of `LEAST`, and 1."""
+    return share / before if before else 1.0 + share / by.LEAST
 
 
 def silent_words(data: xr.DataTree, family: str) -> str:
@@ -152,33 +179,31 @@ def engine_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
     places = range(len(LEVELS))
     taus = [by.engine_tau(data, family, place) for place in places]
     lost = [(by.lost(data, family, place), by.lost(data, SYMMETRIC, place)) for place in places]
-    verdicts = [*map(by.ranking_verdict, taus),
-                *(by.factor_verdict(share / before if before else 1.0 + share / by.LEAST, SEVERAL)
-                  for share, before in lost)]  # fmt: skip
+    verdicts = [
+        *map(by.ranking_verdict, taus),
+        *(by.factor_verdict(over(share, before), SEVERAL) for share, before in lost),
+    ]
     shares = f"{percent(lost[0][0], 0)}, {percent(lost[0][1], 0)} of tops"
     return f"{tau_words(min(taus, key=lambda one: one.value))}; lost at once {shares}", by.worst(verdicts)
 
 
 def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
     """By line of the table the number of a family and its verdict; no number where nothing was measured."""
-    tau, best, (middle, most) = worst_tau(data, family), worst_winner(data, family), steps(data, family)
-    own_middle, own_most = own_steps(data, family)
+    tau, best = worst_tau(data, family), worst_winner(data, family)
+    taken, own = steps(data, family), own_steps(data, family)
     share, before = silent_share(data, family), silent_share(data, SYMMETRIC)
     gap, order, first = exponent_gap(data, family)[0], order_gap(data, family)[0], first_steps(data, family)
     within, known = exponents_within(data, family)
-    round_ones = own_steps(data, family, NEEDLE)
-    but = f"; without needles {number(round_ones[0], 3)}, up to {number(round_ones[1], 3)}" if family == FREE else ""
-    ratio = share / before if before > 0.0 else math.nan
+    but = f"; without needles {own_steps(data, family, NEEDLE).words}" if family == FREE else ""
     own_tau = least([by.own_tau(data, family, target) for target in ASKED])
     return {
         "ranking": (tau_words(tau), by.ranking_verdict(tau)),
         "own ranking": (f"tau {number(own_tau.value, 2)}", by.ranking_verdict(own_tau)),
         "winner": (f"costs {number(best.value, 3)} times the best", by.factor_verdict(best.value)),
-        "steps": (f"{number(middle, 3)}, up to {number(most, 3)} times", by.factor_verdict(most)),
-        "own": (f"{number(own_middle, 3)}, up to {number(own_most, 3)} times{but}", by.factor_verdict(own_most)),
-        "first": (f"up to {number(first, 3)} times{', without needles' if family == FREE else ''}",
-                  by.factor_verdict(first)),
-        "silent": (silent_words(data, family), by.factor_verdict(ratio, SEVERAL)),
+        "steps": (taken.words, taken.verdict), "own": (own.words + but, own.verdict),
+        "first": (("beyond the budget" if first == math.inf else f"up to {number(first, 3)} times") +
+                  ", without needles" * (family == FREE), by.factor_verdict(first)),
+        "silent": (silent_words(data, family), by.factor_verdict(over(share, before), SEVERAL)),
         "growth": (f"{within} of {known} exponents within {by.EXPONENT}, all within {number(gap, 2)}",
                    YES if gap <= by.EXPONENT else NO),
         "order": (f"lower by at most {number(max(order, 0.0), 2)}, limit {by.LOWER}", YES if order <= by.LOWER else NO),
@@ -226,6 +251,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         "bodies": data["short"].sizes["member"], "methods": data["short"].sizes["variant"],
         "long_bodies": data["long"].sizes["member"] if "long" in data.children else None,
         "long_methods": data["long"].sizes["variant"] if "long" in data.children else None,
+        "long_judged_3": float(data["bodies"]["judged"].isel(variant=0).sel(scene="long", family="0.3")),
         "same": by.SAME, "part": by.PART, "level": LEVEL, "double": by.DOUBLE, "several": SEVERAL, "steps": by.STEPS,
         "lower": by.LOWER,
         "off_bound": float(np.nanmax(about["off_bound"].values)),
@@ -252,21 +278,26 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     each = [by.tau(data, family, target) for family in OTHERS for target in ASKED]
     known = [one for one in each if math.isfinite(one.value) and math.isfinite(one.low)]
     answers |= {"taus": len(known), "outside": sum(not one.low <= one.value <= one.high for one in known)}
-    free = [by.step_factors(data, FREE, target) for target in ASKED]
-    answers |= {"fixed": len(by.fixed_steps(data)), "free_steps": len({name for one in free for name in one})}
+    answers["checked"] = CHECKED
     answers |= dict(zip(("silent_3_low", "silent_3_most", "silent_3_four"), silent_orders(data, "0.3"), strict=True))
     if "engines" in data.children:
         answers |= {f"lost_{key(family)}": by.lost(data, family, 0) for family in (SYMMETRIC, "0.3")}
+        answers |= {"engines": data["engines"].sizes["variant"], "engine_steps": float(data["engines"]["steps"][0])}
     if "steady" in data.children:
         answers["grid"] = float(data["steady"]["grid"].max())
-    return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in answers.items()}
+    return {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in answers.items()
+    }
 
 
 def _of_family(data: xr.DataTree, family: str) -> dict[str, Any]:
     place, order = key(family), order_gap(data, family)
     within, known = exponents_within(data, family)
+    taken = steps(data, family)
     answers: dict[str, Any] = {
-        f"tau_{place}": worst_tau(data, family).value, f"steps_{place}_high": steps(data, family)[1],
+        f"tau_{place}": worst_tau(data, family).value, f"steps_{place}_high": taken.most,
+        f"steps_{place}_beyond": taken.beyond, f"steps_{place}_asked": taken.asked,
         f"first_{place}": first_steps(data, family), f"silent_{place}": silent_share(data, family),
         f"growth_{place}_of": exponent_gap(data, family)[1] or None,
         f"growth_{place}_within": within, f"growth_{place}_told": known,
@@ -278,7 +309,7 @@ def _of_family(data: xr.DataTree, family: str) -> dict[str, Any]:
         answers[f"limit_{place}_low"], answers[f"limit_{place}_least"] = limit_ends(data, family)[0], float(least.min())
         answers[f"limit_{place}_of"] = label(str(data["steady"]["variant"].values[int(np.argmin(least))]))
     if family == FREE:
-        answers["round_steps"] = own_steps(data, family, NEEDLE)[0]
+        answers["round_steps"] = own_steps(data, family, NEEDLE).middle
     for name, kind, seen, first in by.orders(data) if order[1] else ():
         if (name, kind) == (order[1], family):
             answers |= {f"order_{place}_seen": seen, f"order_{place}_top": first}
@@ -349,11 +380,11 @@ def step_table(data: xr.DataTree) -> pd.DataFrame:
         each = {family: by.step_factors(data, family, target) for family in OTHERS}
         rows += [
             [label(name), target, before[name].setting, own.get(name, math.nan),
-             *(each[family].get(name, math.nan) for family in OTHERS)]
+             *(each[family][name] for family in OTHERS)]
             for name in by.fixed_steps(data) if np.isfinite(before[name].setting)
         ]  # fmt: skip
     header = ["method", "error", "steps at epsilon 0", "over those in the top's chart", *map(words, OTHERS)]
-    return pd.DataFrame(rows, columns=header)
+    return pd.DataFrame(rows, columns=header).replace(math.inf, math.nan)
 
 
 def silent_table(data: xr.DataTree) -> pd.DataFrame:

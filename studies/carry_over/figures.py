@@ -64,6 +64,10 @@ def draw_steps(data: xr.DataTree) -> Any:
             at = place + 0.25 * (k - 1) + shift.uniform(-0.08, 0.08, values.size)
             named = {"label": f"axis to 1e-{decades(target)} rad"} if place == 0 else {}
             axis.plot(at, values, ls="none", marker=MARKS[k], ms=3, alpha=0.6, color=color, **named)
+            beyond = int(np.isinf(values).sum())
+            if beyond:
+                axis.annotate(f"+{beyond}", (place + 0.25 * (k - 1), 1.0), xycoords=axis.get_xaxis_transform(),
+                              ha="center", va="top", color=color, fontsize=style.LEAST_TEXT)  # fmt: skip
     for factor in (1.0, by.DOUBLE):
         axis.axhline(factor, color="black", lw=0.8, ls="-" if factor == 1.0 else "--")
     _families(axis, OTHERS)

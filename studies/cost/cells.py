@@ -37,7 +37,6 @@ SECONDS, EVALUATIONS = "seconds", "evaluations"
 WITHIN = 2.5  # times the least cost of a class over ten nutations: who comes as close runs over a thousand
 CLOSER = 1.25  # the same of an attitude chart, which has no part but in contests of the attitude
 OFTEN = 0.1  # of the tops
-FINE = 50.0  # steps a nutation that look like enough
 
 
 class Cell(NamedTuple):

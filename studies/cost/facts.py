@@ -44,10 +44,10 @@ def decades(target: float) -> int:
     return round(-np.log10(target))
 
 
-def titled(name: str) -> str:
-    """A variant in a table of classes, with the word for what exists for symmetric bodies alone."""
+def serves(name: str) -> str:
+    """What follows the name of a variant that exists for symmetric bodies alone."""
     method = integrator(name)
-    return name + ("" if method.general or method.needs == "this-top" else " (symmetric)")
+    return "" if method.general or method.needs == "this-top" else " (symmetric)"
 
 
 def setting_words(name: str, value: float) -> str:
@@ -100,6 +100,7 @@ def winners_facts(data: xr.DataTree) -> dict[str, Any]:
     named |= dict(zip(keys, most, strict=True))
     for needs in CLASSES[:-1]:
         named |= _safe(needs.replace("-", "_"), data, Cell("short", "axis", AT, NATURAL, needs))
+    named["kicks_serve"] = serves(named["kicks"]) if named["kicks_seconds"] else ""
     both = [one for one in cells.winners(data) if one["needs"] != "this-top" and one["safe"] and one["hindsight"]]
     named["cells"] = len(both) or None
     named["same"] = sum(one["safe"].name == one["hindsight"].name for one in both) if both else None
@@ -137,7 +138,7 @@ def far_facts(data: xr.DataTree) -> dict[str, Any]:
     """The map: who has the most cells, where splittings win, how many were predicted, and what checks of those say."""
     ends = "", "_share", "_clear", "_short", "_long"
     names = [f"map_{quantity}{end}" for quantity in far.QUANTITIES for end in ends]
-    names += ["map_tops", "predicted", "checks", "checks_held", "checks_longest"]
+    names += ["map_tops", "map_methods", "predicted", "checks", "checks_runs", "checks_told", "checks_longest"]
     names += ["checks_low", "checks_middle", "checks_high"]  # error of a run, measured over predicted
     named: dict[str, Any] = dict.fromkeys(names)
     if "far" not in data.children:
@@ -154,11 +155,12 @@ def far_facts(data: xr.DataTree) -> dict[str, Any]:
         for end, part in (("short", panel.horizons <= SHORT_RUN), ("long", panel.horizons >= LONG_RUN)):
             if there[:, part].any():
                 named[f"map_{quantity}_{end}"] = float(splits[:, part][there[:, part]].mean())
-    named |= {"map_tops": data["far"].sizes["member"], "predicted": predicted / reached if reached else None}
+    named |= {"map_tops": data["far"].sizes["member"], "map_methods": data["far"].sizes["variant"]}
+    named |= {"predicted": predicted / reached if reached else None}
     checks = far.checks(data)
     ran = checks.drop_duplicates(["quantity", "target", "horizon"])
     named |= dict(zip(names[-3:], checks["ratio"].quantile([0.1, 0.5, 0.9]), strict=True))
-    return named | {"checks": len(ran) or None, "checks_held": int(ran["holds"].sum()),
+    return named | {"checks": len(ran) or None, "checks_runs": len(checks), "checks_told": int(checks["told"].sum()),
                     "checks_longest": ran["horizon"].max()}  # fmt: skip
 
 
@@ -192,8 +194,8 @@ def use(data: xr.DataTree) -> pd.DataFrame:
             best = next((one for one in choices if np.isfinite(one.seconds)), None)
             words = NOTHING if cells.asked_tops(data, cell).any() else "not asked"
             if best is not None:
-                words = f"{'' if called else '~ '}{titled(best.name)}, {setting_words(best.name, best.setting)}, "
-                words += duration(best.seconds)
+                words = f"{'' if called else '~ '}{best.name}{serves(best.name)}, "
+                words += f"{setting_words(best.name, best.setting)}, {duration(best.seconds)}"
                 kept = keeps(best.name) if target == AT else kept
             line[f"1e-{decades(target)} rad"] = words
         rows.append(line | {f"keeps, at 1e-{decades(AT)} rad": kept})
@@ -285,6 +287,8 @@ def silent(data: xr.DataTree) -> pd.DataFrame:
 def checked(data: xr.DataTree) -> pd.DataFrame:
     """The predicted cells of the map that were run, with the ratio of measured to predicted errors."""
     runs = far.checks(data)
-    table = runs.groupby(list(runs.columns[:-1]), sort=False)["ratio"].agg(["min", "median", "max"]).reset_index()
-    return table.rename(columns={"target": "error", "horizon": "nutations", "holds": "meets the error",
-                                 "min": "measured / predicted error, least", "max": "most"})  # fmt: skip
+    cells = runs.groupby(list(runs.columns[:-2]), sort=False)
+    table = cells.agg(runs=("told", "size"), told=("told", "sum"), least=("ratio", "min"), median=("ratio", "median"),
+                      most=("ratio", "max")).reset_index()  # fmt: skip
+    return table.rename(columns={"target": "error", "horizon": "nutations", "told": "meet or miss it as predicted",
+                                 "least": "measured / predicted error, least"})  # fmt: skip

@@ -417,20 +417,21 @@ def check(asked: Any) -> xr.Dataset:
 def checks(data: xr.DataTree) -> pd.DataFrame:
     """The predicted cells that were run in full, a line a run and top.
 
-    ``ratio`` is the error over the predicted one, of errors below 1 alone; a cell ``holds`` if the finer setting of the
-    winner meets the target on most tops.
+    ``told``: does the run meet or miss the target as predicted? ``ratio`` is the error over the predicted one, of
+    errors below 1 alone.
     """
-    names, rows = ["quantity", "target", "horizon", "winner", "next", "holds", "ratio"], []
+    names, rows = ["quantity", "target", "horizon", "winner", "next", "told", "ratio"], []
     group = data["checks"].to_dataset().isel(scene=0) if "checks" in data.children else None
     for name in () if group is None else group["variant"].values:
         one = group.sel(variant=name)
         quantity, target, horizon = str(one["quantity"].values), float(one["target"]), float(one["checked_horizon"])
         pair, errors = list(map(str, one["contender"].values)), one["errors"].transpose("rank", "side", "member").values
-        cell = [quantity, target, horizon, *pair, bool((errors[0, 1] <= target).mean() >= 0.5)]
+        cell = [quantity, target, horizon, *pair]
         for rank, side in np.ndindex(2, 2):
             runs, setting = runs_of(data, pair[rank]), float(one["setting_value"][rank, side])
             level = int(np.argmin(np.abs(np.log(runs["setting_value"].values / setting))))
             told = runs["error"].sel(quantity=quantity).isel(setting=level).sel(horizon=horizon, method="nearest")
             for error, foretold in zip(errors[rank, side].tolist(), told.values.tolist(), strict=False):
-                rows.append([*cell, error / foretold if max(error, foretold) < 1.0 else math.nan])
-    return pd.DataFrame(rows, columns=names).astype({"ratio": float})
+                ratio = error / foretold if max(error, foretold) < 1.0 else math.nan
+                rows.append([*cell, (error <= target) == (foretold <= target), ratio])
+    return pd.DataFrame(rows, columns=names).astype({"told": bool, "ratio": float})

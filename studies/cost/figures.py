@@ -18,6 +18,7 @@ from symtop.runner.study import Picture
 
 from . import cells, far
 from .cells import EVALUATIONS, GENERAL, Cell
+from .facts import serves
 from .ranking import run_lengths
 from .tops import NATURAL
 
@@ -63,7 +64,7 @@ def draw_accuracy(data: xr.DataTree) -> Any:
         style_of = style.line(name) | ({"color": PALEST} if own else {})
         axis.plot(x, y, lw=1.0 if own else 1.6, zorder=2 if own else 3, **style_of)
         axis.hlines(y, low, high, color=style_of["color"], lw=3.0, alpha=0.35, zorder=2)
-        ends.append((f"{name}{' (made for this top)' * own}", style_of["color"], x, y))
+        ends.append((f"{name}{' (made for this top)' if own else serves(name)}", style_of["color"], x, y))
     axis.set(xscale="log", yscale="log", ylim=(2e-13, 5e-3), ylabel="axis error that 95 % of the tops keep (rad)")
     axis.set_yticks(list(each), [f"$10^{{{math.log10(target):.0f}}}$" for target in each])
     axis.yaxis.minorticks_off()

@@ -31,6 +31,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     gaps, kernels, charts = tables(data).values()
     compared = cells(data, "theta_gap")
     same, apart = (gaps[(gaps[WORST] < COMMUTES) == wanted] for wanted in (True, False))
+    charts = charts.dropna(subset="time (ratio)")
     slowest = charts.loc[charts["time (ratio)"].idxmax()] if len(charts) else {}
     return {
         "charts_periods": CHART_PERIODS,  # nutations

@@ -57,7 +57,7 @@ class Ratio(NamedTuple):
 
     chart: str
     base: str
-    time: float  # median over the settings
+    time: float  # median over the settings with which both runs end well, NaN if there are none
     error: float  # of the axis; geometric mean over the settings where both can be judged, NaN if there are none
 
 
@@ -67,7 +67,9 @@ def chart_ratios(cell: xr.Dataset) -> list[Ratio]:
     base, *larger = [table for table in by_size if np.isfinite(table["seconds"]).any()] or by_size[:1]
     ratios = []
     for other in larger:
-        time = float(np.nanmedian(other["seconds"] / base["seconds"]))
+        ended = np.isfinite(other["axis"].values) & np.isfinite(base["axis"].values)  # a failed run has no time
+        times = (other["seconds"] / base["seconds"]).values[ended]
+        time = float(np.median(times)) if times.size else math.nan
         good = np.ones(other.sizes["setting"], bool)
         for table in (base, other):  # asymptotic, and above what the reference can tell from zero
             error = table["axis"].values

@@ -11,6 +11,7 @@ that a run that goes on from its checkpoint has the bits of one that was never s
 
 import contextlib
 import json
+import math
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -128,7 +129,8 @@ def _watch_body(scene: Scene, method: Integrator) -> Gauge:
     body, size = scene.top, scene.momentum_scale
     solver, start = chart_of(method, of_body=True)[1], body.momenta(scene.start)
     par, _ = solver.prepare(body, scene.start)
-    energy_start = body_energy(body, np.array([[*scene.start.quaternion, *body.momentum(scene.start)]]))[0]
+    L = body.momentum(scene.start)
+    energy_start = body_energy(body, np.array([[*scene.start.quaternion, *L]]))[0]
 
     def gauge(states: Array, momenta: Array, *, shown: bool = False) -> dict[str, Array]:
         if not shown and solver.present is not None:
@@ -137,7 +139,7 @@ def _watch_body(scene: Scene, method: Integrator) -> Gauge:
         return {
             "energy": (view.energy - energy_start) / scene.energy_scale,
             "p_phi": (momenta[:, 0] - start.p_phi) / size,
-            "momentum": np.linalg.norm(states[:, 4:], axis=1) / size - 1.0,
+            "momentum": (np.linalg.norm(states[:, 4:], axis=1) - math.hypot(*L)) / size,
             "theta": view.theta,
         }
 

@@ -273,6 +273,13 @@ def test_a_body_of_ones_own_on_the_command_line() -> None:
     assert own["errors"] == named["errors"]
 
 
+def test_a_long_run_of_a_body_at_rest_changes_its_momentum_by_nothing() -> None:
+    still = symtop.Scene("still", RigidBody(1.0, 2.0, 2.5), Attitude(), 1.0)
+    data = symtop.long_run(still, "rk4", step_size=0.1, steps=20, quiet=True)
+    assert not data["momentum_least"].values.any()
+    assert not data["momentum_largest"].values.any()
+
+
 def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     turn = np.array([0.5, -0.5, 0.1, 0.7])
     turn /= np.linalg.norm(turn)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.stats import kendalltau
-from symtop_studies.carry_over import comparison as by, facts
+from symtop_studies.carry_over import comparison as by, facts, figures
 from symtop_studies.carry_over.bodies import FAMILIES, FREE, SYMMETRIC, Bodies, as_tops, bodies_of, run_level
 from symtop_studies.carry_over.measures import ASYMPTOTE, observed_order, own_table, table, verdicts
 from symtop_studies.cost.ladder import LEVELS, Climb, setting_of
@@ -148,6 +148,31 @@ def test_a_planted_difference_of_rankings_is_seen_and_scatter_is_none():
     assert turned.value < -0.9
 
 
+def test_prices_do_not_rank_methods_that_reach_nothing():
+    half, rows = 1e-6 * 1.6 ** np.arange(20), ([*range(20)],) * 2
+    half[10:] = np.inf
+    first, second = costs_of(half), costs_of(np.roll(half, 5), seed=1)
+    free = by.bootstrap_tau(
+        first._replace(errors=np.zeros(20)), second._replace(errors=np.zeros(20)), rows, paired=True
+    )
+    noisy = by.bootstrap_tau(first._replace(errors=np.full(20, 0.02)), second._replace(errors=np.full(20, 0.02)), rows,
+                             paired=True)  # fmt: skip
+    assert free.low <= free.value <= free.high
+    assert (noisy.low, noisy.high) == pytest.approx((free.low, free.high), abs=0.02)
+
+
+def test_no_silent_run_of_tops_or_bodies_is_no_difference():
+    assert by.factor_verdict(facts.over(0.0, 0.0), by.SEVERAL) == by.YES
+    assert by.factor_verdict(facts.over(0.2, 0.0), by.SEVERAL) == by.NO
+    assert facts.over(0.06, 0.02) == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(("beyond", "verdict"), [(0, by.FACTOR), (1, by.FACTOR), (2, by.PARTLY)])
+def test_steps_beyond_the_budget_are_no_steps_that_carry_over(beyond, verdict):
+    each = {f"method {k}": np.inf if k < beyond else 1.5 for k in range(20)}  # one in twenty is allowed
+    assert facts.pooled([each]).verdict == verdict
+
+
 def test_verdicts_follow_the_limits_that_were_fixed_before():
     for ends, verdict in (((0.91, 0.99), by.YES), ((0.7, 0.95), by.PARTLY), ((0.6, 0.79), by.NO)):
         assert by.ranking_verdict(by.Interval(0.85, *ends)) == verdict
@@ -215,3 +240,21 @@ def test_planted_factors_of_steps_and_of_silent_runs_are_found():
         assert by.winner(data, FREE, 1e-6) == "gauss-4[body]"
         assert by.winner(data, FREE, 1e-6, "kicks") == "strang[body]"
         assert by.transferred(data, FREE, 1e-6).value == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("unserved", "words"), [(0, "3, up to 3 times"), (3, "3, up to 3 times, beyond the budget 1 of 9")]
+)
+def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved, words):
+    data = planted(3.0)
+    met = data["short"]["met_at"].copy()
+    at = {"variant": 1, "family": [*FAMILIES].index(FREE), "target": 0}
+    met[{**at, "member": slice(unserved)}] = np.inf  # 3 of 40 are more than 5 %
+    data["short"] = data["short"].to_dataset().assign(met_at=met)
+    assert facts.steps(data, FREE).words == words
+    assert facts.steps(data, "0.1").words == "1, up to 1 times"
+    assert by.step_factors(data, FREE, 1e-3).get("strang[body]") == pytest.approx(np.inf if unserved else 3.0)
+    drawn_texts = {one.get_text() for one in figures.draw_steps(data).axes[0].texts}
+    assert drawn_texts == ({"+1"} if unserved else set())
+    everyone_beyond = facts.pooled([{"strang[body]": np.inf}])
+    assert everyone_beyond.words == "beyond the budget 1 of 1"

@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.optimize import root
 from symtop_studies.reduction import commutation, facts, figures, study
 from symtop_studies.reduction.commutation import gap, kernel_path, path, reduced_first
-from symtop_studies.reduction.tables import commutation_table, unreduced_forms
+from symtop_studies.reduction.tables import chart_ratios, commutation_table, unreduced_forms
 
 import symtop
 from symtop.measure import datasets
@@ -164,6 +164,17 @@ def test_the_page_says_what_was_measured(measured, tmp_path):
     text = checked("reduction", measured, tmp_path)
     assert "With midpoint it makes no difference" in text
     assert "With trapezoidal, simpson-linear, galerkin-simpson it does." in text
+
+
+@pytest.mark.parametrize(("failed", "ratio"), [(np.nan, 2.0), (0.1, 1.75)])
+def test_a_run_that_failed_has_no_part_in_the_time_of_a_chart(failed, ratio):
+    axis = np.array([[np.nan] * 4, [1e-2, 1e-3, 1e-4, 1e-5], [failed, 1e-3, 1e-4, 1e-5]])
+    seconds = np.array([[np.nan] * 4, [1.0] * 4, [0.5, 1.5, 2.0, 2.5]])  # what fails early is fast
+    over = ("chart", "setting")
+    cell = xr.Dataset({"axis": (over, axis), "axis_bound": (over, np.full((3, 4), 1e-15)), "seconds": (over, seconds)},
+                      {"chart": ["angles", "axis", "attitude"]})  # fmt: skip
+    (one,) = chart_ratios(cell)
+    assert (one.chart, one.base, one.time) == ("attitude", "axis", ratio)
 
 
 def test_a_kernel_is_known_under_any_name():

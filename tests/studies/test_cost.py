@@ -6,7 +6,7 @@ import timeit
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.cost import cells, facts, ladder, prices as pricing, study, tops as tops_module
+from symtop_studies.cost import cells, facts, figures, ladder, prices as pricing, study, tops as tops_module
 from symtop_studies.cost.cells import GENERAL, Cell
 from symtop_studies.cost.ranking import Ladder, cost_to_reach, hindsight, run_lengths, safe, slowdowns, wins
 from symtop_studies.cost.tops import ASKED, FIRST, KINDS, MOMENTA, NATURAL, SCENE, natural, tops_of
@@ -475,7 +475,7 @@ def test_facts_and_tables_are_those_of_the_cells(small):
         one = cells.winner(small, Cell("short", "axis", target, NATURAL))
         assert said[f"safe_{place}"] == one["safe"].name
         assert winners.loc[GENERAL, target]["time (us)"] == pytest.approx(1e6 * one["safe"].seconds)
-    assert said["kicks"] == "takahashi-imada[axis]"
+    assert said["kicks"] + said["kicks_serve"] == "takahashi-imada[axis] (symmetric)"
     assert said["lagrangian"] is None  # there is none among these
     assert said["kicks_seconds"] > 0.0
     assert cells.safest(small, Cell("short", "axis", 1e-12, NATURAL, "kicks"))[0][0].seconds == INF
@@ -517,4 +517,6 @@ def test_a_share_of_silent_runs_is_that_of_its_kind(small):
 
 def test_the_page_says_what_was_measured(small, tmp_path):
     text = checked("cost", small, tmp_path, elsewhere={"use", "have"})
+    named = {one.get_text() for one in figures.draw_accuracy(small).axes[0].texts}
+    assert {"takahashi-imada[axis] (symmetric)", "rk4[axis]"} <= named
     assert PARTIAL in text  # there are no long runs

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 from symtop_studies.speed import facts, study
 
 import symtop
@@ -43,6 +44,14 @@ def test_a_cost_lies_between_the_runs_that_miss_and_meet_the_error(data):
     assert facts.cost(cell, middle, "force_evaluations") == pytest.approx(math.sqrt(seconds[1] * seconds[2]))
     assert facts.cost(cell, error[2], "force_evaluations") == pytest.approx(seconds[2])
     assert facts.cost(cell, 1e-3 * error.min(), "force_evaluations") == math.inf
+
+
+def test_a_time_that_the_coarsest_setting_takes_is_an_upper_bound(data):
+    assert facts.tables(data)["times"].set_index("variant")["at most (rad)"].eq("").all()  # the control
+    finer = data.assign(axis=data["axis"] * xr.where(data["variant"] == "strang[axis]", 1e-3, 1.0))
+    column = facts.tables(finer)["times"].set_index("variant")["at most (rad)"]
+    assert column["strang[axis]"] == "1e-03"
+    assert column.drop("strang[axis]").eq("").all()
 
 
 def test_the_page_says_what_was_measured(data, tmp_path):
