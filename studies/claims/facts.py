@@ -49,7 +49,9 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     """How many claims have each verdict, how many lies are caught, and how many steps the long runs have."""
     data, false = parts(data)
     refuted = caught(false)
-    entries, bodies = by_kind(ledger(data))
+    every = ledger(data)
+    unsaid = (every["declared"] == "") & (every["verdict"] == "undecided")  # nothing is declared there
+    entries, bodies = by_kind(every[~unsaid])
     count, on_body = Counter(entries["verdict"]), Counter(bodies["verdict"])
     steps = data["steps_run"].sel(scene=SCENE).to_series()
     steps = steps[steps > 0].astype(int)
@@ -66,6 +68,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "caught": int(refuted.sum()),
         "open_claim": open_claim,  # that most of the undecided findings are on
         "open_most": open_most,
+        "unsaid": len(by_kind(every[unsaid])[0]),  # undecided findings on what is not declared
         "runs": len(steps) or None,
         "usual": usual,  # steps of a long run
         "usual_runs": usual_runs,

@@ -10,6 +10,7 @@ import xarray as xr
 from symtop.measure.order import BESIDE
 
 from .measures import (
+    LARGE,
     LEAST_SCENES,
     MAIN,
     OTHERS,
@@ -48,8 +49,12 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "best_work": best[1],
         "second_variant": second[0],
         "second_work": second[1],
+        "unknown": stepping(data).sizes["variant"] - len({name for _, name in efficiencies(data, TARGET)}),
         "span": float(spans.max()) if len(spans) else None,  # most work over least within an order
         "span_order": int(spans.idxmax()) if len(spans) else None,
+        "large": LARGE,  # rad
+        "ratio_asked": int(np.isfinite(data["tolerance"].values).sum()) or None,  # runs at a tolerance
+        "ratio_runs": sum(values.size for values in met.values()),  # of these
         "ratio_middle": float(np.nanmedian(together)) if met else None,  # error over tolerance
         "ratio_most": float(np.nanmax(together)) if met else None,
         "ratio_most_variant": max(met, key=lambda name: met[name].max(), default=None),

@@ -85,7 +85,7 @@ def _history(cell: xr.Dataset) -> tuple[Any, Any]:
 
 
 def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Picture:
-    """A line a variant, grouped by order: the work that the error constants foretell for `TARGET`, over the scenes."""
+    """A line a variant, grouped by order: the work for `TARGET`, over the scenes."""
     labels, scenes = merged(stepping(data), MAIN), [str(name) for name in data["scene"].values]
     known = {name: [works[one, name] for one in scenes if (one, name) in works] for name in labels}
     middle = {name: float(np.median([one.work for one in part])) for name, part in known.items() if part}
@@ -123,7 +123,7 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
     dark = {"color": "#444444", "lw": 0.0}
     axes[0, 0].plot([], [], "o", ms=5.0, label=f"median over up to {len(scenes)} scenes", **dark)
     axes[0, 0].plot([], [], color="#444444", lw=1.2, label="least to largest of the scenes")
-    axes[0, 0].plot([], [], "o", ms=5.0, mfc="white", label="open: extrapolated on most scenes", **dark)
+    axes[0, 0].plot([], [], "o", ms=5.0, mfc="white", label="open: by the law on most scenes", **dark)
     if any(few.values()):
         axes[0, 0].plot([], [], "|", ms=5.0, label=f"known on fewer than {LEAST_SCENES} scenes: not ranked", **dark)
     legend_below(figure, axes)

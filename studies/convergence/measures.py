@@ -4,6 +4,7 @@ The dataset has the columns of `symtop.measure.accuracy.error_table`, over ``sce
 ``rk4[axis]``) and ``setting``, and ``horizon`` over the first two.
 """
 
+import math
 from itertools import product
 from typing import NamedTuple
 
@@ -139,20 +140,26 @@ def energy_history(on: Scene, variant: Integrator, nutations: float) -> xr.Datas
 
 
 class Efficiency(NamedTuple):
-    """What a variant pays for an axis error by its law, error = C h^p: force evaluations per nutation."""
+    """What a variant pays for an axis error: force evaluations per nutation."""
 
     work: float
-    foreseen: bool  # does the error lie outside those that were fitted?
+    foreseen: bool  # by the law error = C h^p, since the error does not lie between those of two runs
 
 
 def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Efficiency]:
-    """The work for an axis error of every variant with a fixed step on every scene where it has an order to trust.
+    """The work for an axis error of every variant with a fixed step on every scene where it is known.
 
-    A step h costs E force evaluations, so that C h^p = error takes E T (C / error)^(1/p) of them in a nutation T. E is
-    the median over the steps of the fit.
+    It lies between the two runs next to the error, on a straight line of logarithms, if every shorter step has less.
+    Elsewhere the law says it of a variant that has an order to trust: a step h costs E force evaluations, so that
+    C h^p = error takes E T (C / error)^(1/p) of them in a nutation T. E is the median over the steps of the fit, and an
+    implicit method, which iterates more at longer steps, pays more there.
     """
     foretold = {}
     for (name, label), fit in fits(data, MAIN).items():
+        work = _between(data.sel(scene=name, variant=label), name, error)
+        if np.isfinite(work):
+            foretold[name, label] = Efficiency(work, False)
+            continue
         if not (np.isfinite(fit.slope) and fit.used.any()):
             continue
         cell, order = data.sel(scene=name, variant=label), declared_order(label) or round(fit.slope)
@@ -160,9 +167,21 @@ def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Effici
         each = np.median((evaluations_a_nutation(cell, name)[used] * steps) / scene(name).nutation_period)
         constant = np.median(cell[MAIN].values[used] / steps**order)
         work = float(each * scene(name).nutation_period * (constant / error) ** (1.0 / order))
-        inside = cell[MAIN].values[used].min() <= error <= cell[MAIN].values[used].max()
-        foretold[name, label] = Efficiency(work, not inside)
+        foretold[name, label] = Efficiency(work, True)
     return foretold
+
+
+def _between(cell: xr.Dataset, name: str, error: float) -> float:
+    """The work between the last run with more than an error and the next; NaN if there are no such two."""
+    order = np.argsort(-cell["step_size"].values)
+    errors, works = cell[MAIN].values[order], evaluations_a_nutation(cell, name)[order]
+    good = (errors > 0.0) & (works > 0.0)
+    errors, works = np.log(errors[good] / error), np.log(works[good])
+    more = np.flatnonzero(errors > 0.0)
+    if not more.size or more[-1] + 1 == errors.size:
+        return math.nan
+    k = more[-1]
+    return math.exp(works[k] + (works[k + 1] - works[k]) * errors[k] / (errors[k] - errors[k + 1]))
 
 
 TARGET = 1e-6  # rad, the axis error at which costs are compared

@@ -67,10 +67,11 @@ def fates(histories: xr.Dataset) -> pd.DataFrame:
 def phases_by_energy(histories: xr.Dataset) -> dict[str, Array]:
     """Growth exponents of the phase error of all runs, by what the energy does: "bounded", "lost" or "kept"."""
     groups: dict[str, list[float]] = {"bounded": [], "lost": [], "kept": []}
-    for name, word in fates(histories)["energy"].items():
-        slopes = histories["phase_exponent"].sel(variant=name).values.ravel()
-        if word != FAILED:
-            groups[word if word in HELD else "lost"].extend(slopes[np.isfinite(slopes)])
+    for name in histories["scene"].values:  # a run may keep on one scene what others of its variant lose elsewhere
+        one = histories.sel(scene=[name])
+        for word, slope in zip(fates(one)["energy"], one["phase_exponent"].squeeze("scene").values, strict=True):
+            if word != FAILED and np.isfinite(slope):
+                groups[word if word in HELD else "lost"].append(float(slope))
     return {word: np.array(slopes) for word, slopes in groups.items()}
 
 

@@ -7,19 +7,21 @@ import pandas as pd
 import xarray as xr
 
 from symtop.methods.framework.registry import split_name
+from symtop.report.formats import abridged
 
-from .atlas import COMMON, FAST, NEAR, SLOW, families, halved_by_pole, map_of, maps, methods_of
+from .atlas import COMMON, FAST, NEAR, SLOW, OutcomeMap, families, halved_by_pole, map_of, maps, methods_of
 from .failures import LOST, MOST
-from .mechanisms import BARELY, limits, measured, misses, outlasting, resonant, sampled
+from .mechanisms import BARELY, lawful, limits, measured, misses, outlasting, resonant, sampled
 from .tables import PERIODS
 
 QUOTED = "stormer-verlet[angles]"  # whose numbers are quoted
 NAMES = (  # of all facts that are measured
     "family", "stepped", "fast_variant", "fast_reach", "slow_variant", "slow_reach", "slow_none", "shortest",
-    "quoted_fast", "quoted_fails", "silent", "cells", "settled", "checks", "refuted", "angles", "angles_halved",
-    "others", "others_halved", "limited", "limit_least", "limit_variant", "resonant", "turned", "sleep_step",
-    "strang_sleeps", "cayley_sleeps", "sleep_miss", "law_middle", "outlasting", "sampled", "hidden", "small",
-    "one_iteration", "solved",
+    "slow_shorter", "fast_finer", "not_angles", "slow_finer", "in_angles", "quoted_fast", "quoted_fails", "silent",
+    "cells", "settled", "checks", "refuted", "angles", "angles_halved", "others", "others_halved", "limited",
+    "sought", "limit_least", "limit_variant", "resonant", "turned", "sleep_step", "strang_sleeps", "cayley_sleeps",
+    "sleep_miss", "law_middle", "law_runs", "law_early", "outlasting", "sampled", "hidden", "small", "one_iteration",
+    "solved",
 )  # fmt: skip
 
 
@@ -51,13 +53,27 @@ def atlas_facts(data: xr.Dataset, family: str) -> dict[str, Any]:
     }
     if steps:
         for kind in ("fast", "slow"):
-            best = max(steps, key=lambda name: np.nan_to_num(steps[name].usual_reach[kind]))
-            answers |= {f"{kind}_variant": best, f"{kind}_reach": steps[best].usual_reach[kind]}
+            most = max(reaches := [float(np.nan_to_num(one.usual_reach[kind])) for one in steps.values()])
+            best = [f"`{name}`" for name, reach in zip(steps, reaches, strict=True) if reach == most]
+            answers |= {f"{kind}_variant": abridged(best), f"{kind}_reach": most}  # settings are a grid: there are ties
         answers |= {"stepped": len(steps), "shortest": min(float(one.settings[0]) for one in steps.values()),
-                  "slow_none": sum(one.usual_reach["slow"] == 0.0 for one in steps.values())}  # fmt: skip
+                  "slow_none": sum(one.usual_reach["slow"] == 0.0 for one in steps.values()),
+                  "slow_shorter": sum(slow_is_finer(one) for one in steps.values())}  # fmt: skip
+    adaptive = {name: one for name, one in shown.items() if one.control == "tolerance"}
+    if adaptive:
+        finer = {name: slow_is_finer(one) for name, one in adaptive.items() if split_name(name)[1] == "angles"}
+        others = [one.usual_reach for name, one in adaptive.items() if name not in finer]
+        answers |= {"in_angles": len(finer) or None, "slow_finer": sum(finer.values()),
+                  "not_angles": len(others) or None,
+                  "fast_finer": sum(one["fast"] < one["slow"] for one in others)}  # fmt: skip
     if QUOTED in steps:
         answers |= {"quoted_fast": steps[QUOTED].usual_reach["fast"], "quoted_fails": steps[QUOTED].failure.setting}
     return answers
+
+
+def slow_is_finer(one: OutcomeMap) -> bool:
+    """Do slow tops need a shorter step, or a finer tolerance, than fast ones?"""
+    return one.usual_reach["slow"] < one.usual_reach["fast"]
 
 
 def pole_facts(part: xr.Dataset) -> dict[str, Any]:
@@ -76,7 +92,8 @@ def resonance_facts(part: xr.Dataset) -> dict[str, Any]:
     """Where small nutations grow (h omega), and how many variants a third of a turn a step loses a top with."""
     phases = limits(part)
     least = min(phases, key=lambda name: phases[name], default=None)
-    return {"limited": len(phases), "limit_least": phases.get(least), "limit_variant": least,
+    return {"limited": len(phases), "sought": float(part["sought_phase"].max()),
+            "limit_least": phases.get(least), "limit_variant": least,
             "resonant": len(resonant(part)), "turned": int(part["third_turn_phase"].count())}  # fmt: skip
 
 
@@ -97,7 +114,9 @@ def sleeping_facts(part: xr.Dataset) -> dict[str, Any]:
 def separatrix_facts(part: xr.Dataset) -> dict[str, Any]:
     """By how much the law of the early error misses (1/λ), and whose runs outlast it."""
     names = ", ".join(f"`{name}`" for name in outlasting(part))
-    return {"law_middle": float(pd.Series(misses(part)).median()), "outlasting": names or None}
+    early = lawful(part) & (part["broken"] > 0.0)
+    return {"law_middle": float(pd.Series(misses(part)).median()), "law_runs": misses(part).size,
+            "law_early": int(early.sum()), "outlasting": names or None}  # fmt: skip
 
 
 def sampling_facts(part: xr.Dataset) -> dict[str, Any]:

@@ -33,11 +33,12 @@ def variants_with(part: xr.Dataset, variable: str) -> dict[str, xr.Dataset]:
 
 
 def limits(part: xr.Dataset) -> dict[str, float]:
-    """The least step, as h omega, at which small nutations grow, of the methods that have a limit."""
+    """The least step, as h omega, at which small nutations grow, of the methods that have a limit or a window."""
+    cells = variants_with(part, "limit_phase") | variants_with(part, "window_start")
     return {
-        name: float(np.fmin(cell["limit_phase"], cell.get("window_start", math.nan)))
-        for name, cell in variants_with(part, "limit_phase").items()
-    }  # a narrow window may come first
+        name: float(np.fmin(cell.get("limit_phase", math.nan), cell.get("window_start", math.nan)))
+        for name, cell in cells.items()
+    }  # a narrow window may come first, or be all there is
 
 
 def resonant(part: xr.Dataset) -> dict[str, float]:

@@ -271,13 +271,63 @@ def test_runs_that_outlast_the_law_of_the_separatrix_are_not_counted():
         "early_error": (("variant", "setting"), [[1e-6, 1e-8], [1e-6, 1e-8]]),
         "predicted_horizon": (("variant", "setting"), [[29.0, 38.2], [29.0, 38.2]]),
         "horizon": (("variant", "setting"), [[29.5, 38.4], [72.0, 71.0]]),
+        "broken": (("variant", "setting"), [[0.0, 0.0], [0.0, 0.0]]),
     }
     part = xr.Dataset(columns, coords={"variant": ["rk4[axis]", "gauss-4[axis]"]})
     assert mechanisms.outlasting(part) == ["gauss-4[axis]"]
     assert facts.separatrix_facts(part)["outlasting"] == "`gauss-4[axis]`"
     assert mechanisms.misses(part) == pytest.approx([0.5, 0.2])
-    part["horizon"][0, 1] = math.nan
+    answers = facts.separatrix_facts(part)
+    assert (answers["law_runs"], answers["law_early"]) == (2, 0)
+    part["horizon"][0, 1] = part["horizon"][1, 1] = math.nan
+    part["broken"][0, 1] = part["broken"][1, 1] = 1.0  # to the second the law does not apply
     assert mechanisms.misses(part) == pytest.approx([0.5])
+    answers = facts.separatrix_facts(part)
+    assert (answers["law_runs"], answers["law_early"]) == (1, 1)
+
+
+def test_a_window_of_growth_is_counted_where_there_is_no_limit_beyond_it():
+    columns = {"limit_phase": ("variant", [math.nan, 5.9, 2.0, math.nan]),
+               "window_start": ("variant", [6.28, 3.14, math.nan, math.nan])}  # fmt: skip
+    names = ["srkn-11-6[axis]", "strang[axis]", "stormer-verlet[angles]", "cayley[axis]"]
+    assert mechanisms.limits(xr.Dataset(columns, coords={"variant": names})) == {
+        names[0]: 6.28,
+        names[1]: 3.14,
+        names[2]: 2.0,
+    }
+
+
+def spins(**made):
+    """Maps over three slow and three fast tops, at three settings, by variant."""
+    one = {name.replace("_", "-"): lines for name, lines in made.items()}
+    cells = []
+    for name, (control, lines) in one.items():
+        cell = hand_made(lines, parameter=(0.2, 0.5, 0.8, 4.0, 8.0, 16.0)).sel(
+            scene="cusp", variant="midpoint", drop=True
+        )
+        chart = "angles" if name.startswith("angles-") else "axis"
+        cells.append((Case("cusp", f"{name.removeprefix('angles-')}[{chart}]"), cell.assign(knob_name=control)))
+    return datasets.combine(cells)
+
+
+SLOW_FINER, FAST_FINER = [[A, L, L]] * 3 + [[A, A, L]] * 3, [[A, A, L]] * 3 + [[A, L, L]] * 3
+
+
+def test_it_is_counted_which_tops_need_the_finer_setting():
+    data = spins(rk4=("step_size", SLOW_FINER), strang=("step_size", SLOW_FINER), rk45=("tolerance", FAST_FINER),
+                 angles_rk45=("tolerance", SLOW_FINER), angles_dop853=("tolerance", FAST_FINER))  # fmt: skip
+    answers = facts.atlas_facts(data, "cusp")
+    assert [answers[name] for name in ("slow_shorter", "stepped", "slow_finer", "in_angles")] == [2, 2, 1, 2]
+    assert (answers["fast_finer"], answers["not_angles"]) == (1, 1)
+
+
+def test_variants_that_reach_equally_far_are_all_named():
+    data = spins(rk4=("step_size", SLOW_FINER), strang=("step_size", SLOW_FINER), cayley=("step_size", [[A, L, L]] * 6))
+    answers = facts.atlas_facts(data, "cusp")
+    assert answers["fast_variant"] == "`rk4[axis]` and `strang[axis]`"
+    assert answers["slow_variant"].count("`") == 6
+    alone = facts.atlas_facts(spins(rk4=("step_size", SLOW_FINER), cayley=("step_size", [[A, L, L]] * 6)), "cusp")
+    assert alone["fast_variant"] == "`rk4[axis]`"  # the control
 
 
 def test_an_energy_error_that_no_sample_sees_is_no_ratio_of_a_floor():
@@ -319,7 +369,8 @@ def measured():
 def test_facts_are_those_of_the_mechanisms(measured):
     answers = facts.facts(measured)
     assert answers.keys() >= set(facts.NAMES)
-    assert {name for name in facts.NAMES if answers[name] is None} == {"cayley_sleeps", "outlasting"}
+    adaptive = {"fast_finer", "not_angles", "slow_finer", "in_angles"}  # there are none here
+    assert {name for name in facts.NAMES if answers[name] is None} == {"cayley_sleeps", "outlasting"} | adaptive
     lost = mechanisms.resonant(measured.sel(scene="steady-fast"))
     assert lost["stormer-verlet[angles]"] == pytest.approx(math.sqrt(3.0), abs=1e-4)
     assert lost["midpoint[angles]"] == pytest.approx(2.0 * math.sqrt(3.0), abs=1e-4)

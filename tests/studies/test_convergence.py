@@ -11,7 +11,7 @@ import symtop
 from symtop.judging.battery import CLAIMS
 from symtop.judging.claims.order import measured_order
 from symtop.measure import datasets
-from symtop.measure.order import BESIDE, order_verdict
+from symtop.measure.order import BESIDE, Fit, order_verdict
 from symtop.methods.framework.registry import integrator, methods, split_name, variants
 from symtop.runner.study import Case
 from tests.templates import checked
@@ -104,10 +104,44 @@ def test_the_work_of_an_error_constant_is_the_work_of_a_run_with_that_error(data
     answers = measures.efficiencies(data, error)["goldstein", "stormer-verlet[angles]"]
     assert answers.work == pytest.approx(work, rel=0.1)
     assert not answers.foreseen
-    beyond = measures.efficiencies(data, error / 4.0)["goldstein", "stormer-verlet[angles]"]
-    assert beyond.work == pytest.approx(2.0 * answers.work, rel=1e-6)
-    assert measures.efficiencies(data, 1e-14)["goldstein", "stormer-verlet[angles]"].foreseen
+    far, beyond = (
+        measures.efficiencies(data, target)["goldstein", "stormer-verlet[angles]"] for target in (1e-14, 25e-16)
+    )
+    assert far.foreseen
+    assert beyond.work == pytest.approx(2.0 * far.work, rel=1e-6)
     assert ("goldstein", "rk45[angles]") not in measures.efficiencies(data, error)  # it has no step to choose
+
+
+def test_work_next_to_which_runs_were_made_is_theirs_and_not_that_of_a_law(data):
+    """An implicit method iterates more at longer steps: the evaluations of other steps say nothing of these."""
+    pair = "goldstein", "midpoint[angles]"
+    cell = data.sel(scene=pair[0], variant=pair[1])
+    k = int(np.flatnonzero(measures.fits(data, "axis")[pair].used)[-1])
+    error, forces = float(cell["axis"][k]), data["force_evaluations"].copy()
+    forces.loc[{"scene": pair[0], "variant": pair[1]}] = np.where(
+        np.arange(cell.sizes["setting"]) == k, 3.0, 1.0
+    ) * forces.sel(scene=pair[0], variant=pair[1])
+    more = data.assign(force_evaluations=forces)
+    before, after = (measures.efficiencies(one, error)[pair].work for one in (data, more))
+    assert after == pytest.approx(3.0 * before, rel=1e-9)
+
+
+def test_a_variant_whose_order_cannot_be_judged_has_the_work_of_its_runs(data, monkeypatch):
+    pair = "goldstein", "midpoint[angles]"
+    known = measures.efficiencies(data, 1e-4)[pair]
+    unjudged = Fit(math.nan, math.nan, math.nan, np.zeros(data.sizes["setting"], bool))
+    monkeypatch.setattr(measures, "fits", lambda *_: {pair: unjudged})
+    assert measures.efficiencies(data, 1e-4) == {pair: known}
+    assert measures.efficiencies(data, 1e-14) == {}
+    monkeypatch.setattr(facts, "efficiencies", lambda *_: {pair: known})
+    assert facts.facts(data)["unknown"] == measures.stepping(data).sizes["variant"] - 1
+
+
+def test_the_page_says_of_how_many_runs_a_tolerance_is_judged(data):
+    answers = facts.facts(data)
+    asked, used = (np.isfinite(data["tolerance"]), sum(map(len, measures.ratios(data).values())))
+    assert (answers["ratio_asked"], answers["ratio_runs"]) == (int(asked.sum()), used)
+    assert used < answers["ratio_asked"]
 
 
 def test_work_is_counted_per_nutation(data):

@@ -183,6 +183,17 @@ def test_phases_are_grouped_by_what_the_energy_does(histories):
     assert sorted(groups["lost"]) == [1.9, 2.0, 2.0, 2.2]
 
 
+def test_a_run_that_keeps_its_energy_is_none_of_those_that_lose_it(histories):
+    """Of a variant that loses the energy on one scene only."""
+    place = {"variant": "rk4[angles]", "scene": "goldstein"}
+    for name, value in (("energy_largest", 1e-14), ("phase_exponent", 0.5)):
+        histories = histories.assign({name: histories[name].copy()})
+        histories[name].loc[place] = value
+    assert measures.fates(histories)["energy"]["rk4[angles]"] == "drift"
+    groups = measures.phases_by_energy(histories)
+    assert (len(groups["lost"]), 0.5 in groups["lost"], 0.5 in groups["kept"]) == (3, False, True)
+
+
 def test_a_prediction_is_judged_by_what_was_measured():
     cells = {"steps": [9.0] * 3, "evaluations": [9.0] * 3, "short": [1000.0] * 3, "ratio": [1.0, 1.25, np.nan],
              "predicted": [2500.0, 2500.0, np.inf], "measured": [2500.0, 2000.0, np.nan]}  # fmt: skip

@@ -210,6 +210,16 @@ def test_the_page_says_what_the_notebook_and_the_discrete_methods_keep(data, tmp
     assert (answers["second_behind"], answers["second_ahead"]) == (2, 3)  # the other two get ahead after 100 s
 
 
+def test_the_momenta_beside_those_of_the_solver_are_those_of_the_methods_that_are_compared(data):
+    other = data.sel(variant=["cayley[axis]"]).assign_coords(variant=["five-rotations[attitude]"])
+    loses = other.assign(p_psi_largest=other["p_psi_largest"] + 1e-3)
+    answers = facts.facts(xr.concat([data, loses], "variant"))
+    assert (answers["compared"], answers["discrete"], answers["momenta_kept"]) == (5, 6, 5)
+    assert answers["momenta"] == facts.facts(data)["momenta"]
+    leaks = data.assign(p_psi_largest=data["p_psi_largest"] + 1e-3)  # the control
+    assert facts.facts(leaks)["momenta"] > 9e-4
+
+
 @pytest.mark.parametrize("name", ["midpoint[angles]", "strang[axis]", SOLVER])
 def test_one_method_alone_has_the_facts_and_figures_that_are_its_own(data, name, tmp_path):
     alone = data.sel(variant=[name])

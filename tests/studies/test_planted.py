@@ -41,6 +41,17 @@ def test_claims_on_a_free_body_are_counted_by_themselves(data):
     assert (refuted["free_refuted"], refuted["refuted"]) == (1, said["refuted"])
 
 
+def test_a_property_that_could_not_be_decided_is_one_that_was_declared(data):
+    said = facts.facts(data)
+    for on, counted in ((SCENE, "undecided"), (facts.FREE, "free_undecided")):
+        one = (data["scene"] == on) & (data["variant"] == "strang") & (data["claim"] == "order")
+        open_ = data.assign(verdict=xr.where(one, "undecided", data["verdict"]))
+        assert facts.facts(open_)[counted] == said[counted] + 1  # the control
+        unsaid = open_.assign(declared=xr.where(one, "", data["declared"]))
+        assert facts.facts(unsaid)[counted] == said[counted]
+        assert facts.facts(unsaid)["unsaid"] == said["unsaid"] + (on == SCENE)
+
+
 def test_one_that_escapes_is_named_and_one_refuted_for_another_claim_is_not_caught(data):
     liar = (data["variant"] == LIAR) & (data["scene"] == SCENE)
     verdict = xr.where(liar & (data["claim"] == "symmetric"), "confirmed", data["verdict"])
