@@ -53,9 +53,11 @@ def atlas_facts(data: xr.Dataset, family: str) -> dict[str, Any]:
     }
     if steps:
         for kind in ("fast", "slow"):
-            most = max(reaches := [float(np.nan_to_num(one.usual_reach[kind])) for one in steps.values()])
-            best = [f"`{name}`" for name, reach in zip(steps, reaches, strict=True) if reach == most]
-            answers |= {f"{kind}_variant": abridged(best), f"{kind}_reach": most}  # settings are a grid: there are ties
+            known = {name: reach for name, one in steps.items() if np.isfinite(reach := one.usual_reach[kind])}
+            if known:  # settings are a grid: there are ties
+                most = max(known.values())
+                best = [f"`{name}`" for name, reach in known.items() if reach == most]
+                answers |= {f"{kind}_variant": abridged(best), f"{kind}_reach": most}
         answers |= {"stepped": len(steps), "shortest": min(float(one.settings[0]) for one in steps.values()),
                   "slow_none": sum(one.usual_reach["slow"] == 0.0 for one in steps.values()),
                   "slow_shorter": sum(slow_is_finer(one) for one in steps.values())}  # fmt: skip

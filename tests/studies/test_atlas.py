@@ -328,6 +328,8 @@ def test_variants_that_reach_equally_far_are_all_named():
     assert answers["slow_variant"].count("`") == 6
     alone = facts.atlas_facts(spins(rk4=("step_size", SLOW_FINER), cayley=("step_size", [[A, L, L]] * 6)), "cusp")
     assert alone["fast_variant"] == "`rk4[axis]`"  # the control
+    no_fast_tops = hand_made([[A, L, L]] * 2, parameter=(0.2, 0.5))
+    assert "fast_reach" not in facts.atlas_facts(no_fast_tops, "cusp")
 
 
 def test_an_energy_error_that_no_sample_sees_is_no_ratio_of_a_floor():
