@@ -280,6 +280,9 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     answers |= {"taus": len(known), "outside": sum(not one.low <= one.value <= one.high for one in known)}
     answers["checked"] = CHECKED
     answers |= dict(zip(("silent_3_low", "silent_3_most", "silent_3_four"), silent_orders(data, "0.3"), strict=True))
+    if "growth" in data.children:
+        judged = data["growth"]["judged"].isel(scene=0)
+        answers |= {f"growth_{key(family)}_judged": float(judged.sel(family=family).min()) for family in ("0.1", "0.3")}
     if "engines" in data.children:
         answers |= {f"lost_{key(family)}": by.lost(data, family, 0) for family in (SYMMETRIC, "0.3")}
         answers |= {"engines": data["engines"].sizes["variant"], "engine_steps": float(data["engines"]["steps"][0])}

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 from symtop_studies.cost.ladder import KEPT, LEVELS, WRONG, Climb, climb, one_by_one, setting_of, stored, typical_work
 from symtop_studies.cost.ranking import cost_to_reach
-from symtop_studies.cost.tops import MOMENTA
+from symtop_studies.cost.tops import CLEAR, MOMENTA
 
 from symtop.measure.settings import TARGETS
 from symtop.methods.framework.plan import Plan
@@ -24,7 +24,7 @@ from symtop.model.charts import Array, attitude_distance
 from symtop.model.exact.heavy_body import HeavyBody
 from symtop.run.ensemble.bodies import body_population, growth, scenes_of
 
-from .bodies import FREE, SYMMETRIC, Bodies, as_tops, grain, run_level, unit
+from .bodies import ASKED, FREE, SYMMETRIC, Bodies, as_tops, grain, run_level, unit
 
 STATUS = tuple(range(2, 8))  # levels whose verdicts are kept: 4.37 to 140 steps a period
 ASYMPTOTE = (1e-9, 1e-3)  # rad
@@ -106,25 +106,35 @@ def observed_order(errors: Array) -> float:
 
 
 def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> xr.Dataset:
-    """Median errors of regular bodies at times that double: exponents are read off them."""
+    """Median errors of regular bodies at times that double: exponents are read off them.
+
+    Of bodies whose truth judges the finest target to the last time: of others, many of which turn chaotic, what is
+    measured may be the error of the truth.
+    """
     at = FIRST_TIME * 2.0 ** np.arange(doublings)
     steps = GROWN[variant.method]
-    medians = np.full((2, len(REGULAR), doublings), np.nan)
+    medians, judged = np.full((2, len(REGULAR), doublings), np.nan), np.zeros(len(REGULAR))
     for row, (kind, epsilon) in enumerate(REGULAR.values()):
         scenes = scenes_of(body_population(count, seed=seed, kind=kind, epsilon=epsilon))
         bodies = Bodies(scenes, [kind] * count, float(at[-1]))
         fine = at[:, np.newaxis] * np.linspace(0.55, 1.0, 10)  # the largest error of the last half of each time
         marks = np.unique(np.rint(fine.ravel() * steps).astype(np.int64))
         bodies.marks, bodies.times = marks, marks * (bodies.period / steps)[:, np.newaxis]
-        plans = [Plan.steps(float(period) / steps, marks) for period in bodies.period]
-        everyone = np.arange(count)
-        runs = one_by_one(variant, bodies.members(everyone), plans)
-        errors = bodies.errors_at(runs.states, everyone)
+        known = np.flatnonzero(bodies.truth[1] <= CLEAR * min(ASKED))
+        judged[row] = known.size / count
+        if not known.size:
+            continue
+        plans = [Plan.steps(float(period) / steps, marks) for period in bodies.period[known]]
+        runs = one_by_one(variant, bodies.members(known), plans)
+        errors = bodies.errors_at(runs.states, known)
         for k, time in enumerate(at):
             near = (marks <= np.rint(time * steps)) & (marks > 0.5 * time * steps)
             for place, name in enumerate(("attitude", "energy")):
                 medians[place, row, k] = np.median(grain(errors[name][:, near].max(axis=1)))
-    data = {f"error_{name}": (("family", "time"), medians[k]) for k, name in enumerate(("attitude", "energy"))}
+    data: dict[str, Any] = {
+        f"error_{name}": (("family", "time"), medians[k]) for k, name in enumerate(("attitude", "energy"))
+    }
+    data["judged"] = "family", judged
     return xr.Dataset(data, {"family": list(REGULAR), "time": at}).assign(_traits(variant))
 
 

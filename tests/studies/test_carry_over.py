@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.stats import kendalltau
-from symtop_studies.carry_over import comparison as by, facts, figures
+from symtop_studies.carry_over import comparison as by, facts, figures, measures
 from symtop_studies.carry_over.bodies import FAMILIES, FREE, SYMMETRIC, Bodies, as_tops, bodies_of, run_level
-from symtop_studies.carry_over.measures import ASYMPTOTE, observed_order, own_table, table, verdicts
+from symtop_studies.carry_over.measures import ASYMPTOTE, growth_table, observed_order, own_table, table, verdicts
 from symtop_studies.cost.ladder import LEVELS, Climb, setting_of
 from symtop_studies.cost.tops import FIRST, MOMENTA
 
@@ -115,6 +115,22 @@ def test_orders_and_exponents_are_read_off():
     for power in (0.0, 1.0, 2.0):
         assert by.exponent(time, 1e-8 * time**power, "attitude") == pytest.approx(power)
     assert np.isnan(by.exponent(time, np.full(6, 1e-16), "energy"))
+
+
+def test_errors_grow_on_bodies_whose_truth_is_known_to_the_end(monkeypatch):
+    """At epsilon = 0.3 some bodies turn chaotic after the ten periods that choose them."""
+    data = growth_table(integrator("kahan-li-8[body]"), 24, 6, 1)
+    shares = dict(zip(data["family"].values.tolist(), data["judged"].values.tolist(), strict=True))
+    assert shares["0.3"] < 0.9 < shares[SYMMETRIC]
+    assert shares[FREE] == 1.0
+
+    def power(table):
+        return by.exponent(table["time"].values, table["error_attitude"].sel(family="0.3").values, "attitude")
+
+    monkeypatch.setattr(measures, "CLEAR", np.inf)
+    everyone = growth_table(integrator("kahan-li-8[body]"), 24, 6, 1)
+    assert (everyone["judged"] == 1.0).all()
+    assert power(data) < 1.2 < power(everyone)  # a symplectic method's phase grows with the time, and chaos faster
 
 
 def costs_of(medians, bodies=60, seed=0):
