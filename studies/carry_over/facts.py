@@ -64,8 +64,9 @@ class Pooled(NamedTuple):
     @property
     def words(self) -> str:
         """In a table."""
-        within = [f"{number(self.middle, 3)}, up to {number(self.most, 3)} times"] if self.beyond < self.asked else []
-        return ", ".join(within + [f"beyond the budget {self.beyond} of {self.asked}"] * (self.beyond > 0))
+        within = f"median {number(self.middle, 3)}, {percent(MOST_OF)} below {number(self.most, 3)}"
+        beyond = f"{self.beyond} of {self.asked} beyond the budget"
+        return ", ".join([within] * (self.beyond < self.asked) + [beyond] * (self.beyond > 0))
 
     @property
     def verdict(self) -> str:
@@ -125,7 +126,7 @@ def silent_words(data: xr.DataTree, family: str) -> str:
     mean, tops = (percent(silent_share(data, one), 1) for one in (family, SYMMETRIC))
     low, most, four = silent_orders(data, family)
     span = f"{100.0 * low:.0f} to {percent(most)}"
-    return f"{mean}, {tops} of tops (order 2: {span}, from 4 on to {percent(four, 1)})"
+    return f"{mean} of runs, {tops} of tops' (order 2: {span}, from order 4 on at most {percent(four, 1)})"
 
 
 def exponent_gaps(data: xr.DataTree, family: str) -> dict[str, float]:
@@ -214,9 +215,9 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
 
 LINES = {
     "ranking": "ranking by cost, kernels for any body", "own ranking": "ranking by the top's own kernels",
-    "own": "safe steps a period, to those of a top", "silent": "wrong without a sign, mean",  # so far: front page
+    "own": "safe steps a period over those of a top", "silent": "wrong without a sign",  # so far: front page
     "winner": "the cheapest kernel for any body", "growth": "growth of errors with time",
-    "first": "safe steps of the cheapest with f(t, y)", "steps": "safe steps, to those of a top as a body",
+    "first": "safe steps of the cheapest with f(t, y)", "steps": "safe steps over those of a top as a body",
     "order": "order of a method",
     "limit": "linear limit of the step", "resonances": "steps that resonate below it",
     "engines": "ranking of engines' maps",

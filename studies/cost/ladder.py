@@ -241,7 +241,7 @@ def table(variant: Integrator, tops: Tops, budget: float, *, twin: bool, guarded
 
 
 def typical_work(variant: Integrator, done: Climb, tops: Any) -> Array:
-    """Force evaluations of the median top of each kind, (LEVELS, kinds); NaN where a level was run on less than half.
+    """Force evaluations of the median top of each kind, (LEVELS, kinds); NaN below the least tolerance of a variant.
 
     A top that left takes as much more at a finer setting as the tops that stayed.
     """

@@ -37,7 +37,7 @@ NAMES = {  # of the facts of each group
     HISTORIES: "nutations steps tolerance own variants holding shortened shortest energy_lost "
     "energy_drifts energy_lost_most energy_lost_worst bounded_runs bounded_as_t lost_runs lost_faster",
     WINDOWS: "long_steps long_scene moved scattered long_momenta",
-    ROUNDINGS: "members walk_least walk_most gain_least gain_most",
+    ROUNDINGS: "members walk_least walk_most walk_interval gain_least gain_most",
     HORIZONS: "lost_short lost_later lost_hits lost_hit_most lost_count",
 }
 
@@ -99,6 +99,7 @@ def of_walks(ensembles: xr.Dataset) -> dict[str, Any]:
     return {
         "members": ensembles.sizes["member"],
         "walk_least": float(powers.min()), "walk_most": float(powers.max()),
+        "walk_interval": float(ensembles["exponent_interval"].isel(scene=0).max()),
         "gain_least": float(gains.min()), "gain_most": float(gains.max()),
     }  # fmt: skip
 

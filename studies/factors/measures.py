@@ -2,7 +2,8 @@
 
 Dimensions: variant (such as ``rk45-numba[axis]``, see `cells`), horizon (nutation periods), target (of the axis
 error, rad), call, process. A time is the median over processes that are started for it, one after another, of the least
-sample of each: where memory and code lie differs from process to process and stays the same within one.
+sample of each: where memory and code lie differs from process to process and stays the same within one. Where the
+quartiles of the processes are far apart more are started, and the least of all count, since a busy machine only adds.
 """
 
 import math
@@ -23,7 +24,7 @@ from .cells import CALLS, COMPILED, NUMPY, SCIPY_NUMBA, SCIPY_PYTHON, Cell, call
 LEAST = 0.7  # of the target: the search ends with an error from here to the target, if nine runs suffice
 PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
 FINER = 1e-3  # of the target: the tolerance that a second search begins with
-NOISY, TRIES = 0.25, 2  # the distance of the quartiles over the median of a time that is taken again; how often
+NOISY, TRIES = 0.25, 4  # the distance of the quartiles over the median of a time that is taken again; how often in all
 ENOUGH = 0.03  # seconds of a function's samples in one process; a longer one has one, the median of five is of five
 WARM = 0.01  # of the horizon: a run that loads and compiles what the timed one calls
 
@@ -90,15 +91,14 @@ def timed(asked: Runs, processes: int) -> Array:
 
 
 def settled_times(asked: Runs, processes: int) -> Array:
-    """As `timed`, with those that are noisy taken again."""
+    """As `timed`; those that are noisy are taken again, and of all processes the least count, as many as before."""
     taken = timed(asked, processes)
     for _ in range(TRIES - 1):
         loud = np.flatnonzero(quartile_spread(taken) > NOISY)
         if not loud.size:
             break
         again = timed(asked._replace(runs=[asked.runs[i] for i in loud]), processes)
-        closer = quartile_spread(again) < quartile_spread(taken[loud])
-        taken[loud[closer]] = again[closer]
+        taken[loud] = np.sort(np.hstack([taken[loud], again]))[:, :processes]
     return taken
 
 

@@ -57,6 +57,20 @@ def code(name: str) -> str:
     return f"`{name}`"
 
 
+def by_name(pairs: Sequence[tuple[str | None, str]], link: str = "to") -> str | None:
+    """Names with what each is named for, a name once: ```a` to 10⁻³, and `b` to 10⁻⁶ and 10⁻⁹``.
+
+    None if a name is.
+    """
+    groups: dict[str | None, list[str]] = {}
+    for name, what in pairs:
+        groups.setdefault(name, []).append(what)
+    if None in groups:
+        return None
+    parts = [f"{code(str(name))} {link} {listed(what)}" for name, what in groups.items()]
+    return ", and ".join(filter(None, [", ".join(parts[:-1]), parts[-1]]))
+
+
 def cell(value: Any, digits: int = 3) -> str:
     """What a cell of a table shows: a number with so many significant digits; nothing for what is missing."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
@@ -69,7 +83,7 @@ def cell(value: Any, digits: int = 3) -> str:
     return str(value)
 
 
-FILTERS = (number, count, percent, power, fixed, duration, microseconds, code, cell)
+FILTERS = (number, count, percent, power, fixed, duration, microseconds, code, by_name, cell)
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -84,10 +98,15 @@ def columns(records: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[
     return list(records[0]), [list(record.values()) for record in records]
 
 
+def listed(names: Sequence[str]) -> str:
+    """A list as a sentence has it: ``a, b and c``."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 def abridged(names: Sequence[str], most: int = FEW) -> str:
     """The first names of a list as a sentence has them, and how many more there are."""
-    *first, last = [*names[:most], f"{len(names) - most} more"] if len(names) > most else names or ["none"]
-    return f"{', '.join(first)} and {last}" if first else last
+    return listed([*names[:most], f"{len(names) - most} more"] if len(names) > most else names or ["none"])
 
 
 def counted(count: int, noun: str = "variant") -> str:

@@ -24,7 +24,7 @@ DPI, SKETCHED = 200, 100
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
 )  # fmt: skip
-NAVY, PLUM, BROWN, LEAF = "#1B3A6B", "#8C4A73", "#8C510A", "#66A61E"  # dark ones of methods drawn beside those
+NAVY, PLUM, BROWN, LEAF, TEAL = "#1B3A6B", "#8C4A73", "#8C510A", "#66A61E", "#148F9E"  # dark ones
 
 
 class Look(NamedTuple):
@@ -67,7 +67,8 @@ _MARKERS = "osv^<>DPXph8dH"
 _LOOKS = {  # of methods that people know, in one colour with fixed steps and through SciPy; `look` finds others
     "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "stormer-verlet": Look(GREEN, "^"),
     "strang": Look(LEAF, "<"), "cayley": Look(GREENS[1], ">"), "takahashi-imada": Look(GREENS[2], "P"),
-    "yoshida-4": Look(GREENS[2], "p"), "srkn-14-6": Look(GREENS[1], "H"), "rk4": Look(ORANGE, "o"),
+    "yoshida-4": Look(GREENS[2], "p"), "srkn-14-6": Look(GREENS[1], "H"), "chin-4a": Look(TEAL, "D"),
+    "rk4": Look(ORANGE, "o"),
     "rk45-compiled": Look(VERMILLION, "s"), "rk45": Look(VERMILLION, "D"), "tsit5-fixed": Look(NAVY, "P"),
     "tsit5": Look(NAVY, "X"), "vern9-fixed": Look(PLUM, "s"), "vern9": Look(PLUM, "d"),
     "dop853-compiled": Look(BROWN, "v"), "dop853-compiled-fixed": Look(BROWN, "^"), "dop853": Look(BROWN, "o"),

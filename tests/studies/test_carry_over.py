@@ -259,7 +259,8 @@ def test_planted_factors_of_steps_and_of_silent_runs_are_found():
 
 
 @pytest.mark.parametrize(
-    ("unserved", "words"), [(0, "3, up to 3 times"), (3, "3, up to 3 times, beyond the budget 1 of 9")]
+    ("unserved", "words"),
+    [(0, "median 3, 95\xa0% below 3"), (3, "median 3, 95\xa0% below 3, 1 of 9 beyond the budget")],
 )
 def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved, words):
     data = planted(3.0)
@@ -268,9 +269,9 @@ def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved,
     met[{**at, "member": slice(unserved)}] = np.inf  # 3 of 40 are more than 5 %
     data["short"] = data["short"].to_dataset().assign(met_at=met)
     assert facts.steps(data, FREE).words == words
-    assert facts.steps(data, "0.1").words == "1, up to 1 times"
+    assert facts.steps(data, "0.1").words == "median 1, 95\xa0% below 1"
     assert by.step_factors(data, FREE, 1e-3).get("strang[body]") == pytest.approx(np.inf if unserved else 3.0)
     drawn_texts = {one.get_text() for one in figures.draw_steps(data).axes[0].texts}
     assert drawn_texts == ({"+1"} if unserved else set())
     everyone_beyond = facts.pooled([{"strang[body]": np.inf}])
-    assert everyone_beyond.words == "beyond the budget 1 of 1"
+    assert everyone_beyond.words == "1 of 1 beyond the budget"

@@ -160,13 +160,14 @@ def test_every_time_is_the_median_of_its_processes(measured, rows):
     assert set(rows["language"][rows["call"] == SOLVE_IVP]) == {SCIPY_PYTHON}
 
 
-def test_a_noisy_time_is_taken_again_and_the_quieter_one_is_kept(monkeypatch):
-    noisy, quiet, worse = [1.0, 1.0, 9.0, 9.0], [2.0, 2.0, 2.1, 2.1], [1.0, 9.0, 9.0, 99.0]
-    asked, taken = [], [np.array([noisy, quiet, noisy]), np.array([quiet, worse])]
+def test_a_noisy_time_is_taken_again_and_the_fastest_processes_count(monkeypatch):
+    noisy, quiet = [1.0, 1.0, 9.0, 9.0], [2.0, 2.0, 2.1, 2.1]
+    again = [np.array([[1.1, 9.0, 9.0, 1.0], [9.0, 9.0, 1.0, 9.0]]), *[np.array([[9.0, 9.0, 9.0, 9.0]])] * 2]
+    asked, taken = [], [np.array([noisy, quiet, noisy]), *again]
     monkeypatch.setattr(measures, "timed", lambda runs, _: asked.append(runs.runs) or taken.pop(0))
     times = measures.settled_times(measures.Runs(SCENE, ["a", "b", "c"], 1, 0.001), 4)
-    assert asked == [["a", "b", "c"], ["a", "c"]]
-    assert times.tolist() == [quiet, quiet, noisy]
+    assert asked == [["a", "b", "c"], ["a", "c"], ["c"], ["c"]]  # 1, 1, 1, 9 stays noisy: no more are tried
+    assert times.tolist() == [[1.0, 1.0, 1.0, 1.1], quiet, [1.0, 1.0, 1.0, 9.0]]
 
 
 @pytest.mark.parametrize(("share", "busy"), [(0.0, None), (facts.NOISY_SHARE, None), (0.2, True)])
