@@ -28,6 +28,7 @@ from symtop.core.errors import (
     check_replaceable,
     file_path,
     positive,
+    words_of,
 )
 from symtop.core.signals import INTERRUPTED, told_apart
 
@@ -211,6 +212,11 @@ class Group(click.Group):
                 raise
             name = str(error.filename)
             warn(f"cannot use {name[:LONGEST_NAME]}{'...' if name[LONGEST_NAME:] else ''}: {error.strerror}")
+            ctx.exit(2)
+        except Exception as error:
+            if not type(error).__module__.startswith("numba."):  # of a plug-in's kernel, where no solver is called
+                raise
+            warn(f"a kernel cannot be compiled: {words_of(error)}")
             ctx.exit(2)
 
 

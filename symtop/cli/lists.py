@@ -103,7 +103,11 @@ def _flags(method: "Integrator") -> str:
 
 def _described(method: "Integrator") -> Record:
     """The record of an integrator, its paragraph, its tolerances and its source."""
+    from symtop.model.charts import BODY
+
     described: Record = {**method.record()}
+    if method.conserves and BODY in method.solvers:
+        described["conserves"] += " of a top"  # of a body, Gauss methods lose p_phi, which Lie-group methods keep
     if method.conserves is not None and len(method.charts()) > 1:
         described["conserves"] += " in every one of its charts"  # some keep more in one of them
     if method.default_tolerance is not None:

@@ -159,6 +159,8 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
 
 
 LONGEST = 300  # characters of an error's message that are shown
+_COMPILING = "(step: nopython frontend)"  # numba says it before each cause, from the loop inwards; the last counts
+_TRACE = r",? (?:defined at |File \"|During: |There are \d+ candidate)"  # what follows a cause
 
 
 def words_of(error: BaseException) -> str:
@@ -167,6 +169,8 @@ def words_of(error: BaseException) -> str:
         message = " ".join(str(error).split())
     except Exception:  # noqa: BLE001  (its own __str__ may raise anything)
         return f"{type(error).__name__}, which cannot be printed"
+    if _COMPILING in message:
+        message = re.split(_TRACE, message.rpartition(_COMPILING)[2], maxsplit=1)[0].strip()
     cut = message if len(message) <= LONGEST else f"{message[:LONGEST]} ..."
     return f"{type(error).__name__}: {cut}" if cut else type(error).__name__
 

@@ -24,7 +24,7 @@ DPI, SKETCHED = 200, 100
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
 )  # fmt: skip
-NAVY, PLUM, BROWN, LEAF, TEAL = "#1B3A6B", "#8C4A73", "#8C510A", "#66A61E", "#148F9E"  # dark ones of methods drawn beside those
+NAVY, PLUM, BROWN, LEAF, TEAL = "#1B3A6B", "#8C4A73", "#8C510A", "#66A61E", "#148F9E"  # dark ones
 
 
 class Look(NamedTuple):

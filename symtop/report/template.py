@@ -117,7 +117,7 @@ def _known(block: str) -> str:
     return "" if all(re.fullmatch(r"\*\*[^*]+\*\*", part) for part in whole) else ("\n" if listed else " ").join(whole)
 
 
-def _passing(filter_: Callable[..., str]) -> Callable[..., str | None]:
+def _passing(filter_: Callable[..., str | None]) -> Callable[..., str | None]:
     """A format as a filter of templates: None, which was not measured, passes, and a name that is not there fails."""
     from jinja2 import Undefined
 

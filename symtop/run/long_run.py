@@ -23,7 +23,7 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.core.code_hash import by_file, digest, hashed
-from symtop.core.errors import SymtopError, SymtopWarning, check_replaceable, file_path, positive, whole
+from symtop.core.errors import SymtopError, SymtopWarning, boolean, check_replaceable, file_path, positive, whole
 from symtop.core.files import cache_root, make_private
 from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
@@ -167,7 +167,7 @@ def long_run(
     count, h = whole("steps", steps, 1, MOST_STEPS), positive("step_size", step_size)
     _, solver = chart_of(method, of_body=chosen.of_body)
     assert isinstance(solver.loop, Loop)  # noqa: S101
-    loop = solver.loop if compensated else solver.loop.plain()
+    loop = solver.loop if boolean("compensated", compensated) else solver.loop.plain()
     par, rule, state = solver.setup(chosen.top, chosen.start, h)
     checkpoints = _Checkpoint(checkpoint, _identity(chosen, method, h, count, compensated))
     result = None if output is None else checkpoints.checked(file_path("output", output))

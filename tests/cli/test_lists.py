@@ -57,6 +57,19 @@ def test_the_flags_are_the_claims(name, order, flags):
     assert line.split()[1:3] == [order, flags]
 
 
+@pytest.mark.parametrize(
+    ("name", "kept"),
+    [
+        ("gauss-4", "axis_length, energy, p_phi, p_psi of a top in every one of its charts"),
+        ("gauss-4[body]", "axis_length, energy, p_phi, p_psi of a top"),  # of a body p_phi is lost: `test_gauss`
+        ("simo-wong", "axis_length, energy, p_phi in every one of its charts"),
+        ("rk4", "nothing in every one of its charts"),
+    ],
+)
+def test_what_a_method_that_steps_bodies_conserves_is_said_of_a_top(name, kept):
+    assert re.search(rf"^conserves +{re.escape(kept)}$", printed("integrators", name, columns=120), re.MULTILINE)
+
+
 def test_one_integrator_is_shown_in_full():
     page = printed("integrators", "midpoint")
     assert page.startswith("midpoint: discrete Lagrangian, midpoint rule\n")

@@ -98,6 +98,55 @@ def test_an_interrupt_of_the_user_is_not_that_of_a_plugin(misbehaving):
             solve(symtop.integrator(name), "angles", scene.top, scene.start, plan)
 
 
+KERNEL = """
+import symtop
+
+def step(par, rule, state, carry, h):
+    return {returns}
+
+loop = symtop.kernel_loop(lambda par, rule, state, h: (0.0,), step, lambda par, rule, before, dstate, h: (0.0, 0.0))
+solver = symtop.FixedStep(loop, (0.0,), symtop.on_angles, 1, implicit=False)
+symtop.register(
+    symtop.Integrator(name="own-kernel", family="other", summary="", solvers={{"angles": solver}}), replace=True
+)
+"""
+
+
+@pytest.mark.parametrize(
+    ("returns", "says"),
+    [
+        ("(0.0,) * 4, carry, 1, 0", None),
+        ("(0.0, 0.0), carry, 1, 0", "Cannot unify UniTuple(float64 x 4) and UniTuple(float64 x 2) for 'dstate.3'"),
+        ("unknown(state)", "NameError: name 'unknown' is not defined"),
+    ],
+)
+def test_a_kernel_that_does_not_compile_is_one_sentence_that_names_the_cause(returns, says, tmp_path):
+    file = tmp_path / "own.py"
+    file.write_text(KERNEL.format(returns=returns))
+    run = "spheroid", "own-kernel"
+    for words in (["run", *run], ["long", *run, "--steps", "10"], ["ensemble", "own-kernel", "--members", "3"]):
+        horizon = [] if words[0] == "long" else ["--horizon", "1"]
+        code, lines = output_of([*words, "--step-size", "0.1", *horizon, "--plugin", file])
+        if says is None:
+            assert code == 0, lines
+        else:
+            assert (code, len(lines)) == (2, 1), lines
+            assert lines[0].startswith("symtop: "), lines
+            assert lines[0].endswith(f"TypingError: {says}"), lines
+
+
+def test_counts_of_numpy_are_numbers_in_a_dataset(misbehaving):
+    def solve(top, start, plan):
+        run = misbehaving.midpoint(top, start, plan)
+        return run._replace(steps=plan.marks[-1], force_evaluations=2 * plan.marks[-1], reached=np.float32(0.5))
+
+    counted = symtop.Integrator(name="counted", family="other", summary="", solvers={"angles": solve})
+    run = symtop.simulate("spheroid", counted, step_size=0.01, horizon=0.5, guard=False)
+    counts = [run.attrs[name] for name in ("steps", "force_evaluations", "reached_time")]
+    assert counts == [50, 100, 0.5]
+    assert [type(count) for count in counts] == [int, int, float]
+
+
 def test_a_solver_that_expects_steps_forwards_is_ended(misbehaving, monkeypatch):
     """Probes of reversibility ask for a step backwards: `claims` waited for ever for a loop up to the horizon."""
     monkeypatch.setattr("symtop.methods.framework.calling.PATIENCE", 0.2)
