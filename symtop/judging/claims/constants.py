@@ -143,7 +143,8 @@ class LongRun(NamedTuple):
     @property
     def span(self) -> str:
         """Its length in words."""
-        return f"{f'{self.steps} steps' if self.steps else 'a formula'} over {self.nutations:.3g} nutations"
+        period = "natural periods" if self.chart == BODY else "nutations"
+        return f"{f'{self.steps} steps' if self.steps else 'a formula'} over {self.nutations:.3g} {period}"
 
 
 def _run(
@@ -372,7 +373,7 @@ def _of_states(run: LongRun) -> Finding:
     declared, verdict, differs = OWN, "refuted", f"differs by {other.size:.1e} {other.how}"
     if other.size <= other.floor:
         declared, verdict, kind = "", "measured", OWN
-        why = f"they differ from those of the states by {other.size:.1e} at most"
+        why = f"the momenta that it reports differ from those of its states by {other.size:.1e} at most"
     elif other.name == OF_RUN:
         kind, why = "another run", f"a run contradicts itself, as if the method knew of it: the state {differs}"
     else:
