@@ -276,6 +276,21 @@ def draw(known: dict[str, list[Run]], target: Path) -> None:
     style.save(figure, target)
 
 
+def summed(name: str, runs: list[Run], guarded: str) -> tuple[str, int]:
+    """How many wrong runs were silent and how many right ones were warned of, in a sentence; and the former."""
+    wrong = [run for run in runs if run.outcome == "ok" and run.error > guard.EXPECTED]
+    right = [run for run in runs if run.outcome == "ok" and run.error <= guard.EXPECTED]
+    silent = [run for run in wrong if not getattr(run, guarded) > guard.EXPECTED]
+    false = sum(getattr(run, guarded) > guard.EXPECTED for run in right)
+    words = f"tops, guard {guarded!r}" if name == "tops" else name
+    sentence = (
+        f"{len(runs)} runs of {words}: of {len(wrong)} wrong ones {len(silent)} were silent, the worst off by "
+        f"{max((run.error for run in silent), default=0.0):.2g} rad; of {len(right)} right ones {false} were "
+        f"warned of ({100.0 * false / max(len(right), 1):.2g} %)."
+    )
+    return sentence, len(silent)
+
+
 def page(results: Path) -> None:
     """Write what was found: counts by population, and by stratum, class of method, horizon and control."""
     facts, known = measured.circumstances(), {name: kept(name) for name in SAMPLERS}
@@ -293,17 +308,9 @@ def page(results: Path) -> None:
     shown = {"tops": known["tops"], "bodies": known["bodies"], "hostile bodies": known["hostile"]}
     for name, runs in shown.items():
         for guarded in ("exact", "series") if name == "tops" else ("series",):
-            wrong = [run for run in runs if run.outcome == "ok" and run.error > guard.EXPECTED]
-            right = [run for run in runs if run.outcome == "ok" and run.error <= guard.EXPECTED]
-            silent = [run for run in wrong if not getattr(run, guarded) > guard.EXPECTED]
-            false = sum(getattr(run, guarded) > guard.EXPECTED for run in right)
-            missed.append(len(silent))
-            words = f"tops, guard {guarded!r}" if name == "tops" else name
-            sentences.append(
-                f"{len(runs)} runs of {words}: of {len(wrong)} wrong ones {len(silent)} were silent, the worst off by "
-                f"{max((run.error for run in silent), default=0.0):.2g} rad; of {len(right)} right ones {false} were "
-                f"warned of ({100.0 * false / max(len(right), 1):.2g} %)."
-            )
+            sentence, silent = summed(name, runs, guarded)
+            missed.append(silent)
+            sentences.append(sentence)
     alt = "Curves of wrong runs warned of against right runs warned of, near one."
     caption = CAPTION.format(*missed, limit=guard.EXPECTED)  # of tops, with the closed form and without
     draw(known, results / "figures" / "guard-curves.png")
@@ -335,6 +342,8 @@ def main() -> None:
         page(Path("results"))
         return
     make(asked.name, asked.count, asked.workers)
+    for guarded in ("exact", "series") if asked.name == "tops" else ("series",):
+        print(summed(asked.name, kept(asked.name), guarded)[0])
     for run in kept(asked.name):
         if run.outcome == "ok" and run.error > 10.0 * guard.EXPECTED and not run.series > guard.EXPECTED:
             print("silent and grossly wrong:", run)

@@ -503,17 +503,21 @@ def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
 def _lines(question: _Question, method: Integrator, setting: float | None) -> dict[str, str]:
     """The command and the Python line that make the recommended run; no command for a scene that has no name here."""
     scene, _, _, horizon = question[:4]
-    name, whole = method.name, horizon == scene.horizon
     in_catalogue = scenes.all_scenes().get(scene.name) == scene
-    label, control = f'"{name}"' if "[" in name else name, str(method.control)
-    option = "" if setting is None else f" --{control.replace('_', '-')} {float(setting)!r}"
-    until = "" if whole else f" --horizon {horizon!r}"
-    files = "".join(f" --plugin {shlex.quote(file)}" for file in loaded())
-    command = f"symtop run {scene.name} {label}{option}{until}{files}"
-    of, until = f'"{scene.name}"' if in_catalogue else "scene", "" if whole else f", horizon={horizon!r}"
-    option = "" if setting is None else f", {control}={float(setting)!r}"
-    python = f'symtop.simulate({of}, "{name}"{option}{until})'
+    of, until = f'"{scene.name}"' if in_catalogue else "scene", f", horizon={horizon!r}" * (horizon != scene.horizon)
+    option = "" if setting is None else f", {method.control}={float(setting)!r}"
+    python = f'symtop.simulate({of}, "{method.name}"{option}{until})'
+    command = command_of(scene, method.name, str(method.control), setting, horizon)
     return {"command": command if in_catalogue else "", "python": python}
+
+
+def command_of(scene: Scene, name: str, control: str, setting: float | None, horizon: float) -> str:
+    """The command that runs a method on a scene."""
+    label = f'"{name}"' if "[" in name else name
+    option = "" if setting is None else f" --{control.replace('_', '-')} {float(setting)!r}"
+    until = "" if horizon == scene.horizon else f" --horizon {horizon!r}"
+    files = "".join(f" --plugin {shlex.quote(file)}" for file in loaded())
+    return f"symtop run {scene.name} {label}{option}{until}{files}"
 
 
 def _exact_seconds(question: _Question) -> float:

@@ -44,6 +44,7 @@ NAMES = {  # what the shell completes: the module and its function
     "variants": ("symtop.methods.framework.registry", "variants"),
 }  # fmt: skip
 BODY, PERIODS = "body", 20.0  # the scene of the options of a body, and its horizon
+TEXT = (".csv", ".tsv", ".txt", ".json")  # what nobody reads as netCDF
 SILENT = ("explore",)  # commands that work until they are ended
 
 
@@ -129,6 +130,12 @@ def body_options(command: Callable[..., None]) -> Callable[..., None]:
     for name, (count, metavar, words) in reversed(OF_BODY.items()):
         with_body = click.option(f"--{name}", metavar=metavar, callback=_numbers(count), help=words)(with_body)
     return with_body
+
+
+def given_body() -> str:
+    """The options of the user's own body as they were given to this command; empty without one."""
+    given = {name: value for name, value in click.get_current_context().params.items() if name in OF_BODY and value}
+    return " ".join(f"--{name} {','.join(map(repr, value))}" for name, value in given.items())
 
 
 def _own_body(numbers: dict[str, Any]) -> "Scene":
@@ -294,6 +301,8 @@ def check_outputs(**files: str | None) -> None:
         if file_path(option, file).is_dir():
             raise SymtopError(f"{option} must be a file, not the folder {file!r}")
         if name == "output":
+            if path.suffix.lower() in TEXT:
+                raise SymtopError(f"{option} is written as netCDF, such as run.nc, not as {file!r}")
             check_replaceable(path)
         try:
             tempfile.TemporaryFile(dir=path.parent).close()

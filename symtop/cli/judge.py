@@ -224,6 +224,12 @@ def recommend(scene: Any, accuracy: float | None, engine: str | None, as_json: b
             advice = answer.advice if accuracy is not None else None
         else:
             answer = advice = advise.recommend(scene, accuracy=accuracy or 0.0, **options)
+            if advice.integrator and (own := common.given_body()):
+                control, setting = "step_size", advice.step_size
+                if setting is None:
+                    control, setting = "tolerance", advice.tolerance
+                command = advise.command_of(scene, advice.integrator, control, setting, advice.horizon)
+                answer = advice = dataclasses.replace(advice, command=f"{command} {own}")
     click.echo(as_text(dataclasses.asdict(answer))) if as_json else say(str(answer))
     if advice is not None and advice.integrator is None:
         sys.exit(1)

@@ -183,6 +183,8 @@ def _scene_page(numbers: Record) -> str:
         )
     for key in ("horizon", "nutation period"):
         numbers[key] += " s" if numbers["units"] == "SI" else ""
+    if "I2" in parts["top"]:
+        numbers = {"natural period" if key == "nutation period" else key: value for key, value in numbers.items()}
     title = textwrap.fill(f"{name}: {purpose}" if purpose else name, terminal_width())
     return f"{title}\n\n{facts(lines | numbers, terminal_width())}"
 

@@ -65,6 +65,7 @@ OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --bod
         ("run spheroid taylor --figure no-such/x.png", ["--figure", "folder that is there", "no-such/x.png"]),
         ("run spheroid taylor --figure x.jpg", ["--figure", ".png or .svg or .pdf", "x.jpg"]),
         ("run spheroid taylor --output no-such/x.nc", ["--output", "folder that is there", "no-such/x.nc"]),
+        ("run spheroid taylor --output run.csv", ["--output is written as netCDF", "run.nc", "'run.csv'"]),
         ("run spheroid rk4 --step-size 0.1 --output a.png --figure ./a.png", ["--output and --figure", "two files"]),
         ("integrators spheroid", ["integrator 'spheroid'", "the name of a scene"]),
         ("scenes rk4", ["scene 'rk4'", "the name of an integrator"]),

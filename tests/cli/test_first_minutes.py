@@ -1,5 +1,7 @@
 """What somebody new meets in the first minutes: each point was a complaint of a trial, and stays mended."""
 
+import re
+import shlex
 import sys
 import time
 
@@ -195,3 +197,14 @@ def test_a_recording_hears_a_silence_and_sees_what_wraps(tmp_path):
 def test_a_symmetric_body_is_not_told_to_be_without_symmetry():
     result = call("recommend", "body", "--body", "2,2,1", "--rates", "0.1,0,3", "--i-use", "mujoco", code=2)
     assert "scene must be one of a SymmetricTop here, not body, a RigidBody" in " ".join(result.stderr.split())
+
+
+def test_the_command_of_a_recommendation_holds_the_options_of_the_body():
+    own = ["--body", "2,1.5,1", "--rates=-0.1,0,3"]
+    answer = call("recommend", "body", *own, "--accuracy", "1e-3", "--needs", "derivative", "--horizon", "10").output
+    (command,) = re.findall(r"^Run it: symtop (.*)$", answer, re.MULTILINE)
+    assert " --horizon 10.0 " in command
+    assert command.endswith(" --body 2.0,1.5,1.0 --rates -0.1,0.0,3.0")
+    assert "accurate to" in call(*shlex.split(command)).output
+    named = call("recommend", "tennis-racket", "--accuracy", "1e-3", "--needs", "derivative").output
+    assert "--body" not in named

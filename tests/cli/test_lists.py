@@ -110,3 +110,10 @@ def test_the_help_describes_every_command_in_one_whole_line():
     lines = result.output.partition("Commands:\n")[2].splitlines()
     assert [line.split()[0] for line in lines] == sorted(main.commands)
     assert all(line.endswith(".") and not line.endswith("..") for line in lines)
+
+
+def test_the_period_of_a_body_is_its_natural_one():
+    body, top = printed("scenes", "heavy-brick"), printed("scenes", "spheroid")
+    assert re.search(r"^natural period +2\.99213$", body, re.MULTILINE)
+    assert "nutation period" not in body
+    assert re.search(r"^nutation period +1\.18017 s$", top, re.MULTILINE)

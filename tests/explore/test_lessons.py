@@ -65,6 +65,9 @@ def test_a_story_a_cell_and_a_link(site):
         browser.wait_for(f"document.querySelector('#status').textContent.startsWith({json.dumps(status)})")
         assert browser.evaluate(form) == before
         browser.wait_for("document.querySelector('#map-note').textContent.startsWith('stormer-verlet')")
+        said = re.search(r"([\d,]+) runs a second$", text(browser, "map-note"))
+        assert said is not None
+        assert int(said[1].replace(",", "")) > 0
         spin = browser.evaluate("document.querySelector('#psi_dot').value")
         key = "document.querySelector('#map').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowDown'}))"
         browser.evaluate(key)

@@ -188,7 +188,7 @@ async function askMap() {
   if (!answer) return;
   mapped = question;
   outcomes.cells = answer.error ? null : { ...answer, range, error: unpack(answer.error_rad) };
-  $("map-note").textContent = answer.error || `${name}, ${answer.columns * answer.rows} runs, ${answer.failed} ended early, ${Math.round(answer.cells_a_second / 1000)} 000 runs a second`;
+  $("map-note").textContent = answer.error || `${name}, ${answer.columns * answer.rows} runs, ${answer.failed} ended early, ${(+answer.cells_a_second.toPrecision(2)).toLocaleString("en")} runs a second`;
   outcomes.draw({ step: values.step_size, spin: values.psi_dot });
   document.body.dataset.maps = +(document.body.dataset.maps || 0) + 1;
   askMap();
