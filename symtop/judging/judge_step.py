@@ -60,6 +60,7 @@ VECTORS = {
 SCALARS = ("time", "theta", "phi", "psi", *CONSTANTS)
 OF_STATES = ("axis", "attitude", "theta", "momentum", "rates")
 FEWEST = 100  # samples by which a law of growth is judged
+SHORTEST, DECADES = 0.2, 2.0  # of the end of a run, in which it is judged
 SEEDS = 1_000_000_000
 OPENING = 60.0  # seconds for loading a file and its imports
 # seconds for the claims of one stage: at most, for all stages together, and at least however many were spent
@@ -270,7 +271,9 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     """What became of a constant of the motion, beside what is claimed of it."""
     scale, grain = (scene.energy_scale, scene.energy_grain) if name == "energy" else (scene.momentum_scale, 1.0)
     true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)
-    change = constant_of(time if time[-1] else [1.0], (values - values[0]) / scale)  # of a start alone nothing grows
+    times = time if time[-1] else [1.0]  # of a start alone nothing grows
+    decades = math.log10(max(times[-1] / scene.time_scale(), 1.0))  # from the first nutation on: it switches errors on
+    change = constant_of(times, (values - values[0]) / scale, min(max(decades, SHORTEST), DECADES))
     if time.size < FEWEST:
         change = change._replace(exponent=math.nan)
     constant = Constant(change, math.nan, KEPT * grain, grain)

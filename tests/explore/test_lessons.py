@@ -59,6 +59,10 @@ def test_a_story_a_cell_and_a_link(site):
         state = browser.evaluate("location.href")
         form = "[...document.querySelectorAll('input[type=number], #scene, #integrator, #second')].map((c) => c.value)"
         before, status = browser.evaluate(form), text(browser, "status").split(";")[0]
+        answered(browser, "#story", "pole jump")
+        cut = "[...document.querySelectorAll('input[type=number]')].filter((c) => c.scrollWidth > c.clientWidth)"
+        assert browser.evaluate("document.querySelector('#phi_dot').value") == "0.650635"
+        assert browser.evaluate(f"{cut}.map((c) => c.value)") == []
         answered(browser, "#story", "loop")
         assert browser.evaluate(form) != before
         browser.evaluate(f"location.href = {json.dumps(state)}")

@@ -1,5 +1,6 @@
 """Plug-ins that misbehave: each ends in one sentence and its exit code, whatever calls them, and spoils nothing."""
 
+import math
 import sys
 import warnings
 from pathlib import Path
@@ -133,6 +134,34 @@ def test_a_kernel_that_does_not_compile_is_one_sentence_that_names_the_cause(ret
             assert (code, len(lines)) == (2, 1), lines
             assert lines[0].startswith("symtop: "), lines
             assert lines[0].endswith(f"TypingError: {says}"), lines
+
+
+def test_an_ensemble_of_a_kernel_that_does_not_compile_is_refused_in_python(misbehaving):
+    def step(par, rule, state, carry, h):
+        return (0.0, 0.0), carry, 1, 0
+
+    def start(par, rule, state, h):
+        return (0.0,)
+
+    def observed(par, rule, before, dstate, h):
+        return 0.0, 0.0
+
+    solver = symtop.FixedStep(symtop.kernel_loop(start, step, observed), (0.0,), symtop.on_angles, 1, implicit=False)
+    own = symtop.Integrator(name="own-kernel", family="other", summary="", solvers={"angles": solver})
+    with pytest.raises(symtop.SymtopError, match="integrator own-kernel failed: TypingError: Cannot unify"):
+        symtop.ensemble(symtop.population(3), own, step_size=0.1, horizon=1.0)
+
+
+@pytest.mark.parametrize("count", [math.nan, math.inf, 1e30])
+def test_a_number_of_steps_that_is_none_is_refused(count, misbehaving):
+    def solve(top, start, plan):
+        return misbehaving.midpoint(top, start, plan)._replace(steps=count)
+
+    counted = symtop.Integrator(name="counted", family="other", summary="", solvers={"angles": solve})
+    with pytest.raises(symtop.SymtopError, match="must return a finite number of steps, not"):
+        symtop.simulate("spheroid", counted, step_size=0.01, horizon=0.5, guard=False)
+    with pytest.raises(symtop.SymtopError, match="must return a finite number of steps, not"):
+        symtop.ensemble(symtop.population(3), counted, step_size=0.01, horizon=0.5)
 
 
 def test_counts_of_numpy_are_numbers_in_a_dataset(misbehaving):

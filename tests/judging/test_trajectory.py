@@ -228,3 +228,14 @@ def test_one_sample_is_judged(time, tmp_path):
     ledger = symtop.judge(tmp_path / "one.csv", energy="bounded")
     assert ledger["theta_error"].value == pytest.approx(0.05)
     assert (ledger["energy"].value, ledger["energy"].verdict) == (0.0, "confirmed")
+
+
+def test_the_first_nutation_of_a_bounded_energy_is_no_growth():
+    """Some nutations of a splitting do not refute its bounded energy; those of a method that gains energy do."""
+    verdicts = {}
+    for name in ("strang", "rkmk-se3-2"):
+        run = symtop.simulate("spheroid", name, step_size=0.01, guard=False)  # over 6.8 nutations
+        verdicts[name] = symtop.judge(run, scene="spheroid", energy="bounded")["energy"]
+    assert verdicts["strang"].verdict != "refuted"
+    assert verdicts["strang"].measured.kind != "drift"
+    assert verdicts["rkmk-se3-2"].verdict == "refuted"

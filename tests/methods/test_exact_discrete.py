@@ -39,7 +39,7 @@ def true_orbit(scene, h, steps):
 
 
 @pytest.mark.parametrize("name", PERIODIC)
-@pytest.mark.parametrize("steps", [100, 20, 4.37, 2.3, 0.61])
+@pytest.mark.parametrize("steps", [100, 20, 4.37, 2.3, 2.0, 0.61, 2.0 / 3.0])
 def test_the_step_is_the_motion_whatever_its_size(name, steps):
     scene = symtop.scene(name)
     h = scene.nutation_period / steps

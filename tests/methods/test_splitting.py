@@ -117,6 +117,15 @@ def test_cayley_keeps_its_own_energy_for_millions_of_steps(scene_name, steps):
     assert cayley_drift(METHODS["cayley"], scene, h, 1.001 * tau, 10_000) > 1e-10
 
 
+@pytest.mark.parametrize("kick", [(0.5, 0.5), (0.3, 0.7)])
+def test_a_splitting_claims_the_cayley_energy_where_it_keeps_it(kick):
+    scene = symtop.scene("spheroid")
+    h = scene.nutation_period / 100.0
+    method = symtop.composition("own", (1.0,), kick, chart="space", rotation="cayley")
+    drift = cayley_drift(method, scene, h, 0.5 * h / scene.top.I1, 10_000)
+    assert (drift < 1e-13) == ("cayley_energy" in method.conserves)
+
+
 @pytest.mark.parametrize("nutations", [0.1, 0.5, 1.03, 2.0])
 @pytest.mark.parametrize("name", ["cayley", "cayley-tuned"])
 def test_cayley_never_blows_up(name, nutations):

@@ -44,6 +44,13 @@ def test_every_outcome_is_produced_said_and_timed(scene, name, controls, outcome
     assert not known[after].any()  # nothing is made up
 
 
+@pytest.mark.parametrize("name", ["taylor", "rk45-compiled"])
+def test_a_run_out_of_budget_says_how_far_it_came_beyond_its_samples(name):
+    run = symtop.simulate("spheroid", name, tolerance=1e-9, budget=40, samples=2, guard=False)
+    assert run.attrs["outcome"] == "out_of_budget"
+    assert 0.0 < run.attrs["reached_time"] < run.attrs["horizon"]
+
+
 def test_an_early_end_is_announced_and_a_run_that_ends_well_is_not():
     for gap, tolerance, outcome in ((1e-14, 1e-9, "step_too_small"), (1e-6, 1e-6, "ok")):
         sentences, controls = [], {"observe": "nutation", "samples": 11}

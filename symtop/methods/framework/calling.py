@@ -68,6 +68,8 @@ def _checked(method: Integrator, shape: tuple[int, int], plan: Plan, run: Any, *
     for name in COUNTS:
         if not isinstance(getattr(run, name), Real):
             raise SymtopError(f"{must} a number of {name}, not {type(getattr(run, name)).__name__}")
+        if name != "reached" and not abs(getattr(run, name)) < 2**63:  # NaN is not
+            raise SymtopError(f"{must} a finite number of {name}, not {getattr(run, name)!r}")
     checked = Run(states, p_phi, p_psi, *run[3:])
     if checked.outcome == "ok" and not np.isfinite(states).all():
         return checked._replace(outcome="not_finite", reached=plan.last_of(np.isfinite(states).all(axis=1)))

@@ -78,7 +78,8 @@ _CAUSES = {
     "left_chart": "theta left (0, pi), where the angles chart ends; take a smaller step or an integrator without poles",
     "not_converged": "the implicit equation of the step was not solved; take a smaller step",
     "not_finite": "the state became infinite or not a number; take a smaller step or a tighter tolerance",
-    "step_too_small": "the step size fell below the spacing of the numbers; loosen the tolerance",
+    "step_too_small": "the step size fell below the spacing of the numbers: the state grows without bound, or is at a "
+    "pole; tighten the tolerance or take an integrator without poles",
     "not_normalised": "the quaternion's length left one by more than 0.1 %; take a smaller step or a tighter tolerance",
     "out_of_budget": "the limit on the work of one run was reached; shorten the horizon or loosen the tolerance",
 }

@@ -165,6 +165,13 @@ def _turned(e: Any, above: Any, par: Any, sigma: float, b: float, J: float, sign
     return aD, D, r, 1.0 / r, delta / (2.0 * math.pi)
 
 
+@register_jitable
+def _least(above: Any, par: Any) -> Any:
+    """The least of P - e2 and of both D, the last small at half a nutation of an axis that comes near a pole."""
+    P = (above[0] + above[1] + above[2]) / 3.0
+    return min(above[1], P - par.b1, P - par.b2)
+
+
 def _mapped(rule: Any, top: Any, at: Any, h: float) -> Any:
     """The numbers of the step h from a start; `rule` says nothing but their type."""
     par, s = oscillator_numbers(top, at)
@@ -174,7 +181,7 @@ def _mapped(rule: Any, top: Any, at: Any, h: float) -> Any:
     rest = h - 2.0 * nutations * half if nutations != 0.0 else h
     parts = 1
     above = differences(e, max(abs(rest), SHORTEST))
-    while above[2] > STEEPEST * above[1] and parts < MOST_PARTS:
+    while above[2] > STEEPEST * _least(above, par) and parts < MOST_PARTS:
         parts += 1
         nutations = np.rint(0.5 * h / parts / half)
         rest = h / parts - 2.0 * nutations * half if nutations != 0.0 else h / parts

@@ -68,7 +68,7 @@ def composition(
     table = rule._replace(turn=ROTATIONS.index(rotation), processor=boost)
     scale = angles.scale if chart == "angles" else space.tuned if table.turn == TUNED else space.scale
     stages = Scaled(table, scale, packed)
-    one_drift = bare and rule.drift == (1.0,)
+    kick_drift_kick = bare and rule.drift == (1.0,) and rule.kick == (0.5, 0.5)
     solvers = {
         shown: FixedStep(march, stages, prepare, 1, implicit=False)
         for shown, (march, prepare) in _KERNELS[chart].items()
@@ -76,14 +76,14 @@ def composition(
     free = body.free_motion(rule, order) if chart == "space" and rotation == "exact" and not boost else None
     if free is not None:
         solvers[BODY] = FixedStep(body.march(free), body.scaled(table), on_body, 1, implicit=False)
-    closed_forms = _KICK_DRIFT_KICK.get((chart, rotation)) if one_drift and rule.kick == (0.5, 0.5) else None
+    closed_forms = _KICK_DRIFT_KICK.get((chart, rotation)) if kick_drift_kick else None
     modified, sleeps = closed_forms or (None, None)
     return Integrator(
         name=name, family="splitting",
         summary=summary or f"splitting with {len(rule.drift)} drifts and {rule.forces} forces a step",
         solvers=solvers,
         order=order, explicit=True, symplectic=True, symmetric=all(numbers == numbers[::-1] for numbers in rule[:3]),
-        conserves=frozenset({"p_phi", "p_psi"} | ({"cayley_energy"} if one_drift and rotation != "exact" else set())),
+        conserves=frozenset(["p_phi", "p_psi"] + ["cayley_energy"] * (kick_drift_kick and rotation != "exact")),
         reference=reference, needs="this-top" if table.turn == TUNED else "kicks",
         general=chart == "space" and rotation == "exact" and not boost,  # reduced angles, a turn about L, a processor
         modified_energy=modified,

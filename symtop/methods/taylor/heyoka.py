@@ -132,6 +132,7 @@ class Flight(NamedTuple):
     steps: int
     order: int
     outcome: str  # heyoka's word
+    time: float  # of the last completed step
 
 
 def propagate(
@@ -150,9 +151,9 @@ def propagate(
     grid = times if times[0] == 0.0 else np.concatenate([[0.0], times])
     numbers = grid if precision == "double" else np.array([kind(float(t)) for t in grid])
     outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers, max_steps=most)
-    order = int(integrator.order)
+    order, time = int(integrator.order), float(integrator.time)
     idle.append(integrator)  # not after an exception, which may leave it in any state
-    return Flight(states[grid.size - times.size :], int(steps), order, outcome.name)
+    return Flight(states[grid.size - times.size :], int(steps), order, outcome.name, time)
 
 
 def solver(chart: str, precision: str, read: Callable[..., tuple[Array, Array, Array]] | None = None) -> Solver:
@@ -172,6 +173,7 @@ def solver(chart: str, precision: str, read: Callable[..., tuple[Array, Array, A
         if "step_limit" in flight.outcome and good[:count].all():
             word = "out_of_budget"
         reached = plan.horizon if word == "ok" else float(plan.times[good][-1]) if good.any() else 0.0
+        reached = flight.time if word == "out_of_budget" else reached
         return Run(states, p_phi, p_psi, flight.steps, flight.steps * flight.order, 0, word, reached)
 
     return solve

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from symtop.core.errors import SymtopError
+from symtop.core.errors import SymtopError, foreign_code
 from symtop.core.jit import compile_kernel, to_fixed_tuple
 from symtop.core.parallel import cores, heed, in_threads
 from symtop.methods.framework.adaptive import Adaptive
@@ -240,7 +240,8 @@ class Job:
         """The states of the members, by the quickest way there is."""
         solver = self.method.solvers[self.chart]
         if isinstance(solver, FixedStep) and not solver.in_python:  # whose marks may stand still at the end of a row
-            done = solver.many(self.numbers, plan.step_size, plan.marks)
+            with foreign_code(f"integrator {self.method.name}"):  # a kernel that does not compile
+                done = solver.many(self.numbers, plan.step_size, plan.marks)
             padding = np.isnan(plan.times)
             done.states[padding], done.momenta[padding] = np.nan, np.nan
             reached = done.steps * plan.step_size
