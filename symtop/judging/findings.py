@@ -160,7 +160,7 @@ KEPT = {"energy": "the energy", "p_phi": "p_phi", "p_psi": "p_psi", "axis_length
 SAYS = {  # of what was measured: {0} is its number, {1} its text
     "wrong limit": "as h -> 0 it goes to another motion, {0:.1e} away",
     "kept": "kept, to {0:.0e}", "bounded": "bounded, within {0:.1e}", "drift": "drifts, by {0:.1e}",
-    "random walk": "wanders as rounding does, by {0:.1e}", "growing": "grows, by {0:.1e}",
+    "random walk": "wanders as rounding does, by {0:.1e}", "growing": "changes, by {0:.1e}, and may grow",
     "symplectic yes": "yes, a step keeps the Poisson bracket to {0:.0e}",
     "symplectic no": "no, a step misses the Poisson bracket by {0:.1e}",
     "symmetric yes": "yes, a step back returns to the start to {0:.0e}",
