@@ -109,3 +109,10 @@ def test_what_a_step_is_on_a_body_is_said_in_natural_periods_with_its_momentum(o
     assert "nutation" not in words[0]
     assert "the momentum" not in words[1]
     assert "nutations (118 a nutation)" in words[1]
+
+
+def test_a_right_step_is_not_refuted_where_a_body_turns_over_after_a_calm_beginning() -> None:
+    ledger = symtop.judge(right.midpoint, scene="tennis-racket", order=2, quick=True)
+    assert ledger.refuted == []
+    assert ledger["order"].verdict == "confirmed"
+    assert ledger["energy"].measured.kind == "drift"
