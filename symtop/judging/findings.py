@@ -156,11 +156,11 @@ class Ledger:
 
 WIDTH, AS = 100, "as with "  # how the reason begins of a claim that was not judged for the same as another
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (0.0, "ns"))
-KEPT = {"energy": "the energy", "p_phi": "p_phi", "p_psi": "p_psi", "axis_length": "|e|"}
+KEPT = {"energy": "the energy", "p_phi": "p_phi", "p_psi": "p_psi", "axis_length": "|e|", "momentum": "the momentum"}
 SAYS = {  # of what was measured: {0} is its number, {1} its text
     "wrong limit": "as h -> 0 it goes to another motion, {0:.1e} away",
     "kept": "kept, to {0:.0e}", "bounded": "bounded, within {0:.1e}", "drift": "drifts, by {0:.1e}",
-    "random walk": "wanders as rounding does, by {0:.1e}", "growing": "grows, by {0:.1e}",
+    "random walk": "wanders as rounding does, by {0:.1e}", "growing": "changes, by {0:.1e}, and may grow",
     "symplectic yes": "yes, a step keeps the Poisson bracket to {0:.0e}",
     "symplectic no": "no, a step misses the Poisson bracket by {0:.1e}",
     "symmetric yes": "yes, a step back returns to the start to {0:.0e}",
@@ -248,12 +248,13 @@ def summary(ledger: Ledger) -> str:
 
 def _runs(ledger: Ledger) -> str:
     """The steps and the lengths of the runs, and the steps that fail, in steps a nutation; empty of a trajectory."""
-    traces, words = ledger.traces, []
+    traces, words, of_body = ledger.traces, [], ledger.about.chart == "body"
     if "steps_run" in traces and (steps := float(traces["steps_run"])):
-        nutations = float(traces["nutations_run"])
-        length = f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation)"
-        relative = "changes of the energy are relative to the nutation's, of momenta to the larger one"
-        words += [f"{length} for the constants", relative]
+        periods, period = float(traces["nutations_run"]), "natural period" if of_body else "nutation"
+        length = f"{steps:.0f} steps over {periods:.3g} {period}s ({steps / periods:.0f} a {period})"
+        scales = "kinetic one of the start and |mgl|, of the momentum to |L|"
+        scales = scales if of_body else "nutation's, of momenta to the larger one"
+        words += [f"{length} for the constants", f"changes of the energy are relative to the {scales}"]
     ladder = ledger.about.nutation / np.asarray(traces.get("step_size", []))  # NaN where no run was made
     if np.isfinite(ladder).any():
         failed = ladder[np.isnan(traces["error"]) & np.isfinite(ladder)]

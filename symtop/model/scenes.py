@@ -129,11 +129,16 @@ class Scene:
 
     @property
     def momentum_scale(self) -> float:
-        """What errors of p_phi and p_psi are divided by, the larger of both in size; of a body, |L| of the start."""
+        """What errors of p_phi and p_psi are divided by: the larger of both in size, or of a body |L|, at the start.
+
+        Where that is zero it is sqrt(|mgl| I1), which the weight gives.
+        """
         if self.of_body:
-            return max(math.hypot(*self.top.momentum(self.start)), TINY)
-        momenta = self.top.momenta(self.start)
-        return max(float(abs(momenta.p_phi)), float(abs(momenta.p_psi)), TINY)
+            size = math.hypot(*self.top.momentum(self.start))
+        else:
+            momenta = self.top.momenta(self.start)
+            size = max(float(abs(momenta.p_phi)), float(abs(momenta.p_psi)))
+        return size or max(math.sqrt(abs(self.top.mgl) * self.top.I1), TINY)
 
     def record(self) -> dict[str, str]:
         """What tables show of this scene, by column."""

@@ -97,3 +97,22 @@ def test_a_run_that_ends_in_its_first_nutation_shows_no_constant(scene: str) -> 
     """Two steps of 1e300 times the state: what did not change in the first is not said to be kept."""
     ledger = symtop.judge(lambda f, t, y, h: 1e300 * y, scene=scene, quick=True)
     assert {ledger[claim].measured.kind for claim in ("energy", "order")} == {""}
+
+
+def test_what_a_step_is_on_a_body_is_said_in_natural_periods_with_its_momentum(only: Callable[..., None]) -> None:
+    """The control: the summary of a top, which speaks of nutations and knows no such momentum."""
+    only("energy", "momentum")
+    words = [" ".join(str(symtop.judge(right.rk4, scene=scene, quick=True)).split()) for scene in (HEAVY, "spheroid")]
+    assert "natural periods (118 a natural period)" in words[0]
+    assert "relative to the kinetic one of the start and |mgl|, of the momentum to |L|" in words[0]
+    assert "does not keep the energy and the momentum." in words[0]
+    assert "nutation" not in words[0]
+    assert "the momentum" not in words[1]
+    assert "nutations (118 a nutation)" in words[1]
+
+
+def test_a_right_step_is_not_refuted_where_a_body_turns_over_after_a_calm_beginning() -> None:
+    ledger = symtop.judge(right.midpoint, scene="tennis-racket", order=2, quick=True)
+    assert ledger.refuted == []
+    assert ledger["order"].verdict == "confirmed"
+    assert ledger["energy"].measured.kind == "drift"

@@ -143,7 +143,8 @@ class LongRun(NamedTuple):
     @property
     def span(self) -> str:
         """Its length in words."""
-        return f"{f'{self.steps} steps' if self.steps else 'a formula'} over {self.nutations:.3g} nutations"
+        period = "natural periods" if self.chart == BODY else "nutations"
+        return f"{f'{self.steps} steps' if self.steps else 'a formula'} over {self.nutations:.3g} {period}"
 
 
 def _run(
@@ -197,9 +198,10 @@ def long_run(
         changes = constants(scene, trajectory)
     count, grains = max(run.steps, 1), {"energy": scene.energy_grain}
     by_name = {
-        name: change_of(plan.times, changes[name], every_step[name], count, grains.get(name, 1.0), plain=plain)
+        name: change_of(plan.times, changes[name], every_step[name], count, grains.get(name, 1.0), plain=plain,
+                        even=not scene.of_body)
         for name in (changes if chart != PLANE else ("energy",))
-    }
+    }  # fmt: skip
     message, nutations = sentence(run.outcome, run.reached, float(plan.times[-1])), run.reached / unit
     costs = run.force_evaluations / count, run.newton_iterations / count, steady
     times = plan.times / unit
@@ -280,12 +282,13 @@ def _cayley_residual(top: SymmetricTop, run: Trajectory) -> Array:
 
 
 def change_of(
-    time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0, *, plain: bool = False
-) -> Constant:
+    time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0, *, plain: bool = False,
+    even: bool = True,
+) -> Constant:  # fmt: skip
     """Size, growth and trend of a residual over so many steps; `every_step` holds it at consecutive ones.
 
     Of `plain` sums half of what rounding makes in one step may be a bias, and add up, but no more than a unit of
-    rounding a step.
+    rounding a step. A motion that is not `even` may begin calmly and turn over later, and so may its residuals.
     """
     jumps = np.abs(np.diff(every_step))
     a_step = float(np.max(jumps[np.isfinite(jumps)])) if np.isfinite(jumps).any() else math.nan
@@ -297,7 +300,7 @@ def change_of(
         calm = np.abs(values[1:-1]) < LITTLE
         jump = np.flatnonzero((ratio[1:] > SUDDEN) & (ratio[:-1] < SUDDEN / 10.0) & calm)
     words = "after t = {:.4g} it changes {:.0e} times as much as by its first steps"
-    sudden = words.format(time[jump[0] + 1], ratio[jump[0] + 1]) if jump.size else ""
+    sudden = words.format(time[jump[0] + 1], ratio[jump[0] + 1]) if even and jump.size else ""
     return Constant(constant_of(time, values), a_step, floor, grain, sudden)
 
 
@@ -372,7 +375,7 @@ def _of_states(run: LongRun) -> Finding:
     declared, verdict, differs = OWN, "refuted", f"differs by {other.size:.1e} {other.how}"
     if other.size <= other.floor:
         declared, verdict, kind = "", "measured", OWN
-        why = f"they differ from those of the states by {other.size:.1e} at most"
+        why = f"the momenta that it reports differ from those of its states by {other.size:.1e} at most"
     elif other.name == OF_RUN:
         kind, why = "another run", f"a run contradicts itself, as if the method knew of it: the state {differs}"
     else:
