@@ -21,8 +21,9 @@ SOLVERS = {row.name: solver for row in variants() for solver in filter(None, map
 IN_LANES = {name for name, solver in SOLVERS.items() if solver.in_lanes}
 ENDS = {  # how members end that step too far: numbers overflow, theta passes a pole, Newton finds no root
     ("not_finite",): ("strang[axis]", "takahashi-imada[attitude]", "cayley[axis]", "srkn-14-6[attitude]",
-                      "rk4[attitude]", "exact-discrete[attitude]", "series[axis]", "series[attitude]",
-                      "rkmk-se3-2[axis]", "crouch-grossman-3[attitude]"),
+                      "rk4[attitude]", "series[axis]", "series[attitude]", "rkmk-se3-2[axis]",
+                      "crouch-grossman-3[attitude]"),
+    (): ("exact-discrete[attitude]",),  # whose steps are parts of a nutation, however long they are
     ("not_finite", "left_chart"): ("stormer-verlet[angles]",),
     ("not_converged",): ("gauss-4[axis]", "gauss-8[axis]", "gauss-4[attitude]", "lie-variational[axis]",
                          "generalised-alpha[attitude]"),
