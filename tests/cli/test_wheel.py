@@ -88,7 +88,7 @@ def test_a_wheel_brings_the_kernels_of_first_runs(tmp_path):
     lines = re.findall(
         r"^(?:\$ )?symtop ((?:run|compare|recommend|ensemble|long) .*?)(?: +#.*)?$", README, re.MULTILINE
     )
-    assert len(lines) == 6
+    assert len(lines) == 5
     cache = tmp_path / "cache"
     for line in lines:
         words = line.replace("--steps 1e9", "--steps 1e6").replace('"', "").split()
