@@ -166,7 +166,8 @@ def test_the_page_has_every_report_and_what_was_foreseen():
 def test_the_faulty_rule_is_refuted_and_the_mended_one_is_not(row, only):
     line = FORESEEN[row]
     only(line)
-    assert ledger_of(row, faulty=True).refuted == [line] == [page()[row][1]]
+    assert ledger_of(row, faulty=True).refuted == [line]
+    assert line in page()[row][1].split(", ")
     assert ledger_of(row, faulty=False).refuted == []
 
 
