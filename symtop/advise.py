@@ -28,7 +28,7 @@ stands it is mostly the fastest way, and the advice says so with its time.
 import math
 import re
 import shlex
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -146,7 +146,7 @@ class _Question(NamedTuple):
     step: float | None = None  # that they must have
     max_step: float = math.inf
     general: bool = False
-    keeps: str | None = None
+    keeps: Collection[str] = ()
     pace: float = math.inf  # most seconds of a step
 
     def advice(self, **facts: Any) -> Advice:
@@ -155,7 +155,8 @@ class _Question(NamedTuple):
 
     def allows(self, method: Integrator) -> bool:
         """Is a method what the user can use, before its error is known?"""
-        conserving = all(declared(method, claim) in ("kept", "bounded") for claim in KEPT.get(self.keeps or "", ()))
+        claims = [claim for kept in self.keeps for claim in KEPT[kept]]
+        conserving = all(declared(method, claim) in ("kept", "bounded") for claim in claims)
         fixed = self.step is None and self.max_step == self.pace == math.inf
         return conserving and (fixed or method.fixed_step) and (not self.general or BODY in _solvers(method))
 
@@ -187,7 +188,8 @@ class _Trial(NamedTuple):
 def recommend(
     scene: "str | Scene", *, accuracy: float, quantity: str | None = None, horizon: float | None = None,
     needs: Collection[str] = (), step_size: float | None = None,
-    max_step: float | None = None, general: bool = False, keeps: str | None = None, time_a_step: float | None = None,
+    max_step: float | None = None, general: bool = False, keeps: str | Collection[str] | None = None,
+    time_a_step: float | None = None,
 ) -> Advice:  # fmt: skip
     """The cheapest integrator, with its step or tolerance, that keeps the error of `quantity` below `accuracy`.
 
@@ -201,7 +203,7 @@ def recommend(
 
     `step_size` is the step that you have: every method of fixed step runs with it, and the fastest that is good enough
     is the answer. `max_step` is the longest step, `time_a_step` the most seconds of one on this machine. `general`
-    leaves out what does not run on bodies without symmetry, `keeps` ("energy", "momenta") what lets them drift.
+    leaves out what does not run on bodies without symmetry, `keeps` ("energy", "momenta" or both) what lets them drift.
 
     Raises SymtopError for arguments that are out of range, and for a `horizon` to which the motion of a body is not
     known. It runs what it recommends: once the candidates are compiled, from 0.1 s to half a minute.
@@ -223,8 +225,10 @@ def recommend(
         raise SymtopError(f"step_size must be {words}", "step_size")
     longest = math.inf if max_step is None else positive("max_step", max_step)
     pace = math.inf if time_a_step is None else positive("time_a_step", time_a_step)
-    keeps = None if keeps is None else one_of("keeps", keeps, [*KEPT][: 1 if scene.of_body else None])
-    limits = step, longest, boolean("general", general), keeps, pace
+    kept: Iterable[object] = () if keeps is None else keeps if isinstance(keeps, Iterable) else [keeps]
+    kept = keeps.replace(" ", "").split(",") if isinstance(keeps, str) else kept
+    constants = tuple(one_of("keeps", one, [*KEPT][: 1 if scene.of_body else None]) for one in kept)
+    limits = step, longest, boolean("general", general), constants, pace
     question = _Question(scene, accuracy, quantity, horizon, allowed, *limits)
     if accuracy < limit:
         source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"

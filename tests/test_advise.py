@@ -215,7 +215,7 @@ def test_the_table_names_methods_for_every_class_and_none_where_a_user_limits_st
     both = advise._menu(ask(("derivative", "kicks")))
     assert {symtop.integrator(name).needs for name in both[:2]} == {"derivative", "kicks"}
     assert all(symtop.integrator(name).general for name in advise._menu(ask((), general=True)))
-    for limit in ({"step": 0.01}, {"max_step": 0.1}, {"keeps": "energy"}, {"pace": 1e-3}):
+    for limit in ({"step": 0.01}, {"max_step": 0.1}, {"keeps": ("energy",)}, {"pace": 1e-3}):
         assert advise._menu(ask((), **limit)) == []
     assert advise._menu(ask(())._replace(quantity="precession_rate")) == []  # the study has no such quantity
 
@@ -346,6 +346,22 @@ def test_limits_leave_out_what_a_user_cannot_use():
     slow = ask(accuracy=1e-3, needs="kicks", step_size=0.002, time_a_step=1e-12)
     assert slow.integrator is None
     assert any(words.startswith("A step takes over 1e-12 s") for words in slow.fails)
+
+
+def test_energy_and_momenta_may_both_be_asked_to_be_kept():
+    ask = functools.partial(advise._Question, symtop.scene("spheroid"), 1e-3, "axis", 2.0, ())
+    every, *one, both = (
+        {*advise._everyone(ask(keeps=kept))} for kept in ((), ("energy",), ("momenta",), ("energy", "momenta"))
+    )
+    assert both == one[0] & one[1]
+    assert both < one[0] < every
+    assert both < one[1] < every
+    words = functools.partial(symtop.recommend, "spheroid", accuracy=1e-3, horizon=2.0, step_size=0.01, needs="kicks")
+    for kept in ("energy, momenta", ["energy", "momenta"]):
+        assert words(keeps=kept).integrator in both
+    for wrong in ("energy,time", 3, ["energy", 3]):
+        with pytest.raises(symtop.SymtopError, match=r"keeps .* is unknown; known: energy, momenta"):
+            words(keeps=wrong)
 
 
 def test_a_step_that_takes_too_long_stays_named_when_another_does_later(monkeypatch):

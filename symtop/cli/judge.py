@@ -193,7 +193,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
 @click.option("--time-a-step", type=float, help="The most seconds that a step may take here, for example 1e-6.")
 @click.option("--needs", callback=common.separated, help="What you can supply: derivative,kicks or torque,inertia.")
 @click.option("--general", is_flag=True, help="Only what runs on a body without symmetry, too.")
-@click.option("--keeps", help="Only what does not let it drift: energy or momenta.")
+@click.option("--keeps", help="Only what does not let it drift: energy, momenta or energy,momenta.")
 @click.option("--quantity", help="Of what: axis, which is the default, attitude (that of a body), theta, energy, ...")
 @click.option("--horizon", type=float, help="Time to run to; the scene's own by default.")
 @common.scene_options
