@@ -6,6 +6,8 @@ symtop runs on Windows; it shows that none of them is needed.
 
 import json
 
+import pytest
+
 from tests.commands import customized
 
 POORER = """
@@ -40,6 +42,7 @@ print(json.dumps({"there": there, "first": first, "again": again, "judged": judg
 """
 
 
+@pytest.mark.slow
 def test_a_study_in_workers_is_resumed_a_long_run_ends_and_somebodys_step_is_judged(tmp_path):
     """Commands in one process, as each start takes two seconds."""
     result = customized(tmp_path, POORER)(python=COMMANDS)

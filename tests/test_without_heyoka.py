@@ -31,6 +31,7 @@ def hidden(tmp_path):
     return customized(tmp_path, HIDING)
 
 
+@pytest.mark.slow
 def test_taylor_alone_is_missing_and_refused_and_a_run_a_certificate_in_40_digits_and_advice_need_none(hidden):
     """All in one process, as each start takes two seconds."""
     result = hidden(python=COMMANDS)

@@ -50,6 +50,7 @@ COLUMNS, ROWS = 48, 32  # steps, spins
 MAP_SAMPLES = 9
 MOST_MAP_STEPS = 20_000_000  # of all cells: seconds of an implicit method
 OSCILLATOR_HORIZON, MOST_OSCILLATOR_STEPS = 25.0, 10_000
+MOST_FRICTION = 1e6
 MOST_TOP_STEPS, MOST_TOP_EVALUATIONS = 100_000, 50_000  # of the damped top: half a second for either
 RULES = ("midpoint", "trapezoidal")  # of the discrete Lagrangian of the oscillator
 
@@ -123,7 +124,7 @@ def setup(fields: Mapping[str, Any]) -> Setup:
     """The run that a page asks for. Raises SymtopError if a field is missing or out of range."""
     if not isinstance(fields, Mapping):
         raise SymtopError(f"the question must be a mapping of names to values, not {fields!r}")
-    of_body = fields.get("I2") is not None
+    of_body = fields.get("I2") is not None or str(fields.get("base")) in body_scenes()
     names = (OF_BODY, RATES) if of_body else (TOP, START)
     missing = [name for name in (*names[0], *names[1], "horizon", "integrator") if name not in fields]
     if missing:
@@ -271,9 +272,16 @@ def outcome_map(config: Setup, steps: np.ndarray, spins: np.ndarray) -> dict[str
     }
 
 
+def _friction(fields: Mapping[str, Any]) -> float:
+    friction = finite("friction", fields.get("friction"), 0.0)
+    if friction > MOST_FRICTION:
+        raise SymtopError(f"friction must be at most {MOST_FRICTION:g}, not {friction!r}", "friction")
+    return friction
+
+
 def damped(fields: Mapping[str, Any]) -> tuple[float, float]:
-    """Friction and step of the oscillator: `friction` (at least 0) and `oscillator_step`. SymtopError for others."""
-    friction, step = finite("friction", fields.get("friction"), 0.0), positive("step", fields.get("oscillator_step"))
+    """Friction and step of the oscillator: `friction` (0 to 1e6) and `oscillator_step`. SymtopError for others."""
+    friction, step = _friction(fields), positive("step", fields.get("oscillator_step"))
     least, most = OSCILLATOR_HORIZON / MOST_OSCILLATOR_STEPS, OSCILLATOR_HORIZON / 2.0
     if not least <= step <= most:
         raise SymtopError(f"step must be between {least} and {most}, not {step!r}", "step")
@@ -302,7 +310,7 @@ def oscillator(friction: float, step: float) -> dict[str, Any]:
 def damped_top(fields: Mapping[str, Any]) -> tuple[Setup, float]:
     """The midpoint rule on the page's top at its step, and the friction. Raises SymtopError as `setup` and `damped`."""
     config = setup({**fields, "integrator": "midpoint"})
-    friction = finite("friction", fields.get("friction"), 0.0)
+    friction = _friction(fields)
     if (steps := config.scene.horizon / (config.setting or 1.0)) > MOST_TOP_STEPS:
         raise SymtopError(f"the damped top must have at most {MOST_TOP_STEPS} steps, not {steps:.3g}")
     return config, friction

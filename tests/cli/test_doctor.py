@@ -109,6 +109,7 @@ def test_every_compiled_method_is_run_in_each_of_its_charts():
         assert variants <= set(names) if method.implementation != "python" else not variants & set(names)
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_is_named(monkeypatch):
     monkeypatch.setattr(doctor, "variants", lambda: ["strang[axis]", "no-such-method[axis]"])
     _, failed = doctor.compile_all(jobs=1)

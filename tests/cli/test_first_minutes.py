@@ -103,6 +103,7 @@ def test_a_proposed_step_is_of_use():
         assert 1e-5 < error < 1e-2
 
 
+@pytest.mark.slow
 def test_figures_come_in_three_kinds_and_are_the_same_again(tmp_path):
     """The bytes of an SVG; those of a PNG and a PDF have a test with the figures."""
     files = [tmp_path / name for name in ("a.png", "A.PDF", "a.svg", "B.SVG")]
@@ -123,6 +124,7 @@ for words in {WORDS}:
 """
 
 
+@pytest.mark.slow
 def test_nothing_wraps_on_a_terminal_and_a_list_is_there_within_two_seconds():
     listed, several = recorded(["integrators"]), recorded([], code=SEVERAL)
     for recording, longest, text in ((listed, 2.0, ["strang"]), (several, 60.0, ["on spheroid", "20 ", "convergence"])):
@@ -159,6 +161,7 @@ symtop.register(
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="the C library is loaded by another name there")
 def test_the_clock_goes_on_while_somebody_holds_the_lock_of_python(tmp_path):
     (tmp_path / "locked.py").write_text(LOCKED, encoding="utf-8")
@@ -186,6 +189,7 @@ def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
     assert len(refreshes) == count
 
 
+@pytest.mark.slow
 def test_a_recording_hears_a_silence_and_sees_what_wraps(tmp_path):
     """Negative control: a plug-in that sleeps while it is loaded, and a table of every column."""
     (tmp_path / "sleeps.py").write_text("import time\ntime.sleep(2.1)\n")

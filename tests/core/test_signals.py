@@ -57,6 +57,7 @@ def _a_minute():
     signal.signal(signal.SIGALRM, usual)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_a_minute")
 def test_a_write_is_whole_and_gives_back_its_lock_wherever_it_is_interrupted(tmp_path):
     lines = write_with_signal(tmp_path / "whole.nc", -1)

@@ -47,6 +47,7 @@ def text(browser, name):
     return browser.evaluate(f"document.querySelector('#{name}').textContent")
 
 
+@pytest.mark.slow
 def test_a_story_a_cell_and_a_link(site):
     with Browser(1280, 900) as browser:
         browser.open(address(site))
@@ -87,6 +88,7 @@ def test_a_story_a_cell_and_a_link(site):
         assert browser.outside() == []
 
 
+@pytest.mark.slow
 def test_a_hand_reaches_everything_and_every_text_can_be_read(site):
     with Browser(1280, 1400) as browser:
         browser.open(address(site))

@@ -79,6 +79,7 @@ def test_a_crowd_is_served_and_nothing_is_said_of_those_who_leave(crowd, count):
     assert log.read_text() == ""
 
 
+@pytest.mark.slow
 def test_three_thousand_connections_are_refused_and_forgotten(crowd):
     """Idle ones beyond the limit get 503, which is reported; the explorer answers while they are still open.
 

@@ -171,6 +171,7 @@ def test_a_program_that_writes_anything_else_is_told_so(tmp_path, body, words, m
         stepper.march(SPHEROID.top, None, np.full(6, 5.0), 0.1, np.array([0, 1, 2, 3]))
 
 
+@pytest.mark.slow
 def test_a_slow_program_has_the_time_that_earlier_runs_took_also_after_a_short_one(tmp_path, monkeypatch):
     monkeypatch.setattr(heartbeat, "patience", 0.6)
     body = STILL.replace("for k", "import time; time.sleep(0.004 * n)\nfor k")
@@ -266,7 +267,9 @@ def _keeps_its_slope(f, t, y, h, memory=[np.zeros(6)]):  # noqa: B006, B008  (wh
 PENDULUM = symtop.Scene("pendulum", symtop.SymmetricTop(1.0, 0.5, 1.0), symtop.Angles(theta=2.0), 20.0)
 
 
-@pytest.mark.parametrize("scene", ["sleeping", "separatrix", PENDULUM])
+@pytest.mark.parametrize(
+    "scene", ["sleeping", *(pytest.param(scene, marks=pytest.mark.slow) for scene in ("separatrix", PENDULUM))]
+)
 def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, only):
     """Beside a pole angles know a state badly; a pendulum has momenta of zero, which are no unit."""
     only("calls", "order")
@@ -276,6 +279,7 @@ def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, onl
     assert symtop.judge(_keeps_its_slope, scene=scene, quick=True)["calls"].verdict == "refuted"
 
 
+@pytest.mark.slow
 def test_a_method_of_order_2_goes_to_the_motion_of_a_separatrix_too(only):
     """Its runs do not within these steps: the motion grows their errors a millionfold."""
     only("order")
@@ -363,6 +367,7 @@ def test_waiting_for_a_processor_takes_none_of_the_time_that_judging_has():
         busy.wait()
 
 
+@pytest.mark.slow
 def test_a_step_that_hangs_backwards_is_judged_forwards(impatient, only):
     only("calls", "order", "symplectic")
     ledger = symtop.judge(hangs_backwards, quick=True, order=2)
@@ -518,6 +523,7 @@ def test_a_path_with_a_space_is_a_path_and_a_program_must_be_named(tmp_path, onl
         assert (code, "form program" in output, mark.exists()) == (2, True, False)
 
 
+@pytest.mark.slow
 def test_a_command_whose_reader_leaves_ends():
     command = [sys.executable, "-m", "symtop.cli", "judge", f"{STEPS}:heun", "--quick"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
@@ -566,6 +572,7 @@ def test_a_matrix_that_is_no_rotation_any_more_is_seen():
     assert (run.attrs["outcome"], run.attrs["reached_time"]) == ("not_finite", 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no fork")
 def test_the_process_of_a_method_ends_with_a_judge_that_is_killed():
     """kill -9 leaves no process behind that waits for it; before the kill it does wait."""
@@ -619,6 +626,7 @@ def test_the_order_of_a_quaternion_is_said_where_a_step_is_refused_and_the_error
         symtop.judge(of_a_rotation, quick=True)
 
 
+@pytest.mark.slow
 def test_a_step_that_slows_down_is_judged_on_shorter_runs_and_one_that_stops_says_why_once(only, monkeypatch):
     """A step takes 0.5 ms from t = 20 on, which its first ones do not tell; or 2.5 ms, always."""
     only("energy", "p_phi", "p_psi")

@@ -147,6 +147,7 @@ def test_a_program_in_another_language():
             assert ledger["order"].verdict == ("refuted" if refuted else "confirmed")
 
 
+@pytest.mark.slow
 def test_the_stages_of_an_implicit_class_are_solved_and_newton_is_left_as_it_was(only):
     from scipy.integrate._ivp import radau
 

@@ -80,6 +80,7 @@ def test_the_command_judges_on_a_body() -> None:
     assert findings == {"order": "confirmed", "energy": "confirmed", "momentum": "confirmed"}
 
 
+@pytest.mark.slow
 def test_a_step_is_drawn_beside_methods_on_a_body(tmp_path: Path) -> None:
     """As in `judge --figure`, and in `compare`, which both take it in the chart of a body."""
     (tmp_path / "my.py").write_text("def step(q, w, h, inertia, torque):\n    return q, w\n", encoding="utf-8")
@@ -115,4 +116,4 @@ def test_a_right_step_is_not_refuted_where_a_body_turns_over_after_a_calm_beginn
     ledger = symtop.judge(right.midpoint, scene="tennis-racket", order=2, quick=True)
     assert ledger.refuted == []
     assert ledger["order"].verdict == "confirmed"
-    assert ledger["energy"].measured.kind == "drift"
+    assert ledger["energy"].measured.kind in ("growing", "drift")  # the length of its runs follows from its speed

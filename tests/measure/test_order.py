@@ -38,7 +38,7 @@ def coverage(kind, fit_one, judged=0.97, **curves):
     return float(np.mean(inside))
 
 
-@pytest.mark.parametrize("kind", ["normal", "sampled maxima"])
+@pytest.mark.parametrize("kind", [pytest.param("normal", marks=pytest.mark.slow), "sampled maxima"])
 def test_the_interval_of_the_extrapolated_order_covers_what_it_says(kind):
     assert 0.93 <= coverage(kind, lambda h, e, p: order(h, e, 1e-30, 1.0, p, symmetric=True)) <= 0.97
 

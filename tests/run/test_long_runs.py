@@ -319,6 +319,7 @@ def test_what_a_free_body_keeps_grows_as_rounding_and_what_it_does_not_keep_as_t
     assert sizes["rk4"][1] == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_checkpoint_does_not_depend_on_what_its_process_has_run():
     """Told before and after other work by a new process, and by this one."""
     script = """

@@ -272,13 +272,16 @@ except KeyboardInterrupt:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "setting", "long", "threads"),
-    [pytest.param("strang[axis]", "per_nutation=200", 20_000, 1, marks=pytest.mark.slow),
-     ("strang[axis]", "per_nutation=200", 20_000, 2),
-     pytest.param("gauss-12[attitude]", "per_nutation=50", 2000, 2, marks=pytest.mark.slow),
-     pytest.param("rk45-compiled[axis]", "tolerance=1e-9", 10_000, 2, marks=pytest.mark.slow)],
-)  # fmt: skip
+    [
+        ("strang[axis]", "per_nutation=200", 20_000, 1),
+        ("strang[axis]", "per_nutation=200", 20_000, 2),
+        ("gauss-12[attitude]", "per_nutation=50", 2000, 2),
+        ("rk45-compiled[axis]", "tolerance=1e-9", 10_000, 2),
+    ],
+)
 def test_an_interrupt_is_heard_within_a_second(name, setting, long, threads):
     code = INTERRUPTED.replace("NAME", repr(name)).replace("THREADS", str(threads))
     code = code.replace("SETTING", setting).replace("LONG", str(long))

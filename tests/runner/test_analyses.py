@@ -91,6 +91,7 @@ def test_each_of_several_is_concluded_by_another_process_to_the_same_files(scrip
     assert not leftovers(tmp_path / "together")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("shared")
 def test_a_process_that_is_killed_is_done_without(script, tmp_path):
     code, output = studied(tmp_path / "r", script("killed"), script("second"))

@@ -71,6 +71,7 @@ def test_methods_of_one_family_do_not_begin_side_by_side(tmp_path):
     assert in_order([]) == []
 
 
+@pytest.mark.slow
 def test_a_trial_decides_whether_timed_cases_run_at_once_in_workers_that_are_there(tmp_path, monkeypatch, pool):
     """After all others; few of them, too: workers have the kernels, this process has not."""
     for ratio in (pools.DISTURBED, 1.01 * pools.DISTURBED):

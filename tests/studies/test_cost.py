@@ -208,6 +208,7 @@ def test_a_noisy_price_is_measured_again_and_marked_if_it_stays():
     assert pricing.prices(tree_of(np.concatenate([noisy, again]))).marked == ["b"]
 
 
+@pytest.mark.slow
 def test_prices_of_fresh_processes_agree_with_a_run_timed_by_hand():
     """Evaluations times the price, plus the call, is the time of a run of another length."""
     names = ["strang[axis]", "rk4[axis]"]

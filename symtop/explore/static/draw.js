@@ -236,7 +236,8 @@ export function plot(canvas, time, curves, logarithmic, now) {
     low = Math.min(high - 3, Math.max(Math.floor(low), high - 8));  // every residual begins at zero: eight decades are enough
     shown.forEach((values) => values.forEach((v, k) => { if (v < low) values[k] = low; }));
   } else {
-    const pad = 0.06 * (high - low) + 1e-9; low -= pad;
+    const pad = 0.06 * (high - low) + 2e-3 * Math.max(Math.abs(low), Math.abs(high)) + 1e-9;  // what four digits tell apart
+    low -= pad;
     high += pad;
   }
   const end = time[time.length - 1] || 1;

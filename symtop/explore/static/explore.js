@@ -66,6 +66,7 @@ function edited(group) {
   $("reset").disabled = false;
 }
 
+const counted = (count, noun) => `${count} ${noun}${count === 1 ? "" : "s"}`;
 const ofBody = () => document.body.classList.contains("a-body");  // a body without symmetry, and no top
 const errorOf = (largest) => largest[ofBody() ? "attitude_error" : "axis_error"];
 
@@ -148,11 +149,14 @@ async function post(path, changes) {
   return fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ ...values, base: $("scene").value, ...changes }) });
 }
 
+// What an answer is of: one of another scene or method than the page's own is not shown.
+const subject = () => [$("scene").value, values.integrator, values.second].join();
+
 // One request at a time; changes made meanwhile lead to one more, with the newest values.
 async function ask() {
   if (asking) { stale = true; return; }
   asking = true;
-  const began = performance.now();
+  const began = performance.now(), about = subject();
   const patience = setTimeout(() => {
     $("status").textContent = `${values.integrator}: computing; the first run of a method takes longer, because it is compiled`;
   }, 400);
@@ -162,7 +166,9 @@ async function ask() {
     const [answer, other] = await Promise.all(asked.map(async (one) => one && (await one).json()));
     clearTimeout(patience);
     const refused = answer.error || (other && other.error);
-    if (refused) refuse(refused); else { show(answer, other, began); if (!stale) askMap(); }
+    if (about !== subject()) stale = true;
+    else if (refused) refuse(refused);
+    else { show(answer, other, began); if (!stale) askMap(); }
   } catch {
     clearTimeout(patience);
     refuse("the explorer's server does not answer; is symtop explore still running?");
@@ -204,7 +210,7 @@ async function askCost() {
   const answer = await response.json();
   costs = answer.error ? null : answer;
   const bad = answer.error ? [answer.error] : answer.lines.filter((line) => line.message).map((line) => `${line.name}: ${line.message}`);
-  $("cost-note").textContent = [...bad, ...(answer.missing ? [`${answer.missing} methods are being measured`] : [])].join("; ");
+  $("cost-note").textContent = [...bad, ...(answer.missing ? [answer.missing === 1 ? "1 method is being measured" : `${answer.missing} methods are being measured`] : [])].join("; ");
   drawPlots();
   document.body.dataset.costs = answer.error ? "refused" : answer.lines.length;
   if (answer.missing) patient = setTimeout(askCost, 700);
@@ -278,8 +284,8 @@ function show(answer, other, began) {
     const largest = answer.largest[name];
     $(`largest-${name}`).textContent = largest == null ? "" : largest === 0 ? "always zero" : `largest ${largest.toExponential(1)}`;
   }
-  const a = answer.steps_per_nutation ? `, ${Math.round(answer.steps_per_nutation)} a ${ofBody() ? "natural period" : "nutation"}` : "";
-  $("status").textContent = `${values.integrator}: ${answer.message}; ${answer.steps} steps${a}, ${answer.force_evaluations} force evaluations, ${answer.run_ms.toFixed(0)} ms`;
+  const many = answer.steps_per_nutation, a = many ? `, ${many < 10 ? +many.toPrecision(2) : Math.round(many)} a ${ofBody() ? "natural period" : "nutation"}` : "";
+  $("status").textContent = `${values.integrator}: ${answer.message}; ${counted(answer.steps, "step")}${a}, ${counted(answer.force_evaluations, "force evaluation")}, ${answer.run_ms.toFixed(0)} ms`;
   $("status").className = answer.outcome === "ok" ? "" : "failed";
   $("other").hidden = !other;
   if (other) {
