@@ -195,6 +195,7 @@ def test_a_slow_program_has_the_time_that_earlier_runs_took_also_after_a_short_o
         ("nothing.py:step", {}, "FILE.py:NAME with a file that is there"),
         ("nothing.so", {}, "must be a file that is there"),
         ("no-such-program-anywhere -x", {"form": "program"}, "must be a command that can be run"),
+        ("my 'engine -x", {"form": "program"}, 'must be a command that can be run, not "my \'engine -x"'),
         ("true", {}, "or a command with form program, not 'true'"),
         ("python engine.py", {}, "a command needs form program"),
         (midpoint, {"form": "rotation"}, r"must take \(q, w, h, inertia, torque\), not \(f, t, y, h\)"),
@@ -475,6 +476,7 @@ def test_a_false_claim_gives_code_1_and_says_why(only):
         ((":heun", "--card", "x.txt"), "--card must be a file that ends in .html or .htm, not 'x.txt'"),
         ((":heun", "--badge", "x.png"), "--badge must be a file that ends in .svg, not 'x.png'"),
         ((":heun", "--figure", "step.doc"), "--figure must be a file that ends in"),
+        ((":leapfrog", "--form", "separable", "--figure", "step.png"), "symtop: --figure shows errors of the axis"),
     ],
 )
 def test_bad_input_to_the_command(arguments, words):
