@@ -135,6 +135,11 @@ def test_a_table_in_full_is_opened_searched_sorted_and_saved(browser):
     browser.click(f"{fold} th button")
     assert browser.evaluate(names) == up[::-1]
     assert browser.evaluate(f"{table}.tHead.rows[0].cells[0].ariaSort") == "descending"
+    cells = f"[...{table}.tBodies[0].rows].map(row => row.cells[1])"
+    browser.evaluate(f"{cells}.forEach((cell, k) => {{ cell.textContent = k === 3 ? 'inf' : `${{k}}`; }})")
+    browser.click(f"{fold} th:nth-child(2) button")
+    ordered = browser.evaluate(f"{cells}.map(cell => cell.textContent)")
+    assert ordered == [*(str(k) for k in range(len(every)) if k != 3), "inf"]  # numbers all of them
     saved = browser.evaluate("""(async () => {
         let blob; const link = HTMLAnchorElement.prototype.click, make = URL.createObjectURL;
         HTMLAnchorElement.prototype.click = function () { this.dataset.saved = this.download; };
