@@ -125,6 +125,7 @@ def _draw_beside(
         from symtop.judging.adapters.adapter import integrator
         from symtop.judging.claims.subject import open_target
         from symtop.judging.comparison import compare, ranked
+        from symtop.measure.sweep import period_word
         from symtop.model.scenes import scene as find_scene
         from symtop.report.plot import draw_compare
 
@@ -141,7 +142,7 @@ def _draw_beside(
         words = ", ".join(
             [*(f"{name} {error:.0e}" for name, error in errors.items()), *(f"{name} none" for name in rest)]
         )
-        say(f"Axis error (rad) for {most:.0f} force evaluations in {NUTATIONS:g} nutations: {words}.")
+        say(f"Axis error (rad) for {most:.0f} force evaluations in {NUTATIONS:g} {period_word(data)}s: {words}.")
 
 
 @click.command(short_help="Measure what integrators claim about themselves.")

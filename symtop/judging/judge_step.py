@@ -152,7 +152,7 @@ def judge(
         for finding in _findings(subject, process, began, QUICK_VERDICT if quick else VERDICT):
             listen(finding)
             findings.append(finding)
-    follow = frozenset(name for name, follows in implied.items() if follows)
+    follow = frozenset(one.claim for one in findings if one.declared and implied.get(one.claim))
     return Ledger(about.name, problem.name, tuple(findings), subject.traces, about, follow)
 
 

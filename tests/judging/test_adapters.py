@@ -460,6 +460,19 @@ def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch,
     assert len(ranking) == 5
 
 
+def test_a_claim_is_implied_if_it_follows_from_those_that_are_made(only):
+    only("order", "time", "energy")
+    for words, end in (((), "(time): 1 confirmed."), (("--symplectic",), "(energy and time): 1 confirmed, 1 refuted.")):
+        assert run_judge(f"{STEPS}:heun", "--order", "2", *words)[1].endswith(f"Implied by them {end}\n")
+
+
+def test_the_figure_on_a_body_counts_in_its_periods(only, tmp_path):
+    only("order")
+    for scene, unit in (("heavy-brick", "natural periods"), ("spheroid", "nutations")):
+        code, output = run_judge(f"{STEPS}:heun", "--scene", scene, "--figure", str(tmp_path / "step.png"))
+        assert (code, f" force evaluations in 10 {unit}: " in output) == (0, True), output
+
+
 def test_a_false_claim_gives_code_1_and_says_why(only):
     only("order", "symplectic")
     code, output = run_judge(f"{STEPS}:heun", "--order", "3", "--not-symplectic", "--json")
