@@ -238,6 +238,7 @@ def recommend(
     names, source = _candidates(question)
     search = _Search(question, names, _menu(question))
     ranked, beside, fails = search.answers(), search.beside(), search.fails
+    source = f"tried all {search.widened} compiled methods that you can use" if search.widened else source
     # Times of the user's own methods in plain Python say nothing beside those of compiled ones.
     own = [one.name for one in integrators().values() if one.implementation == "python" and not is_built_in(one.name)]
     if own:
@@ -268,6 +269,7 @@ class _Search:
         self.trials: list[_Trial] = []  # the fastest first
         self.fails: dict[str, list[str]] = {}  # names of methods by why they are no answer
         self.errors_at_step: dict[str, float] = {}  # errors of those that run with the user's step
+        self.widened = 0  # methods that there are, if all had to be tried
         of_top = [] if question.needs else [name for name in names if integrator(name).needs in THIS_TOP]
         self._try(names)
         costs = {name: one.cost(question) for one in self.trials if (name := one.run.integrator.name) in menu}
@@ -282,7 +284,7 @@ class _Search:
         ranked = self._confirmed(self._general, FINALISTS)
         if not ranked and self.menu:
             everyone = _everyone(self.question._replace(needs=self.question.needs or OF_ANY))
-            rest = {*everyone} - {*self.names, *self.menu}
+            self.widened, rest = len(everyone), {*everyone} - {*self.names, *self.menu}
             self._try(rest)
             ranked = self._confirmed([name for name in self._names() if name in rest], FINALISTS)
         return _timed(self.question, ranked, self.fails, ROUNDS)

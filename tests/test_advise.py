@@ -204,6 +204,7 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     assert advice.confidence == "checked"
     assert advice.integrator not in menu
     assert {*names} - {"series[axis]"} == everyone
+    assert "tried all 8 compiled methods" in advice.reason
 
 
 def test_the_table_names_methods_for_every_class_and_none_where_a_user_limits_steps():

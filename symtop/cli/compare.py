@@ -67,7 +67,9 @@ def compare(
         return
     timed, end, count = options["cost"] == "time", data.attrs["horizon"], data.attrs["nutations"]
     unit, period = " s" if data["reached_time"].attrs["units"] == "s" else "", period_word(data)
-    say(f"{data['scene'].item()} to t = {end:.6g}{unit} ({count:.3g} {period}s): the cheapest run by {options['cost']}")
+    many = f"{count:.3g}"
+    span = f" ({many} {period}{'s' * (many != '1')})" if count > 0.0 else ""  # and not of a motion that never returns
+    say(f"{data['scene'].item()} to t = {end:.6g}{unit}{span}: the cheapest run by {options['cost']}")
     cost = "time" if timed else "force evaluations"
     say(f"steps a {period} or tolerance (tol), {cost}; error of {data.attrs['quantity']}")
     rows = [[titled(cell), *(_cell(one, timed) for one in own)] for cell, own in zip(cells, records, strict=True)]
@@ -101,6 +103,6 @@ def _cell(record: dict[str, Any], timed: bool) -> str:
 
     steps, tolerance = record["steps_per_nutation"], record["tolerance"]
     fixed, formula = not math.isnan(record["step_size"]), math.isnan(tolerance)
-    many = f"{steps:.3g}" if steps < 1e3 else f"{steps:.0f}"
+    many = f"{steps:.3g}" if steps < 999.5 else f"{steps:.0f}"
     setting = f"{many} steps" if fixed else "-" if formula else f"tol {tolerance:.0e}"
     return f"{setting:>10} {pace(record['seconds']) if timed else format(record['force_evaluations'], '.1e'):>7}"

@@ -11,7 +11,6 @@ from symtop.cli.clock import ticking
 from symtop.cli.common import File, as_text, check_outputs, completing, json_option, plugin_option, say, say_written
 from symtop.core.errors import SymtopError
 
-CHARTS = ("axis", "attitude", "angles")
 BESIDE, NUTATIONS, MOST_BESIDE = ("rk4", "strang", "dop853", "taylor"), 10.0, 2e4  # of runs, and their evaluations
 LONGEST_BESIDE = 5.0  # seconds of a run of the judged step, which may be slow
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
@@ -81,7 +80,7 @@ def judge(
         elif line := findings.line(event, common.terminal_width()):
             click.echo(line)
 
-    check_outputs(output=output, card=card, badge=badge, figure=figure)
+    _check(options["form"], output=output, card=card, badge=badge, figure=figure)
     ledger = judged(target, scene=scene, tell=None if as_json else tell, **options)
     _refuse_of_trajectory(ledger, card, figure)
     if as_json:
@@ -104,6 +103,13 @@ def judge(
         sys.exit(1)
 
 
+def _check(form: str | None, **files: str | None) -> None:
+    """Refuse, before a step is judged, files that cannot be written, and a figure that would be empty."""
+    check_outputs(**files)
+    if files["figure"] is not None and form == "separable":
+        raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
+
+
 def _refuse_of_trajectory(ledger: Any, *files: str | None) -> None:
     if not ledger.about.chart and any(files):
         raise SymtopError("a card or a figure shows a method: there is none of a trajectory")
@@ -119,14 +125,12 @@ def _draw_beside(
         from symtop.judging.adapters.adapter import integrator
         from symtop.judging.claims.subject import open_target
         from symtop.judging.comparison import compare, ranked
-        from symtop.model.charts import BODY
+        from symtop.measure.sweep import period_word
         from symtop.model.scenes import scene as find_scene
         from symtop.report.plot import draw_compare
 
         on = find_scene(scene, bodies=True)
         stepper = open_target(target, options["form"], options["chart"], on=on, adaptive=options["adaptive"])
-        if stepper.chart not in (*CHARTS, BODY):
-            raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
         methods = [integrator(stepper, order=options["order"]), *BESIDE]
         # `compare` counts a step as one force evaluation at least
         budget = min(MOST_BESIDE, LONGEST_BESIDE / max(seconds_a_step, 1e-9))
@@ -138,7 +142,7 @@ def _draw_beside(
         words = ", ".join(
             [*(f"{name} {error:.0e}" for name, error in errors.items()), *(f"{name} none" for name in rest)]
         )
-        say(f"Axis error (rad) for {most:.0f} force evaluations in {NUTATIONS:g} nutations: {words}.")
+        say(f"Axis error (rad) for {most:.0f} force evaluations in {NUTATIONS:g} {period_word(data)}s: {words}.")
 
 
 @click.command(short_help="Measure what integrators claim about themselves.")

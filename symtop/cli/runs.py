@@ -15,6 +15,7 @@ from symtop.cli.common import File, as_text, check_outputs, completing, say, say
 from symtop.core import files
 from symtop.core.errors import SymtopError, whole
 from symtop.core.progress import post
+from symtop.report.formats import FIRM, counted, duration
 
 FEWEST, FEW, MANY = 1000, 100_000, 20  # steps that are timed before a run of many times as many
 DECADES = 2.5  # of time, the last of a long run, in which the growth of a change is fitted
@@ -104,7 +105,7 @@ def run(
         say(f"{variant} on {problem.name}: {facts['outcome_message']}")
         other = nominal is not None and abs(actual / nominal - 1.0) > SAME
         of = f" of {actual:.6g}, for a whole number of them fills the horizon" if other else ""
-        say(f"{facts['steps']} steps{of}, {facts['force_evaluations']} force evaluations")
+        say(f"{counted(facts['steps'], 'step')}{of}, {counted(facts['force_evaluations'], 'force evaluation')}")
         if facts["sampling"] == "dithered":
             say("samples are not evenly spaced, so that they show all phases of the nutation")
         if facts["outcome"] == "ok":
@@ -142,7 +143,7 @@ def estimate(steps: float, run: Callable[[int], object]) -> None:
     took = seconds * steps / (few - FEWEST)
     post("running")  # no longer compiling
     if took > 10.0:
-        warn(f"{steps:.3g} steps take about {f'{took:.2g} s' if took < 100.0 else f'{took / 60.0:.2g} min'}")
+        warn(f"{steps:.3g} steps take about {duration(took).replace(FIRM, ' ')}")
 
 
 @click.command(short_help="Run up to billions of steps in little memory.")
@@ -247,7 +248,7 @@ def ensemble(
         raise SymtopError("--epsilon must come with --bodies: it is how far heavy bodies are from a top")
     noun, most = ("bodies", COMPARED_BODIES) if bodies else ("tops", COMPARED)
     with ticking(f"drawing {noun}"):
-        from symtop.report.spread import LEVELS, QUANTITIES, SHOWN_BY, largest, member_errors, spread
+        from symtop.report.spread import LEVELS, QUANTITIES, SHOWN_BY, largest, member_errors, so_many, spread
         from symtop.run.ensemble import bodies as random_bodies, ensemble as runs
         from symtop.run.ensemble.population import check_memory, population
 
@@ -261,7 +262,7 @@ def ensemble(
         needed = " or ".join(SHOWN_BY[name] for name in words)
         raise SymtopError(f"--figure needs {needed} among --variables, whose errors it shows")
     files.expected[0] = KERNELS
-    post(f"running {members} {noun}")
+    post(f"running {so_many(members, noun)}")
     try:
         data = runs.ensemble(sample, integrator, variables=variables, path=output, **settings)
     except KeyboardInterrupt:
@@ -286,8 +287,12 @@ def ensemble(
     else:
         counts = ", ".join(f"{count} {OUTCOME.get(name, name)}" for name, count in outcomes.items())
         execution = data.attrs["execution"]
-        say(f"{data.attrs['title']}: {counts}\n{steps} steps, computed {EXECUTION.get(execution, execution)}")
-        heading = [f"largest error, {few.sizes['member']} {noun}", *(f"{100.0 * level:g} %" for level in LEVELS)]
+        say(f"{data.attrs['integrator']} on {so_many(members, noun)}: {counts}")
+        say(f"{counted(steps, 'step')}, computed {EXECUTION.get(execution, execution)}")
+        heading = [
+            f"largest error, {so_many(few.sizes['member'], noun)}",
+            *(f"{100.0 * level:g} %" for level in LEVELS),
+        ]
         if worst:
             click.echo(table(heading, [[words[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
         say_written(output, figure)

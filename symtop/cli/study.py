@@ -227,7 +227,7 @@ def check_all(
         click.echo(as_text(checks))
     for entry in [] if as_json else checks:
         count = len(entry["differences"])
-        verdict = f"{count} differences" if count else "the same to the last bit, times aside"
+        verdict = counted(count, "difference") if count else "the same to the last bit, times aside"
         click.echo("{study}: {compared} of {stored} cases computed again, {verdict}".format(verdict=verdict, **entry))
         for difference in entry["differences"]:
             click.echo(f"  {difference}", err=True)

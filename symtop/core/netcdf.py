@@ -104,8 +104,10 @@ def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
 
 @functools.cache
 def variable_attributes(name: str, units: str) -> dict[str, str]:
-    """The long name and units of a variable; none of one that symtop does not know."""
-    return label(VARIABLES[name], units) if name in VARIABLES else {}
+    """The long name and units of a variable, or of the low half of one, NAME_lo; none of what symtop does not know."""
+    whole = name.removesuffix("_lo")
+    known = label(VARIABLES[whole], units) if whole in VARIABLES else {}
+    return known | {"long_name": f"{known['long_name']}, low half"} if known and whole != name else known
 
 
 def label(entry: tuple[str, ...], units: str, elsewhere: str = "") -> dict[str, str]:
@@ -120,10 +122,11 @@ def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree
     """Give variables without a long name theirs and units, and a dataset, or a tree's root, provenance and attributes.
 
     `units` is that of the scene: "SI", or empty for a problem without units, where all but angles have the unit "1".
+    Variables that were labelled as those of such a problem get the units of the scene.
     """
     for group in groups(data).values():
         for name, variable in group.variables.items():  # ``group[name]`` would make a DataArray
-            if "long_name" not in variable.attrs:
+            if "long_name" not in variable.attrs or variable.attrs == variable_attributes(str(name), ""):
                 variable.attrs.update(variable_attributes(str(name), units))
     data.attrs.update(attributes_of(title, **attributes))
     return data

@@ -85,11 +85,11 @@ def compare(
         results = []
         kernels = [one for one in variants if one.implementation == "compiled"]
         files.expected[0] = len(kernels) + (0 if closed_form.load() else files.CLOSED_FORM)
-        post(f"running {len(names)} methods")
+        post(f"methods that have run: 0 of {len(names)}")
         for one in in_threads(runs_of, variants, min(cores(), len(variants))):
             results.append(one)
             bar.update()
-            post(f"{len(results)} of {len(names)} methods have run")
+            post(f"methods that have run: {len(results)} of {len(names)}")
         rows: list[dict[str, Any]] = [{"setting_value": math.nan, "outcome": "ok"}]
         if cost == "time":
             bar.set_description("timing")

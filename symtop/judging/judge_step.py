@@ -152,7 +152,7 @@ def judge(
         for finding in _findings(subject, process, began, QUICK_VERDICT if quick else VERDICT):
             listen(finding)
             findings.append(finding)
-    follow = frozenset(name for name, follows in implied.items() if follows)
+    follow = frozenset(one.claim for one in findings if one.declared and implied.get(one.claim))
     return Ledger(about.name, problem.name, tuple(findings), subject.traces, about, follow)
 
 
@@ -181,17 +181,25 @@ def read(target: Any) -> dict[str, Any]:
         raise SymtopError(
             f"{path.name} must begin with a line of names, time and of {', '.join(fields[1:])}, not {head[:60]!r}"
         )
-    if not any(lines):
+    if not any(one.partition("#")[0].strip() for one in lines):
         raise SymtopError(f"{path.name} must have a line of numbers below its names, and has none")
-    try:
-        columns = dict(zip(names, np.loadtxt(lines, ndmin=2, unpack=True), strict=True))
-    except ValueError as error:
-        why = str(error).partition(";")[0]
-        raise SymtopError(f"{path.name} must have {len(names)} numbers in each line: {why}") from None
+    columns = _numbers(path.name, names, lines)
     for name, parts in VECTORS.items():
         if set(parts) <= set(columns):
             columns[name] = np.stack([columns[part] for part in parts], axis=-1)
     return {name: values for name, values in columns.items() if name in (*VECTORS, *SCALARS)}
+
+
+def _numbers(file: str, names: list[str], lines: list[str]) -> dict[str, np.ndarray]:
+    """Columns by name of the lines of a file."""
+    must = f"{file} must have {len(names)} numbers in each line"
+    try:
+        rows = np.loadtxt(lines, ndmin=2)
+    except ValueError as error:
+        raise SymtopError(f"{must}: {str(error).partition(';')[0]}") from None
+    if rows.shape[1] != len(names):
+        raise SymtopError(f"{must}, not {rows.shape[1]}")
+    return dict(zip(names, rows.T, strict=True))
 
 
 def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy: str | None) -> list[Finding]:

@@ -17,6 +17,7 @@ import numpy as np
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home
 from symtop.judging.findings import Finding, Ledger, claim_name, description
+from symtop.model.charts import BODY
 from symtop.report.figures import SMALLEST
 from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels, slope_guide
 from symtop.report.template import environment
@@ -66,10 +67,11 @@ def _order(axis: Any, ledger: Ledger) -> None:
 
 def _energy(axis: Any, ledger: Ledger) -> None:
     traces, finding = ledger.traces, ledger["energy"]
-    axis.set(
-        title=f"energy: {finding.measured or 'not measured'}", xlabel="time (nutations)",
-        ylabel="|change|, of the nutation's energy",
-    )  # fmt: skip
+    unit, scale = "nutations", "nutation's energy"
+    if ledger.about.chart == BODY:
+        unit, scale = "natural periods", "kinetic energy and |mgl|"
+    title = f"energy: {finding.measured or 'not measured'}"
+    axis.set(title=title, xlabel=f"time ({unit})", ylabel=f"|change|, of the {scale}")
     times, change = (np.asarray(traces.get(name, [])) for name in ("long_nutations", "energy_change"))
     valid = np.isfinite(change) & np.isfinite(times)
     if not valid.any():

@@ -14,7 +14,8 @@ UNITS = ((1e-9, "ns"), (1e-6, "µs"), (1e-3, "ms"), (1.0, "s"), (60.0, "min"), (
 
 def number(value: float, digits: int = 2, unit: str = "") -> str:
     """A number with so many significant digits, and its unit: ``10⁻⁶ rad``, ``1.4 × 10⁻¹³``, ``0.012``, ``340``."""
-    text = f"{value:.{digits}g}" if not 10.0**digits <= abs(value) < LARGEST_PLAIN else f"{value:.0f}"
+    rounded = float(f"{value:.{digits}g}")
+    text = f"{value:.{digits}g}" if not 10.0**digits <= abs(rounded) < LARGEST_PLAIN else f"{value:.0f}"
     mantissa, mark, power = text.partition("e")
     ten = f"10{str(int(power or 0)).translate(RAISED)}"
     printed = text if not mark else ten if mantissa == "1" else f"{mantissa}{FIRM}×{FIRM}{ten}"

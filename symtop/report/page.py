@@ -195,7 +195,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
         contents=[(name, _heading(part)) for name, part in together.items()],
         parts={name: writer(part.replace(f"]({REFERENCE}#", "](#")) for name, part in together.items()},
         integrators=_whole("integrators", *records),
-        provenance=studies[-1]["provenance"],
+        provenance=netcdf.provenance(changes=True),
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
     )
     target = results / PAGE

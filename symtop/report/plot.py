@@ -155,7 +155,7 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
     ax.set_ylim(bottom=0.1 * level)
     if compared:
         nutations, end = data.attrs["nutations"], data.attrs["horizon"]
-        runs = f"{nutations:.3g} {period_word(data)}s" if nutations > 0.0 else f"t = {end:g}"
+        runs = f"{nutations:.3g} {period_word(data)}{'s' * (nutations != 1.0)}" if nutations > 0.0 else f"t = {end:g}"
         ax.set_title(f"{data['scene'].item()}, {runs}", loc="left", weight="bold")
         if x == "seconds" and data["exact_seconds"].notnull():
             ax.axvline(exact := data["exact_seconds"].item(), color="0.35", ls=(0, (1, 2)), lw=1.0)
@@ -169,7 +169,7 @@ def _ensemble(ax: "Axes", data: xr.Dataset, quantity: str, members: Any) -> None
     if "horizon" not in data or "chart" not in data.attrs:
         raise SymtopError("data over member must be a dataset of ensemble, with its horizons and attributes")
     _bands(ax, data, quantity, spread.member_errors(members, data, quantity))
-    ax.set_title(f"{data.attrs['integrator']} on {data.sizes['member']} {spread.kind_of(data)}")
+    ax.set_title(f"{data.attrs['integrator']} on {spread.so_many(data.sizes['member'], spread.kind_of(data))}")
 
 
 def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Dataset, path: str | Path) -> None:
@@ -209,8 +209,9 @@ def draw_ensemble(data: xr.Dataset, errors: dict[str, spread.Array], path: str |
         _bands(axis, data, name, values)
         axis.label_outer()
     ended = (data["outcome"] == "ok").mean().item()
+    members = spread.so_many(data.sizes["member"], spread.kind_of(data))
     sentence = (
-        f"{data.attrs['integrator']} on {data.sizes['member']} {spread.kind_of(data)}: errors against the true motion; "
+        f"{data.attrs['integrator']} on {members}: errors against the true motion; "
         f"{100.0 * ended:.4g} % of the runs ended ok"
     )
     if ended < 1.0:

@@ -41,6 +41,11 @@ def kind_of(data: xr.Dataset) -> str:
     return "bodies" if data.attrs["chart"] == charts.BODY else "tops"
 
 
+def so_many(count: int, kind: str) -> str:
+    """So many "tops" or "bodies" in words."""
+    return f"{count} {kind if count != 1 else {'tops': 'top', 'bodies': 'body'}[kind]}"
+
+
 def member_errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array:
     """Errors (n, samples) of an ensemble of these members; NaN beyond the samples of a run of few steps."""
     one_of("quantity", quantity, QUANTITIES[kind_of(data)])

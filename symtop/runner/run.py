@@ -206,13 +206,17 @@ def _tables(study: Study, data: Combined, results: Path) -> Iterator[dict[str, A
 
 
 def _saved(study: Study, data: Combined, results: Path, save: Save, *, quick: bool) -> Iterator[dict[str, str]]:
-    """Save the pictures one by one; StudyError for what is none."""
+    """Save the pictures one by one; StudyError for what is none, and for a second one of a name."""
+    names = set[str]()
     for picture in each(study.name, "pictures", lambda: study.pictures(data), Picture, "or yield Pictures"):
         if not hasattr(picture.figure, "savefig"):
             kind = type(picture.figure).__name__
             raise StudyError(f"study {study.name}: the figure of a Picture must be one of matplotlib, not a {kind}")
         with failing(study.name, "pictures"):
             label("name of a picture", picture.name)
+        if picture.name in names:
+            raise StudyError(f"study {study.name}: pictures must have a name each, and two are called {picture.name}")
+        names.add(picture.name)
         file = f"{study.name}-{picture.name}.{getattr(picture.figure, 'suffix', 'png')}"  # a film is a GIF
         if quick and hasattr(picture.figure, "text"):
             picture.figure.text(

@@ -25,6 +25,8 @@ def test_run_prints_the_errors_and_writes_the_dataset(tmp_path):
     assert report["steps"] == 800
     assert 1e-3 < report["errors"]["axis"]["largest"] < 2e-2
     assert report["errors"]["p_psi"]["largest"] < 1e-14
+    once = call("run", "spheroid", "strang", "--step-size", 8, "--no-guard").output
+    assert "\n1 step, 1 force evaluation\n" in once
 
 
 def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):

@@ -49,6 +49,13 @@ def test_json_has_outcomes_and_errors_and_a_finer_step_has_smaller_ones():
     assert fine["steps"] == 10 * coarse["steps"]
 
 
+def test_one_member_is_one():
+    for kind, one in (((), "top"), (("--bodies", "--kind", "regular"), "body")):
+        output = call("--members", 1, *kind, "strang", *STEPS, "--samples", 2).output
+        assert f"strang on 1 {one}: 1 reached the horizon\n60 steps, computed " in output
+        assert f"largest error, 1 {one} " in output
+
+
 def test_members_that_fail_are_counted_and_drawn(tmp_path):
     result = call("--members", 60, "stormer-verlet", *STEPS, "--samples", 21, "--figure", tmp_path / "f.png")
     assert "left_chart" in result.output

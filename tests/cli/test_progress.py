@@ -67,6 +67,8 @@ def test_a_run_of_many_steps_says_how_long_it_takes(capsys, monkeypatch):
     runs.estimate(1e9, run)
     minutes = re.fullmatch(r"symtop: 1e\+09 steps take about (\d+) min\n", capsys.readouterr().err)
     assert 15 <= int(minutes[1]) <= 25
+    runs.estimate(9e9, run)  # and so many two and a half hours
+    assert re.fullmatch(r"symtop: 9e\+09 steps take about 2.\d h\n", capsys.readouterr().err)
     assert max(few) < 1.1e6
     few.clear()
     step = 1e-4  # in plain Python

@@ -36,6 +36,9 @@ def run():
 MADE = {
     "errors": symtop.errors,
     "reference": lambda _: symtop.reference("spheroid", np.linspace(0.0, 2.0, 11)),
+    "reference of a body": lambda _: symtop.reference("check-case-2", [0.0, 1.0]),
+    "reference beyond double": lambda _: symtop.reference("spheroid", [0.0, 1.0], "quad"),
+    "bodies": lambda _: symtop.body_population(8, seed=1),
     "population": lambda _: symtop.population(8, seed=1),
     "ensemble": lambda _: symtop.ensemble(symtop.population(8, seed=1), "strang", per_nutation=50, nutations=1),
     "long_run": lambda _: symtop.long_run("spheroid", "strang", steps=20_000, step_size=0.001, quiet=True),
@@ -61,9 +64,12 @@ def test_units_are_those_of_the_scene():
     scenes = {name: symtop.scene(name).units for name in symtop.scenes()}
     for name in ("SI", ""):
         scene = next(key for key, units in scenes.items() if units == name)
-        data = symtop.simulate(scene, "strang", step_size=0.001, horizon=0.01)
-        assert data["time"].attrs["units"] == ("s" if name == "SI" else "1")
-        assert data["energy"].attrs["units"] == ("kg m2 s-2" if name == "SI" else "1")
-        assert data["theta"].attrs["units"] == "rad"
+        body = "check-case-2" if name == "SI" else "heavy-brick"
+        run = symtop.simulate(scene, "strang", step_size=0.001, horizon=0.01)
+        for data in (run, symtop.reference(scene, [0.0, 1.0]), symtop.reference(body, [0.0, 1.0])):
+            assert data["time"].attrs["units"] == ("s" if name == "SI" else "1")
+            assert data["energy"].attrs["units"] == ("kg m2 s-2" if name == "SI" else "1")
+            assert data["p_phi"].attrs["units"] == ("kg m2 s-1" if name == "SI" else "1")
+            assert data["theta"].attrs["units"] == "rad"
     with pytest.raises(symtop.SymtopError, match="units"):
         dataclasses.replace(symtop.scene("spheroid"), units="imperial")

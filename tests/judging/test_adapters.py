@@ -195,6 +195,7 @@ def test_a_slow_program_has_the_time_that_earlier_runs_took_also_after_a_short_o
         ("nothing.py:step", {}, "FILE.py:NAME with a file that is there"),
         ("nothing.so", {}, "must be a file that is there"),
         ("no-such-program-anywhere -x", {"form": "program"}, "must be a command that can be run"),
+        ("my 'engine -x", {"form": "program"}, 'must be a command that can be run, not "my \'engine -x"'),
         ("true", {}, "or a command with form program, not 'true'"),
         ("python engine.py", {}, "a command needs form program"),
         (midpoint, {"form": "rotation"}, r"must take \(q, w, h, inertia, torque\), not \(f, t, y, h\)"),
@@ -459,6 +460,19 @@ def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch,
     assert len(ranking) == 5
 
 
+def test_a_claim_is_implied_if_it_follows_from_those_that_are_made(only):
+    only("order", "time", "energy")
+    for words, end in (((), "(time): 1 confirmed."), (("--symplectic",), "(energy and time): 1 confirmed, 1 refuted.")):
+        assert run_judge(f"{STEPS}:heun", "--order", "2", *words)[1].endswith(f"Implied by them {end}\n")
+
+
+def test_the_figure_on_a_body_counts_in_its_periods(only, tmp_path):
+    only("order")
+    for scene, unit in (("heavy-brick", "natural periods"), ("spheroid", "nutations")):
+        code, output = run_judge(f"{STEPS}:heun", "--scene", scene, "--figure", str(tmp_path / "step.png"))
+        assert (code, f" force evaluations in 10 {unit}: " in output) == (0, True), output
+
+
 def test_a_false_claim_gives_code_1_and_says_why(only):
     only("order", "symplectic")
     code, output = run_judge(f"{STEPS}:heun", "--order", "3", "--not-symplectic", "--json")
@@ -475,6 +489,7 @@ def test_a_false_claim_gives_code_1_and_says_why(only):
         ((":heun", "--card", "x.txt"), "--card must be a file that ends in .html or .htm, not 'x.txt'"),
         ((":heun", "--badge", "x.png"), "--badge must be a file that ends in .svg, not 'x.png'"),
         ((":heun", "--figure", "step.doc"), "--figure must be a file that ends in"),
+        ((":leapfrog", "--form", "separable", "--figure", "step.png"), "symtop: --figure shows errors of the axis"),
     ],
 )
 def test_bad_input_to_the_command(arguments, words):

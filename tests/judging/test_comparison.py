@@ -164,7 +164,7 @@ def test_a_horizon_beyond_the_budget_is_not_run():
     plt.close(symtop.plot(data).figure)
 
 
-def test_the_command_prints_a_line_for_each_variant(tmp_path):
+def test_the_command_prints_a_line_for_each_variant(tmp_path, clean_registry):
     words = ["spheroid", "midpoint", "rk4", "--nutations", "1", "--cost", "evaluations", "--budget", "1e4"]
     figure, output = tmp_path / "c.png", tmp_path / "c.nc"
     result = call("compare", *words, "--figure", figure, "--output", output)
@@ -183,7 +183,14 @@ def test_the_command_prints_a_line_for_each_variant(tmp_path):
     }  # fmt: skip
     assert runs["rk4[axis]", 1e-6]["force_evaluations"] == least(stored, 1e-6)["rk4[axis]"]
     assert [report[name] for name in ("scene", "cost")] == ["spheroid", "evaluations"]
-    assert result.stdout.startswith("spheroid to t = 1.18017 s (1 nutations): ")
+    assert result.stdout.startswith("spheroid to t = 1.18017 s (1 nutation): ")
+    plugin = tmp_path / "still.py"
+    plugin.write_text(
+        "import symtop\nstart = symtop.Angles(theta=1.0)\n"
+        "symtop.register_scene(symtop.Scene('still', symtop.SymmetricTop(1.0, 1.0, 0.0), start, 5.0))\n"
+    )
+    still = call("compare", "still", "exact", "--cost", "evaluations", "--plugin", plugin).stdout
+    assert still.startswith("still to t = 5: the cheapest run by evaluations\n")
     for bad in (["rk5"], [], ["rk4", "--figure", "c.doc"]):
         call("compare", "spheroid", *bad, code=2)
 

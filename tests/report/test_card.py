@@ -3,6 +3,7 @@
 import re
 import xml.etree.ElementTree as ET
 
+import numpy as np
 import pytest
 
 import symtop
@@ -58,6 +59,21 @@ def test_a_card_without_measurements_says_why(tmp_path):
     assert "no &lt;luck&gt;" in page
     assert "<luck>" not in page
     assert [figure.axes[0].texts[0].get_text() for figure in figures(NOTHING)] == ["no <luck>", "it stopped"]
+
+
+@pytest.mark.parametrize(
+    ("chart", "unit", "scale"),
+    [("axis", "nutations", "nutation's energy"), ("body", "natural periods", "kinetic energy and |mgl|")],
+)
+def test_the_units_of_a_card_are_those_of_its_scene(chart, unit, scale, tmp_path):
+    run = {"long_nutations": [1.0, 2.0], "energy_change": [1e-9, 2e-9], "steps_run": np.array(200)}
+    energy = Finding("energy", "", Measured("drift", 2e-9), "measured", "it grows", 2e-9, 1e-11)
+    findings, about = (NOTHING["order"], energy), About("mine", chart, "python", 0.0)
+    ledger = Ledger("mine", "any", findings, {name: np.asarray(values) for name, values in run.items()}, about)
+    axes = figures(ledger)[1].axes[0]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (f"time ({unit})", f"|change|, of the {scale}")
+    of_body = "relative to the kinetic energy of the start" in card(ledger, tmp_path / "card.html").read_text("utf-8")
+    assert of_body is (chart == "body")
 
 
 def test_the_badge_says_what_is_refuted_or_what_the_method_is(ledger, tmp_path):

@@ -44,6 +44,7 @@ def test_an_ensemble_of_short_runs_is_drawn_over_time(n, per_nutation):
     tops = symtop.population(n, seed=3)
     runs = symtop.ensemble(tops, "strang", per_nutation=per_nutation, nutations=1, quiet=True)
     ax = symtop.plot(runs, members=tops)
+    assert ax.get_title() == ("strang on 1 top" if n == 1 else "strang on 40 tops")
     times = ax.get_lines()[0].get_xdata()
     assert times.size == per_nutation
     ax.figure.canvas.draw()

@@ -93,6 +93,8 @@ def test_a_grid_that_is_none_is_refused(tmp_path, change, says, words):
         ("pictures = lambda data: iter([Figure()])", "pictures must return or yield Pictures; an entry is a Figure"),
         ("pictures = lambda data: [Picture('a', 'a.png')]", "must be one of matplotlib, not a str"),
         ("pictures = lambda data: [Picture('../a', Figure())]", "name of a picture must be"),
+        ("pictures = lambda data: [Picture('a', Figure()), Picture('b', Figure()), Picture('a', Figure())]",
+         "pictures must have a name each, and two are called a"),
         ("pictures = lambda data: (1 / 0 for _ in 'x')", "pictures failed: ZeroDivisionError"),
         ("tables = lambda data: pd.DataFrame()", "tables must return tables by name, not"),
         ("tables = lambda data: {'a': [1.0]}", "table a must be a DataFrame, not a list"),

@@ -106,7 +106,9 @@ class Program(Stepper):
     own_loop = True
 
     def __init__(self, command: str, chart: str) -> None:
-        self.words, self.chart, self.form = shlex.split(command), chart, FORMULATIONS[chart]
+        self.words, self.chart, self.form = [], chart, FORMULATIONS[chart]
+        with contextlib.suppress(ValueError):  # a quotation that does not end
+            self.words = shlex.split(command)
         self.words[:1] = [str(at_home(word)) if word.startswith("~") else word for word in self.words[:1]]
         if not self.words or shutil.which(self.words[0]) is None:
             raise SymtopError(f"a program must be a command that can be run, not {command!r}")

@@ -76,7 +76,8 @@
         const down = head.getAttribute("aria-sort") === "ascending", sign = down ? -1 : 1;
         for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
         head.setAttribute("aria-sort", down ? "descending" : "ascending");
-        const text = (row) => row.cells[column].textContent.trim(), number = (row) => Number(text(row).replaceAll(",", ""));
+        const text = (row) => row.cells[column].textContent.trim();
+        const number = (row) => Number(text(row).replaceAll(",", "").replace(/inf$/, "Infinity")); // as Python writes it
         const rows = [...body.rows], numeric = rows.every((row) => !Number.isNaN(number(row)));
         const order = numeric ? (a, b) => number(a) - number(b) : (a, b) => text(a).localeCompare(text(b));
         rows.sort((a, b) => (!text(a) - !text(b)) || sign * order(a, b)); // what is empty stands last

@@ -7,7 +7,7 @@ epsilon v off the third axis, |v| up to 1, rates across it up to 3/2. Attitudes 
 
     short-axis       a rotation about the axis of the largest moment, up to 0.5 rad off
     long-axis        about that of the smallest moment
-    near-separatrix  2 E I2/L^2 = 1 to 2^-16 .. 2^-4 of the room there is
+    near-separatrix  where 2 E I2 = L^2, but for the momentum along the largest moment, off by 2^-16 .. 2^-4 of itself
     near-symmetric   two moments equal to 2^-20 .. 2^-6, the momentum in any direction
     needle           the smallest moment is 2^-12 .. 2^-5 of the others, which spins fast
     heavy            epsilon from 2^-7 to 1/2, spins from 1/16 to 4 of the sleeping threshold
