@@ -90,7 +90,7 @@ def test_a_real_limit_on_the_size_of_files(tmp_path):
         [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=240, check=False
     )
     assert result.returncode == 2, result.stderr
-    assert result.stderr.startswith("symtop: cannot write")
+    assert result.stderr.splitlines()[-1].startswith("symtop: cannot write")
     assert "Traceback" not in result.stderr
     assert not list((tmp_path / "small").rglob("*.npz"))
     assert not leftovers(tmp_path / "small")
@@ -251,7 +251,8 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quic
     ended_with, _, err = ended(process)
     assert time.monotonic() - start < 10.0
     assert ended_with == code
-    assert err == f"symtop: {says}; what was computed is kept, and the same command goes on from there\n"
+    last = err.splitlines()[-1]  # below lines of progress, on a slow machine
+    assert last == f"symtop: {says}; what was computed is kept, and the same command goes on from there"
     assert not leftovers(tmp_path / "r")
     count = len(list((tmp_path / "r").rglob("cases/probe/*.npz")))
     assert count >= 1, [path.read_text() for path in (tmp_path / "r").rglob("*.failed.json")]
