@@ -187,7 +187,7 @@ class _Trial(NamedTuple):
 
 def recommend(
     scene: "str | Scene", *, accuracy: float, quantity: str | None = None, horizon: float | None = None,
-    needs: Collection[str] = (), step_size: float | None = None,
+    needs: str | Collection[str] | None = None, step_size: float | None = None,
     max_step: float | None = None, general: bool = False, keeps: str | Collection[str] | None = None,
     time_a_step: float | None = None,
 ) -> Advice:  # fmt: skip
@@ -210,7 +210,7 @@ def recommend(
     """
     scene = scenes.scene(scene, bodies=True)
     quantity = ("attitude" if scene.of_body else "axis") if quantity is None else quantity
-    allowed = _needs([needs] if isinstance(needs, str) else needs)
+    allowed = _needs(_words(needs))
     accuracy = positive("accuracy", accuracy)
     one_of("quantity", quantity, settings.OF_BODY if scene.of_body else KNOWN_QUANTITIES)
     if quantity in settings.ANGLES and accuracy >= math.pi:
@@ -225,9 +225,7 @@ def recommend(
         raise SymtopError(f"step_size must be {words}", "step_size")
     longest = math.inf if max_step is None else positive("max_step", max_step)
     pace = math.inf if time_a_step is None else positive("time_a_step", time_a_step)
-    kept: Iterable[object] = () if keeps is None else keeps if isinstance(keeps, Iterable) else [keeps]
-    kept = keeps.replace(" ", "").split(",") if isinstance(keeps, str) else kept
-    constants = tuple(one_of("keeps", one, [*KEPT][: 1 if scene.of_body else None]) for one in kept)
+    constants = tuple(one_of("keeps", one, [*KEPT][: 1 if scene.of_body else None]) for one in _words(keeps))
     limits = step, longest, boolean("general", general), constants, pace
     question = _Question(scene, accuracy, quantity, horizon, allowed, *limits)
     if accuracy < limit:
@@ -249,7 +247,14 @@ def recommend(
     return _advice(question, ranked, sentences, source, beside)
 
 
-def _needs(choice: Collection[str]) -> tuple[str, ...]:
+def _words(given: object) -> list[object]:
+    """Words of a list, or of a text with commas between them; none of None."""
+    if isinstance(given, str):
+        return [*COMMA.split(given.strip())]
+    return [] if given is None else [*given] if isinstance(given, Iterable) else [given]
+
+
+def _needs(choice: Collection[object]) -> tuple[str, ...]:
     """Names of `NEEDS`, by these or by words: a word that completes no need stands for all that have it."""
     parts = {name: set(COMMA.split(words)) for name, words in NEEDS.items()}
     terms = dict.fromkeys([*NEEDS, *sorted(set().union(*parts.values()))])

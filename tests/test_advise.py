@@ -363,6 +363,8 @@ def test_energy_and_momenta_may_both_be_asked_to_be_kept():
     for wrong in ("energy,time", 3, ["energy", 3]):
         with pytest.raises(symtop.SymtopError, match=r"keeps .* is unknown; known: energy, momenta"):
             words(keeps=wrong)
+        with pytest.raises(symtop.SymtopError, match=r"needs .* is unknown; known: derivative"):
+            words(needs=wrong)
 
 
 def test_a_step_that_takes_too_long_stays_named_when_another_does_later(monkeypatch):

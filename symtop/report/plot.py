@@ -154,8 +154,8 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
             ends[f"{label}: {fails}" if fails else label] = (*map(float, place), options["color"])
     ax.set_ylim(bottom=0.1 * level)
     if compared:
-        nutations, end = data.attrs["nutations"], data.attrs["horizon"]
-        runs = f"{nutations:.3g} {period_word(data)}{'s' * (nutations != 1.0)}" if nutations > 0.0 else f"t = {end:g}"
+        many, end = f"{data.attrs['nutations']:.3g}", data.attrs["horizon"]
+        runs = f"{many} {period_word(data)}{'s' * (many != '1')}" if many != "0" else f"t = {end:g}"
         ax.set_title(f"{data['scene'].item()}, {runs}", loc="left", weight="bold")
         if x == "seconds" and data["exact_seconds"].notnull():
             ax.axvline(exact := data["exact_seconds"].item(), color="0.35", ls=(0, (1, 2)), lw=1.0)

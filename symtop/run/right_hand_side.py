@@ -14,6 +14,7 @@ Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, sect
 
 import math
 from collections.abc import Callable, Sequence
+from decimal import ROUND_DOWN, Context
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -163,25 +164,26 @@ def _outlook(
     expected = max(grown(Probe(times, error, "ok", end, 0), end, straight=False), float(error.max()) * total / since)
     expected = math.inf if ended else min(expected, 2.0 * extent)
     better = setting * (accuracy / max(expected, TINY)) ** (1.0 / ((rule and integrator(method).order) or 1))
-    better = min(better, end if rule else LOOSEST)
+    better = 0.3 * setting if ended else min(better, end if rule else LOOSEST)
+    better = float(Context(prec=2, rounding=ROUND_DOWN).create_decimal(better))
     change = math.sqrt(EPSILON) * extent
     slopes = [(f(t, y + change * unit) - f(t, y)) / change for unit in np.eye(y.size)]
     fastest, cause = float(np.abs(np.linalg.eigvals(np.array(slopes))).max()), "step"
-    why = f"errors add up over {end * frequency / (2.0 * math.pi):.3g} periods; take a {kind} of about {better:.1g}"
+    why = f"errors add up over {end * frequency / (2.0 * math.pi):.3g} periods; take a {kind} of about {better:.2g}"
     if not expected > accuracy:
-        cause, why = "", f"a {kind} of {better:.1g} would do for {accuracy:.1g}"
+        cause, why = "", f"a {kind} of {better:.2g} would do for {accuracy:.1g}"
     elif mean * fastest > 1.0 and fastest > STIFF * frequency:
         cause, better = "stiffness", math.nan
         why = f"f has rates of {fastest:.1g}, the motion of {frequency:.1g}; take an implicit method, such as radau"
     elif ended or np.linalg.norm(run_piece(moved)[1] - states, axis=1).max() > OWN * since**2 * MOVED * extent:
         better = min(better, 0.3 * setting)
         cause = "instability"
-        why = f"it multiplies a small change more than the motion does; try a {kind} of {better:.1g}"
+        why = f"it multiplies a small change more than the motion does; try a {kind} of {better:.2g}"
     elif total > UNSTABLE * growth.at(0.5 * end):
         lost = total * EPSILON * extent > accuracy
         cause, better = "instability", math.nan if lost else better
         why = f"the motion multiplies a small change {total:.1g} times; " + (
-            "rounding alone decides, shorten the horizon" if lost else f"try a {kind} of {better:.1g}"
+            "rounding alone decides, shorten the horizon" if lost else f"try a {kind} of {better:.2g}"
         )
     elif float(error.max()) < 10.0 * FINE * float(np.abs(true).max()):
         cause, better, why = "rounding", math.nan, f"rounding adds up, and no {kind} helps"

@@ -321,7 +321,7 @@ def answered(browser, selector, value):
 def test_a_person_can_use_it(site, tmp_path):
     with Browser(1280, 900) as browser:
         browser.open(address(site))
-        browser.wait_for("document.body.dataset.answer === 'ok'")
+        browser.wait_for("document.body.dataset.answers === '2'")  # the page asks twice as it opens
         browser.click("#play")
         status = "document.querySelector('#status').textContent"
         browser.wait_for(f"{status}.includes('midpoint: reached t = 8')")
@@ -421,6 +421,17 @@ def test_an_answer_of_another_scene_or_method_than_the_pages_is_not_shown(site):
         browser.set("#horizon", 60)  # and no more: the answer before it is shown
         browser.wait_for("window.said.some((words) => words.startsWith('gauss-4: reached t = 70'))")
         assert browser.problems == []
+
+
+def test_lines_of_another_motion_are_not_shown(site):
+    with Browser() as browser:
+        browser.open(address(site))
+        data = "document.querySelector('#cost').dataset"
+        browser.wait_for(f"{data}.missing === '0' && {data}.lines > 0")
+        browser.evaluate("window.went = fetch; window.never = new Promise(() => {}); 0")
+        browser.evaluate("window.fetch = (path, ...rest) => (path === 'cost' ? never : went(path, ...rest)); 0")
+        answered(browser, "#theta", 0.5)
+        browser.wait_for(f"{data}.lines === '0'")
 
 
 def test_the_page_counts_and_labels_what_can_be_told_apart(site):
@@ -589,7 +600,9 @@ def test_the_chart_of_costs_and_the_oscillator_are_on_the_page(site, tmp_path):
         answered(browser, "#second", "strang")
         browser.wait_for(f"{data}.points === '2'")
         image = browser.evaluate("document.querySelector('#cost').toDataURL()")
+        lines = browser.evaluate(f"{data}.lines")
         answered(browser, "#step_size", 0.05)  # the points move along their lines
+        assert browser.evaluate(f"{data}.lines") == lines != "0"
         browser.wait_for(
             f"{data}.points === '2' && document.querySelector('#cost').toDataURL() !== {json.dumps(image)}"
         )

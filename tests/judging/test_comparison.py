@@ -138,6 +138,9 @@ def test_another_quantity_takes_the_chart_that_shows_it(quantity):
     charts = {"attitude": ["strang[attitude]", "rk4[angles]"], "energy": ["strang[axis]", "rk4[axis]"]}
     assert data["variant"].values.tolist() == charts[quantity]
     assert data["error"].attrs["units"] == ("rad" if quantity == "attitude" else "1")
+    ax = symtop.plot(data)
+    assert ax.get_title(loc="left") == "spheroid, 1 nutation"
+    plt.close(ax.figure)
     assert (data["reached"].sel(target=1e-6) == "met").all()
 
 

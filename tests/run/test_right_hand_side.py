@@ -146,6 +146,17 @@ def test_the_step_that_is_advised_keeps_the_accuracy():
     expected = symtop.guard(kepler, 0.0, at_pericentre(0.3), horizon, step_size=0.1, accuracy=1e-3)
     assert expected.error > 1e-3
     assert 3e-4 < measured(kepler, at_pericentre(0.3), horizon, "rk4", step_size=expected.setting) < 2e-3
+    assert f"take a step of about {expected.setting!r}" in str(expected)
+
+
+@pytest.mark.parametrize("step", [0.8, 1.0])
+def test_a_step_is_advised_where_the_piece_itself_fails(step):
+    stiffening = lambda t, y: [y[1], -(y[0] ** 3)]
+    expected = symtop.guard(stiffening, 0.0, [3.0, 0.0], 100.0, step_size=step)
+    assert math.isinf(expected.error)
+    assert 0.2 * step < expected.setting < 0.4 * step
+    assert f"try a step of {expected.setting!r}" in str(expected)
+    assert math.isfinite(symtop.guard(stiffening, 0.0, [3.0, 0.0], 100.0, step_size=expected.setting).error)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ export function drawCost(canvas, { lines, missing }, runs, catalogue) {
   const color = (name) => { const own = catalogue.find((entry) => entry.name === name).color; return own === "#000000" ? tone("ink") : own; };
   const points = runs.filter((one) => one.seconds > 0 && one.error > 0);
   const all = [...lines.flatMap((line) => line.seconds.map((seconds, k) => [seconds, line.error[k]])), ...points.map((one) => [one.seconds, one.error])];
+  Object.assign(canvas.dataset, { lines: lines.length, points: points.length, missing });
   if (!all.length) return;
   const span = (place) => { const logs = all.map((pair) => Math.log10(pair[place])); return [Math.min(...logs) - 0.2, Math.max(...logs) + 0.2]; };
   const [west, east] = span(0);
@@ -64,5 +65,4 @@ export function drawCost(canvas, { lines, missing }, runs, catalogue) {
     context.fill();
     context.stroke();
   }
-  Object.assign(canvas.dataset, { lines: lines.length, points: points.length, missing });
 }

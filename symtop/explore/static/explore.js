@@ -152,6 +152,9 @@ async function post(path, changes) {
 // What an answer is of: one of another scene or method than the page's own is not shown.
 const subject = () => [$("scene").value, values.integrator, values.second].join();
 
+// What the lines of the costs are of.
+const motion = () => JSON.stringify([...TOP, ...START, ["horizon"]].map(([name]) => values[name]));
+
 // One request at a time; changes made meanwhile lead to one more, with the newest values.
 async function ask() {
   if (asking) { stale = true; return; }
@@ -204,11 +207,11 @@ async function askMap() {
 async function askCost() {
   clearTimeout(patient);
   if (document.hidden) { patient = setTimeout(askCost, 1000); return; }
-  const question = costed = JSON.stringify(values);
+  const question = costed = JSON.stringify(values), of = motion();
   const response = await post("cost").catch(() => null);  // `ask` says that nobody answers
   if (!response || question !== costed) return;
   const answer = await response.json();
-  costs = answer.error ? null : answer;
+  costs = answer.error ? null : { ...answer, of };
   const bad = answer.error ? [answer.error] : answer.lines.filter((line) => line.message).map((line) => `${line.name}: ${line.message}`);
   $("cost-note").textContent = [...bad, ...(answer.missing ? [answer.missing === 1 ? "1 method is being measured" : `${answer.missing} methods are being measured`] : [])].join("; ");
   drawPlots();
@@ -304,7 +307,7 @@ function show(answer, other, began) {
   $("netcdf").disabled = $("script").disabled = false;
   run.error = answer.outcome === "ok" ? errorOf(answer.largest) : null;
   if (second) second.error = other.outcome === "ok" ? errorOf(other.largest) : null;
-  if (costs) costs.seconds = [];  // those of the runs before
+  if (costs) costs = costs.of === motion() ? { ...costs, seconds: [] } : { lines: [], seconds: [] };  // not those of before
   clearTimeout(patient);
   askDamped();
   drawPlots();
