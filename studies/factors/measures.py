@@ -90,16 +90,20 @@ def timed(asked: Runs, processes: int) -> Array:
     return np.array([fresh_process.call(least_times, asked) for _ in range(processes)]).T
 
 
-def settled_times(asked: Runs, processes: int) -> Array:
-    """As `timed`; those that are noisy are taken again, and of all processes the least count, as many as before."""
-    taken = timed(asked, processes)
+def settled_times(asked: Runs, processes: int) -> tuple[Array, Array]:
+    """As `timed`, and how often each was taken.
+
+    Those that are noisy are taken again, and of all processes the least count, as many as before.
+    """
+    taken, tries = timed(asked, processes), np.ones(len(asked.runs))
     for _ in range(TRIES - 1):
         loud = np.flatnonzero(quartile_spread(taken) > NOISY)
         if not loud.size:
             break
         again = timed(asked._replace(runs=[asked.runs[i] for i in loud]), processes)
         taken[loud] = np.sort(np.hstack([taken[loud], again]))[:, :processes]
-    return taken
+        tries[loud] += 1
+    return taken, tries
 
 
 def factorial(
@@ -113,7 +117,7 @@ def factorial(
     numbers = {name: np.full(shape, math.nan) for name in names}
     reasons = np.full(shape, "", dtype=object)
     samples = np.full((*shape, len(CALLS), processes), math.nan)
-    spread = np.full((*shape, len(CALLS)), math.nan)
+    spread, tries = (np.full((*shape, len(CALLS)), math.nan) for _ in range(2))
     places, runs = [], []
     for goal in goals:
         part = [cell for cell in grid if cell.language in goal.languages]
@@ -129,9 +133,9 @@ def factorial(
                 if caller(scene, cell, call, met.setting, met.horizon) is not None:
                     places.append((grid.index(cell), *at, CALLS.index(call)))
                     runs.append((cell.name, call, met.setting, met.horizon))
-    times = settled_times(Runs(scene, runs, rounds, batch), processes)
-    for place, taken, wide in zip(places, times, quartile_spread(times), strict=True):
-        samples[place], spread[place] = taken, wide
+    times, often = settled_times(Runs(scene, runs, rounds, batch), processes)
+    for place, taken, wide, count in zip(places, times, quartile_spread(times), often, strict=True):
+        samples[place], spread[place], tries[place] = taken, wide, count
     dims = ("variant", "horizon", "target")
     table = xr.Dataset(
         {name: (dims, values) for name, values in numbers.items()}
@@ -141,4 +145,6 @@ def factorial(
         },
     )  # fmt: skip
     dims = (*dims, "call")
-    return table.assign({"seconds": (dims, np.median(samples, -1)), "spread": (dims, spread)})
+    return table.assign(
+        {"seconds": (dims, np.median(samples, -1)), "spread": (dims, spread), "seconds_tries": (dims, tries)}
+    )

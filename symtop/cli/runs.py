@@ -67,6 +67,7 @@ def run(
     with ticking("loading"):
         from symtop.core import netcdf
         from symtop.measure.errors import OF_BODY, QUANTITIES, errors
+        from symtop.measure.settings import judgeable
         from symtop.measure.verdicts import judgement
         from symtop.model import scenes
         from symtop.run.reference.truth import reference
@@ -75,8 +76,8 @@ def run(
         settings["step_size"] = h = common.step_of(scene, settings)
         problem = scenes.scene(scene, bodies=True)
         horizon = problem.horizon if settings["horizon"] is None else scenes.horizon_of(settings["horizon"])
-        if problem.of_body:
-            _check_body(problem, guard, horizon)
+        if problem.of_body:  # one to which its motion is not known is refused before the run, and not after it
+            judgeable(problem, "attitude", horizon)
     if h is not None and h > 0.0:
         few_steps = partial(simulate, scene, integrator, step_size=h, samples=2, guard=False)
         estimate(horizon / h, lambda few: few_steps(horizon=few * h))
@@ -115,16 +116,6 @@ def run(
         say_written(output, figure)
     if facts["outcome"] != "ok":
         sys.exit(3)
-
-
-def _check_body(scene: Any, guard: str, horizon: float) -> None:
-    """Refuse, before the run, a guard that bodies do not have and a horizon to which the motion is not known."""
-    from symtop.measure.settings import judgeable
-
-    if guard == "exact":
-        words = f"series on {scene.name}, a body without symmetry, not 'exact'"
-        raise SymtopError(f"guard must be {words}", "guard")
-    judgeable(scene, "attitude", horizon)
 
 
 def estimate(steps: float, run: Callable[[int], object]) -> None:

@@ -113,11 +113,13 @@ def errors(
     doubtful = [] if sure else elsewhere(data.time, columns)
     for sentence in [*doubtful, *(doubts(data.time, columns, chosen.horizon) if foreign else ())]:
         warnings.warn(f"on {chosen.name}: {sentence}", SymtopWarning, stacklevel=2)
-    shown = dataset(data.time, columns | {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns})
+    bounds = {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns}
+    shown = dataset(data.time, columns | bounds, chosen.units)
     for name in columns:
         words, units = ERRORS[name]
         if chosen.of_body:
             words = words.replace("E0 - min V", "the kinetic energy of the start and |mgl|")
+            words = words.replace("the larger momentum", "the momentum of the start")
         shown.variables[name].attrs.update(long_name=words, units=units)
         shown.variables[f"{name}_bound"].attrs.update(long_name=f"least {words} to be told from none", units=units)
     attributes = {"scene": chosen.name, "precision": truth.attrs["precision"]}

@@ -158,7 +158,7 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
     if not math.isfinite(factor):
         return Growth(math.nan, 0.0)
     factor **= 1.0 / stride
-    doubt = ROUNDING / nudge / min(stride * h * frequency, 1.0) ** 2 / stride
+    doubt = ROUNDING / nudge / max(min(stride * h * frequency, 1.0) ** 2, TINY) / stride
     return Growth(factor, off + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), SLOWEST)), doubt)
 
 

@@ -23,14 +23,23 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.core.code_hash import by_file, digest, hashed
-from symtop.core.errors import SymtopError, SymtopWarning, boolean, check_replaceable, file_path, positive, whole
+from symtop.core.errors import (
+    SymtopError,
+    SymtopWarning,
+    boolean,
+    check_replaceable,
+    file_path,
+    foreign_code,
+    positive,
+    whole,
+)
 from symtop.core.files import cache_root, make_private
 from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
 from symtop.core.progress import progress_bar
 from symtop.core.signals import ending_on_sigterm
 from symtop.methods.framework.loop import FixedStep, Loop, Marks, Position, inside
-from symtop.methods.framework.plan import OK, OUTCOMES, sentence
+from symtop.methods.framework.plan import OK, ending, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.charts import BODY, Array, View, body_energy
 from symtop.model.scenes import Scene, scene as find_scene
@@ -167,7 +176,8 @@ def long_run(
     count, h = whole("steps", steps, 1, MOST_STEPS), positive("step_size", step_size)
     _, solver = chart_of(method, of_body=chosen.of_body)
     assert isinstance(solver.loop, Loop)  # noqa: S101
-    loop = solver.loop if boolean("compensated", compensated) else solver.loop.plain()
+    compensated = boolean("compensated", compensated)
+    loop = solver.loop if compensated else solver.loop.plain()
     par, rule, state = solver.setup(chosen.top, chosen.start, h)
     checkpoints = _Checkpoint(checkpoint, _identity(chosen, method, h, count, compensated))
     result = None if output is None else checkpoints.checked(file_path("output", output))
@@ -185,11 +195,13 @@ def long_run(
                     bar.update(after.k - at.k)
                     at = after
                     checkpoints.note(at, rows)
+        with foreign_code(f"integrator {method.name} on {chosen.name}"):
+            ended = ending(outcome)
         data = netcdf.describe(
             _windowed(rows, ends, quantities), title=f"{title}, {count} steps", units=chosen.units,
             integrator=method.name, scene=chosen.name, step_size=h, horizon=count * h,
-            compensated=str(compensated).lower(), outcome=OUTCOMES[outcome], reached_time=reached * h,
-            outcome_message=sentence(OUTCOMES[outcome], reached * h, count * h, chosen.second),
+            compensated=str(compensated).lower(), outcome=ended, reached_time=reached * h,
+            outcome_message=sentence(ended, reached * h, count * h, chosen.second),
         )  # fmt: skip
         if result is not None:
             checkpoints.write(data, result)

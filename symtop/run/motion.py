@@ -98,7 +98,8 @@ class Growth(NamedTuple):
         if until <= last:
             return float(self.size[min(int(np.searchsorted(self.times, until)), count - 1)])
         power = math.log2(float(self.size[-1] / self.size[count // 2 - 1]))
-        return float(self.size[-1]) * math.pow(until / last, min(max(power, 1.0), MOST_POWER))
+        folds = min(max(power, 1.0), MOST_POWER) * math.log(until / last)
+        return float(self.size[-1]) * math.exp(min(folds, MOST_FOLDS))
 
 
 @register_jitable

@@ -173,8 +173,8 @@ def simulate(
     report = guard if callable(guard) else _warn if isinstance(guard, str) or boolean("guard", guard) else None
     arguments = scene, integrator, step_size, tolerance, horizon, samples, observe, budget
     chosen, method, chart, plan, dithered = _prepared(*arguments)
-    if isinstance(guard, str):
-        one_of("guard", guard, ("series",) if chosen.of_body else ("exact", "series"))
+    if isinstance(guard, str) and one_of("guard", guard, ("exact", "series")) == "exact" and chosen.of_body:
+        raise SymtopError(f"guard must be series on {chosen.name}, a body without symmetry, not 'exact'", "guard")
     trajectory, caution = _guarded(chosen, method, chart, plan, report, series=guard == "series")
     data = dataset(trajectory.time, trajectory.columns, chosen.units)
     data.attrs = netcdf.attributes_of(

@@ -71,5 +71,7 @@ def test_units_are_those_of_the_scene():
             assert data["energy"].attrs["units"] == ("kg m2 s-2" if name == "SI" else "1")
             assert data["p_phi"].attrs["units"] == ("kg m2 s-1" if name == "SI" else "1")
             assert data["theta"].attrs["units"] == "rad"
+        wrong = symtop.errors({"time": run["time"], "theta": run["theta"]}, scene)
+        assert wrong["time"].attrs["units"] == ("s" if name == "SI" else "1")
     with pytest.raises(symtop.SymtopError, match="units"):
         dataclasses.replace(symtop.scene("spheroid"), units="imperial")

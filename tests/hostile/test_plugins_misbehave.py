@@ -136,6 +136,18 @@ def test_a_kernel_that_does_not_compile_is_one_sentence_that_names_the_cause(ret
             assert lines[0].endswith(f"TypingError: {says}"), lines
 
 
+@pytest.mark.parametrize("number", [9, -1])
+def test_a_kernel_that_returns_an_unknown_outcome_is_told_so(number, tmp_path):
+    file = tmp_path / "own.py"
+    file.write_text(KERNEL.format(returns=f"(0.0,) * 4, carry, 1, {number}"))
+    run = "spheroid", "own-kernel"
+    for words in (["run", *run], ["long", *run, "--steps", "10"], ["ensemble", "own-kernel", "--members", "3"]):
+        horizon = [] if words[0] == "long" else ["--horizon", "1"]
+        code, lines = output_of([*words, "--step-size", "0.1", *horizon, "--plugin", file])
+        assert (code, len(lines)) == (2, 1), lines
+        assert lines[0].endswith(f"must return an outcome from 0 to 6, not {number}"), lines
+
+
 def test_an_ensemble_of_a_kernel_that_does_not_compile_is_refused_in_python(misbehaving):
     def step(par, rule, state, carry, h):
         return (0.0, 0.0), carry, 1, 0

@@ -330,8 +330,22 @@ def test_the_guard_without_the_truth_is_asked_for_by_its_name():
         symtop.simulate("spheroid", "gauss-4", **controls | {"step_size": 0.01})
     with pytest.raises(symtop.SymtopError, match="guard 'closed' is unknown; known: exact, series"):
         symtop.simulate("spheroid", "midpoint", **controls | {"guard": "closed"})
-    with pytest.raises(symtop.SymtopError, match="guard 'exact' is unknown; known: series"):
+    with pytest.raises(symtop.SymtopError, match="guard must be series on heavy-brick, a body without symmetry"):
         symtop.simulate("heavy-brick", "rk4", **controls | {"guard": "exact"})
+
+
+def test_a_free_top_without_spin_which_has_no_small_nutations_is_judged_like_any():
+    for spin in (0.0, 0.5):
+        free = symtop.Scene(
+            "free", symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(1.0, 0.0, 0.0, 1.0, 0.0, spin), 20.0
+        )
+        assert "expect an axis error" in caution(free, "rk4[axis]", step_size=1.5)
+        assert caution(free, "rk4[axis]", step_size=1e-3) == ""
+
+
+def test_a_run_that_is_far_longer_than_is_watched_is_warned_of():
+    body = symtop.Scene("far", symtop.RigidBody(1.0, 2.0, 3.0), symtop.Attitude(omega_body=(1e-3, 1.0, 1e-3)), 1e22)
+    assert "rounding alone decides" in caution(body, "rk4", step_size=1e15)
 
 
 def test_an_unstable_motion_is_warned_of_beyond_the_errors_of_its_piece():

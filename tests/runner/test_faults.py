@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -78,6 +79,11 @@ def test_what_the_netcdf_library_or_the_system_refuses_to_write(tmp_path, monkey
         refused(tmp_path, "no room is left")
 
 
+def sentences(err):
+    """What was written but lines of progress, of which a slow machine shows more."""
+    return [line for line in err.splitlines() if not re.search(r", \d+ s$", line)]
+
+
 @pytest.mark.slow
 def test_a_real_limit_on_the_size_of_files(tmp_path):
     """The kernel refuses to let files grow beyond 8 kB: every write fails as on a full disk, in workers too."""
@@ -90,7 +96,7 @@ def test_a_real_limit_on_the_size_of_files(tmp_path):
         [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=240, check=False
     )
     assert result.returncode == 2, result.stderr
-    assert result.stderr.startswith("symtop: cannot write")
+    assert sentences(result.stderr)[0].startswith("symtop: cannot write")
     assert "Traceback" not in result.stderr
     assert not list((tmp_path / "small").rglob("*.npz"))
     assert not leftovers(tmp_path / "small")
@@ -251,7 +257,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quic
     ended_with, _, err = ended(process)
     assert time.monotonic() - start < 10.0
     assert ended_with == code
-    assert err == f"symtop: {says}; what was computed is kept, and the same command goes on from there\n"
+    assert sentences(err) == [f"symtop: {says}; what was computed is kept, and the same command goes on from there"]
     assert not leftovers(tmp_path / "r")
     count = len(list((tmp_path / "r").rglob("cases/probe/*.npz")))
     assert count >= 1, [path.read_text() for path in (tmp_path / "r").rglob("*.failed.json")]
@@ -338,7 +344,7 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
         "exits": "its process was ended",
         "shape": "must return a Run with real states",
     }
-    lines = err.strip().splitlines()
+    lines = sentences(err)
     assert len(lines) == 2 * len(says)
     for name, sentence in says.items():
         own = [line for line in lines if f"bad-{name} on " in line]

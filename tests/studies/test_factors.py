@@ -165,9 +165,10 @@ def test_a_noisy_time_is_taken_again_and_the_fastest_processes_count(monkeypatch
     again = [np.array([[1.1, 9.0, 9.0, 1.0], [9.0, 9.0, 1.0, 9.0]]), *[np.array([[9.0, 9.0, 9.0, 9.0]])] * 2]
     asked, taken = [], [np.array([noisy, quiet, noisy]), *again]
     monkeypatch.setattr(measures, "timed", lambda runs, _: asked.append(runs.runs) or taken.pop(0))
-    times = measures.settled_times(measures.Runs(SCENE, ["a", "b", "c"], 1, 0.001), 4)
+    times, tries = measures.settled_times(measures.Runs(SCENE, ["a", "b", "c"], 1, 0.001), 4)
     assert asked == [["a", "b", "c"], ["a", "c"], ["c"], ["c"]]  # 1, 1, 1, 9 stays noisy: no more are tried
     assert times.tolist() == [[1.0, 1.0, 1.0, 1.1], quiet, [1.0, 1.0, 1.0, 9.0]]
+    assert tries.tolist() == [2, 1, 4]
 
 
 @pytest.mark.parametrize(("share", "busy"), [(0.0, None), (facts.NOISY_SHARE, None), (0.2, True)])
@@ -179,6 +180,9 @@ def test_times_of_a_busy_machine_are_not_compared(quiet, share, busy):
     data = quiet.assign({"spread": (quiet["spread"].dims, spread)})
     answers = facts.facts(data)
     assert (answers["loud"], answers["times"], answers["busy"]) == (loud, known.size, busy)
+    assert answers["again"] == 0
+    retaken = data["seconds_tries"].where(~(data["spread"] > facts.NOISY), 4)
+    assert facts.facts(data.assign({"seconds_tries": retaken}))["again"] == loud
     assert (answers["whole"] is None) == np.isnan(answers["user_most"]) == bool(busy)
     tables = facts.tables(data)
     assert tables["effects"].empty == tables["charts"].empty == tables["scipy"].empty == bool(busy)

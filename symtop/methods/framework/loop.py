@@ -34,7 +34,7 @@ from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.parallel import heed
 from symtop.methods.framework import lanes as many, preparation
 from symtop.methods.framework.lanes import Blocks, Lanes, Many, Whole
-from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan, Run
+from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan, Run, ending
 from symtop.methods.framework.preparation import Preparation, Shown, as_it_steps, momenta_at, opened
 from symtop.methods.framework.registry import Solver
 from symtop.methods.vectors import accumulate, accumulate_plainly, zero
@@ -279,7 +279,7 @@ class FixedStep:
         samples, numbers = len(marks), flat(top, start)
         states, momenta = np.empty((samples, size)), np.empty((2, samples))
         steps, work, outcome = run(numbers, rule, h, marks, states, momenta)
-        spent, ended = work * evaluations + steps * each_step, OUTCOMES[outcome]
+        spent, ended = work * evaluations + steps * each_step, ending(outcome)
         fields = states, momenta[0], momenta[1], steps, spent, work * counted, ended, steps * h
         return tuple.__new__(Run, fields)
 
@@ -290,7 +290,7 @@ class FixedStep:
         if plan.marks[0] == 0:
             done.momenta[0] = top.momenta(start)[:2]
         states = done.states if self.present is None else self.present(par, plan.times, done.states)
-        counts = done.steps, *self.counts(done.steps, done.work), OUTCOMES[done.outcome], done.steps * plan.step_size
+        counts = done.steps, *self.counts(done.steps, done.work), ending(done.outcome), done.steps * plan.step_size
         return Run(states, done.momenta[:, 0], done.momenta[:, 1], *counts)
 
     def many(self, numbers: Array, h: Array, marks: Whole) -> Many:

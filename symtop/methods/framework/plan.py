@@ -6,6 +6,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from symtop.core.errors import SymtopError
+
 Array = NDArray[np.float64]
 
 
@@ -73,6 +75,14 @@ class Run(NamedTuple):
 
 OUTCOMES = ("ok", "left_chart", "not_converged", "not_finite", "step_too_small", "out_of_budget", "not_normalised")
 OK, LEFT_CHART, NOT_CONVERGED, NOT_FINITE, STEP_TOO_SMALL, OUT_OF_BUDGET, NOT_NORMALISED = range(len(OUTCOMES))
+
+
+def ending(outcome: int) -> str:
+    """The outcome with that number; SymtopError if a kernel has returned any other."""
+    if not 0 <= outcome < len(OUTCOMES):
+        raise SymtopError(f"a kernel must return an outcome from 0 to {len(OUTCOMES) - 1}, not {outcome}")
+    return OUTCOMES[outcome]
+
 
 _CAUSES = {
     "left_chart": "theta left (0, pi), where the angles chart ends; take a smaller step or an integrator without poles",

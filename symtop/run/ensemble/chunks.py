@@ -244,8 +244,12 @@ class Job:
                 done = solver.many(self.numbers, plan.step_size, plan.marks)
             padding = np.isnan(plan.times)
             done.states[padding], done.momenta[padding] = np.nan, np.nan
-            reached = done.steps * plan.step_size
-            return _Runs(done.states, done.momenta, done.steps, *solver.counts(*done[2:4]), done.outcome, reached)
+            reached, odd = done.steps * plan.step_size, ~np.isin(done.outcome, range(len(OUTCOMES)))
+            outcome, raised = np.where(odd, ENDS.index(RAISED), done.outcome), ""
+            if odd.any():
+                must = f"must return an outcome from 0 to {len(OUTCOMES) - 1}, not {done.outcome[odd][0]}"
+                raised = f"integrator {self.method.name} {must}"
+            return _Runs(done.states, done.momenta, done.steps, *solver.counts(*done[2:4]), outcome, reached, raised)
         if isinstance(solver, Adaptive) and self.tolerance is not None:
             done, ended = solver.many(self.numbers, self.tolerance, plan.times, plan.counts, self.budget)
             return _Runs(done.states, done.momenta, done.steps, done.work, 0 * done.work, done.outcome, ended)
