@@ -255,7 +255,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         "long_judged_3": float(data["bodies"]["judged"].isel(variant=0).sel(scene="long", family="0.3")),
         "same": by.SAME, "part": by.PART, "level": LEVEL, "double": by.DOUBLE, "several": SEVERAL, "steps": by.STEPS,
         "lower": by.LOWER,
-        "off_bound": float(np.nanmax(about["off_bound"].values)),
+        "off_bound": float(about["off_bound"].max()),
         "truth_bound": float(np.nanmedian(about["truth_bound"].values[: len(FAMILIES) - 1])),
         "judged_chaotic": float(about["judged"].sel(family=CHAOTIC)),
         "ceiling_6": by.ceiling(data, 1e-6).value,

@@ -23,6 +23,7 @@ from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import Array, attitude_distance
 from symtop.model.exact.heavy_body import HeavyBody
 from symtop.run.ensemble.bodies import body_population, growth, scenes_of
+from symtop.run.reference.independent_checks import have_heyoka
 
 from .bodies import ASKED, FREE, SYMMETRIC, Bodies, as_tops, grain, run_level, unit
 
@@ -148,7 +149,7 @@ def about(drawn: dict[str, Bodies], *, long: bool) -> xr.Dataset:
         if not long and not bodies.scenes[0].top.free:
             grown[row] = [growth(scene) for scene in bodies.scenes]
         chosen = [k for k in range(min(CHECKED, n)) if not bodies.scenes[k].top.free and bodies.known[k]]
-        off = [_checked(bodies, k) for k in chosen]
+        off = [_checked(bodies, k) for k in chosen] if have_heyoka() else []
         gap[row] = max(off, default=np.nan)
         known.append(float(bodies.asked(TARGETS)["axis"][2].mean()))
     over = ("family", "member")
