@@ -230,6 +230,7 @@ def test_a_kernel_is_the_same_to_a_profiler():
     assert digest(by_file(jit.code_of(kernel_with(1.0)))) == plain
 
 
+@pytest.mark.slow  # times, of which others at work on the machine are a part
 def test_the_walk_of_a_kernel_takes_less_than_a_loop_in_python_and_a_walk_of_four_does_not():
     """A loop that takes a millisecond on an idle machine; the least of 20 of each, in turns."""
     marches = [symtop.integrator(f"gauss-{order}").solvers["attitude"].loop.march for order in (12, 10, 8, 6)]
