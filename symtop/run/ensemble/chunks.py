@@ -29,7 +29,7 @@ from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.lanes import Array, W, Whole, column, divided, members_of, of_bodies, put, turns
 from symtop.methods.framework.loop import FixedStep
-from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, off_length
+from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, ending, off_length
 from symtop.methods.framework.preparation import opened
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
@@ -244,12 +244,15 @@ class Job:
                 done = solver.many(self.numbers, plan.step_size, plan.marks)
             padding = np.isnan(plan.times)
             done.states[padding], done.momenta[padding] = np.nan, np.nan
-            reached, odd = done.steps * plan.step_size, ~np.isin(done.outcome, range(len(OUTCOMES)))
-            outcome, raised = np.where(odd, ENDS.index(RAISED), done.outcome), ""
-            if odd.any():
-                must = f"must return an outcome from 0 to {len(OUTCOMES) - 1}, not {done.outcome[odd][0]}"
-                raised = f"integrator {self.method.name} {must}"
-            return _Runs(done.states, done.momenta, done.steps, *solver.counts(*done[2:4]), outcome, reached, raised)
+            reached, raised = done.steps * plan.step_size, ""
+            if (odd := (done.outcome < 0) | (done.outcome >= len(OUTCOMES))).any():
+                try:
+                    ending(done.outcome[odd][0])
+                except SymtopError as error:
+                    raised = f"integrator {self.method.name}: {error}"
+                done.outcome[odd] = ENDS.index(RAISED)
+            counts = done.steps, *solver.counts(*done[2:4])
+            return _Runs(done.states, done.momenta, *counts, done.outcome, reached, raised)
         if isinstance(solver, Adaptive) and self.tolerance is not None:
             done, ended = solver.many(self.numbers, self.tolerance, plan.times, plan.counts, self.budget)
             return _Runs(done.states, done.momenta, done.steps, done.work, 0 * done.work, done.outcome, ended)
