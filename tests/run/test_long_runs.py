@@ -242,13 +242,6 @@ def test_bad_input_gets_one_sentence(integrator, settings, words):
         long_run(SCENE, integrator, quiet=True, **settings)
 
 
-def test_a_truth_value_of_numpy_is_one():
-    plain = [
-        long_run(SCENE, "midpoint", steps=10, step_size=0.1, quiet=True, compensated=no) for no in (np.False_, False)
-    ]
-    assert plain[0].identical(plain[1])
-
-
 def test_memory_does_not_grow_with_the_steps():
     peaks = []
     for steps in (100_000, 1_000_000):
