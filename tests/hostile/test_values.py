@@ -277,7 +277,9 @@ def test_numbers_of_every_kind_are_read():
         assert real_numbers("row", row).tolist() == [1.0]
     assert real_numbers("row", [10**30]).tolist() == [1e30]
     assert real_numbers("row", 2.5).shape == ()
-    assert FORM(np.ones((2, 3))[:, ::2]).theta.shape == (2, 2)
+    for shape in ((), (0,), (2, 2)):
+        assert FORM(np.ones((*shape, 2))[..., 0]).theta.shape == shape
+        assert FORM.quaternion(np.ones(shape)).shape == (*shape, 4)
 
 
 @pytest.mark.parametrize("name", ["rk45", "rk45-compiled", "lsoda", "radau", "dop853", "taylor", "strang", "exact"])

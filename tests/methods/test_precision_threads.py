@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import symtop
+from symtop.core.numbers import context
 from symtop.methods.runge_kutta.gauss import gauss_rule
 from symtop.methods.taylor import heyoka
 
@@ -49,6 +50,7 @@ def disturbed(times):
 
 
 def test_coefficients_and_starts_are_those_computed_alone_while_others_change_the_precision():
+    assert [len(str(context(number).sqrt(2))) for number in (20, 50, 20)] == [21, 51, 21]  # a point and the digits
     alone = coefficients(), numbers("spheroid"), numbers("goldstein")
     rule, first, second, _ = together(
         lambda: [coefficients() for _ in range(5)],

@@ -170,6 +170,9 @@ def test_a_checkpoint_knows_a_method_by_what_it_holds_and_not_by_its_name():
     renamed = dataclasses.replace(symtop.integrator("strang"), name=plain.name)
     assert identity(renamed) != identity(plain)  # another kernel
     assert identity(dataclasses.replace(plain, summary="said otherwise")) == identity(plain)
+    others = [(SCENE, 2.0 * h, 500, True), (SCENE, h, 501, True), (SCENE, h, 500, False)]
+    others.append((symtop.scene("goldstein"), h, 500, True))
+    assert len({longrun._identity(scene, plain, *run) for scene, *run in others} | {identity(plain)}) == 5
 
 
 def test_an_interrupt_keeps_every_finished_window(tmp_path, monkeypatch):

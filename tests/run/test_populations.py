@@ -8,7 +8,7 @@ from symtop.core.netcdf import content_hash
 from symtop.model.exact.closed_form import NUMBERS, ClosedForms
 from symtop.run.ensemble import population as populations
 from symtop.run.ensemble.bodies import CHAOS, FREE, STRATA as BODY_STRATA, body_population, growth, scenes_of
-from symtop.run.ensemble.population import STRATA, population, sine_cosine
+from symtop.run.ensemble.population import STRATA, population
 
 COUNT = 3000
 HASH = "8afda6e1ae62a77eabc29ef01ffbbb0c0777d931e63e1ed78ae8aed761d678b2"  # of 1000 members of seed 1
@@ -124,12 +124,6 @@ def test_a_seed_has_all_its_digits_however_large_it_is(draw, tmp_path):
         assert data.equals(draw(3, seed=np.int64(seed) if seed < 2**63 else seed))
         data.to_netcdf(tmp_path / "drawn.nc")
     assert draw(3, seed=4.0).attrs["seed"] == 4
-
-
-def test_sine_and_cosine_by_series_are_those_of_the_library():
-    angle = np.linspace(0.0, np.pi, 2001)
-    for ours, theirs in zip(sine_cosine(angle), (np.sin(angle), np.cos(angle)), strict=True):
-        np.testing.assert_allclose(ours, theirs, atol=2e-15)
 
 
 BODY_HASH = "db868dbc6447cfc999cf348d04fb7e241827773bc77f595a9064c2a658f8b795"  # of 64 members of seed 1

@@ -141,17 +141,14 @@ def test_a_failed_write_leaves_the_old_file_and_no_scraps(tmp_path, monkeypatch)
     run = symtop.simulate("spheroid", "stormer-verlet", step_size=0.01)
     path = netcdf.write(run, tmp_path / "run.nc")
     before = path.read_bytes()
+    with pytest.raises(symtop.SymtopError, match="it is a folder"):
+        netcdf.write(run, tmp_path)
 
     monkeypatch.setattr(type(run), "to_netcdf", Mock(side_effect=OSError(28, "No space left on device")))
     with pytest.raises(symtop.SymtopError, match="No space left"):
         netcdf.write(run, path)
     assert path.read_bytes() == before
     assert [item.name for item in tmp_path.iterdir()] == ["run.nc"]
-
-
-def test_a_folder_is_no_file_to_write(tmp_path):
-    with pytest.raises(symtop.SymtopError, match="it is a folder"):
-        netcdf.write(symtop.simulate("spheroid", "taylor", samples=3), tmp_path)
 
 
 @pytest.mark.parametrize("theta", [0.0, math.pi])
