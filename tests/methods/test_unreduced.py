@@ -92,10 +92,9 @@ def one_iteration(par, rule, state, carry, h):
     return step, ((w, v, u), carry[0], carry[1]), 1, 0
 
 
-@pytest.mark.parametrize("scene_name", SCENES)
-def test_one_iteration_a_step_lets_the_momenta_go(scene_name):
+def test_one_iteration_a_step_lets_the_momenta_go():
     """The negative control: equations that are not solved show in p_phi, which no parameter holds."""
-    largest, _ = momentum_walk(scene_name, kernel_loop(kernel.begin, one_iteration, kernel.observe), steps=50_000)
+    largest, _ = momentum_walk("goldstein", kernel_loop(kernel.begin, one_iteration, kernel.observe), steps=50_000)
     assert not largest < 1e-11
 
 

@@ -104,9 +104,6 @@ def test_a_row_is_a_method_in_one_chart_and_every_table_can_name_it():
     assert (on_axis.name, on_axis.method, on_axis.charts()) == ("rk4[axis]", "rk4", ("axis",))
     runs = {row.name: symtop.simulate("spheroid", row, step_size=0.01, guard=False) for row in (in_angles, on_axis)}
     assert {name: run.attrs["chart"] for name, run in runs.items()} == {"rk4[angles]": "angles", "rk4[axis]": "axis"}
-    change = {name: float(abs(run["p_phi"] - run["p_phi"][0]).max()) for name, run in runs.items()}
-    assert change["rk4[angles]"] > 1e-6  # the loss is the chart's and not the method's:
-    assert change["rk4[axis]"] < 1e-13
     assert on_axis.variant("axis") is on_axis
     names = [row.name for row in registry.variants()]
     assert len(names) == len(set(names)) == sum(len(entry.charts()) for entry in registry.methods().values())
