@@ -198,10 +198,8 @@ def test_imports_that_run_upward_are_reported(small):
 
 
 def test_a_circle_of_files_is_reported(small):
-    assert circles(small) == [
-        "symtop.model.left <-> symtop.model.right",
-        "symtop.report.page <-> symtop_studies.drift.study",
-    ]
+    neighbours, study = "symtop.model.left <-> symtop.model.right", "symtop.report.page <-> symtop_studies.drift.study"
+    assert circles(small) == [neighbours, study]
 
 
 def test_other_faults_are_reported(small):

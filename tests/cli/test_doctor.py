@@ -21,9 +21,8 @@ def faults(findings):
 def test_all_is_well_here_and_it_says_what_it_saw(tmp_path):
     result = call("doctor", "--results", tmp_path, "--json")
     topics = {entry["topic"]: entry["result"] for entry in json.loads(result.output)}
-    assert {"python", "numba", "cache", "kernels cache", "reference cache", "studies", "published values"} <= set(
-        topics
-    )
+    expected = {"python", "numba", "cache", "kernels cache", "reference cache", "studies", "published values"}
+    assert expected <= set(topics)
     assert topics["heyoka quad"] == "33.7 digits"
     assert topics["numba"] == importlib.metadata.version("numba")
     count = len(published.published_values())
@@ -48,20 +47,14 @@ def test_a_package_that_is_missing_or_too_old(monkeypatch):
 @pytest.mark.parametrize(
     ("requirement", "result", "healthy"),
     [
-        ("numpy[some-extra]>=2.0", "2.4.6", True),
-        ("numpy[some-extra]>=3.0", "2.4.6", False),
-        ("numpy~=2.0", "2.4.6", True),
-        ("numpy~=1.26", "2.4.6", False),
-        ("numpy<2", "2.4.6", False),
-        ("numpy>=2,!=2.4.6", "2.4.6", False),
-        ("no-such-package", "absent", False),
-        ("no-such-package; extra == 'peers'", "absent, an extra", True),
-        ("numpy<2; extra == 'peers'", "2.4.6", False),
-        ("no-such-package; sys_platform == 'amiga'", None, True),
+        ("numpy[some-extra]>=2.0", "2.4.6", True), ("numpy[some-extra]>=3.0", "2.4.6", False),
+        ("numpy~=2.0", "2.4.6", True), ("numpy~=1.26", "2.4.6", False), ("numpy>=2,!=2.4.6", "2.4.6", False),
+        ("no-such-package", "absent", False), ("no-such-package; extra == 'peers'", "absent, an extra", True),
+        ("numpy<2; extra == 'peers'", "2.4.6", False), ("no-such-package; sys_platform == 'amiga'", None, True),
         ("no-such-package; extra == 'peers' and sys_platform == 'amiga'", None, True),
         ("no-such-package; python_version >= '3.8'", "absent", False),
     ],
-)
+)  # fmt: skip
 def test_every_form_of_a_requirement_is_read(monkeypatch, requirement, result, healthy):
     real = importlib.metadata.version
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: [requirement])

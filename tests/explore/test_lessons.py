@@ -100,10 +100,8 @@ def test_a_hand_reaches_everything_and_every_text_can_be_read(site):
         browser.evaluate("document.querySelector('#purpose').style.color = '#555'")
         assert browser.evaluate(FAINT)  # the control: grey on dark
         browser.prefer("light")
-        shown = (
-            "[...document.querySelectorAll('select, input, button, canvas[tabindex]')].filter((c) => !c.disabled && "
-        )
-        expected = browser.evaluate(f"{shown} c.checkVisibility()).length")
+        controls = "[...document.querySelectorAll('select, input, button, canvas[tabindex]')]"
+        expected = browser.evaluate(f"{controls}.filter((c) => !c.disabled && c.checkVisibility()).length")
         browser.evaluate("document.activeElement.blur(); window.reached = new Set()")
         for _ in range(expected):
             browser.press("Tab")
@@ -186,17 +184,14 @@ def test_a_body_is_two_bricks_side_by_side(site):
         answered(browser, "#story", "tennis-racket")
         browser.wait_for("document.querySelector('#status').textContent.startsWith('lie-variational: reached t = 100')")
         visible = "document.querySelector('{}').checkVisibility()"
-        shown = {
-            name: browser.evaluate(visible.format(name)) for name in ("#plot-middle", "#I2", "#w2", "#map", "#theta")
-        }
-        assert shown == {"#plot-middle": True, "#I2": True, "#w2": True, "#map": False, "#theta": False}
+        for name, shown in {"#plot-middle": True, "#I2": True, "#w2": True, "#map": False, "#theta": False}.items():
+            assert browser.evaluate(visible.format(name)) is shown, name
         before = browser.evaluate("document.querySelector('#sphere').toDataURL().length")
         answered(browser, "#I1-slider", 0.2)  # and the sides of the bricks
         browser.wait_for(f"document.querySelector('#sphere').toDataURL().length !== {before}")
         assert browser.evaluate("document.querySelector('#scene').selectedOptions[0].text") == "tennis-racket (edited)"
-        assert browser.evaluate(
-            "[...document.querySelector('#integrator').options].find((o) => o.value === 'midpoint').disabled"
-        )
+        options = "[...document.querySelector('#integrator').options]"
+        assert browser.evaluate(f"{options}.find((o) => o.value === 'midpoint').disabled")
         answered(browser, "#scene", "goldstein")
         assert browser.evaluate(visible.format("#map"))
         assert not browser.evaluate(visible.format("#I2"))

@@ -188,9 +188,8 @@ def test_a_body_is_judged_by_attitudes_and_rates(scene, tmp_path):
     assert other["rates_error"].value < 1e-13
     assert other["momentum_error"].value > 1e-5
     file.write_text(text(of_body(scene, 1.001), OF_BODY), encoding="utf-8")
-    assert symtop.judge(file, scene=scene)["rates_error"].value == pytest.approx(
-        1e-3 * np.linalg.norm(true[:, 5:], axis=1).max(), rel=1e-9
-    )
+    expected = 1e-3 * np.linalg.norm(true[:, 5:], axis=1).max()
+    assert symtop.judge(file, scene=scene)["rates_error"].value == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_conjugate_attitude_of_a_body_is_refused_although_it_starts_right(tmp_path):

@@ -7,7 +7,6 @@ import pytest
 import xarray as xr
 
 from symtop.core.errors import SymtopError
-from symtop.runner import run as runner
 from symtop.runner.study import Case, StudyError, each
 from tests.commands import answer
 
@@ -134,16 +133,6 @@ def test_settings_that_json_can_hold_are_right(settings):
     assert Case("spheroid", "rk4", settings).settings is settings
     with pytest.raises(SymtopError, match="setting 'b' must be numbers"):
         Case("spheroid", "rk4", {**settings, "b": {1, 2}})
-
-
-def test_what_python_raises_is_kept_as_the_cause(tmp_path):
-    script = tmp_path / "mine.py"
-    script.write_text(SCRIPT.format(change="facts = lambda data: 1 / 0"))
-    sys.modules.pop("symtop_study_mine", None)
-    with pytest.raises(SymtopError, match="facts failed: ZeroDivisionError") as info:
-        runner.run(runner.load(str(script)), tmp_path / "results", jobs=1, quiet=True)
-    assert isinstance(info.value.__cause__, ZeroDivisionError)
-    assert xr.open_dataset(tmp_path / "results" / "mine.nc").sizes["variant"] == 2
 
 
 def test_a_page_that_is_wrong_is_told_of(tmp_path):

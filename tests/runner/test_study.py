@@ -72,9 +72,8 @@ def test_fresh_computes_everything_and_the_files_are_the_same_to_the_byte(tmp_pa
     assert probe(tmp_path).exit_code == 0
 
     def bytes_of():  # but for the record of the files' times
-        return {
-            path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file() and path.name != "manifest.json"
-        }
+        files = (path for path in tmp_path.rglob("*") if path.is_file() and path.name != "manifest.json")
+        return {path: path.read_bytes() for path in files}
 
     before = bytes_of()
     result = probe(tmp_path, "--fresh", "--json")
@@ -169,8 +168,7 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path, clean_registr
     small = dataclasses.replace(whole, cases=lambda quick: cases)
     symtop.register(unlucky)
     findings = runner.run(small, tmp_path, quick=True, quiet=True)
-    assert findings["failures"] == [
-        "unlucky[angles] on goldstein failed: integrator unlucky[angles] failed: RuntimeError: no luck"
-    ]
+    (failure,) = findings["failures"]
+    assert failure == "unlucky[angles] on goldstein failed: integrator unlucky[angles] failed: RuntimeError: no luck"
     assert list(netcdf.read(tmp_path / "stability.nc")["variant"].values) == ["midpoint[angles]"]
     assert runner.run(small, tmp_path, quick=True, quiet=True)["failures"]  # tried again, not forgotten

@@ -507,15 +507,6 @@ def test_only_methods_that_keep_energy_and_momenta_answer_who_must_keep_them(dat
     assert keeping == {name for name in every if name.startswith("gauss-")} < every
 
 
-def test_a_share_of_silent_runs_is_that_of_its_kind(small):
-    table = facts.tables(small)["silent"].set_index(["variant", "kind of top"])
-    health = cells.health(small, "rk4[axis]")
-    kind = KINDS.index("near-separatrix")
-    rows = table.loc[("rk4[axis]", "near-separatrix")]
-    at = [int(np.argmin(np.abs(health.setting - steps))) for steps in facts.STEPS]
-    assert np.array_equal(rows["wrong"], health.wrong[at, kind] / health.drawn[kind])
-
-
 def test_the_page_says_what_was_measured(small, tmp_path):
     text = checked("cost", small, tmp_path, elsewhere={"use", "have"})
     named = {one.get_text() for one in figures.draw_accuracy(small).axes[0].texts}

@@ -27,14 +27,6 @@ def test_facts_follow_from_the_errors_and_a_bound_that_is_broken_is_counted(data
     assert facts.facts(worse)["bounds_held"] == 2
 
 
-def test_tables_hold_each_source_at_its_longest_time(data):
-    ends = facts.tables(data)["sources"]
-    assert list(ends["time (s)"]) == [20.0, 20.0]
-    row = ends.set_index("source").loc["closed form"]
-    last = data.sel(scene="spheroid", variant="closed form", horizon=20.0)
-    assert (row["axis error (rad)"], row["claimed bound (rad)"]) == (float(last[ERROR]), float(last[BOUND]))
-
-
 def test_the_page_says_what_was_measured(data, tmp_path):
     text = checked("truth", data, tmp_path)
     assert "4 of 4 bounds" in text
