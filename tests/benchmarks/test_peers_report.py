@@ -77,8 +77,6 @@ def test_methods_on_f_alone_are_counted_by_themselves():
     data = _stored({"symtop": (1e-4, 1e-5), "rebound": (2e-4, 2e-4)} | scipys)
     data = data.assign_coords(variant=["series[axis]", *data["variant"].values[1:]])
     assert summary.general(data) == []
-    assert "on f(t, y) alone" not in (caption := study.caption(data)[0])
-    assert "`series[axis]`, which is made of this top's equations" in caption
     slow = data.isel(variant=[0]).assign_coords(variant=["rk4[axis]"])
     for name in ("seconds", "seconds_samples"):
         slow[name] = 4.0 * slow[name]
@@ -86,9 +84,7 @@ def test_methods_on_f_alone_are_counted_by_themselves():
     assert summary.general(both) == ["rk4[axis]"]
     assert summary.score(both, "public", ["rk4[axis]"]).slower == {"rebound": "2 of 2"}
     assert "are faster in 4 of 6 comparisons" in summary.verdict(both)[2]
-    caption = study.caption(both)[0]
-    assert "which needs f(t, y) alone (spheroid), solve_ivp takes 2 to 2 times and 22.5 to 22.5" in caption
-    assert "faster than it are rebound in 2 of 2 at the left. " in caption
+    assert "solve_ivp takes 2 to 2 times and 22.5 to 22.5" in study.caption(both)[0]
 
 
 # ---- the report ------------------------------------------------------------------------------------------------------

@@ -98,21 +98,13 @@ def test_a_refusal_names_the_argument_its_value_and_what_is_allowed(words, parts
 
 
 def test_a_plugin_that_registers_nothing_is_told_of(tmp_path):
-    for text, expected in (("x = 1\n", True), (ANOTHER_NAME, False), (REPLACED, False)):
+    replaced = "import dataclasses, symtop\nown = symtop.integrators()['midpoint']\n"
+    replaced += "symtop.register(dataclasses.replace(own, summary='mine'), replace=True)\n"
+    for text, expected in (("x = 1\n", True), (replaced, False)):
         plugin = tmp_path / f"plugin_{len(text)}.py"
         plugin.write_text(text, encoding="utf-8")
         result = call("scenes", "--plugin", plugin)
         assert (f"{plugin.name} registers no integrator and no scene" in result.output) is expected
-
-
-ANOTHER_NAME = """import dataclasses
-import symtop
-symtop.register_scene(dataclasses.replace(symtop.scene("spheroid"), name="a-new-name"))
-"""
-REPLACED = """import dataclasses
-import symtop
-symtop.register(dataclasses.replace(symtop.integrators()["midpoint"], summary="mine"), replace=True)
-"""
 
 
 @pytest.mark.parametrize(

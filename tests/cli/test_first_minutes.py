@@ -208,5 +208,3 @@ def test_the_command_of_a_recommendation_holds_the_options_of_the_body():
     assert " --horizon 10.0 " in command
     assert command.endswith(" --body 2.0,1.5,1.0 --rates -0.1,0.0,3.0")
     assert "accurate to" in call(*shlex.split(command)).output
-    named = call("recommend", "tennis-racket", "--accuracy", "1e-3", "--needs", "derivative").output
-    assert "--body" not in named

@@ -107,18 +107,6 @@ def test_what_is_quoted_is_put_between_the_marks_of_a_page():
         taker.answer(REPORT, "Which is it?", "More")
 
 
-def test_a_table_is_quoted_with_its_title_and_what_stands_below():
-    taker, table = _taker(), "**You have?**\n\n| x |\n|---|\n| 1 |\n"
-    assert taker.titled(f"A.\n\n{table}\nIt is one.\n\nMore.\n", "You have") == f"\n{table}\nIt is one.\n"
-    assert taker.titled(REPORT, "You have") == ""
-
-
-def test_the_readme_has_the_beginning_of_the_front_page():
-    begun = _taker().beginning(REPORT)
-    assert begun.startswith("**Figure 1**\n\n![A](docs/snapshot/figures/a.png)\n")
-    assert begun.endswith("| 1 | 2 |\n")
-
-
 def test_what_pages_quote_is_what_the_stored_report_says():
     report = (ROOT / "docs" / "snapshot" / "report.md").read_text(encoding="utf-8")
     for name, said in _taker().quoted(report).items():

@@ -24,7 +24,7 @@ from symtop.judging.adapters.python_step import PythonStep, RotationStep, Separa
 from symtop.judging.battery import stages
 from symtop.judging.claims import order, structure
 from symtop.judging.claims.subject import FORMS, open_target
-from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Measured, line, undecided
+from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Measured, line
 from symtop.judging.remote import clock
 from tests.commands import answer
 from tests.judging.blind.right import midpoint, product, rates, rk4, turn, verlet
@@ -405,11 +405,6 @@ def test_a_line_says_what_was_measured_and_of_a_claim_that_fails_why():
     assert line(wrong).splitlines() == [
         "order          as h -> 0 it goes to another motion, 3.0e-04 away (claimed: 2; refuted)", "    it stops short.",
     ]  # fmt: skip
-    assert line(Finding("p_psi", "kept", Measured("kept", 0.0), "confirmed", "")) == (
-        "p_psi          kept, to the last bit (claimed: kept; confirmed)"
-    )
-    assert line(undecided("energy", "", "it stopped")).splitlines()[0] == "energy         undecided"
-    assert line(Finding("calls", "", Measured("a function"), "measured", "", 0.0, 1e-13)) == ""
     failed = {"step_size": np.array([0.01, 0.1, np.nan]), "error": np.array([1e-6, np.nan, np.nan])}
     ledger = Ledger("mine", "spheroid", (wrong,), failed, About("mine", "axis", "python", 2e-5, 3, 1.0))
     assert "Its runs: 10 to 100 steps a nutation for the order (10 and fewer fail).\n" in str(ledger)

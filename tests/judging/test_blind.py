@@ -168,7 +168,7 @@ def test_an_implicit_class_has_its_order_in_full():
 # ---- what is wrong ---------------------------------------------------------------------------------------------------
 
 QUICKLY = (
-    "stale_force", "rotation_frames", "symplectic_euler", "half_symmetric", "adams_from_memory", "edits_the_judge",
+    "stale_force", "symplectic_euler", "half_symmetric", "adams_from_memory", "edits_the_judge",
     "euler_in_a_spot", "WrongSum", "separable_stale", "separable_damped",
 )  # fmt: skip
 

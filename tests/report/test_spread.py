@@ -10,6 +10,13 @@ SOME = symtop.population(30, seed=7)
 ASKED = {"per_nutation": 30, "nutations": 2, "samples": 41, "quiet": True}
 
 
+def test_errors_are_those_of_the_ensemble():
+    data = symtop.ensemble(SOME, "strang[axis]", **ASKED)
+    wrong = symtop.errors(data, SOME)
+    for name, atol in (("axis", 1e-14), ("energy", 1e-13)):
+        np.testing.assert_allclose(member_errors(SOME, data, name), np.abs(wrong[name]), rtol=1e-6, atol=atol)
+
+
 def test_quantiles_are_members_and_a_failed_one_is_infinitely_wrong():
     data = symtop.ensemble(symtop.population(200, seed=3), "stormer-verlet", **ASKED)
     errors = member_errors(symtop.population(200, seed=3), data, "axis")

@@ -84,11 +84,9 @@ METHODS = "symtop.methods"
     ("place", "stale"),
     [
         (f"{METHODS}.runge_kutta.gauss:solve_stages", GAUSS),
-        (f"{METHODS}.lagrangian.galerkin:increment", {"galerkin-simpson"}),
         (f"{METHODS}.lagrangian.discrete_lagrangian:increment", STRAIGHT),
         (f"{METHODS}.library.scipy_ivp:compiled_field", SCIPY),
         (f"{METHODS}.runge_kutta.explicit:later_stages", {"rk4"}),  # the guard's watch reaches what pairs are made of
-        (f"{METHODS}.splitting.reversible:march", {"stormer-verlet-reversible"}),
         (f"{METHODS}.lie_group.generalised_alpha:_corrected", {"generalised-alpha"}),
         (f"{METHODS}.taylor.heyoka:propagate", {"taylor", "taylor-longdouble", "taylor-quad"}),
         ("symtop.cli.common:as_text symtop.report.page:write symtop.measure.accuracy:error_row", set()),

@@ -92,7 +92,6 @@ def test_facts_are_those_of_the_runs(measured):
     assert answers["spherical"] == float(usual["frame_spherical"].sel(variant="no-gyro[axis]")) < 0.01
     assert float(usual["frame_spherical"].sel(variant="mujoco-euler[axis]")) > 0.1
     assert answers["best"] == answers["worst"] == float(usual["frame_axis"].sel(variant="mujoco-euler[axis]"))
-    assert answers["level_fast_variant"] == "no-gyro[axis]"
     assert (answers["maps"], answers["turned"], answers["singles"], answers["members"]) == (2, 1, 1, 20)
     assert answers["lost"] == 1  # mujoco-euler flies apart on the fast top
     assert answers["single_best"] > 1e-3
@@ -104,7 +103,6 @@ def test_what_was_not_measured_is_none(measured):
     answers = facts.facts(fast)
     assert answers["members"] is answers["energy_lost"] is None
     assert np.isnan([answers["wall"], answers["share_most"]]).all()
-    assert answers["lost"] == 1
     assert [one.name for one in study.STUDY.pictures(fast)] == ["cost"]
     alone = xr.DataTree.from_dict({"tops": measured["tops"].to_dataset().sel(variant=["no-gyro[axis]"])})
     for one, most in ((measured, 5), (alone, 1)):  # entries of the key: what is drawn, and no more
@@ -162,14 +160,9 @@ def test_at_the_same_cost_a_method_of_four_evaluations_takes_a_quarter_of_the_st
     assert alone["level_axis"].values.tolist() == alone["frame_axis"].values.tolist()
 
 
-def test_orders_are_tabled_in_double_precision(measured):
-    tables = facts.tables(measured)
-    assert list(tables["orders"]["order"]) == [0.0, 1.0]
-    assert list(tables["orders"]["maps"]) == [1, 1]
-    assert tables["maps"]["variant"].iloc[0] == "strang[axis]"
-
-
 def test_shares_count_tops_within_five_degrees(measured):
+    tables = facts.tables(measured)
+    assert [*zip(tables["orders"]["order"], tables["orders"]["maps"], strict=True)] == [(0.0, 1), (1.0, 1)]  # in double
     off = measured["population"]["off"].sel(scene="population", variant="strang[axis]").values
     share = facts.lines(measured)["share"]
     assert share["strang[axis]"] == np.mean(np.degrees(off) <= 5.0)

@@ -90,21 +90,17 @@ def weak_gravity(f, t, y, h):
     return rk4(lambda s, z: f(s, z) * np.array([1, 1, 1, *[9.80665 / 9.81] * 3]), t, y, h)
 
 
-def single(f, t, y, h):
-    """Its state is kept in single precision."""
-    return rk4(f, t, y, h).astype(np.float32).astype(float)
-
-
-def leaking(f, t, y, h):
-    """A millionth of a millionth of the momentum is lost in each step."""
-    return rk4(f, t, y, h) * np.array([1, 1, 1, *[1 - 1e-12] * 3])
+def spoilt(change):
+    """rk4, what it returns changed."""
+    return lambda f, t, y, h: change(rk4(f, t, y, h))
 
 
 _noise = np.random.default_rng(1)
-
-
-def noisy(f, t, y, h):
-    return rk4(f, t, y, h) * (1 + 1e-11 * _noise.standard_normal(6))
+single = spoilt(lambda y: y.astype(np.float32).astype(float))
+leaking = spoilt(lambda y: y * np.array([1, 1, 1, *[1 - 1e-12] * 3]))  # of the momentum, in each step
+rounded = spoilt(lambda y: np.round(y, 8))
+noisy = spoilt(lambda y: y * (1 + 1e-11 * _noise.standard_normal(6)))
+sometimes_noisy = spoilt(lambda y: y * (1.0 + 1e-11 * _noise.standard_normal() * (_noise.random() < 0.3)))
 
 
 def projected(f, t, y, h):
@@ -220,11 +216,6 @@ def poisoned(f, t, y, h):
     return y + h * _memory["slope"]
 
 
-def rounded(f, t, y, h):
-    """Its state is rounded to eight decimals."""
-    return np.round(rk4(f, t, y, h), 8)
-
-
 extrapolated = functools.partial(with_base, base=euler)  # Euler's method, as one of order 2 is
 
 
@@ -300,31 +291,18 @@ def separable_damped(state, h, dT, dV):
 # ---- right at the start of the scene ---------------------------------------------------------------------------------
 
 
-def late_euler(f, t, y, h):
-    return (euler if t > 25.0 else rk4)(f, t, y, h)
+def where(condition, worse=euler, good=rk4):
+    """The worse method where the condition holds of t, y and h."""
+    return lambda f, t, y, h: (worse if condition(t, y, h) else good)(f, t, y, h)
 
 
-def euler_off_the_energy(f, t, y, h):
-    """rk4 where |L| is as on the scene's motion, from 12.1 to 16.3."""
-    return (rk4 if 12.0 < np.linalg.norm(y[3:]) < 16.5 else euler)(f, t, y, h)
-
-
-def euler_above(f, t, y, h):
-    return (euler if y[2] > 0.93 else rk4)(f, t, y, h)
-
-
-def coarse_rk2(f, t, y, h):
-    return (midpoint if abs(h) >= 0.01 else rk4)(f, t, y, h)
-
-
-def half_symmetric(f, t, y, h):
-    """Symmetric where the scene's motion is, e_z from -0.16 to 0.92."""
-    return (implicit_midpoint if y[2] > -0.2 else midpoint)(f, t, y, h)
-
-
-def euler_in_a_spot(f, t, y, h):
-    """Euler's method in a thousandth of all states, through which a run comes after 30 nutations."""
-    return (euler if abs(math.atan2(y[1], y[0]) - 0.5) < 0.03 and abs(y[2] - math.cos(0.7)) < 0.02 else rk4)(f, t, y, h)
+late_euler = where(lambda t, y, h: t > 25.0)
+euler_off_the_energy = where(lambda t, y, h: not 12.0 < np.linalg.norm(y[3:]) < 16.5)  # the motion has 12.1 to 16.3
+euler_above = where(lambda t, y, h: y[2] > 0.93)
+coarse_rk2 = where(lambda t, y, h: abs(h) >= 0.01, midpoint)
+half_symmetric = where(lambda t, y, h: y[2] <= -0.2, midpoint, implicit_midpoint)  # e_z of the motion: -0.16 to 0.92
+# in a thousandth of all states, through which a run comes after 30 nutations
+euler_in_a_spot = where(lambda t, y, h: abs(math.atan2(y[1], y[0]) - 0.5) < 0.03 and abs(y[2] - math.cos(0.7)) < 0.02)
 
 
 _step = {}
@@ -361,10 +339,6 @@ _steps = [0]
 def tires(f, t, y, h):
     _steps[0] += 1
     return (rk4 if _steps[0] < 3_000 else euler)(f, t, y, h)
-
-
-def sometimes_noisy(f, t, y, h):
-    return rk4(f, t, y, h) * (1.0 + 1e-11 * _noise.standard_normal() * (_noise.random() < 0.3))
 
 
 def edits_the_judge(f, t, y, h):
