@@ -265,13 +265,6 @@ def test_two_runs_that_never_end_do_not_keep_a_small_one_waiting(site):
     assert time.monotonic() - began < 25.0  # 5 s on two free cores
 
 
-def test_a_query_is_ignored(site):
-    assert request(site, "GET", "/?x=1")[1] == request(site, "GET", "/")[1]
-    assert request(site, "GET", "/catalogue?")[0] == 200
-    assert request(site, "GET", "/no?/catalogue")[0] == 404
-    assert "energy" in json.loads(request(site, "POST", "/run?x=1", json.dumps(fields()), **JSON)[1])["largest"]
-
-
 @pytest.mark.parametrize(("path", "status"), [("/", 200), ("/explore.js?x", 200), ("/catalogue", 200), ("/no", 404)])
 def test_head_is_get_without_a_body(site, path, status):
     whole, bare = request(site, "GET", path), request(site, "HEAD", path)

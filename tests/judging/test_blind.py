@@ -160,11 +160,6 @@ def test_the_stages_of_an_implicit_class_are_solved_and_newton_is_left_as_it_was
     assert radau.NEWTON_MAXITER == 6
 
 
-@pytest.mark.slow
-def test_an_implicit_class_has_its_order_in_full():
-    confirmed(symtop.judge(integrate.Radau, order=5), "order")
-
-
 # ---- what is wrong ---------------------------------------------------------------------------------------------------
 
 QUICKLY = (

@@ -74,7 +74,6 @@ def everyone():
 
 
 GAUSS = {f"gauss-{order}" for order in (2, 4, 6, 8, 10, 12)}
-COLLECTIVE = {f"collective-gauss-{order}" for order in (2, 4, 6)}
 SCIPY = {"rk45", "dop853", "lsoda", "radau"}
 STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear"}
 METHODS = "symtop.methods"

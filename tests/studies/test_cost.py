@@ -472,6 +472,13 @@ def test_facts_and_tables_are_those_of_the_cells(small):
     assert tables["have"]["1e-3 rad"][0].endswith(f" {number(rk4.seconds / best.seconds)} times")
 
 
+def test_a_share_of_silent_runs_is_that_of_its_kind(small):
+    rows = facts.tables(small)["silent"].set_index(["variant", "kind of top"]).loc[("rk4[axis]", "near-separatrix")]
+    health, kind = cells.health(small, "rk4[axis]"), KINDS.index("near-separatrix")
+    at = [int(np.argmin(np.abs(health.setting - steps))) for steps in facts.STEPS]
+    assert np.array_equal(rows["wrong"], health.wrong[at, kind] / health.drawn[kind])
+
+
 def test_what_is_kept_is_declared_or_linear_in_the_state():
     kept = {
         "rk4[axis]": "p_phi", "rk4[angles]": "nothing exactly", "rkmk-se3-4[axis]": "p_psi, |e|",
