@@ -18,5 +18,5 @@ def test_what_goes_wrong_on_a_page_is_seen(tmp_path):
         assert any("said" in problem for problem in browser.problems)
         assert any("undefinedName" in problem for problem in browser.problems)
         assert browser.outside() == ["https://example.invalid/a.png"]
-        browser.evaluate("document.body.innerHTML = '<p style=\"width: 800px\">wide</p>'")
+        browser.evaluate("document.body.innerHTML = '<p style=\"width: 3000px\">wide</p>'")
         assert browser.too_wide > 400

@@ -14,7 +14,6 @@ import pytest
 
 from symtop import __version__
 from symtop.cli.main import main
-from symtop.judging.claims import order
 from tests.commands import call, ended, symtop
 from tests.judging.conftest import shorten
 from tests.pages import LANGUAGES, ROOT, Block, blocks, pages
@@ -89,7 +88,6 @@ def follow(page, slow, folder, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     if not slow:
         shorten(monkeypatch)
-        monkeypatch.setattr(order, "DRAWS", (96, 8))
     reader = Page(page, slow=slow)
     for block in PAGES[page]:
         reader.follow(block)

@@ -22,7 +22,6 @@ from symtop.judging import judge_step
 from symtop.judging.adapters.adapter import heartbeat, integrator, label_of
 from symtop.judging.adapters.python_step import PythonStep, RotationStep, SeparableStep
 from symtop.judging.battery import stages
-from symtop.judging.claims import order, structure
 from symtop.judging.claims.subject import FORMS, open_target
 from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Measured, line
 from symtop.judging.remote import clock
@@ -32,12 +31,6 @@ from tests.judging.conftest import shorten
 
 SPHEROID = symtop.scene("spheroid")
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no C compiler")
-
-
-@pytest.fixture(autouse=True)
-def few_starts(monkeypatch):
-    monkeypatch.setattr(order, "DRAWS", (96, 8))
-    monkeypatch.setattr(structure, "DRAWS", (8, 2))
 
 
 def run_of(stepper, steps=200):

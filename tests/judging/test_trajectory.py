@@ -143,7 +143,6 @@ def test_the_command_takes_a_file(table, tmp_path):
         ("time,theta\n0,high\n", "numbers in each line: could not convert string 'high' to float64"),
         ("time,energy\n0,1\n", "one of axis, quaternion, theta"),
         ("time,theta\n\n", "run.csv must have a line of numbers below its names, and has none"),
-        ("time,theta\n \n# none\n", "run.csv must have a line of numbers below its names, and has none"),
         ("time,theta,energy\n0,0.4\n1,0.4\n", "3 numbers in each line, not 2$"),
         ("time,theta,Lx,Ly\n0,0.4,1,1\n", "run.csv must have all of Lx, Ly, Lz, and lacks Lz"),
         ("", "it is no text, or empty"),

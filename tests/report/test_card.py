@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.judging.claims import order, subject
 from symtop.judging.findings import About, Finding, Ledger, Measured
 from symtop.report.card import badge, card, figures, write_badge
+from tests.judging.conftest import shorten
 
 
 def midpoint(f, t, y, h):
@@ -19,9 +19,7 @@ def midpoint(f, t, y, h):
 @pytest.fixture(scope="module")
 def ledger():
     with pytest.MonkeyPatch.context() as shorter:
-        for module, name in ((subject, "LONG"), (subject, "SLOPES"), (order, "DRAWS")):
-            full, quick = getattr(module, name)
-            shorter.setattr(module, name, (full, type(full)(quick / 3)))
+        shorten(shorter)
         return symtop.judge(midpoint, quick=True, order=2, symplectic=True)
 
 

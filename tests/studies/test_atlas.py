@@ -80,6 +80,16 @@ def test_columns_that_are_run_together_have_the_bits_of_runs_one_by_one(name, mo
         np.testing.assert_array_equal(values, others)
 
 
+def test_errors_are_followed_where_they_are_asked_for():
+    """A column that is not followed has the same verdicts, and an error that is too large where the run is wrong."""
+    spins, method = [0.3, 1.0, 8.0], integrator("strang")
+    whole, one = (outcome_map("cusp", spins, method, STEPS, 12.0, followed) for followed in (None, [3]))
+    np.testing.assert_array_equal(whole.verdict, one.verdict)
+    np.testing.assert_array_equal(whole.axis_error[:, 3], one.axis_error[:, 3])
+    np.testing.assert_array_equal(whole.axis_error[whole.verdict == 0], one.axis_error[whole.verdict == 0])
+    assert (one.axis_error < whole.axis_error).any()
+
+
 SETTLING = {"strang": np.geomspace(0.01, 2.0, 40), "gauss-4": np.geomspace(0.02, 2.0, 30),
             "stormer-verlet": np.geomspace(0.01, 0.5, 30), "rk45-compiled": np.geomspace(1e-9, 0.1, 30)}  # fmt: skip
 
