@@ -14,7 +14,7 @@ def one_seed(monkeypatch):
 
 def shorten(monkeypatch):
     """A quick judging takes a fifth of the time: shorter runs, fewer starts that are drawn."""
-    shorter = {(subject, "LONG"): (10.0, 0.5), (subject, "SLOPES"): (6.0, 0.35)}
+    shorter = {(subject, "LONG"): (10.0, 0.5), (subject, "SLOPES"): (6.0, 0.35), (subject, "ENOUGH"): 0.005}
     for (module, name), numbers in (shorter | {(order, "DRAWS"): (96, 8), (structure, "DRAWS"): (8, 2)}).items():
         monkeypatch.setattr(module, name, numbers)
 
