@@ -11,7 +11,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from symtop.core.numbers import sign_changes
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
@@ -48,6 +47,24 @@ def sleep_margin(method: Integrator, spin: float, h: float) -> float:
     t, d = (z[1] * z[2] - z[0] * z[3]) / base, (z[2] * z[2] - z[1] * z[3]) / base
     x = float((t * t / (4.0 * d)).real)
     return 4.0 * x * (1.0 - x)
+
+
+def sign_changes(function: Callable[[float], float], grid: np.ndarray, tolerance: float = 1e-12) -> list[float]:
+    """Where a function changes its sign between neighbours of a grid, by bisection; jumps through NaN do not count."""
+    values = [function(float(x)) for x in grid]
+    roots = []
+    for left, right, low, high in zip(grid[:-1], grid[1:], values[:-1], values[1:], strict=True):
+        if not (math.isfinite(low) and math.isfinite(high)) or (low > 0.0) == (high > 0.0):
+            continue
+        a, b = float(left), float(right)
+        while b - a > tolerance * max(1.0, abs(b)):
+            middle = 0.5 * (a + b)
+            value = function(middle)
+            if not math.isfinite(value):
+                break
+            a, b = (middle, b) if (value > 0.0) == (low > 0.0) else (a, middle)
+        roots.append(0.5 * (a + b))
+    return roots
 
 
 def sleeping_threshold(method: Integrator, h: float) -> float:

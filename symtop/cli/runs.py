@@ -239,6 +239,8 @@ def ensemble(
         raise SymtopError("--epsilon must come with --bodies: it is how far heavy bodies are from a top")
     noun, most = ("bodies", COMPARED_BODIES) if bodies else ("tops", COMPARED)
     with ticking(f"drawing {noun}"):
+        import numpy as np
+
         from symtop.report.spread import LEVELS, QUANTITIES, SHOWN_BY, largest, member_errors, so_many, spread
         from symtop.run.ensemble import bodies as random_bodies, ensemble as runs
         from symtop.run.ensemble.population import check_memory, population
@@ -287,6 +289,8 @@ def ensemble(
         if worst:
             click.echo(table(heading, [[words[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
         say_written(output, figure)
+    if lost := sum(np.isnan(own.get("attitude", []))):
+        warn(f"the attitudes of {so_many(lost, noun)} are not compared: their motion is not known to 1e-9 rad")
     if "ok" not in outcomes:
         sys.exit(3)
 

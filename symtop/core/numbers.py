@@ -1,9 +1,8 @@
-"""Numbers that many modules need, each defined once, arrays of real numbers, mpmath for threads, zeros of functions."""
+"""Numbers that many modules need, each defined once, arrays of real numbers, mpmath for threads."""
 
 import math
 import sys
 import threading
-from collections.abc import Callable
 from reprlib import repr as short
 from typing import Any
 
@@ -41,21 +40,3 @@ def real_numbers(name: str, values: object) -> np.ndarray:
     if array.dtype.kind not in "fiu":
         raise SymtopError(f"{name} must be real numbers, not {short(values)}")
     return np.asarray(array, dtype=np.float64, order="C")
-
-
-def sign_changes(function: Callable[[float], float], grid: np.ndarray, tolerance: float = 1e-12) -> list[float]:
-    """Where a function changes its sign between neighbours of a grid, by bisection; jumps through NaN do not count."""
-    values = [function(float(x)) for x in grid]
-    roots = []
-    for left, right, low, high in zip(grid[:-1], grid[1:], values[:-1], values[1:], strict=True):
-        if not (math.isfinite(low) and math.isfinite(high)) or (low > 0.0) == (high > 0.0):
-            continue
-        a, b = float(left), float(right)
-        while b - a > tolerance * max(1.0, abs(b)):
-            middle = 0.5 * (a + b)
-            value = function(middle)
-            if not math.isfinite(value):
-                break
-            a, b = (middle, b) if (value > 0.0) == (low > 0.0) else (a, middle)
-        roots.append(0.5 * (a + b))
-    return roots

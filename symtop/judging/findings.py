@@ -174,7 +174,7 @@ SAYS = {  # of what was measured: {0} is its number, {1} its text
 
 def pace(seconds: float) -> str:
     """A short time in the unit that suits it: 5.4 us, 4.8 ms."""
-    size, unit = next(one for one in UNITS if not seconds < one[0])
+    size, unit = next(one for one in UNITS if not float(f"{seconds:.3g}") < one[0])
     return f"{seconds / (size or 1e-9):.3g} {unit}"
 
 
@@ -214,6 +214,7 @@ def description(findings: Sequence[Finding]) -> str:
         wrong, p = order.kind == "wrong limit", order.number
         whole = not wrong and abs(p - round(p)) < 0.3
         words += ["converges to another motion" if wrong else f"order {round(p)}" if whole else f"order {p:.1f}"]
+        words[-1] += " or more" * order.text.endswith("or more")
     for claim, yes in (("symplectic", "symplectic"), ("symmetric", "reversible")):
         answer = measured.get(claim, NOTHING).kind
         words += [yes] if answer == "yes" else [f"not {yes}"] if answer == "no" else []
@@ -249,8 +250,9 @@ def summary(ledger: Ledger) -> str:
 def _runs(ledger: Ledger) -> str:
     """The steps and the lengths of the runs, and the steps that fail, in steps a nutation; empty of a trajectory."""
     traces, words, of_body = ledger.traces, [], ledger.about.chart == "body"
+    period = "natural period" if of_body else "nutation"
     if "steps_run" in traces and (steps := float(traces["steps_run"])):
-        periods, period = float(traces["nutations_run"]), "natural period" if of_body else "nutation"
+        periods = float(traces["nutations_run"])
         length = f"{steps:.0f} steps over {periods:.3g} {period}s ({steps / periods:.0f} a {period})"
         scales = "kinetic one of the start and |mgl|, of the momentum to |L|"
         scales = scales if of_body else "nutation's, of momenta to the larger one"
@@ -261,7 +263,7 @@ def _runs(ledger: Ledger) -> str:
         fails = f" ({failed.max():.0f} and fewer fail)" if failed.size else ""
         one = ledger.about.nutation / traces.get("structure_step", math.nan)
         structure = f", {one:.1f} for the structure" if math.isfinite(one) else ""
-        tries = f"{np.nanmin(ladder):.0f} to {np.nanmax(ladder):.0f} steps a nutation for the order{fails}{structure}"
+        tries = f"{np.nanmin(ladder):.0f} to {np.nanmax(ladder):.0f} steps a {period} for the order{fails}{structure}"
         words.insert(0, tries)
     joined = ";\n    ".join(words)
     return f"Its runs: {joined}.\n" if words else ""

@@ -10,8 +10,8 @@ all spin, 5000. Both momenta share one scale because one of them may vanish. Rad
 a body without symmetry the scale of the energy is that of the start, kinetic and |mgl|, and that of p_phi and of the
 vector L is |L|.
 
-The attitude of a run is compared as it is, by 4 asin(|q - q_ref|/2): where a method lets the length of q leave one, as
-explicit ones do, that counts, too, and may be twice the angle. `drop_attrs()` leaves out what is not an angle.
+Where a method lets the length of e or q leave one, as explicit ones do, that is no part of an angle; the energy and
+the momenta of such a state have it.
 
 A trajectory of another program is checked first. A quaternion shows the attitude, the axis and theta; theta, phi and
 psi the same; theta and phi the axis; an axis shows theta. Vectors that are not quite of length one are scaled to it.

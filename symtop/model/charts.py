@@ -170,11 +170,15 @@ def axis_distance(first: Array, second: Array, low: Array | float = 0.0) -> Arra
 
 
 def attitude_distance(first: Array, second: Array, low: Array | float = 0.0) -> Array:
-    """Angle of the rotation between two orientations in radians, shape (...); `second` may have a low half."""
-    sign = np.where(np.sum(first * second, axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
-    gap = np.sqrt(np.sum(((first - sign * second) - sign * low) ** 2, axis=-1))
-    angle: Array = np.minimum(4.0 * np.arcsin(np.minimum(1.0, 0.5 * gap)), np.pi)  # of quaternions of any length
-    return angle
+    """Angle of the rotation between two orientations in radians, shape (...), to 1e-16 however small.
+
+    `second` is of length one and may have a low half; `first` may be of any length, which is no angle.
+    """
+    cosine = np.sum(first * second, axis=-1, keepdims=True)  # of half the angle, times the length of `first`
+    sign = np.where(cosine < 0.0, -1.0, 1.0)
+    gap = (first - sign * second) - sign * low
+    across = gap - np.sum(gap * second, axis=-1, keepdims=True) * second
+    return np.asarray(2.0 * np.arctan2(np.sqrt(np.sum(across * across, axis=-1)), np.abs(cosine[..., 0])))
 
 
 def space_energy(top: SymmetricTop, axis: Any, momentum: Any, p_psi: Any) -> Any:

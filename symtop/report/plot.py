@@ -204,8 +204,9 @@ def _line(axis: Any, times: Any, values: Any, color: str, label: str) -> None:
 
 def draw_ensemble(data: xr.Dataset, errors: dict[str, spread.Array], path: str | Path) -> None:
     """A panel for each error of an ensemble in a file: quantiles of the `member_errors` (n, samples) against time."""
-    figure, axes = panels(len(errors), 1, height=2.1, sharex=True)
-    for axis, (name, values) in zip(axes[:, 0], errors.items(), strict=True):
+    drawn = {name: values for name, values in errors.items() if not np.isnan(values).all()} or errors
+    figure, axes = panels(len(drawn), 1, height=2.1, sharex=True)
+    for axis, (name, values) in zip(axes[:, 0], drawn.items(), strict=True):
         _bands(axis, data, name, values)
         axis.label_outer()
     ended = (data["outcome"] == "ok").mean().item()
@@ -216,6 +217,8 @@ def draw_ensemble(data: xr.Dataset, errors: dict[str, spread.Array], path: str |
     )
     if ended < 1.0:
         sentence += ", and those that failed count as infinitely wrong, at the upper edge"
+    if lost := max(np.isnan(values).all(axis=1).sum() for values in errors.values()):
+        sentence += f"; the angle is without {lost}, whose motion is not known"
     headline(figure, sentence)
     save(figure, at_home(path))
 

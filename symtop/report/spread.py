@@ -8,6 +8,7 @@ A member that has failed has an infinite error from there on, so that it counts 
 Quantiles are those of the sample, without interpolation: an infinite one says that so many have failed.
 """
 
+import contextlib
 import functools
 from typing import Any
 
@@ -47,7 +48,10 @@ def so_many(count: int, kind: str) -> str:
 
 
 def member_errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array:
-    """Errors (n, samples) of an ensemble of these members; NaN beyond the samples of a run of few steps."""
+    """Errors (n, samples) of an ensemble of these members; NaN beyond the samples of a run of few steps.
+
+    The attitudes of a body whose motion is not known to 1e-9 rad up to its last sample are not compared: NaN.
+    """
     one_of("quantity", quantity, QUANTITIES[kind_of(data)])
     inputs = read_members(members)
     refuse_others(inputs, data)
@@ -78,12 +82,12 @@ def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
             truth = _forms(numbers.tobytes()).axis(filled)
             errors, valid = charts.axis_distance(values, truth), np.isfinite(truth).all(axis=2)
         else:
-            rows = []
-            for (body, start), when, mine in zip(members_of(numbers), filled, values, strict=True):
-                name = "the body with the moments {}, {} and {}".format(*body.moments)
-                true = body_samples(name, body, start, when.tobytes(), precise=False)
-                rows.append(charts.attitude_distance(mine, true.quaternion, true.quaternion_lo))
-            errors = np.array(rows)
+            errors, valid = np.full(times.shape, np.nan), np.zeros(times.shape, bool)
+            for i, ((body, start), when) in enumerate(zip(members_of(numbers), filled, strict=True)):
+                with contextlib.suppress(SymtopError):  # a motion that is lost before the last time, as in chaos
+                    true = body_samples("a member", body, start, when.tobytes(), precise=False)
+                    errors[i] = charts.attitude_distance(values[i], true.quaternion, true.quaternion_lo)
+                    valid[i] = True
     return np.where(finite & valid, np.where(np.isfinite(errors), errors, np.inf), np.nan)
 
 
@@ -125,5 +129,5 @@ def spread(errors: Array, levels: tuple[float, ...] = LEVELS) -> Array:
 
 
 def largest(errors: Array) -> Array:
-    """The largest error of each member over its run, shape (n,)."""
-    return np.asarray(np.where(np.isnan(errors), 0.0, errors).max(axis=1))
+    """The largest error of each member over its run, shape (n,); NaN where nothing was compared."""
+    return np.asarray(np.fmax.reduce(errors, axis=1))

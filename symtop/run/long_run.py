@@ -172,7 +172,7 @@ def long_run(
     Raises SymtopError for a method without a compiled loop, for a checkpoint of another run and for an output that
     cannot be written.
     """
-    chosen, method = find_scene(scene, bodies=True), find_integrator(integrator)
+    chosen, method, silent = find_scene(scene, bodies=True), find_integrator(integrator), boolean("quiet", quiet)
     count, h = whole("steps", steps, 1, MOST_STEPS), positive("step_size", step_size)
     _, solver = chart_of(method, of_body=chosen.of_body)
     assert isinstance(solver.loop, Loop)  # noqa: S101
@@ -186,7 +186,7 @@ def long_run(
     quantities = OF_BODY if chosen.of_body else QUANTITIES
     gauge = watch(chosen, method, h) if len(rows) < len(ends) else None
     with checkpoints.saved_on_failure():
-        with progress_bar(title, quiet=quiet, total=count, initial=at.k, unit="step", unit_scale=True) as bar:
+        with progress_bar(title, quiet=silent, total=count, initial=at.k, unit="step", unit_scale=True) as bar:
             while gauge is not None and len(rows) < len(ends) and outcome == OK:
                 stretch, after = loop.advance(par, rule, at, h, scattered(at.k, ends[len(rows)]))
                 outcome, reached = stretch.outcome, after.k

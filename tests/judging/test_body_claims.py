@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import symtop
@@ -107,6 +108,15 @@ def test_what_a_step_is_on_a_body_is_said_in_natural_periods_with_its_momentum(o
     assert ["natural periods (118 a" in one for one in words] == [True, False]
     assert ["nutations (118 a" in one for one in words] == [False, True]
     assert ["the energy and the momentum." in one for one in words] == [True, False]
+
+
+def test_the_card_of_a_body_shows_the_errors_that_its_order_was_found_from(only: Callable[..., None]) -> None:
+    only("order")
+    ledger = symtop.judge(right.rk4, scene=HEAVY, order=4, quick=True)
+    fitted = ledger.traces["fitted"] == 1.0
+    steps, errors = (ledger.traces[name][fitted] for name in ("step_size", "error"))
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(4.0, abs=0.2)
+    assert " steps a natural period for the order" in " ".join(str(ledger).split())
 
 
 def test_a_right_step_is_not_refuted_where_a_body_turns_over(only: Callable[..., None]) -> None:

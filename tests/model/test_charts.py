@@ -89,6 +89,15 @@ def test_distances_measure_small_and_large_angles(size):
     assert charts.attitude_distance(base, -turned) == pytest.approx(size, rel=1e-12, abs=5e-16)
 
 
+def test_the_length_of_a_quaternion_is_no_part_of_an_angle():
+    base, turned = (charts.quaternion_from_angles(1.0, 0.3, psi) for psi in (0.2, 0.2 + 1e-6))
+    for length in (1.0 - 1e-6, 1.0, 1.0 + 1e-6, 2.0):  # a difference of 1e-6 in length would look like 2e-6 rad
+        assert charts.attitude_distance(length * turned, base) == pytest.approx(1e-6, rel=1e-9)
+    low = np.array([3e-17, -1e-17, 2e-17, 1e-17])  # of the reference: a gap below the spacing of doubles is seen
+    across = low - (low @ base) * base
+    assert charts.attitude_distance(base, base, low) == pytest.approx(2.0 * math.sqrt(across @ across), rel=1e-9)
+
+
 def test_the_usual_formula_for_the_distance_has_a_floor_that_ours_has_not():
     base, turned = charts.quaternion_from_angles(1.0, 0.3, 0.2), charts.quaternion_from_angles(1.0, 0.3, 0.2 + 1e-10)
     usual = 2.0 * math.acos(min(1.0, float(base @ turned)))

@@ -235,11 +235,12 @@ def test_a_failed_run_shows_the_windows_it_had():
         ("rk45", {"steps": 10, "step_size": 0.1}, "rk45 has no compiled loop of fixed steps"),
         ("midpoint", {"steps": 10**12, "step_size": 0.1}, "steps must be at most"),
         ("midpoint", {"steps": 10, "step_size": 0.1, "compensated": "no"}, "compensated must be True or False"),
+        ("midpoint", {"steps": 10, "step_size": 0.1, "quiet": 3}, "quiet must be True or False"),
     ],
 )
 def test_bad_input_gets_one_sentence(integrator, settings, words):
     with pytest.raises(SymtopError, match=words):
-        long_run(SCENE, integrator, quiet=True, **settings)
+        long_run(SCENE, integrator, **{"quiet": True} | settings)
 
 
 def test_a_truth_value_of_numpy_is_one():

@@ -10,9 +10,8 @@ import xarray as xr
 from scipy.linalg import expm
 from symtop_studies.carry_over import comparison as by, facts, limits as of
 from symtop_studies.carry_over.bodies import FAMILIES, FREE, SYMMETRIC, bodies_of
-from symtop_studies.stability.linear_limits import sleep_margin
+from symtop_studies.stability.linear_limits import sign_changes, sleep_margin
 
-from symtop.core.numbers import sign_changes
 from symtop.methods.framework.registry import integrator
 from symtop.model.charts import BODY
 

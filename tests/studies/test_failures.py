@@ -15,12 +15,11 @@ from symtop_studies.stability.failures import (
     survives,
     surviving_displacements,
 )
-from symtop_studies.stability.linear_limits import linear_limits, sleep_margin, sleeping_threshold
+from symtop_studies.stability.linear_limits import linear_limits, sign_changes, sleep_margin, sleeping_threshold
 from symtop_studies.stability.solver_tolerance import solver_sweep, textbook_midpoint
 from symtop_studies.stability.tables import narrow_window
 
 import symtop
-from symtop.core.numbers import sign_changes
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator, methods

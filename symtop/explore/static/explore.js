@@ -192,7 +192,7 @@ async function askMap() {
   mapping = true;
   const name = values.integrator;
   const response = await post("map", range).catch(() => null);  // `ask` says that nobody answers
-  const answer = response && await response.json();
+  const answer = response && await response.json().catch(() => null);
   mapping = false;
   if (!answer) return;
   mapped = question;

@@ -152,6 +152,7 @@ def on_body(subject: Subject) -> list[Finding]:
     """
     claim, scene = subject.method.order, subject.scene
     fitted = measured_order(subject.method, scene, quick=subject.quick, finest=subject.finest, main="attitude")
+    subject.traces.update(fitted.traces())
     fit, verdict, why = fitted.main, order_verdict(claim, fitted.main), f"attitude {fitted.main} on {scene.name}"
     if not fitted.measured:
         error = fitted.error[fitted.step_size <= 10.0 * np.min(fitted.step_size)]
@@ -203,6 +204,13 @@ class Order(NamedTuple):
         fit = self.main
         return Measured("slope", fit.slope, text=str(fit)) if math.isfinite(fit.slope) else NOTHING
 
+    def traces(self) -> dict[str, Array]:
+        """Steps, errors and which of them the slope is fitted to, (SHOWN,) from the finest on, padded with NaN."""
+        rank = np.argsort(self.step_size)[:SHOWN]
+        columns = {"step_size": self.step_size, "error": self.error, "fitted": self.main.used.astype(float)}
+        padded = np.full(SHOWN - rank.size, math.nan)
+        return {name: np.concatenate([values[rank], padded]) for name, values in columns.items()}
+
 
 def measured_order(
     method: Integrator, scene: Scene, *, quick: bool = False, finest: float | None = None, main: str = ""
@@ -242,10 +250,8 @@ def _by_steps(subject: Subject) -> Finding:
         # limit of its runs is extrapolated by a power that they do not have: it looks wrong
         method = replace(method, order=max(series.order, 1))
         fitted = measured_order(method, scene, **options)
-    main, measured, rank = fitted.main, fitted.measured, np.argsort(fitted.step_size)[:SHOWN]
-    columns = {"step_size": fitted.step_size, "error": fitted.error, "fitted": main.used.astype(float)}
-    padded = np.full(SHOWN - rank.size, math.nan)
-    subject.traces.update({name: np.concatenate([values[rank], padded]) for name, values in columns.items()})
+    main, measured = fitted.main, fitted.measured
+    subject.traces.update(fitted.traces())
     slopes = ", ".join(f"{name} {fit}" for name, fit in fitted.fits.items() if math.isfinite(fit.slope))
     slopes = f"slopes {slopes} on {fitted.scene}" if slopes else "no slope"
     power = method.order or 1

@@ -41,7 +41,6 @@ import numpy as np
 
 from symtop.core.jit import register_jitable
 from symtop.core.jit_functions import shared
-from symtop.core.numbers import sign_changes
 from symtop.methods.framework.lanes import Lanes
 from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.framework.registry import Array
@@ -237,7 +236,9 @@ def cayley_correction(view: View, momenta: Momenta, h: float) -> Array:
 
 def strang_sleeps_from(h: float) -> float:
     """The spin w3 from which the upright top of I1 = I3 = mgl = 1 sleeps at a step h: w3 tan(w3 h/4) = h."""
-    return sign_changes(lambda a: a * math.tan(0.25 * a * h) - h, np.array([1.0, min(2.5, 1.9 * math.pi / h)]))[0]
+    from scipy.optimize import brentq
+
+    return float(brentq(lambda a: a * math.tan(0.25 * a * h) - h, 1.0, min(2.5, 1.9 * math.pi / h)))
 
 
 def cayley_sleeps_from(h: float) -> float:
