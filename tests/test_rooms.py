@@ -34,6 +34,7 @@ ORDER = (  # from the ground up
     ("studies",),
 )
 FLOOR = {room: floor for floor, row in enumerate(ORDER) for room in row}
+STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # which hold others: an expression imports nothing
 STRANGERS = {"methods": {"xarray", "matplotlib"}}  # packages that a room does not import
 
 
@@ -84,7 +85,7 @@ def _arrows(node: ast.AST, package: str, known: set[str], *, typing: bool = Fals
             for alias in child.names:
                 inner = f"{source}.{alias.name}"
                 yield Arrow(inner if inner in known else source, child.lineno, typing)
-        else:
+        elif isinstance(child, STATEMENTS):
             checked = isinstance(child, ast.If) and ast.unparse(child.test).rpartition(".")[2] == "TYPE_CHECKING"
             yield from _arrows(child, package, known, typing=typing or checked)
 
