@@ -17,7 +17,6 @@ from numba import types
 import symtop
 from symtop.core import code_hash, files, jit
 from symtop.core.code_hash import Code, by_file, changes, digest, merged
-from symtop.measure.timing import first_call
 from symtop.run.plugins import execute
 from symtop.runner import fingerprint
 from tests.commands import printed_by
@@ -228,20 +227,6 @@ def test_a_kernel_is_the_same_to_a_profiler():
     cleared = not kernel_with(1.0).__code__.co_flags & inspect.CO_OPTIMIZED  # by numba, for all that share the code
     assert cleared is (sys.version_info < (3, 12))
     assert digest(by_file(jit.code_of(kernel_with(1.0)))) == plain
-
-
-@pytest.mark.slow  # times, of which others at work on the machine are a part
-def test_the_walk_of_a_kernel_takes_less_than_a_loop_in_python_and_a_walk_of_four_does_not():
-    """A loop that takes a millisecond on an idle machine; the least of 20 of each, in turns."""
-    marches = [symtop.integrator(f"gauss-{order}").solvers["attitude"].loop.march for order in (12, 10, 8, 6)]
-
-    def walk(count):
-        for march in marches[:count]:
-            digest(by_file(jit.code_of(march)))
-
-    turns = [(lambda: walk(1)), (lambda: sum(k * k for k in range(20_000))), (lambda: walk(4))]
-    one, loop, four = map(min, zip(*([first_call(turn) for turn in turns] for _ in range(20)), strict=True))
-    assert one < loop < four
 
 
 def test_no_method_hangs_on_how_many_types_numba_has_made():

@@ -4,8 +4,10 @@ Values that cannot be meant must be refused; of the others (`ANY`) it is only as
 of them, and at once. The command line is tried in `tests.hostile.test_command_lines`.
 """
 
+import datetime
 import decimal
 import fractions
+import inspect
 import math
 import time
 import warnings
@@ -15,6 +17,8 @@ import pytest
 import xarray as xr
 
 import symtop
+from symtop.core.numbers import real_numbers
+from symtop.model.exact.closed_form import ClosedForm, ClosedForms
 
 SECONDS = 20.0  # of processor time for one call
 
@@ -38,7 +42,6 @@ NOT_WHOLE = [*NOT_POSITIVE, 1.5, 2.0000001]
 UNKNOWN = [None, 3, "", "no-such", b"spheroid", [], object(), "Spheroid ", "\0", "x" * 5000]
 NOT_LABEL = [None, 3, "", " x", "a b", "ä", "-x", "x" * 65, "a/b", "a\nb", b"x", []]
 NOT_ROW = [None, "01", {}, 3.0, [math.nan], ["x"], [[0.5]], [None], object(), [1j]]
-NOT_TIMES = [None, "x", [], [math.nan], [math.inf], [-1.0], [[1.0]], ["x"], object(), np.zeros((2, 2)), [None]]
 
 TOP, START = symtop.SymmetricTop(2.0, 1.0, 1.0), symtop.Angles(theta=0.5, psi_dot=5.0)
 SOLVERS = {"angles": lambda top, start, plan: None}
@@ -56,192 +59,144 @@ ANY = [
 RUN = symtop.simulate("spheroid", "strang", step_size=0.01, horizon=0.5, samples=11)
 NO_TIMES = [{"time": [0.0]}, {"time": "x", "theta": [1.0]}, xr.Dataset(), {"axis": [[0, 0, 1.0]]}]
 NOT_DATA = [None, 3, "x", [], {}, object(), *NO_TIMES]
-NOT_HORIZONS = [value for value in NOT_POSITIVE if value is not None]
-NAMED = [value for value in UNKNOWN if value is not None]  # where None asks for the default
+NAMED = [value for value in UNKNOWN if value]  # where None or "" asks for the default
 NO_NUMBER = [value for value in NOT_POSITIVE if not isinstance(value, np.ndarray | list)]
 SMALL = symtop.population(3, seed=1)
+KINDS = {  # what is refused of arguments of these names, by whichever function; None is right where it is the default
+    "I1 mass polar_radius equatorial_radius at_centre axial": NOT_POSITIVE,
+    "step_size tolerance horizon accuracy budget nutations max_step time_a_step": NOT_POSITIVE,
+    "mgl theta phi psi theta_dot phi_dot psi_dot gravity pivot_distance distance processor": NOT_FINITE,
+    "top start": [*NOT_FINITE, *UNKNOWN], "order threads steps n": NOT_WHOLE, "samples": [*NOT_WHOLE, 1],
+    "name": NOT_LABEL,
+    "nodes weights drift kick gradient b c quaternion omega_body": NOT_ROW,
+    "scene scenes integrator integrators methods chart precision observe observes quantity cost": UNKNOWN,
+    "family implementation rotation": UNKNOWN,
+}  # fmt: skip
+USUAL = {name: values for names, values in KINDS.items() for name in names.split()}
 
-CALLS = {
+CALLS = {  # a function, good arguments, names of those of which the usual values are refused, and what else is refused
     "SymmetricTop": (
-        symtop.SymmetricTop,
-        {"I1": 2.0, "I3": 1.0, "mgl": 1.0},
-        {"I1": NOT_POSITIVE, "I3": [*NOT_POSITIVE, 4.1, 1e300], "mgl": NOT_FINITE},
+        symtop.SymmetricTop, {"I1": 2.0, "I3": 1.0, "mgl": 1.0}, "I1 mgl", {"I3": [*NOT_POSITIVE, 4.1, 1e300]},
     ),
     "from_spheroid": (
-        symtop.SymmetricTop.from_spheroid,
-        {"mass": 1.0, "polar_radius": 2.0, "equatorial_radius": 1.0},
-        {
-            "mass": NOT_POSITIVE,
-            "polar_radius": NOT_POSITIVE,
-            "equatorial_radius": NOT_POSITIVE,
-            "gravity": NOT_FINITE,
-            "pivot_distance": [value for value in NOT_FINITE if value is not None],
-        },
+        symtop.SymmetricTop.from_spheroid, {"mass": 1.0, "polar_radius": 2.0, "equatorial_radius": 1.0},
+        "mass polar_radius equatorial_radius gravity pivot_distance", {},
     ),
-    "Angles": (
-        symtop.Angles,
-        {"theta": 0.5},
-        dict.fromkeys(("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot"), NOT_FINITE),
-    ),
+    "Angles": (symtop.Angles, {"theta": 0.5}, "theta phi psi theta_dot phi_dot psi_dot", {}),
     "Scene": (
-        symtop.Scene,
-        {"name": "mine", "top": TOP, "start": START, "horizon": 1.0},
-        {"name": NOT_LABEL, "top": NOT_FINITE, "start": NOT_FINITE, "horizon": NOT_POSITIVE, "observes": UNKNOWN},
+        symtop.Scene, {"name": "mine", "top": TOP, "start": START, "horizon": 1.0},
+        "name top start horizon observes", {},
     ),
     "simulate midpoint": (
-        symtop.simulate,
-        {"scene": "spheroid", "integrator": "midpoint", **STEP},
-        {
-            "scene": UNKNOWN,
-            "integrator": UNKNOWN,
-            "step_size": [*NOT_POSITIVE, 1.1, 1e300, 1e-300],
-            "tolerance": [value for value in NOT_POSITIVE if value is not None] + [1e-6],
-            "horizon": [value for value in NOT_POSITIVE if value is not None] + [1e300, 0.001],
-            "samples": [*NOT_WHOLE, 1, 10**9],
-            "observe": [value for value in UNKNOWN if value is not None],
-        },
+        symtop.simulate, {"scene": "spheroid", "integrator": "midpoint", **STEP},
+        "scene integrator step_size tolerance horizon samples observe",
+        {"step_size": [None, 1.1, 1e300, 1e-300], "tolerance": [1e-6], "horizon": [1e300, 0.001], "samples": [10**9]},
     ),
     "simulate rk45": (
-        symtop.simulate,
-        {"scene": "spheroid", "integrator": "rk45", "tolerance": 1e-6, "horizon": 0.5, "samples": 11},
-        {"tolerance": [*NOT_POSITIVE, 1e-15, 1.0, 1e300], "step_size": [0.01, "x", math.nan], "observe": ["psi"]},
+        symtop.simulate, {"scene": "spheroid", "integrator": "rk45", "tolerance": 1e-6, "horizon": 0.5, "samples": 11},
+        "tolerance step_size observe",
+        {"tolerance": [None, 1e-15, 1.0, 1e300], "step_size": [0.01], "observe": ["psi"]},
     ),
     "reference": (
-        symtop.reference,
-        {"scene": "spheroid", "times": [0.5], "precision": "double"},
-        {"scene": UNKNOWN, "times": NOT_TIMES, "precision": UNKNOWN},
+        symtop.reference, {"scene": "spheroid", "times": [0.5], "precision": "double"}, "scene precision", {},
     ),
-    "register": (symtop.register, {"entry": None}, {"entry": [*NOT_FINITE, symtop.integrator("midpoint")]}),
-    "register_scene": (symtop.register_scene, {"entry": None}, {"entry": [*NOT_FINITE, symtop.scene("spheroid")]}),
-    "scene": (symtop.scene, {"name": "spheroid"}, {"name": UNKNOWN}),
-    "integrator": (symtop.integrator, {"name": "midpoint"}, {"name": UNKNOWN}),
-    "citation": (symtop.citation, {"name": "midpoint"}, {"name": UNKNOWN}),
+    "register": (symtop.register, {"entry": None}, "", {"entry": [*NOT_FINITE, symtop.integrator("midpoint")]}),
+    "register_scene": (symtop.register_scene, {"entry": None}, "", {"entry": [*NOT_FINITE, symtop.scene("spheroid")]}),
+    "scene": (symtop.scene, {"name": "spheroid"}, "name", {"name": UNKNOWN}),
+    "integrator": (symtop.integrator, {"name": "midpoint"}, "name", {"name": UNKNOWN}),
+    "citation": (symtop.citation, {"name": "midpoint"}, "name", {"name": UNKNOWN}),
     "discrete_lagrangian": (
-        symtop.discrete_lagrangian,
-        {"name": "mine", "nodes": (0.5,), "weights": (1.0,)},
-        {
-            "name": NOT_LABEL,
-            "nodes": [*NOT_ROW, (1.5,), (), (0.2, 0.8)],
-            "weights": [*NOT_ROW, (0.9,), (), (0.5, 0.5)],
-            "order": [value for value in NOT_WHOLE if value is not None],
-        },
+        symtop.discrete_lagrangian, {"name": "mine", "nodes": (0.5,), "weights": (1.0,)}, "name nodes weights order",
+        {"nodes": [(1.5,), (), (0.2, 0.8)], "weights": [(0.9,), (), (0.5, 0.5)]},
     ),
     "composition": (
-        symtop.composition,
-        {"name": "mine", "drift": (1.0,), "kick": (0.5, 0.5)},
-        {
-            "name": NOT_LABEL,
-            "drift": [*NOT_ROW, (0.9,), (), (0.5, 0.5)],
-            "kick": [*NOT_ROW, (0.5, 0.4), (1.0,)],
-            "gradient": [value for value in NOT_ROW if value is not None] + [(1.0,), (1.0, 1.0)],
-            "chart": UNKNOWN,
-            "rotation": [*UNKNOWN, "cayley"],
-            "processor": [*NOT_FINITE, 1.0],
-        },
+        symtop.composition, {"name": "mine", "drift": (1.0,), "kick": (0.5, 0.5)},
+        "name drift kick gradient chart rotation processor",
+        {"drift": [(0.9,), (), (0.5, 0.5)], "kick": [(0.5, 0.4), (1.0,)], "gradient": [(1.0,), (1.0, 1.0)],
+         "rotation": ["cayley"], "processor": [1.0]},
     ),
     "runge_kutta": (
-        symtop.runge_kutta,
-        {"name": "mine", "a": ((), (1.0,)), "b": (0.5, 0.5)},
-        {
-            "name": NOT_LABEL,
-            "a": [None, 3, "x", (), ((),), ((), (math.nan,)), ((), ("x",)), ((), (1.0, 1.0, 1.0)), [[0, 1], [1, 0]]],
-            "b": [*NOT_ROW, (0.5, 0.4), (1.0,)],
-            "c": [value for value in NOT_ROW if value is not None] + [(0.0, 0.5), (0.0,)],
-        },
+        symtop.runge_kutta, {"name": "mine", "a": ((), (1.0,)), "b": (0.5, 0.5)}, "name b c",
+        {"a": [None, 3, "x", (), ((),), ((), (math.nan,)), ((), ("x",)), ((), (1.0, 1.0, 1.0)), [[0, 1], [1, 0]]],
+         "b": [(0.5, 0.4), (1.0,)], "c": [(0.0, 0.5), (0.0,)]},
     ),
-    "series": (symtop.series, {"name": "mine", "order": 12}, {"name": NOT_LABEL, "order": [*NOT_WHOLE, 9, 24]}),
+    "series": (symtop.series, {"name": "mine", "order": 12}, "name order", {"order": [9, 24]}),
     "Integrator": (
-        symtop.Integrator,
-        {"name": "mine", "family": "other", "summary": "", "solvers": SOLVERS},
-        {
-            "name": NOT_LABEL,
-            "family": UNKNOWN,
-            "solvers": [None, {}, [], {"angles": 3}, {"elsewhere": print}, "x"],
-            "control": [3, "", "steps", []],
-            "implementation": UNKNOWN,
-            "order": [value for value in NOT_WHOLE if value is not None],
-        },
+        symtop.Integrator, {"name": "mine", "family": "other", "summary": "", "solvers": SOLVERS},
+        "name family implementation order",
+        {"solvers": [None, {}, [], {"angles": 3}, {"elsewhere": print}, "x"], "control": [3, "", "steps", []]},
     ),
     "from_quaternion": (
-        symtop.Angles.from_quaternion,
-        {"quaternion": [1.0, 0.0, 0.0, 0.0], "omega_body": [0.0, 0.0, 1.0]},
-        {"quaternion": [*NOT_ROW, [1.0, 0.0], [2.0, 0.0, 0.0, 0.0], [0.0] * 4], "omega_body": [*NOT_ROW[1:], [1.0]]},
+        symtop.Angles.from_quaternion, {"quaternion": [1.0, 0.0, 0.0, 0.0], "omega_body": [0.0, 0.0, 1.0]},
+        "quaternion omega_body", {"quaternion": [[1.0, 0.0], [2.0, 0.0, 0.0, 0.0], [0.0] * 4], "omega_body": [[1.0]]},
     ),
     "from_inertia": (
-        symtop.SymmetricTop.from_inertia,
-        {"mass": 1.0, "at_centre": 0.01, "axial": 0.004, "distance": 0.25},
-        {**dict.fromkeys(("mass", "at_centre", "axial"), NOT_POSITIVE), "distance": NOT_FINITE, "gravity": NOT_FINITE},
+        symtop.SymmetricTop.from_inertia, {"mass": 1.0, "at_centre": 0.01, "axial": 0.004, "distance": 0.25},
+        "mass at_centre axial distance gravity", {},
     ),
-    "errors": (symtop.errors, {"run": RUN}, {"run": NOT_DATA, "scene": UNKNOWN[1:]}),
+    "errors": (symtop.errors, {"run": RUN}, "scene", {"run": NOT_DATA}),
     "errors of a table": (
         lambda time, theta: symtop.errors({"time": time, "theta": theta}, "spheroid"),
-        {"time": [0.0, 0.5], "theta": [0.4, 0.4]},
+        {"time": [0.0, 0.5], "theta": [0.4, 0.4]}, "",
         {"time": ["x", [0.0, 10**400], [0.0, -(10**400)]], "theta": ["x", [10**400, 0.4], [0.4, math.inf, 1.0]]},
     ),
     "recommend": (
-        symtop.recommend,
-        {"scene": "spheroid", "accuracy": 1e-2, "horizon": 0.1},
-        {
-            "scene": UNKNOWN, "accuracy": NOT_POSITIVE, "quantity": NAMED, "horizon": NOT_HORIZONS,
-            **dict.fromkeys(("step_size", "max_step", "time_a_step"), NOT_HORIZONS), "general": ["yes", 2],
-            "keeps": ["time", 3],
-        },
+        symtop.recommend, {"scene": "spheroid", "accuracy": 1e-2, "horizon": 0.1},
+        "scene accuracy quantity horizon step_size max_step time_a_step", {"general": ["yes", 2], "keeps": ["time", 3]},
     ),
     "population": (
-        symtop.population, {"n": 3, "seed": 1}, {"n": NOT_WHOLE, "seed": [None, "x", -1, 1.5, math.nan, [], 1j]}
+        symtop.population, {"n": 3, "seed": 1}, "n", {"seed": [None, "x", -1, 1.5, math.nan, [], 1j]},
     ),
     "ensemble": (
         symtop.ensemble,
         {"members": SMALL, "integrator": "strang", "step_size": 0.05, "horizon": 0.2, "samples": 3, "quiet": True},
-        {
-            "members": [*NOT_DATA[:4], xr.Dataset({"I1": 1.0}), [symtop.scene("spheroid"), 3], SMALL.to_dataframe()],
-            "integrator": UNKNOWN, "step_size": NO_NUMBER, "horizon": NO_NUMBER[1:],
-            "samples": [*NOT_WHOLE, 1], "observe": NAMED,
-            "threads": [value for value in NOT_WHOLE if value is not None],
-        },
+        "integrator samples observe threads",
+        {"members": [*NOT_DATA[:4], xr.Dataset({"I1": 1.0}), [symtop.scene("spheroid"), 3], SMALL.to_dataframe()],
+         "step_size": NO_NUMBER, "horizon": NO_NUMBER[1:]},
     ),
     "sweep": (
         symtop.sweep,
         {"scenes": "spheroid", "integrators": "strang", "step_size": [0.05], "horizon": 0.2, "quiet": True},
-        {"scenes": UNKNOWN, "integrators": UNKNOWN, "step_size": ["x", [0.0], [-1.0], [math.nan], object()]},
+        "scenes integrators", {"step_size": ["x", [0.0], [-1.0], [math.nan], object()]},
     ),
     "compare": (
         symtop.compare,
         {"scene": "spheroid", "methods": "strang", "nutations": 1.0, "cost": "evaluations", "budget": 1e3},
-        {
-            "scene": UNKNOWN, "methods": UNKNOWN, "quantity": UNKNOWN, "cost": UNKNOWN, "budget": NOT_POSITIVE[1:],
-            "nutations": NOT_POSITIVE[1:],
-        },
+        "scene methods quantity cost budget nutations", {},
     ),
     "long_run": (
         symtop.long_run,
         {"scene": "spheroid", "integrator": "strang", "steps": 10, "step_size": 0.01, "checkpoint": False},
-        {"scene": UNKNOWN, "integrator": UNKNOWN, "steps": NOT_WHOLE, "step_size": NOT_POSITIVE},
+        "scene integrator steps step_size", {},
     ),
-    "field": (symtop.field, {"chart": "axis", "top": TOP}, {"chart": UNKNOWN, "top": UNKNOWN}),
-    "plot": (symtop.plot, {"data": RUN}, {"data": NOT_DATA, "quantity": UNKNOWN}),
-    "ClosedForm": (symtop.ClosedForm, {"top": TOP, "start": START}, {"top": UNKNOWN, "start": UNKNOWN}),
-    "ClosedForm at": (symtop.ClosedForm(TOP, START), {"times": [0.5]}, {"times": ["x", None, [math.nan], object()]}),
+    "field": (symtop.field, {"chart": "axis", "top": TOP}, "chart top", {}),
+    "plot": (symtop.plot, {"data": RUN}, "quantity", {"data": NOT_DATA}),
+    "ClosedForm": (symtop.ClosedForm, {"top": TOP, "start": START}, "top start", {}),
+
     "judge": (
-        symtop.judge,
-        {"target": lambda f, t, y, h: y, "quick": True},
-        {
-            "form": [value for value in UNKNOWN[1:] if value], "chart": UNKNOWN, "scene": UNKNOWN,
-            "order": NOT_WHOLE[1:], "energy": [*UNKNOWN[1:], np.array([1.0, 2.0])],
-            "conserves": ["energy", np.array(1.0), np.array([1.0]), np.array(["x"]), [10**400], {"x": 1}, 3],
-        },
+        symtop.judge, {"target": lambda f, t, y, h: y, "quick": True}, "chart scene order",
+        {"form": NAMED, "energy": [*UNKNOWN[1:], np.array([1.0, 2.0])],
+         "conserves": ["energy", np.array(1.0), np.array([1.0]), np.array(["x"]), [10**400], {"x": 1}, 3]},
     ),
     "judge of nothing": (
         symtop.judge,
         {"target": "no-such-file.py:step", "form": "ode", "conserves": ["energy"], "energy": "kept", "quick": True},
-        {"chart": UNKNOWN, "order": NOT_WHOLE[1:], "symplectic": ["x", 2, np.array([True, False])]},
+        "chart order", {"symplectic": ["x", 2, np.array([True, False])]},
     ),
 }  # fmt: skip
-BAD = [
-    pytest.param(function, good, argument, values, id=f"{name} {argument}")
-    for name, (function, good, bad) in CALLS.items()
-    for argument, values in bad.items()
-]
+
+
+def refused(function, usual, own):
+    """The values of each argument that a function must refuse."""
+    values = {name: [*own.get(name, ())] for name in {**dict.fromkeys(usual.split()), **own}}
+    for name in usual.split():
+        optional = inspect.signature(function).parameters[name].default is None
+        values[name] += [value for value in USUAL[name] if value is not None or not optional]
+    return values
+
+
+REFUSED = {name: refused(function, usual, own) for name, (function, _, usual, own) in CALLS.items()}
+BAD = [(name, argument) for name, arguments in REFUSED.items() for argument in arguments]
 COST = {"judge", "recommend", "compare"}  # seconds for every value that is taken: their bad ones only
 
 
@@ -263,18 +218,19 @@ def came(function, arguments):
             assert time.process_time() - began < SECONDS
 
 
-@pytest.mark.parametrize(("function", "good", "argument", "values"), BAD)
-def test_bad_values_are_refused(function, good, argument, values):
-    assert not [value for value in values if not came(function, {**good, argument: value})]
+@pytest.mark.parametrize(("name", "argument"), BAD)
+def test_bad_values_are_refused(name, argument):
+    function, good, *_ = CALLS[name]
+    assert not [value for value in REFUSED[name][argument] if not came(function, {**good, argument: value})]
 
 
 @pytest.mark.parametrize("stride", [19, pytest.param(1, marks=pytest.mark.slow)])
 def test_anything_is_used_or_refused(stride):
     """Each value of `ANY` for each argument, or every nineteenth, begun with another one at each argument."""
-    places = [(name, key) for name, call in CALLS.items() if name not in COST for key in sorted({*call[1], *call[2]})]
+    places = [(name, key) for name in CALLS if name not in COST for key in sorted({*CALLS[name][1], *REFUSED[name]})]
     faults = []
     for k, (name, argument) in enumerate(places):
-        function, good, _ = CALLS[name]
+        function, good, *_ = CALLS[name]
         for value in ANY[k % stride :: stride] if (name, argument) != ("register", "entry") else ():
             try:
                 came(function, {**good, argument: value})
@@ -284,6 +240,91 @@ def test_anything_is_used_or_refused(stride):
 
 
 def test_the_same_calls_with_good_input_are_fine():
-    for name, (function, good, _) in CALLS.items():
+    for name, (function, good, *_) in CALLS.items():
         if name not in ("register", "register_scene", "judge of nothing"):
             assert came(function, good) == "", name
+
+
+ODD_TIMES = [
+    10**400, [10**400], 1j, [1j], np.array([1.0 + 0j]), {1: 2}, {}, {0.0}, "abc", "1", ["1"], b"1", np.array(["1"]),
+    None, [None], object(), [object()], [[1.0, 2.0], [3.0]], np.datetime64("2020"), datetime.date(2020, 1, 1), [True],
+    True, iter([1.0]), lambda: 1.0, [math.nan], [math.inf], 1e101,
+]  # fmt: skip
+SPHEROID = symtop.scene("spheroid")
+FORM = ClosedForm(SPHEROID.top, SPHEROID.start)
+FORMS = ClosedForms([[2.0, 1.0, 1.0, 0.5, 0, 0, 0, 0, 5.0]])
+
+
+@pytest.mark.parametrize("times", ODD_TIMES, ids=lambda times: repr(times)[:20])
+def test_odd_times_are_refused_in_one_sentence(times):
+    functions = [FORM, FORM.turns, FORM.quaternion, FORM.axis, FORM.run, FORMS, FORMS.axis, FORMS.turns]
+    functions += [lambda row: symtop.reference(SPHEROID, row), lambda row: FORM.axis_distance(row, np.ones((1, 3)))]
+    for ask in functions:
+        with pytest.raises(symtop.SymtopError, match="times must be") as info:
+            ask(times)
+        assert len(str(info.value)) < 300
+
+
+@pytest.mark.parametrize("numbers", ODD_TIMES, ids=lambda numbers: repr(numbers)[:20])
+def test_odd_tops_are_refused_in_one_sentence(numbers):
+    with pytest.raises(symtop.SymtopError):
+        ClosedForms(numbers)
+
+
+def test_numbers_of_every_kind_are_read():
+    kinds = [1], np.array([1], np.int8), np.array([1.0], np.float16), [fractions.Fraction(1)], [decimal.Decimal(1)]
+    for row in kinds:
+        assert real_numbers("row", row).tolist() == [1.0]
+    assert real_numbers("row", [10**30]).tolist() == [1e30]
+    assert real_numbers("row", 2.5).shape == ()
+    for shape in ((), (0,), (2, 2)):
+        assert FORM(np.ones((*shape, 2))[..., 0]).theta.shape == shape
+        assert FORM.quaternion(np.ones(shape)).shape == (*shape, 4)
+
+
+@pytest.mark.parametrize("name", ["rk45", "rk45-compiled", "lsoda", "radau", "dop853", "taylor", "strang", "exact"])
+def test_a_horizon_too_short_for_a_step_is_refused(name):
+    method = symtop.integrator(name)
+    for horizon in (5e-324, 1e-320, 1e-305, 1e-101):
+        control = {None: {}, "tolerance": {"tolerance": 1e-6}, "step_size": {"step_size": horizon}}[method.control]
+        with pytest.raises(symtop.SymtopError, match="horizon must be at least 1e-100"):
+            symtop.simulate(SPHEROID, name, horizon=horizon, **control)
+    control = {None: {}, "tolerance": {"tolerance": 1e-6}, "step_size": {"step_size": 1e-100}}[method.control]
+    assert symtop.simulate(SPHEROID, name, horizon=1e-100, **control).attrs["outcome"] == "ok"
+
+
+def extreme(I1, I3, mgl, spin):
+    return symtop.Scene("extreme", symtop.SymmetricTop(I1, I3, mgl), symtop.Angles(1.0, psi_dot=spin), 10.0)
+
+
+SLOW = [(1e-30, 1e-31, 1e30), (1e30, 1e30, 1e-30), (1e-30, 1e-30, 1e-30)]
+TOPS = [(1e-30, 1e-30, 1e30), (1, 1e-30, 1), *(pytest.param(numbers, marks=pytest.mark.slow) for numbers in SLOW)]
+
+
+@pytest.mark.parametrize("spin", [0.0, 2.0])
+@pytest.mark.parametrize("numbers", TOPS)
+def test_references_of_extreme_tops_are_told_or_refused(numbers, spin):
+    scene = extreme(*numbers, spin)
+    assert np.isfinite(symtop.reference(scene, [0.0, 1.0])["theta"]).all()
+    pytest.importorskip("heyoka")
+    for options in ({"precision": "double"}, {"certify": "integration"})[: 1 if spin else 2]:
+        try:
+            assert np.isfinite(symtop.reference(scene, [0.0, 1.0], **options)["theta"]).all()
+        except symtop.SymtopError as error:
+            assert "ends at t = 0" in str(error)  # noqa: PT017
+            assert numbers[2] == 1e30
+
+
+@pytest.mark.parametrize("theta", [5e-324, 1e-320, 1e-200, 1e-162])
+def test_a_swing_too_narrow_for_numbers_is_refused_and_one_that_is_not_is_followed(theta):
+    """A hanging top that swings through the pole: its distance from it is theta^2/2."""
+    hanging = symtop.SymmetricTop(1.0, 1.5, -1.0)
+    for ask in (
+        lambda: ClosedForm(hanging, symtop.Angles(theta)),
+        lambda: symtop.simulate(symtop.Scene("s", hanging, symtop.Angles(theta), 3.0), "rk4", step_size=0.01),
+    ):
+        with pytest.raises(symtop.SymtopError, match="leave it by as much"):
+            ask()
+    swing = ClosedForm(hanging, symtop.Angles(1e-140))(np.array([0.0, 1.0])).theta
+    assert swing[0] == pytest.approx(1e-140, rel=1e-12)
+    assert abs(swing[1]) == pytest.approx(1e-140 * math.cos(1.0), rel=1e-6)

@@ -14,14 +14,10 @@ from symtop.measure.errors import ERRORS, OF_BODY, QUANTITIES
 from symtop.runner.scripts import file_beside, names
 from tests.core.test_conventions import lacking
 
-UNITS = {"1", "rad", "rad s-1", "s", "kg m2", "s-1", "s-2", "kg m2 s-2", "kg m2 s-1"}
 ROOT = Path(__file__).resolve().parents[2]
 PEERS = netcdf.read_columns(ROOT / "benchmarks" / "peers" / "columns.tsv")
 OWN = {name: netcdf.read_columns(file_beside(name, "columns.tsv")) for name in names()}
 CHECKS = "checks"  # a group of the study of cost, of a second round that a quick pass may not have
-ENTRIES = {"any": netcdf.VARIABLES, "errors": columns.ERROR_TABLE} | {
-    study: {name: column.entry for name, column in own.items()} for study, own in (OWN | {"peers": PEERS}).items()
-}
 
 
 def table_of(**attributes: dict[str, str]) -> xr.Dataset:
@@ -31,15 +27,6 @@ def table_of(**attributes: dict[str, str]) -> xr.Dataset:
     for name, given in attributes.items():
         data[name].attrs = given
     return data
-
-
-@pytest.mark.parametrize("key", ENTRIES)
-def test_every_entry_is_a_name_with_units_that_are_known(key):
-    for name, (long_name, *units) in ENTRIES[key].items():
-        assert long_name.strip() == long_name, name
-        assert len(long_name) > 5, name
-        assert set(units) <= UNITS, name
-        assert len(units) < 2 or units[1] in ("1", "rad"), name
 
 
 def test_an_error_table_says_of_what_and_against_what():

@@ -7,75 +7,44 @@ import pytest
 
 import symtop
 from symtop.measure.conservation import from_increments, growth, momenta_of, residuals, trend
+from symtop.methods.framework.angles import on_angles
 from symtop.methods.framework.plan import Plan
+from symtop.methods.lagrangian import discrete_lagrangian, galerkin
 from symtop.model.scenes import closed_form
 from symtop.run.simulation import integrate
 from tests.conftest import random_scenes
 
+SPHEROID = symtop.scene("spheroid")
 DISCRETE = {"midpoint": 1e-11, "trapezoidal": 1e-11, "stormer-verlet": 1e-11, "galerkin-simpson": 1e-13}  # of momenta
 
 
-@pytest.fixture(scope="module")
-def million():
-    """10^6 steps of each discrete method on spheroid."""
-    scene = symtop.scene("spheroid")
-    return {
-        name: integrate(scene, name, step_size=0.01, horizon=10_000.0, samples=4001, observe="nutation")
-        for name in DISCRETE
-    }
-
-
 @pytest.mark.parametrize("name", DISCRETE)
-def test_recomputed_momenta_stay_put_without_a_trend(million, name):
-    run = million[name]
+def test_a_million_steps_keep_recomputed_momenta_and_bound_the_energy_without_a_trend(name):
+    run = integrate(SPHEROID, name, step_size=0.01, horizon=10_000.0, samples=4001, observe="nutation")
     assert run.steps == 1_000_000
-    for quantity in ("p_phi", "p_psi"):
-        change = residuals(symtop.scene("spheroid"), run)[quantity]
-        assert np.max(np.abs(change)) < DISCRETE[name]
-        assert not trend(run.time, change).significant
-
-
-@pytest.mark.parametrize("name", DISCRETE)
-def test_energy_error_is_bounded_without_a_trend(million, name):
-    run = million[name]
-    change = residuals(symtop.scene("spheroid"), run)["energy"]
-    line, power = trend(run.time, change), growth(run.time, change)
-    assert not line.significant
-    assert abs(power.slope) < 0.05
+    changes = residuals(SPHEROID, run)
+    assert not any(trend(run.time, changes[quantity]).significant for quantity in ("p_phi", "p_psi", "energy"))
+    assert max(np.max(np.abs(changes[quantity])) for quantity in ("p_phi", "p_psi")) < DISCRETE[name]
+    assert abs(growth(run.time, changes["energy"]).slope) < 0.05
     # of second order in the step: bounded, not small; or of fourth
-    assert (1e-11 if name == "galerkin-simpson" else 1e-6) < np.max(np.abs(change)) < 1e-3
+    assert (1e-11 if name == "galerkin-simpson" else 1e-6) < np.max(np.abs(changes["energy"])) < 1e-3
 
 
-def test_momenta_are_recomputed_and_not_copied():
-    """A kernel that moves phi by the wrong amount shows it in p_phi."""
-    from symtop.methods.framework.angles import on_angles
-    from symtop.methods.framework.loop import kernel_loop
-    from symtop.methods.lagrangian import discrete_lagrangian as family
-
-    scene = symtop.scene("spheroid")
-    par, state = on_angles(scene.top, scene.start)
-    right = family.increment
-
-    def wrong(par, rule, state, carry, h):
-        step, carry, effort, outcome = right(par, rule, state, carry, h)
-        return (step[0], step[1], step[2] * (1.0 + 1e-6), step[3]), carry, effort, outcome
-
-    loop = kernel_loop(family.begin, wrong, family.observe)
-    done = loop(par, family.Quadrature((0.5,), (1.0,)), state, 0.01, np.array([0, 100]))
-    momenta = scene.top.momenta(scene.start)
-    assert abs(done.momenta[-1, 0] / momenta.p_phi - 1.0) > 1e-8
+@pytest.mark.parametrize(
+    ("family", "rule"),
+    [(discrete_lagrangian, discrete_lagrangian.Quadrature((0.5,), (1.0,))), (galerkin, galerkin.Iteration())],
+    ids=["midpoint", "galerkin"],
+)
+def test_momenta_are_recomputed_and_not_copied(family, rule):
+    """A phi that moves 1e-10 too far shows in p_phi."""
+    par, state = on_angles(SPHEROID.top, SPHEROID.start)
+    step, *_ = family.increment(par, rule, state, family.begin(par, rule, state, 0.01), 0.01)
+    right = family.observe(par, rule, state, step, 0.01)
+    assert right == pytest.approx(SPHEROID.top.momenta(SPHEROID.start)[:2], rel=1e-14)
+    moved = (step[0], step[1], step[2] + 1e-10, step[3])
+    assert abs(family.observe(par, rule, state, moved, 0.01)[0] - right[0]) > 1e-9
 
 
-def test_trend_sees_a_drift_of_a_few_rounding_units_and_ignores_an_oscillation():
-    t = np.linspace(0.0, 1000.0, 4001) + 0.3 * np.sin(np.arange(4001))
-    wave = 1e-5 * np.sin(5.3 * t)
-    assert not trend(t, wave).significant
-    drifting = trend(t, wave + 1e-8 * t)
-    assert drifting.significant
-    assert drifting.rise == pytest.approx(1e-5, rel=0.3)
-
-
-SPHEROID = symtop.scene("spheroid")
 PLAN = Plan.steps(SPHEROID.nutation_period / 118.02, [0, 40_000])
 
 

@@ -64,6 +64,9 @@ def test_false_alarms_of_the_trend_are_as_rare_as_it_says():
     assert np.mean(walks) < 0.45
     assert np.mean(waves) < 0.05
     assert trend(t, rng.normal(size=t.size) + 0.005 * t).significant
+    drifting = trend(t, np.sin(5.3 * t) + 1e-3 * t)  # by less than it oscillates
+    assert drifting.significant
+    assert drifting.rise == pytest.approx(1.0, rel=0.3)
 
 
 def test_errors_of_momenta_and_energy_are_relative_to_their_documented_scales():

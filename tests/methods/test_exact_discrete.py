@@ -10,7 +10,7 @@ import symtop
 from benchmarks import exactness
 from symtop.methods.framework.loop import inside
 from symtop.methods.framework.plan import Plan
-from symtop.methods.lagrangian.oscillators import Map, momentum, numbers as exact_map, on_oscillators
+from symtop.methods.lagrangian.oscillators import Map, numbers as exact_map, on_oscillators
 from symtop.model import charts
 from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import closed_form
@@ -194,18 +194,6 @@ def test_the_discrete_routhians_of_both_oscillators_are_one_map_of_the_height(na
                 heights.append(sign * (2.0 * s - 1.0))
             gaps.append(np.abs(np.array(heights) - true[2:]).max())
         assert min(gaps) > 1e-8 if wrong else max(gaps) < 1e-12
-
-
-def test_the_chart_is_the_top():
-    for top, start in exactness.random_tops(50, seed=5):
-        par, state = on_oscillators(top, start)
-        assert momentum(par, state) == pytest.approx(charts.space_state("axis", top, start)[3:], abs=1e-12)
-        mu = -(par.b1 + par.b2)
-        s, rate = state[0] ** 2 + state[1] ** 2, 2.0 * (state[0] * state[4] + state[1] * state[5])
-        wp = par.kappa * s + par.b1
-        assert wp == pytest.approx(0.5 * (par.kappa * math.cos(start.theta) - mu), abs=1e-13 * (1 + abs(mu)))
-        cubic = 4 * wp**3 - par.g2 * wp - par.g3
-        assert (par.kappa * rate) ** 2 == pytest.approx(cubic, abs=1e-12 * (1 + abs(mu)) ** 3)
 
 
 # ---- long runs and rounding ------------------------------------------------------------------------------------------

@@ -8,7 +8,6 @@ import symtop
 from symtop.measure.step_map import StepMap, angles_at, one_step, return_miss, symplectic_defect
 from symtop.methods.framework.angles import on_angles
 from symtop.methods.lagrangian import galerkin as kernel
-from symtop.model.top import effective_force, effective_stiffness
 from tests.conftest import random_scenes
 
 SCENES = ("spheroid", "goldstein")
@@ -83,22 +82,6 @@ def test_a_step_without_its_last_force_is_neither_symplectic_nor_symmetric():
     assert return_miss(one_step(wrong, "angles", scene, 0.02), scene.start) > 1e-5
 
 
-@pytest.mark.parametrize("scene", random_scenes(4, seed=24), ids=lambda s: s.name)
-def test_slopes_at_a_node_are_those_of_the_effective_potential(scene):
-    """V' and V'' as the model has them, and the derivatives by the momenta by differences (V' is quadratic in them)."""
-    par, (theta, *_) = on_angles(scene.top, scene.start)
-    south, north, e = par.south, par.north, 0.5
-
-    def V(south, north):
-        return effective_force(theta, north, south, par.I1, par.mgl)[0]
-
-    pull = kernel._pull(par, kernel._node(par, theta), south, north)
-    assert pull.slope == pytest.approx(V(south, north), rel=1e-13)
-    assert pull.stiffness == pytest.approx(effective_stiffness(theta, north, south, par.I1, par.mgl), rel=1e-12)
-    assert pull.south == pytest.approx((V(south + e, north) - V(south - e, north)) / (2 * e), rel=1e-12)
-    assert pull.north == pytest.approx((V(south, north + e) - V(south, north - e)) / (2 * e), rel=1e-12)
-
-
 @pytest.mark.parametrize("scene", random_scenes(4, seed=25), ids=lambda s: s.name)
 def test_every_derivative_of_a_trial_is_right(scene):
     """The analytic Jacobian against central differences; one that is off by a thousandth is seen."""
@@ -119,18 +102,6 @@ def test_every_derivative_of_a_trial_is_right(scene):
 
     assert agree(1.0)
     assert not agree(1.001)
-
-
-def test_the_recomputed_momenta_see_a_wrong_increment():
-    """A phi that moved 1e-10 too far shows in p_phi."""
-    scene = symtop.scene("spheroid")
-    par, state = on_angles(scene.top, scene.start)
-    carry = kernel.begin(par, kernel.Iteration(), state, 0.01)
-    step, *_ = kernel.increment(par, kernel.Iteration(), state, carry, 0.01)
-    right = kernel.observe(par, kernel.Iteration(), state, step, 0.01)
-    assert right == pytest.approx(scene.top.momenta(scene.start)[:2], rel=1e-14)
-    moved = (step[0], step[1], step[2] + 1e-10, step[3])
-    assert abs(kernel.observe(par, kernel.Iteration(), state, moved, 0.01)[0] - right[0]) > 1e-9
 
 
 @pytest.mark.parametrize("scene_name", SCENES)

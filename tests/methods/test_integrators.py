@@ -13,6 +13,7 @@ from symtop.methods.framework.angles import on_angles
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, forces, march, node_sums, opening
+from symtop.methods.lagrangian.unreduced import unreduced
 from tests.conftest import random_scenes
 
 
@@ -53,58 +54,16 @@ def test_starting_from_q0_plus_h_v0_costs_an_order():
     assert fit.slope == pytest.approx(1.0, abs=0.06)
 
 
-def test_a_rule_that_is_not_symmetric_misses_the_start():
-    lopsided = symtop.discrete_lagrangian("left", (0.0, 2.0 / 3.0), (0.25, 0.75))
+@pytest.mark.parametrize("form", [lambda reduced: reduced, unreduced], ids=["reduced", "unreduced"])
+def test_a_rule_that_is_not_symmetric_misses_the_start(form):
+    lopsided = form(symtop.discrete_lagrangian("left", (0.0, 2.0 / 3.0), (0.25, 0.75)))
     assert lopsided.symmetric is False
     scene = random_scenes(1, seed=5)[0]
     assert return_miss(one_step(lopsided, "angles", scene, 0.02), scene.start) > 5e-9  # of the largest coordinate
 
 
-def test_midpoint_is_the_implicit_midpoint_rule_of_the_reduced_hamiltonian():
-    """theta1 - theta0 = h p_mid/I1, p1 - p0 = -h V'(theta_mid): reduction and discretisation commute."""
-    scene = symtop.scene("spheroid")
-    run = symtop.simulate(scene, "midpoint", step_size=0.01, horizon=0.05, samples=6)
-    momenta = scene.top.momenta(scene.start)
-    theta, p = run["theta"].values, run["p_theta"].values
-    middle = 0.5 * (theta[1:] + theta[:-1])
-    assert np.diff(theta) == pytest.approx(0.01 * 0.5 * (p[1:] + p[:-1]) / scene.top.I1, abs=5e-16)
-    assert np.diff(p) == pytest.approx(-0.01 * scene.top.potential_slope(middle, momenta), abs=2e-14)
-
-
-@pytest.mark.parametrize(
-    ("name", "nodes", "weights"), [("midpoint", (0.5,), (1.0,)), ("trapezoidal", (0.0, 1.0), (0.5, 0.5))]
-)
-def test_discrete_momenta_are_those_of_the_discrete_lagrangian(name, nodes, weights):
-    """-D1 Ld and D2 Ld by numerical differentiation of the discrete Lagrangian itself, written out independently."""
-    scene = symtop.scene("spheroid")
-    top, h = scene.top, 0.01
-    run = symtop.simulate(scene, name, step_size=h, horizon=0.03, samples=4, observe="attitude")
-    q = np.stack([run["theta"], run["phi"], run["psi"]], axis=1)
-
-    def discrete(q0, q1):
-        v = (q1 - q0) / h
-        total = 0.0
-        for a, w in zip(nodes, weights, strict=True):
-            theta = (q0 + a * (q1 - q0))[0]
-            across = v[0] ** 2 + (v[1] * np.sin(theta)) ** 2
-            along = v[2] + v[1] * np.cos(theta)
-            total += w * (0.5 * top.I1 * across + 0.5 * top.I3 * along**2 - top.mgl * np.cos(theta))
-        return h * total
-
-    def slope(k, which, q0, q1):
-        e = np.zeros(3)
-        e[k] = 1e-5
-        moved = [(q0 + e, q1), (q0 - e, q1)] if which == 1 else [(q0, q1 + e), (q0, q1 - e)]
-        return (discrete(*moved[0]) - discrete(*moved[1])) / 2e-5
-
-    for j in (1, 2):
-        for k, momentum in enumerate((run["p_theta"].values[j], run["p_phi"].values[j], run["p_psi"].values[j])):
-            assert slope(k, 2, q[j - 1], q[j]) == pytest.approx(momentum, abs=2e-8)
-            assert -slope(k, 1, q[j], q[j + 1]) == pytest.approx(momentum, abs=2e-8)
-
-
-def test_one_newton_iteration_is_not_enough_and_round_off_is_reached_with_more():
-    """A loose stop rule shows as an error of the implicit equation; the default leaves rounding only."""
+def test_midpoint_is_the_implicit_midpoint_rule_of_the_reduced_hamiltonian_to_rounding():
+    """theta1 - theta0 = h p_mid/I1, p1 - p0 = -h V'(theta_mid); a loose stop rule shows as an error."""
     scene = symtop.scene("spheroid")
     par, state = on_angles(scene.top, scene.start)
     h, marks = 0.02, np.arange(0, 40)
@@ -112,8 +71,9 @@ def test_one_newton_iteration_is_not_enough_and_round_off_is_reached_with_more()
     def residual(tolerance):
         done = march(par, Quadrature((0.5,), (1.0,), tolerance), state, h, marks)
         theta, p = done.states[:, 0], done.states[:, 1]
-        momenta = scene.top.momenta(scene.start)
-        return np.max(np.abs(np.diff(p) + h * scene.top.potential_slope(0.5 * (theta[1:] + theta[:-1]), momenta)))
+        middle, momenta = 0.5 * (theta[1:] + theta[:-1]), scene.top.momenta(scene.start)
+        assert np.diff(theta) == pytest.approx(h * 0.5 * (p[1:] + p[:-1]) / scene.top.I1, abs=5e-16)
+        return np.max(np.abs(np.diff(p) + h * scene.top.potential_slope(middle, momenta)))
 
     assert residual(1e-8) < 5e-14
     assert residual(1e3) > 1e-9

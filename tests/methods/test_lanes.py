@@ -1,6 +1,6 @@
 """Members that step side by side in lanes have the bits of runs alone, whatever stands beside them."""
 
-from concurrent.futures import ThreadPoolExecutor
+import dataclasses
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +13,12 @@ from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
 from symtop.methods.framework.space import on_axis
+from symtop.methods.lagrangian.discrete_lagrangian import discrete_lagrangian
+from symtop.methods.lie_group.generalised_alpha import generalised_alpha
+from symtop.methods.lie_group.runge_kutta import LieTable, lie_runge_kutta
+from symtop.methods.lie_group.variational import EULER_POINCARE, Variational, lie_variational
+from symtop.methods.runge_kutta.explicit import runge_kutta
+from symtop.methods.splitting.coefficients import SUZUKI_4
 from symtop.methods.splitting.composition import composition
 from symtop.methods.splitting.space import march_axis
 from symtop.model.top import flat
@@ -216,16 +222,6 @@ def test_groups_hold_every_member_once_and_no_more_steps_than_asked():
     assert all(a[-1] < b[0] for a, b in pairwise(parts))
 
 
-@pytest.mark.parametrize("name", ["strang[axis]", "gauss-4[axis]", "midpoint[angles]"])
-def test_threads_get_the_bits_of_one(name):
-    given = members(40)
-    alone = SOLVERS[name].many(*given)
-    with ThreadPoolExecutor(4) as pool:
-        for made in pool.map(lambda _: SOLVERS[name].many(*given), range(8)):
-            for one, other in zip(made, alone, strict=True):
-                np.testing.assert_array_equal(one, other)
-
-
 def test_a_long_run_in_which_lanes_are_given_up_between_samples():
     """The marks lie further apart than the steps after which a block looks for lanes that were given up."""
     numbers, h, _ = members(W, seed=4)
@@ -273,19 +269,6 @@ def test_turns_are_those_of_a_sleeping_top_and_of_a_pendulum():
     assert angle[2] == np.inf
 
 
-def test_members_that_turn_alike_take_as_many_iterations():
-    """What the order is for: 32 members in order differ less in their work than 32 as they came."""
-    numbers, h, _ = members(seed=5)
-    marks = np.tile([0, 50], (1000, 1))
-    done = SOLVERS["midpoint[angles]"].many(numbers, h, marks)
-    ended = np.flatnonzero(done.steps == 50)
-    slowest = [
-        done.work[part[: len(part) // W * W].reshape(-1, W)].max(axis=1).mean()
-        for part in (ended[np.argsort(turns(numbers, h)[ended])], ended)
-    ]
-    assert slowest[0] < 0.8 * slowest[1]
-
-
 def test_an_exact_step_of_several_parts_is_run_alone():
     """Next to a separatrix a long step is divided; its neighbours in the block are not."""
     scene, solver = symtop.scene("separatrix"), SOLVERS["exact-discrete[axis]"]
@@ -308,3 +291,88 @@ def test_a_rule_that_is_a_table_of_stages_runs_in_lanes():
     marks = np.tile([0, 10, 50], (40, 1))
     for one, other in zip(solver.many(numbers, steps, marks), strang.many(numbers, steps, marks), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+# ---- methods on Lie groups -------------------------------------------------------------------------------------------
+
+CHARTS = ("axis", "attitude")
+
+
+def test_kernels_are_shared_by_charts_compositions_and_numbers():
+    """Axis and attitude differ in what is shown, compositions in the table; other equations are other kernels."""
+    kernels = {
+        (name, chart): SOLVERS[f"{name}[{chart}]"]._whole.blocks().march
+        for name in (*EXPLICIT, *ITERATED)
+        for chart in CHARTS
+    }
+    assert all(kernels[name, "axis"] is kernels[name, "attitude"] for name in (*EXPLICIT, *ITERATED))
+    assert kernels["lie-variational", "axis"] is kernels["lie-variational-suzuki-4", "axis"]
+    assert len(set(map(id, kernels.values()))) == 8
+    other = generalised_alpha("other", 0.3).solvers["axis"]
+    assert other._whole.blocks().march is kernels["generalised-alpha", "axis"]
+
+
+def with_shares(name, shares):
+    """A method as a composition of itself."""
+    solver = SOLVERS[name]
+    return dataclasses.replace(solver, rule=solver.rule._replace(shares=shares))
+
+
+def of_table(*rows, bent=False):
+    return lie_runge_kutta("any", rows, 1, "", "", bent=bent).solvers["attitude"]
+
+
+@pytest.mark.parametrize(
+    "solver",
+    [
+        of_table(((1.0,),)),
+        of_table(((1.0,),), ((0.5, 0.5), (0.0, 0.0)), bent=True),
+        lie_variational("any", Variational(EULER_POINCARE, SUZUKI_4.drift), 4, "", "").solvers["axis"],
+        generalised_alpha("any", 0.0).solvers["axis"],
+        dataclasses.replace(SOLVERS["rkmk-se3-2[attitude]"], rule=LieTable((0.0,), (1.0,))),
+        with_shares("rkmk-se3-2[attitude]", (0.25, 0.75)),
+        with_shares("generalised-alpha[axis]", (0.25, 0.5, 0.25)),
+        runge_kutta("any", ((),), (1.0,)).solvers["axis"],
+        runge_kutta("any", ((), (1 / 3,), (0.0, 2 / 3)), (0.25, 0.0, 0.75)).solvers["axis"],
+        discrete_lagrangian("mixed", (0.0, 0.0, 0.3, 1.0), (0.1, 0.2, 0.3, 0.4)).solvers["angles"],
+    ],
+    ids=[
+        "euler",
+        "heun",
+        "euler-poincare-4",
+        "alpha-0",
+        "zeros",
+        "rkmk-twice",
+        "alpha-thrice",
+        "rk-1",
+        "rk-3",
+        "weights",
+    ],
+)
+def test_tables_and_compositions_of_ones_own_have_the_bits_of_runs_alone(solver):
+    """A weight of 0 is carried out like any other, and each share of generalised-alpha goes on from the last one."""
+    given = members(200, seed=12)
+    assert solver.in_lanes
+    assert_runs_alone(solver, *given, solver.many(*given))
+
+
+@pytest.mark.parametrize("name", ["commutator-free-4", "generalised-alpha"])
+def test_lanes_whose_exponential_turns_too_far_for_its_series_run_alone(name):
+    solver, given = SOLVERS[f"{name}[axis]"], members(400, seed=11)
+    left = set(left_alone(solver, *given).tolist())
+    done = solver.many(*given)
+    failed = set(np.flatnonzero(done.outcome != 0).tolist())
+    assert failed < left  # some of those that are left end well, with sine and cosine
+    assert len(set(range(400)[FAR]) & left) > 0.6 * len(range(400)[FAR])
+    assert len(left) < 80
+
+
+@pytest.mark.parametrize("name", ["lie-variational", "euler-poincare", "simo-wong"])
+def test_cayleys_rotation_turns_as_far_as_it_likes_in_lanes(name):
+    """Only members whose equation cannot be solved, or takes half of the passes or more, are left."""
+    solver, given = SOLVERS[f"{name}[axis]"], members(400, seed=11)
+    left, done = set(left_alone(solver, *given).tolist()), solver.many(*given)
+    failed = set(np.flatnonzero(done.outcome != 0).tolist())
+    assert failed <= left
+    assert len(left) <= len(failed) + 5
+    assert len(set(range(400)[FAR]) - left) > (0 if name == "lie-variational" else 5)

@@ -139,9 +139,3 @@ def test_errors_follow_the_tolerance_in_fewer_forces_than_dop853_takes_in_angles
         error = float(symtop.errors(mine)["axis"].max())
         assert mine.attrs["force_evaluations"] < theirs.attrs["force_evaluations"]
         assert error < min(tolerance, float(symtop.errors(theirs)["axis"].max()))
-
-
-def test_momenta_stay_those_of_the_start():
-    run = symtop.simulate("spheroid", "dprkn8", tolerance=1e-6, samples=501, guard=False)
-    for name in ("p_phi", "p_psi"):
-        np.testing.assert_allclose(run[name], run[name][0], rtol=1e-13)

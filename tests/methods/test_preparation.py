@@ -1,8 +1,6 @@
 """What surrounds a kernel compiles to the bits of its Python, and a run at once is a run in stretches."""
 
-import contextlib
 import dataclasses
-import math
 import random
 
 import numpy as np
@@ -11,16 +9,13 @@ import pytest
 import symtop
 from symtop.core.jit import compile_kernel
 from symtop.methods.framework import loop, loop as loops
-from symtop.methods.framework.angles import on_angles, require_chart, with_rates
-from symtop.methods.framework.lanes import refused
+from symtop.methods.framework.angles import on_angles, with_rates
 from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.preparation import Body, Start
 from symtop.methods.framework.space import on_attitude, on_axis, on_frame
 from symtop.methods.lagrangian.unreduced import with_momenta
-from symtop.methods.splitting import angles, space
 from symtop.methods.splitting.coefficients import METHODS
-from symtop.methods.splitting.composition import composition
 from symtop.methods.splitting.loop import exact_sum
 from symtop.model.top import Angles, SymmetricTop, flat
 
@@ -116,18 +111,6 @@ def test_every_run_at_once_is_a_run_in_stretches():
                     assert_the_same_run(solver, scene.top, scene.start, Plan.steps(h, np.arange(0, 400, 3)))
 
 
-def test_a_run_that_fails_shows_nothing_after_its_failure():
-    """It leaves the chart after a few steps; the samples beyond are NaN, the start is there."""
-    scene = symtop.scene("grazing")
-    solver = symtop.integrator("stormer-verlet").solvers["angles"]
-    run = solver(scene.top, scene.start, Plan.steps(0.3, np.arange(0, 15)))
-    assert run.outcome == "left_chart"
-    finite = np.isfinite(run.states).all(axis=1)
-    assert finite.sum() == run.steps + 1
-    np.testing.assert_array_equal(finite, np.isfinite(run.p_phi))
-    assert (run.p_phi[0], run.p_psi[0]) == scene.top.momenta(scene.start)[:2]
-
-
 def test_long_runs_return_to_python(monkeypatch):
     """Beyond `BLOCK` steps a run is made in stretches, to the same bits, so that an interrupt is heard."""
     scene, solver = symtop.scene("spheroid"), symtop.integrator("gauss-4").solvers["attitude"]
@@ -136,31 +119,6 @@ def test_long_runs_return_to_python(monkeypatch):
     monkeypatch.setattr(loops, "BLOCK", 7)
     monkeypatch.setattr(loop, "flat", None)  # what a run in one call begins with
     np.testing.assert_array_equal(solver(scene.top, scene.start, plan).states, whole.states)
-
-
-def test_a_start_on_a_pole_is_refused_as_before():
-    top = SymmetricTop(1.0, 1.0, 1.0)
-    for prepare in (on_angles, with_rates, with_momenta):
-        with pytest.raises(symtop.SymtopError, match="inside"):
-            prepare(top, Angles(0.0))
-    with pytest.raises(symtop.SymtopError, match="inside"):
-        symtop.integrator("midpoint").solvers["angles"](top, Angles(0.0), Plan.steps(0.1, [1]))
-
-
-def test_many_starts_are_refused_as_each_of_them_is():
-    theta = [0.0, 1e-300, 1.0, np.pi, 3.2, -0.1, np.nan, np.inf]
-    numbers = np.zeros((len(theta), 9))
-    numbers[:, 3] = theta
-
-    def refuses(value):
-        with contextlib.suppress(symtop.SymtopError):
-            require_chart(Start(value, 0.0, 0.0, 0.0, 0.0, 0.0))
-            return False
-        return True
-
-    assert refused(require_chart, numbers).tolist() == [refuses(value) for value in theta]
-    assert refused(require_chart, numbers).sum() == 6
-    assert not refused(None, numbers).any()
 
 
 @pytest.mark.parametrize("rule", [(0.0,), np.array([0.5, 0.25]), 0.5])
@@ -178,16 +136,6 @@ def test_a_rule_may_be_whatever_a_kernel_takes(rule):
     run = solver(SymmetricTop(1.0, 1.0, 1.0), Angles(1.0, theta_dot=0.5), Plan.steps(0.25, [0, 1, 4]))
     assert run.states[:, 0].tolist() == [1.0, 1.125, 1.5]
     assert (solver._whole is not None) == isinstance(rule, tuple)
-
-
-def test_a_tuned_drift_hangs_on_the_start():
-    entry = composition("tuned", (1.0,), (0.5, 0.5), chart="space", rotation="cayley-tuned")
-    solver = entry.solvers["axis"]
-    top, at = SymmetricTop(2.0, 1.0, 2.0), Angles(0.5, psi_dot=20.0)
-    half = solver.rule(top, at, 0.1).drift[0]
-    assert half == 0.5 * 0.1 / 2.0 * space.tangent_scale(top, at, 0.1)
-    assert not math.isclose(half, 0.5 * 0.1 / 2.0, rel_tol=1e-6)
-    assert angles.march is not space.march_axis
 
 
 def test_a_composition_travels_as_an_array_and_arrives_whole():

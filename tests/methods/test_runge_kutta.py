@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.measure.conservation import growth, residuals, trend
 from symtop.methods.framework.angles import field_angles, with_rates
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.registry import integrator
-from symtop.methods.library.scipy_ivp import RightHandSide, scipy_method
+from symtop.methods.library.scipy_ivp import RightHandSide
 from symtop.methods.runge_kutta import pairs
 from symtop.methods.runge_kutta.explicit import LOOPS, runge_kutta
 from symtop.methods.runge_kutta.pair_tables import DORMAND_PRINCE
 from symtop.model.scenes import closed_form
-from symtop.run.simulation import integrate, make_plan
+from symtop.run.simulation import make_plan
+from tests.conftest import random_scenes
 from tests.judging.blind.right import CLASSICAL, explicit
 from tests.measure.test_step_series import series
 
@@ -47,18 +47,6 @@ def test_a_tableau_may_be_made_of_arrays():
     assert rules[0] == rules[1]
     rows = [np.array([]), np.array([1.0])]
     assert runge_kutta("heun", rows, heun[1]).solvers["axis"].rule == rules[0]
-
-
-def test_rk4_loses_energy_linearly():
-    scene = symtop.scene("spheroid")
-    period = scene.nutation_period
-    run = integrate(scene, "rk4", step_size=period / 40.3, horizon=2000 * period, samples=4001, observe="axis")
-    residual = residuals(scene, run)["energy"]
-    drift, power = trend(run.time, residual), growth(run.time, residual)
-    assert drift.significant
-    assert abs(drift.rise) > 1e-3
-    assert abs(power.slope - 1.0) < 0.05
-    assert np.all(run.p_phi == run.p_phi[0])  # linear in (e, L): every Runge-Kutta method keeps it
 
 
 @pytest.mark.parametrize(
@@ -98,20 +86,10 @@ def test_the_right_hand_side_is_the_derivative_of_the_true_motion(name, chart):
     states = [form.prepare(scene.top, symtop.Angles(*map(float, values)))[1] for values in motion]
     back2, back, here, ahead, ahead2 = np.array(states)
     slope = (8.0 * (ahead - back) - (ahead2 - back2)) / (12.0 * h)
-    result = np.array(form.field(par, tuple(here)))
-    np.testing.assert_allclose(result, slope, atol=1e-7 * np.max(np.abs(slope)))
-
-
-@pytest.mark.parametrize("chart", list(FORMULATIONS))
-def test_both_languages_of_the_right_hand_side_compute_the_same(chart):
-    scene = symtop.scene("goldstein")
-    runs = [
-        symtop.simulate(scene, scipy_method("RK45", compiled=compiled).variant(chart), tolerance=1e-7, horizon=4.0)
-        for compiled in (False, True)
-    ]
-    assert runs[0].attrs["steps"] == runs[1].attrs["steps"]
-    assert runs[0].attrs["force_evaluations"] == runs[1].attrs["force_evaluations"]
-    np.testing.assert_allclose(runs[0]["axis"], runs[1]["axis"], atol=1e-11)
+    np.testing.assert_allclose(form.field(par, tuple(here)), slope, atol=1e-7 * np.max(np.abs(slope)))
+    state = symtop.field(chart, scene.top).state(symtop.Angles(*map(float, motion[2])))
+    theirs = [symtop.field(chart, scene.top, compiled=compiled)(0.0, state) for compiled in (False, True)]
+    np.testing.assert_allclose(theirs, [slope] * 2, atol=1e-7 * np.max(np.abs(slope)))
 
 
 @pytest.mark.parametrize("chart", list(FORMULATIONS))
@@ -139,6 +117,54 @@ def test_p_phi_stays_where_it_is_linear_in_the_state_and_is_lost_in_angles(name)
     assert change["attitude"]["p_phi"] <= 2e-16
     assert change["angles"]["p_phi"] > 1e-8  # the negative control
     assert min(change[chart]["p_psi"] for chart in change) > 1e-9  # L.e is not linear, and nothing is copied
+
+
+@pytest.mark.parametrize("chart", list(FORMULATIONS))
+def test_numpy_and_compiled_are_one_function(chart):
+    for scene in random_scenes(5, seed=3):
+        plain, fast = (symtop.field(chart, scene.top, compiled=compiled) for compiled in (False, True))
+        y = plain.state(scene.start)
+        np.testing.assert_allclose(plain(0.0, y), fast(1.0, y), rtol=1e-14, atol=1e-14)
+        np.testing.assert_array_equal(fast.kernel(*fast.parameters, y), fast(0.0, y))
+        assert y.shape == ((7,) if chart == "attitude" else (6,))
+
+
+def test_the_attitude_takes_its_spin_from_the_state():
+    """A field of one top serves every start: the kernels' own holds the spin of one."""
+    scene = symtop.scene("spheroid")
+    f = symtop.field("attitude", scene.top)
+    for spin in (0.0, 3.0, 80.0):
+        start = symtop.Angles(theta=0.7, psi_dot=spin)
+        y, h = f.state(start), 1e-6
+        truth = symtop.ClosedForm(scene.top, start).quaternion([h])[0]
+        assert np.abs(truth - (y[:4] + h * f(0.0, y)[:4])).max() < 1e-8
+
+
+def test_a_pole_of_the_angles_is_nan_and_no_other_chart_has_one():
+    top = symtop.SymmetricTop(2.0, 1.0, 1.0)
+    start = symtop.Angles(theta=0.0, theta_dot=1.0, psi_dot=2.0)
+    for chart in ("axis", "attitude"):
+        f = symtop.field(chart, top)
+        assert np.isfinite(f(0.0, f.state(start))).all()
+    assert math.isnan(symtop.field("angles", top)(0.0, np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]))[4])
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("chart", list(FORMULATIONS))
+def test_a_state_of_another_shape_is_refused(chart, compiled):
+    """Compiled code does not look where an array ends."""
+    size = 7 if chart == "attitude" else 6
+    f = symtop.field(chart, symtop.SymmetricTop(1.0, 0.5, 1.0), compiled=compiled)
+    for shape in ((3,), (13 - size,), (size, 3), (size, 1), (0,), ()):
+        with pytest.raises(symtop.SymtopError) as refused:
+            f(0.0, np.ones(shape))
+        assert str(refused.value) == f"y must have the shape ({size},) in the chart {chart}, not {shape}"
+    for value in ("abcdef", None, [1.0, 2.0], [[1.0], [2.0, 3.0]]):
+        with pytest.raises(symtop.SymtopError, match="y must"):
+            f(0.0, value)
+    y = f.state(symtop.Angles(1.0, psi_dot=2.0))
+    for same in (list(y), np.repeat(y, 2)[::2]):
+        np.testing.assert_array_equal(f(0.0, same), f(0.0, y))
 
 
 # --- Dormand-Prince -------------------------------------------------------------------------------------------------

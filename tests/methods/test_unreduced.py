@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from symtop_studies.reduction.tables import unreduced_cost, unreduced_forms, unreduced_gaps
+from symtop_studies.reduction.tables import unreduced_cost, unreduced_gaps
 
 import symtop
 from symtop.measure.conservation import trend
-from symtop.measure.step_map import one_step, return_miss, symplectic_defect
+from symtop.measure.step_map import one_step, symplectic_defect
 from symtop.methods.framework.loop import kernel_loop
 from symtop.methods.lagrangian import unreduced as kernel
 from symtop.methods.lagrangian.discrete_lagrangian import RULES, Quadrature
-from symtop.methods.lagrangian.unreduced import march, unreduced, with_momenta
+from symtop.methods.lagrangian.unreduced import march, with_momenta
 from tests.conftest import random_scenes
 
 PAIRS = ("midpoint", "trapezoidal")
@@ -38,12 +38,13 @@ def test_another_rule_is_another_trajectory(scene_name):
     assert largest_gap(scene_name, "midpoint", "trapezoidal" + TWIN) > 1e-7
 
 
-def test_every_twin_is_of_a_registered_method_and_its_history_is_rounding():
-    assert {name: name + TWIN for name in PAIRS}.items() <= unreduced_forms().items()
+def test_the_study_finds_rounding_between_the_forms_and_iterations_that_end_soon():
     scene = symtop.scene("goldstein")
     history = unreduced_gaps(scene, "midpoint", scene.nutation_period, 500, samples=51)
     assert float(history["psi_gap"].max()) < 1e-12
     assert float(history["p_phi_drift"].max()) < 1e-13
+    iterations = unreduced_cost(scene, "midpoint", [scene.nutation_period / 300.0], batches=1)["iterations_per_step"]
+    assert ((iterations >= 1.0) & (iterations < 5.0)).all()
 
 
 def test_a_map_that_invents_its_momenta_is_not_symplectic():
@@ -58,13 +59,6 @@ def test_a_map_that_invents_its_momenta_is_not_symplectic():
     scene = random_scenes(1, seed=11)[0]
     step = one_step(wrong, "angles", scene, 0.02)
     assert symplectic_defect(step, scene.start).size * step.unit > 1e-5
-
-
-def test_a_lopsided_rule_misses_the_start():
-    lopsided = unreduced(symtop.discrete_lagrangian("left", (0.3,), (1.0,)))
-    assert lopsided.symmetric is False
-    scene = random_scenes(1, seed=12)[0]
-    assert return_miss(one_step(lopsided, "angles", scene, 0.02), scene.start) > 1e-7
 
 
 def momentum_walk(scene_name, loop, steps=1_000_000):
@@ -130,23 +124,6 @@ def test_newtons_jacobian_is_that_of_the_discrete_legendre_transform(rule):
     assert miss(1e-3, "") / miss(5e-4, "") == pytest.approx(4.0, rel=0.02)
     for entry in ("stiffness", "before_v", "before_u", "after_v", "after_u"):
         assert miss(1e-3, entry) / miss(5e-4, entry) == pytest.approx(2.0, rel=0.3)
-
-
-def test_the_three_by_three_solver_is_exact():
-    rng = np.random.default_rng(1)
-    for _ in range(50):
-        matrix = rng.normal(size=(3, 3)) + 4.0 * np.eye(3)
-        right = rng.normal(size=3)
-        solution = kernel._solve(*(tuple(row) for row in matrix), tuple(right))
-        assert np.array(solution) == pytest.approx(np.linalg.solve(matrix, right), rel=1e-12, abs=1e-14)
-
-
-@pytest.mark.parametrize("scene_name", SCENES)
-def test_the_iteration_ends_within_a_handful(scene_name):
-    scene = symtop.scene(scene_name)
-    cost = unreduced_cost(scene, "midpoint", [scene.nutation_period / 300.0], batches=1)
-    assert (cost["iterations_per_step"] < 5.0).all()
-    assert (cost["iterations_per_step"] >= 1.0).all()
 
 
 def test_long_horizons_do_not_slow_it_down():

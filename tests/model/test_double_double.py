@@ -116,15 +116,3 @@ def test_quad_double_is_right_to_sixty_digits():
             assert _error(ours, true) <= 1e-62
             assert _error(dd.narrowed(ours), true) <= UNIT
     assert _error(dd.mul((0.1, 0.0), (0.3, 1e-18)), mp.mpf(0.1) * (mp.mpf(0.3) + mp.mpf(1e-18))) > 1e-40  # the control
-
-
-def test_one_formula_serves_both_kinds():
-    a, b = (0.1, 1e-18), (0.3, -2e-18)
-    for ours in (dd.plus, dd.minus, dd.times):
-        short, long = ours(a, b), ours(dd.widened(a), dd.widened(b))
-        assert len(short) == 2
-        assert len(long) == 4
-        assert abs(_exact(short) - _exact(long)) < 1e-31
-        assert abs(_exact(dd.narrowed(long)) - _exact(long)) < 1e-32
-    assert dd.like(a, b) == b
-    assert dd.like(dd.widened(a), b) == dd.widened(b)

@@ -83,16 +83,6 @@ def test_a_start_next_to_a_pole_keeps_its_motion(pole):
     assert at.theta == pytest.approx(abs(pole - 1e-6), abs=1e-15)
 
 
-def test_a_foreign_run_is_judged_from_its_first_sample():
-    """What an own simulator has: a quaternion and a body rate. The run that follows is the scene's."""
-    scene = symtop.scene("spheroid")
-    q = charts.quaternion_from_angles(scene.start.theta, scene.start.phi, scene.start.psi)
-    start = symtop.Angles.from_quaternion(q, omega_body=body_rates(scene.start))
-    mine = symtop.Scene("mine", scene.top, start, 8.0)
-    run = symtop.simulate("spheroid", "gauss-8", step_size=0.002)
-    assert float(symtop.errors({"time": run["time"], "quaternion": run["quaternion"]}, mine)["attitude"].max()) < 1e-9
-
-
 def test_a_body_from_its_moments_about_the_centre_is_the_spheroid():
     mass, polar, equatorial, arm = 1.3, 0.2, 0.1, 0.25
     spheroid = symtop.SymmetricTop.from_spheroid(mass, polar, equatorial, pivot_distance=arm)
@@ -124,8 +114,3 @@ def test_a_body_from_its_moments_about_the_centre_is_the_spheroid():
 def test_bad_input_is_one_sentence(call, words):
     with pytest.raises(symtop.SymtopError, match=words):
         call()
-
-
-def test_a_misspelled_argument_is_named():
-    with pytest.raises(TypeError, match="unexpected keyword argument 'center'"):
-        symtop.RigidBody.from_inertia(np.eye(3), mgl=1.0, center=(0, 0, 1))

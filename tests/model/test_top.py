@@ -1,24 +1,14 @@
-"""The model: published numbers, derivatives, poles."""
+"""The model: derivatives, poles, periods, and roots by Newton's method within a bracket."""
 
 import math
 
 import mpmath
-import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from symtop import Angles, SymmetricTop, scene
+from symtop.model.top import newton_between
 from tests.conftest import random_scenes
-
-
-def test_energy_and_momenta_of_the_thirty_digit_scenes(truth):
-    for name in ("spheroid_ieee", "goldstein_at_rest_ieee"):
-        entry = truth[name]
-        chosen = scene("spheroid" if name.startswith("spheroid") else "goldstein")
-        momenta = chosen.top.momenta(chosen.start)
-        assert chosen.top.energy(chosen.start) == pytest.approx(float(entry["E"]), rel=3e-16)
-        assert momenta.p_phi == pytest.approx(float(entry["p_phi"]), rel=3e-16)
-        assert momenta.p_psi == pytest.approx(float(entry["p_psi"]), rel=3e-16)
-        assert chosen.nutation_period == pytest.approx(float(entry["nutation_period"]), rel=1e-13)
 
 
 def test_spheroid_has_the_notebooks_inertia_and_a_physical_reading():
@@ -94,19 +84,6 @@ def test_nutation_frequency_of_sleeping_tops_has_the_classical_threshold():
     assert asleep.steady_theta(fallen) > 0.1
 
 
-def test_free_and_hanging_tops_have_a_nutation_period():
-    free = SymmetricTop(2.0, 1.0, 0.0)
-    start = Angles(theta=1.0, theta_dot=0.3, phi_dot=0.5, psi_dot=2.0)
-    momenta = free.momenta(start)
-    across = 2.0 * (free.energy(start) - momenta.p_psi**2 / 2.0) * free.I1  # |L|^2 - p_psi^2
-    assert free.nutation_period(start) == pytest.approx(
-        2 * math.pi * 2.0 / math.sqrt(across + momenta.p_psi**2), rel=1e-12
-    )
-    up, down = SymmetricTop(2.0, 1.0, 3.0), SymmetricTop(2.0, 1.0, -3.0)
-    mirrored = Angles(theta=math.pi - 1.0, theta_dot=-0.3, phi_dot=-0.5, psi_dot=2.0)
-    assert down.nutation_period(mirrored) == pytest.approx(up.nutation_period(start), rel=1e-12)
-
-
 @pytest.mark.parametrize("theta", [0.0, 0.3, 1.0, math.pi])
 @pytest.mark.parametrize("psi_dot", [0.0, 1e-200])
 def test_a_free_top_at_rest_keeps_its_inclination(theta, psi_dot):
@@ -123,9 +100,33 @@ def test_a_top_that_moves_or_falls_from_rest_does_not():
     assert (low, high) == (-1.0, pytest.approx(math.cos(1.0), abs=1e-15))
 
 
-def test_arrays_and_floats_give_the_same_potential():
-    chosen = scene("spheroid")
-    momenta = chosen.top.momenta(chosen.start)
-    thetas = np.linspace(0.1, 3.0, 7)
-    one_by_one = [chosen.top.potential(float(theta), momenta) for theta in thetas]
-    assert np.array_equal(chosen.top.potential(thetas, momenta), one_by_one)
+LN2 = 0.6931471805599453
+FUNCTIONS = {
+    "convex": (lambda x: math.exp(x) - 2.0, math.exp, -5.0, 8.0, LN2),
+    "a pole at the left": (lambda x: 1.0 - 1e-24 / x**3, lambda x: 3e-24 / x**4, 1e-9, 3.0, 1e-8),
+    "flat, where Newton's steps leave": (math.atan, lambda x: 1.0 / (1.0 + x * x), -1.0, 1e6, 0.0),
+    "a slope that turns": (lambda x: x**3 - 2.0 * x - 5.0, lambda x: 3.0 * x * x - 2.0, -1.0, 6.0, 2.0945514815423265),
+    "a jump": (lambda x: math.copysign(1.0, x - 0.3), lambda x: 0.0, 0.0, 1.0, 0.3),
+    "no finite slope": (lambda x: x - 0.3, lambda x: math.nan, 0.0, 1.0, 0.3),
+}
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_the_root_is_found_to_its_last_places(name):
+    value, slope, below, above, root = FUNCTIONS[name]
+    assert newton_between(value, slope, below, above) == pytest.approx(root, rel=1e-15, abs=1e-200)
+    if root:
+        assert brentq(value, below, above, xtol=1e-30, rtol=1e-15) == pytest.approx(root, rel=1e-14)
+
+
+def test_a_slope_that_is_wrong_costs_steps_and_no_digits():
+    calls = []
+
+    def value(x):
+        calls.append(x)
+        return math.exp(x) - 2.0
+
+    assert newton_between(value, math.exp, -5.0, 8.0) == pytest.approx(LN2, rel=1e-15)
+    good = len(calls)
+    assert newton_between(value, lambda x: 3.7 * math.exp(x), -5.0, 8.0) == pytest.approx(LN2, rel=1e-15)
+    assert good < 15 < len(calls) - good < 200

@@ -6,7 +6,9 @@ import pytest
 import symtop
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
+from symtop.model import charts
 from symtop.model.charts import CHARTS, DIMENSIONS, View, axis_of, space_momenta
+from symtop.model.scenes import closed_form, scene
 from symtop.run.reference.truth import reference
 
 TOP, START = symtop.scene("spheroid").top, symtop.scene("spheroid").start
@@ -49,3 +51,20 @@ def test_momenta_are_read_in_the_precision_of_the_states():
     p_phi, p_psi = space_momenta("attitude", states)
     assert p_phi.dtype == p_psi.dtype == axis_of("attitude", states).dtype == np.longdouble
     assert float(p_psi[0]) == pytest.approx(TOP.momenta(START).p_psi, rel=1e-15)
+
+
+@pytest.mark.parametrize("chart", ["axis", "attitude"])
+@pytest.mark.parametrize("known", [401, 250], ids=["whole", "broken off"])
+def test_axis_energy_and_momentum_have_the_bits_of_a_view(chart, known):
+    form = closed_form(scene("spheroid"))
+    states = form.state(np.linspace(0.0, 40.0, 401))
+    states[known:] = np.nan
+    if chart == "axis":
+        states = np.concatenate([charts.axis_from_quaternion(states[:, :4]), states[:, 4:]], axis=1)
+    view = View(chart, scene("spheroid").top, states, np.full(401, form.p_phi), np.full(401, form.p_psi))
+    charts._reader.compile()
+    readings = [*charts.readings(view), charts.axes(chart, states)]
+    for ours, theirs in zip(readings, (view.axis, view.energy, view.p_theta, view.axis), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    moved = View(chart, view.top, states * (1.0 + 2e-16), view.p_phi, view.p_psi)
+    assert not np.array_equal(charts.readings(moved)[1], view.energy, equal_nan=True)

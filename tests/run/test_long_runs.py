@@ -170,6 +170,9 @@ def test_a_checkpoint_knows_a_method_by_what_it_holds_and_not_by_its_name():
     renamed = dataclasses.replace(symtop.integrator("strang"), name=plain.name)
     assert identity(renamed) != identity(plain)  # another kernel
     assert identity(dataclasses.replace(plain, summary="said otherwise")) == identity(plain)
+    others = [(SCENE, 2.0 * h, 500, True), (SCENE, h, 501, True), (SCENE, h, 500, False)]
+    others.append((symtop.scene("goldstein"), h, 500, True))
+    assert len({longrun._identity(scene, plain, *run) for scene, *run in others} | {identity(plain)}) == 5
 
 
 def test_an_interrupt_keeps_every_finished_window(tmp_path, monkeypatch):
@@ -241,13 +244,6 @@ def test_a_failed_run_shows_the_windows_it_had():
 def test_bad_input_gets_one_sentence(integrator, settings, words):
     with pytest.raises(SymtopError, match=words):
         long_run(SCENE, integrator, **{"quiet": True} | settings)
-
-
-def test_a_truth_value_of_numpy_is_one():
-    plain = [
-        long_run(SCENE, "midpoint", steps=10, step_size=0.1, quiet=True, compensated=no) for no in (np.False_, False)
-    ]
-    assert plain[0].identical(plain[1])
 
 
 def test_memory_does_not_grow_with_the_steps():

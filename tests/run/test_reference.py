@@ -6,7 +6,6 @@ import os
 import random
 import subprocess
 import sys
-import time
 import timeit
 import warnings
 
@@ -20,7 +19,7 @@ from symtop.model import charts, scenes
 from symtop.model.exact import closed_form
 from symtop.model.exact.constants import RATE
 from symtop.model.exact.digits import PreciseForm
-from symtop.run.reference.independent_checks import check_times, integrate, integrate_with_checks, precise_attitude
+from symtop.run.reference.independent_checks import check_times, integrate, integrate_with_checks
 from symtop.run.reference.truth import UNCERTIFIED, Certificate, closed_bounds, closed_values
 
 
@@ -74,7 +73,7 @@ def check_bounds(count, precision, seed):
 
 @pytest.mark.parametrize(
     ("precision", "count", "seed"),
-    [("longdouble", 1, 11), ("double", 3, 11), ("closed-form", 3, 11),
+    [("longdouble", 1, 11), ("double", 1, 11), ("closed-form", 1, 11),
      *(pytest.param(precision, 56, 2026, marks=pytest.mark.slow) for precision in ("longdouble", "closed-form"))],
 )  # fmt: skip
 def test_bounds_hold_on_random_tops_and_are_tight(precision, count, seed):
@@ -162,15 +161,6 @@ def test_quadruple_precision_has_24_digits_at_t_8(truth, name):
     assert float(data["theta_error_bound"][0]) < 1e-24
 
 
-def test_the_published_grazing_benchmark_agrees_between_both_methods():
-    """Bruls, Cardona and Arnold's top passes 4.15e-5 degrees from theta = 180 (`test_guard` measures it)."""
-    scene = symtop.scene("bruls-cardona-arnold")
-    times = np.linspace(0.0, 2.0, 401)
-    integrated = symtop.reference(scene, times, "longdouble")
-    closed = symtop.reference(scene, times, "closed-form")
-    assert float(charts.axis_distance(integrated["axis"].values, closed["axis"].values).max()) < 1e-13
-
-
 def test_a_long_reference_takes_milliseconds_and_states_what_it_rests_on(cache):
     """1001 times up to 1e5 took half a minute by integration; the certificate is made once and told afterwards."""
     closed_form.compile_now()
@@ -192,21 +182,6 @@ def test_a_long_reference_takes_milliseconds_and_states_what_it_rests_on(cache):
     assert again.equals(plain)
     seconds = min(timeit.repeat(lambda: symtop.reference("spheroid", times), number=1, repeat=7))
     assert seconds < 0.01
-
-
-def test_an_integration_is_kept_and_its_second_call_is_quicker(cache):
-    times = np.linspace(0.0, 1000.0, 1001)
-    symtop.reference("goldstein", [1.0], "longdouble")  # imports and the build of the integrator
-    precise_attitude.cache_clear()
-    start = time.process_time()
-    first = symtop.reference("spheroid", times, "longdouble")
-    middle = time.process_time()
-    second = symtop.reference("spheroid", times, "longdouble")
-    end = time.process_time()
-    assert middle - start < 1.5
-    assert end - middle < 0.2 * (middle - start)
-    assert first.equals(second)
-    assert len(list(cache.glob("reference/*.nc"))) == 2
 
 
 @pytest.mark.parametrize("damage", ["truncated", "zeros", "empty", "foreign", "one value changed"])

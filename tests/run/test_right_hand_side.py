@@ -55,7 +55,7 @@ def measured(f, y0, horizon, name, **control):
 
 REGULAR = [
     (kepler, at_pericentre(0.3), 10, "rk4", {"step_size": 0.06}),
-    (kepler, at_pericentre(0.3), 40, "dop853", {"tolerance": 1e-8}),
+    (kepler, at_pericentre(0.3), 20, "dop853", {"tolerance": 1e-8}),
     (kepler, at_pericentre(0.6), 10, "rk4", {"step_size": 0.03}),
     (kepler, at_pericentre(0.6), 20, "rk45", {"tolerance": 1e-8}),
     (henon_heiles, of_energy(1.0 / 12.0, 0.1), 20, "rk4", {"step_size": 0.1}),
@@ -149,9 +149,8 @@ def test_the_step_that_is_advised_keeps_the_accuracy():
     assert f"take a step of about {expected.setting!r}" in str(expected)
 
 
-@pytest.mark.parametrize("step", [0.8, 1.0])
-def test_a_step_is_advised_where_the_piece_itself_fails(step):
-    stiffening = lambda t, y: [y[1], -(y[0] ** 3)]
+def test_a_step_is_advised_where_the_piece_itself_fails():
+    step, stiffening = 0.8, lambda t, y: [y[1], -(y[0] ** 3)]
     expected = symtop.guard(stiffening, 0.0, [3.0, 0.0], 100.0, step_size=step)
     assert math.isinf(expected.error)
     assert 0.2 * step < expected.setting < 0.4 * step

@@ -12,26 +12,20 @@ import symtop
 from symtop.core import netcdf
 from symtop.core.numbers import GOLDEN
 from symtop.run import trajectory as trajectories
-from symtop.run.simulation import WIDEST_GAP, integrate, sample_times, unseen
+from symtop.run.simulation import WIDEST_GAP, integrate, sample_times
 from symtop.run.trajectory import Trajectory, dataset
 
 
 def test_the_dataset_is_the_one_that_is_promised():
     run = symtop.simulate("spheroid", "midpoint", step_size=0.013, samples=51, guard=False)
-    assert set(run.dims) == {"time", "component"}
     assert list(run["component"].values) == ["x", "y", "z"]
     for name in ("theta", "phi", "psi", "energy", "p_phi", "p_psi", "p_theta"):
         assert run[name].dims == ("time",)
-        assert run[name].attrs["units"]
     assert run["axis"].dims == ("time", "component")
-    assert np.linalg.norm(run["axis"], axis=1) == pytest.approx(1.0, abs=1e-15)
     attrs = run.attrs
-    assert attrs["steps"] == 615
-    assert attrs["step_size"] == 8.0 / 615  # h = T/N exactly
-    assert attrs["outcome"] == "ok"
-    assert attrs["reached_time"] == pytest.approx(8.0)
-    for name in ("integrator", "scene", "force_evaluations", "newton_iterations", "outcome_message", "symtop_version"):
-        assert name in attrs
+    assert (attrs["steps"], attrs["step_size"], attrs["outcome"]) == (615, 8.0 / 615, "ok")  # h = T/N exactly
+    assert attrs["reached_time"] == 8.0
+    assert {"integrator", "scene", "force_evaluations", "newton_iterations", "symtop_version"} <= attrs.keys()
     steps = run["time"].values / attrs["step_size"]
     assert steps == pytest.approx(np.rint(steps), abs=1e-9)
 
@@ -43,17 +37,6 @@ def test_energy_and_momenta_start_at_their_exact_values():
         assert float(run["energy"][0]) == pytest.approx(14.1, rel=1e-15)
         assert float(run["p_phi"][0]) == pytest.approx(3.4, rel=1e-15)
         assert float(run["p_psi"][0]) == pytest.approx(5.0, rel=1e-15)
-
-
-def test_the_chart_follows_what_is_observed():
-    axis = symtop.simulate("spheroid", "taylor", observe="axis", samples=11)
-    attitude = symtop.simulate("spheroid", "taylor", observe="attitude", samples=11)
-    assert axis.attrs["chart"] == "axis"
-    assert "psi" not in axis
-    assert attitude.attrs["chart"] == "attitude"
-    assert "psi" in attitude
-    assert float(abs(axis["theta"] - attitude["theta"]).max()) < 1e-13
-    assert float(abs(axis["phi"] - attitude["phi"]).max()) < 1e-12
 
 
 def test_samples_commensurate_with_the_nutation_are_dithered_and_said_to_be():
@@ -158,17 +141,14 @@ def test_a_failed_write_leaves_the_old_file_and_no_scraps(tmp_path, monkeypatch)
     run = symtop.simulate("spheroid", "stormer-verlet", step_size=0.01)
     path = netcdf.write(run, tmp_path / "run.nc")
     before = path.read_bytes()
+    with pytest.raises(symtop.SymtopError, match="it is a folder"):
+        netcdf.write(run, tmp_path)
 
     monkeypatch.setattr(type(run), "to_netcdf", Mock(side_effect=OSError(28, "No space left on device")))
     with pytest.raises(symtop.SymtopError, match="No space left"):
         netcdf.write(run, path)
     assert path.read_bytes() == before
     assert [item.name for item in tmp_path.iterdir()] == ["run.nc"]
-
-
-def test_a_folder_is_no_file_to_write(tmp_path):
-    with pytest.raises(symtop.SymtopError, match="it is a folder"):
-        netcdf.write(symtop.simulate("spheroid", "taylor", samples=3), tmp_path)
 
 
 @pytest.mark.parametrize("theta", [0.0, math.pi])
@@ -180,20 +160,6 @@ def test_a_start_on_a_pole_is_refused_by_the_angles_chart_and_welcome_elsewhere(
     assert run["theta"].values == pytest.approx(theta, abs=1e-15)
 
 
-def test_the_two_readings_of_the_notebooks_second_top_differ_as_they_should():
-    """alpha = 1.6 is not a release at rest: u'^2 there is 0.0473752579827533, and at rest alpha = 1.4981443962885."""
-    rest, rising = symtop.scene("goldstein"), symtop.scene("goldstein-rising")
-
-    def alpha(scene):
-        momenta = scene.top.momenta(scene.start)
-        return 2.0 * (scene.top.energy(scene.start) - momenta.p_psi**2 / (2.0 * scene.top.I3)) / scene.top.I1
-
-    assert alpha(rest) == pytest.approx(1.4981443962885, abs=1e-12)
-    assert alpha(rising) == pytest.approx(1.6, abs=1e-14)
-    u_dot = math.sin(rising.start.theta) * rising.start.theta_dot
-    assert u_dot**2 == pytest.approx(0.0473752579827533, rel=1e-13)
-
-
 def test_the_three_kinds_of_nutation_are_what_they_are_called():
     """At the upper turning point phi' vanishes (cusp), turns back (loop) or goes on (wave)."""
     for name, sign in (("cusp", 0.0), ("loop", -1.0), ("wave", 1.0)):
@@ -201,12 +167,3 @@ def test_the_three_kinds_of_nutation_are_what_they_are_called():
         motion = symtop.ClosedForm(scene.top, scene.start)(np.linspace(0.0, scene.nutation_period, 2001))
         assert np.sign(np.round(motion.phi_dot.min(), 9)) == sign
         assert motion.phi_dot.max() > 0.0
-
-
-def test_so_few_samples_that_they_leave_an_eighth_of_the_phases_unseen_are_dithered_unlooked():
-    rng = np.random.default_rng(5)
-    gaps = {count: min(unseen(rng.uniform(0.0, 30.0, count), 1.0) for _ in range(400)) for count in (2, 5, 8)}
-    assert min(gaps.values()) >= WIDEST_GAP
-    assert unseen(np.arange(9) * (1.0 + 1.0 / 9.0), 1.0) < WIDEST_GAP  # the control: nine may leave less
-    for count, dithered in ((8, True), (9, False)):
-        assert sample_times((count - 1) * 10.0 / 9.0, count, 1.0)[2] == dithered

@@ -99,17 +99,6 @@ def test_the_beginning_of_another_ensemble_and_a_damaged_piece_are_refused(tmp_p
         assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **SETTINGS))
 
 
-def test_what_a_process_has_computed_before_does_not_make_it_another_ensemble(tmp_path, monkeypatch):
-    monkeypatch.setattr(ensemble.Stream, "finish", lambda *_: xr.Dataset())
-    for name in ("strang[attitude]", "gauss-4[axis]", "rk45-compiled[axis]"):
-        settings = {"nutations": 2, "samples": 11, "quiet": True}
-        settings |= {"tolerance": 1e-6} if name.startswith("rk45") else {"per_nutation": 20}
-        for _ in range(3):
-            symtop.ensemble(SOME, name, path=tmp_path / f"{name}.nc", **settings)
-            symtop.ensemble(SOME, name, **settings)
-            symtop.simulate("spheroid", "rk4[axis]", step_size=0.1, guard=False)
-
-
 def test_one_process_at_a_time_writes_a_file(tmp_path, small_pieces, monkeypatch):
     """A second one on the same path is told so in a sentence; another path, and the same one later, are free."""
     path, keep, once = tmp_path / "runs.nc", ensemble.Stream.keep, []

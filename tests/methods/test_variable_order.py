@@ -1,4 +1,4 @@
-"""Adams methods: coefficients on any nodes, against SciPy's Adams codes, orders, steps of one length, samples."""
+"""Methods of variable order: coefficients of Adams on any nodes, SciPy's Adams codes, lines of an extrapolation."""
 
 import itertools
 
@@ -7,22 +7,11 @@ import pytest
 from scipy import integrate
 
 import symtop
+from symtop.core.jit import compile_kernel
 from symtop.methods.framework.equations import FORMULATIONS
-from symtop.methods.runge_kutta import adams
-from symtop.methods.runge_kutta.adams import (
-    ALPHA,
-    BETA,
-    GAMMA,
-    HIGHEST,
-    LAST,
-    LENGTH,
-    NUMBERS,
-    ORDER_THEN,
-    PSI,
-    SIGMA,
-    G,
-)
-from symtop.model.top import flat
+from symtop.methods.runge_kutta import adams, extrapolation
+from symtop.methods.runge_kutta.adams import ALPHA, BETA, GAMMA, HIGHEST, LAST, NUMBERS, PSI, SIGMA, G
+from symtop.model.scenes import closed_form
 
 
 def prepared(steps, h, k):
@@ -117,30 +106,6 @@ def test_errors_follow_the_tolerance_and_orders_rise_with_it(name, tolerances, c
         assert steps[2] < 2.5 * steps[0]  # of one order: hundreds of times as many
 
 
-def steps_of(tolerance):
-    """(length, order) of each step on the axis, by a run in pieces of one step."""
-    scene = symtop.scene("spheroid")
-    solver = symtop.integrator("adams").solvers["axis"]
-    kernel, place, times = solver.loop(tolerance), np.zeros(solver.room), np.array([8.0])
-    numbers = flat(scene.top, scene.start)
-    samples, made = -1, []
-    states, momenta = np.empty((1, 6)), np.empty((1, 2))
-    while samples < 1:
-        samples, *_ = kernel(numbers, tolerance, times, 1, samples, place, states, momenta)
-        made.append((place[6 + 6 * LAST + LENGTH], int(place[6 + 6 * LAST + ORDER_THEN])))
-    return made[1:]  # the first call evaluates f at the start
-
-
-def test_it_starts_with_order_one_and_keeps_the_length_of_steps():
-    made = steps_of(1e-9)
-    orders, lengths = [k for _, k in made], np.array([h for h, _ in made])
-    assert orders[:5] == [1, 2, 3, 4, 5]  # the start, in steps that double
-    np.testing.assert_array_equal(lengths[1:4] / lengths[:3], 2.0)
-    assert 6 <= np.median(orders) <= 12
-    assert np.mean(lengths[1:] == lengths[:-1]) > 0.5
-    assert np.median([k for _, k in steps_of(1e-3)]) < np.median(orders)
-
-
 def test_a_run_of_ten_trillion_seconds_begins():
     """Its first step is far below the spacing of numbers at its end, on whose grid steps lie: it stood still."""
     top = symtop.SymmetricTop(5.8e10, 5.6e10, -7.2e-12)
@@ -148,3 +113,30 @@ def test_a_run_of_ten_trillion_seconds_begins():
     run = symtop.simulate(scene, "adams", tolerance=1e-9, samples=11, budget=1e5)
     assert run.attrs["outcome"] == "ok"
     assert float(symtop.errors(run)["axis"].max()) < 1e-3
+
+
+SPHEROID = symtop.scene("spheroid")
+
+
+def one_step(h, lines):
+    """A step of h with so many lines, as a sample at the fraction h of a step of one."""
+    form = FORMULATIONS["axis"]
+    par, state = form.prepare(SPHEROID.top, SPHEROID.start)
+    method = extrapolation.method(form.field)
+    memory = np.zeros((extrapolation.LAST + 1, 6))
+    memory[0] = form.field(par, state)
+    memory[extrapolation.ORDERS, 1] = lines
+    sample = method.sample
+
+    def kernel(par, state, memory, x):
+        return sample(par, state, state, memory, 1.0, x)
+
+    return np.array(compile_kernel(kernel)(par, state, memory, h))
+
+
+@pytest.mark.parametrize("lines", [1, 2, 3, 4])
+def test_a_line_more_gives_two_orders_more(lines):
+    steps = np.array([0.16, 0.08]) if lines > 2 else np.array([0.04, 0.02])
+    exact = closed_form(SPHEROID).axis(steps)
+    errors = [np.linalg.norm(one_step(float(h), lines)[:3] - e) for h, e in zip(steps, exact, strict=True)]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2 * lines + 1, abs=0.7)  # of one step

@@ -1,11 +1,14 @@
-"""Pieces on threads come back in order, an error ends the rest, and one thread is the caller's."""
+"""Pieces on threads come back in order and an error ends the rest; worker processes have one thread each."""
 
+import multiprocessing
+import os
 import threading
 import time
+from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
-from symtop.core.parallel import StoppedError, heed, in_threads
+from symtop.core.parallel import VARIABLES, OneThreadEach, StoppedError, heed, in_threads
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
@@ -75,3 +78,32 @@ def test_pieces_that_have_begun_heed_an_interrupt():
         list(in_threads(work, range(2), 2))
     assert ended.wait(5.0)
     heed()  # nothing asks the caller's thread to stop
+
+
+def looked_up(name):
+    return os.environ.get(name)
+
+
+def seen_by(context):
+    """What a process that is started so finds in its environment."""
+    with ProcessPoolExecutor(1, context) as pool:
+        return [pool.submit(looked_up, name).result() for name in VARIABLES]
+
+
+@pytest.fixture(autouse=True)
+def unset(monkeypatch):
+    for name in VARIABLES:
+        monkeypatch.delenv(name, raising=False)
+
+
+def test_a_process_has_one_thread_and_this_one_keeps_its_environment():
+    before = dict(os.environ)
+    assert seen_by(OneThreadEach()) == ["1"] * len(VARIABLES)
+    assert dict(os.environ) == before
+    assert seen_by(multiprocessing.get_context("spawn")) == [None] * len(VARIABLES), "nobody else is told"
+
+
+def test_what_the_user_has_set_is_obeyed(monkeypatch):
+    monkeypatch.setenv(VARIABLES[0], "3")
+    assert seen_by(OneThreadEach()) == ["3", "1", "1"]
+    assert os.environ[VARIABLES[0]] == "3"
