@@ -19,9 +19,8 @@ def checked(name: str, data: object, folder: Path, elsewhere: Collection[str] = 
     """
     study, page = runner.load(name), runner.file_beside(name, "page.md")
     assert page is not None
-    findings = runner.findings_of(
-        study, data, folder, lambda figure, _: plt.close(figure), failures=[], cases=1, page=page
-    )
+    close = lambda figure, _: plt.close(figure)
+    findings = runner.findings_of(study, data, folder, close, failures=[], cases=1, page=page)
     there = {one["name"] for kind in ("pictures", "tables") for one in findings[kind]}
     absent = set(re.findall(r"has\(\"([\w-]+)\"\)", findings["page"])) - there
     assert {first or linked for first, linked in NAMED.findall(findings["page"])} - absent == there - {*elsewhere}, (

@@ -172,15 +172,6 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
     assert "not to the end (stopped by rounding" in " ".join(advice.fails)
 
 
-def test_the_answer_does_not_depend_on_the_working_directory(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "results").mkdir()
-    (tmp_path / "results" / "cost.nc").write_text("no dataset")
-    few(monkeypatch, 1)
-    assert symtop.recommend("spheroid", accuracy=1e-3).integrator == "strang"
-    assert "strang" in call("recommend", "spheroid", "--accuracy", "1e-3").output
-
-
 def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it(monkeypatch):
     names, real = [], advise._try
     monkeypatch.setattr(advise, "_try", lambda *arguments: names.append(arguments[1].name) or real(*arguments))
@@ -351,9 +342,8 @@ def test_limits_leave_out_what_a_user_cannot_use():
 
 def test_energy_and_momenta_may_both_be_asked_to_be_kept():
     ask = functools.partial(advise._Question, symtop.scene("spheroid"), 1e-3, "axis", 2.0, ())
-    every, *one, both = (
-        {*advise._everyone(ask(keeps=kept))} for kept in ((), ("energy",), ("momenta",), ("energy", "momenta"))
-    )
+    choices = (), ("energy",), ("momenta",), ("energy", "momenta")
+    every, *one, both = ({*advise._everyone(ask(keeps=kept))} for kept in choices)
     assert both == one[0] & one[1]
     assert both < one[0] < every
     assert both < one[1] < every

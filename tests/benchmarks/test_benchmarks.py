@@ -5,8 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from benchmarks import adaptive, bench, ensemble, kernels, lanes, measured, targets, truth, twin, whole_run
-from symtop.core import netcdf
+from benchmarks import adaptive, ensemble, kernels, lanes, truth, twin
 from symtop.measure.timing import Timing, timings
 from symtop.methods.framework import loop as loops
 from symtop.methods.framework.lanes import Many
@@ -14,7 +13,6 @@ from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import methods
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForms
-from symtop.report import page
 
 KEYS = kernels.keys()
 STEPS = 500
@@ -57,16 +55,12 @@ def test_a_twin_that_leaves_the_chart_says_so():
 @pytest.mark.parametrize(
     "key",
     [
-        ("stormer-verlet", "angles"),
-        ("strang", "axis"),
-        ("midpoint", "angles"),
-        ("rk4", "axis"),
-        ("dop853-compiled-fixed", "axis"),
-        ("gauss-6", "axis"),
+        ("stormer-verlet", "angles"), ("strang", "axis"), ("midpoint", "angles"), ("rk4", "axis"),
+        ("dop853-compiled-fixed", "axis"), ("gauss-6", "axis"),
         ("gauss-2", "attitude"),  # nine components: the widest state that the loop adds up
     ],
     ids="-".join,
-)
+)  # fmt: skip
 def test_a_kernel_takes_at_most_a_quarter_more_than_its_twin(key):
     kernel, steps = kernels.kernel(key), 8000
     other = twin.Twin(kernel)
@@ -77,36 +71,6 @@ def test_a_kernel_takes_at_most_a_quarter_more_than_its_twin(key):
 def test_a_ratio_carries_the_spread_of_its_fifths():
     ours, theirs = Timing((2.0, 2.2, 2.0, 2.0, 3.0), 0.0), Timing((1.0, 1.0, 1.0, 1.0, 1.0), 0.0)
     assert kernels.ratio(ours, theirs) == (2.0, 2.0, 3.0)
-
-
-def test_what_the_benchmark_leaves_is_what_the_report_shows(tmp_path):
-    rows = [kernels.Row("midpoint", "angles", 200.0, 0.01, 180.0, 1.11, 1.1, 1.3, 0.0, 2.2),
-            kernels.Row("gauss-8", "axis", 900.0, 0.01, 600.0, 1.5, 1.4, 1.6, 1e-16, 9.9)]  # fmt: skip
-    facts = measured.circumstances() | {"measured": "2001-02-03", "processor": "an abacus"}
-    forms = [truth.Row("set-up and one sample, double-double", 4.9e-6, 6.4e-6)]
-    names = ("simulate", "guard", "solver, every step shown")
-    items = [whole_run.Item(name, 1e-6 * 10**k, 10.0**k) for k, name in enumerate(names)]
-    reached, one_step = [targets.Reached("rk4", 99, 1e-5, 400.0)], {"rk4[axis]": 2.25e-6, "gauss-2[axis]": 3e-6}
-    many = [ensemble.Item(ensemble.WHOLE, 4.321e-6, 123.0)]
-    timed = {
-        "strang": (33.0, 4.4, 7.5, 7.4, 7.6),
-        "rk4": (27.0, 6.0, 4.5, 4.4, 4.6),
-        "gauss-4": (99.0, 33.0, 3.0, 2.9, 3.1),
-    }
-    lane_rows = [lanes.Row(name, "axis", *numbers) for name, numbers in timed.items()]
-    batch = lanes.Batch(1e-6, 1.2e-6, 45, 7e-6, 16e-6, 2.6e-6)
-    together = lanes.Measured(lane_rows, [lanes.Threads("strang", "axis", 1.9, 1.8, 2.0)], [batch])
-    called = [ensemble.Call("strang", 0.9e-6, 2.5e-9, 25e-9)]
-    results = bench.Results(rows, {"python": 0.012}, forms, 1e-9, reached, items, one_step, many, called, together)
-    assert "python  12.00\n" in bench.tables(results)[-1].text
-    netcdf.write_json(tmp_path / "bench.json", bench.findings(results, facts))
-    text = page.write(tmp_path).read_text()
-    markdown = (tmp_path / "report.md").read_text() + (tmp_path / "reference.md").read_text()
-    calls = "0.90 us a member beside its steps, 2.50 ns a step, 10.0 times"
-    counted = ("1 of 2 kernels", "3.0 us at most", "123 times faster", "explicit: 1 of 2 methods", calls)
-    for words in (*counted, "gauss: 1 of 1 methods", "4.5 times with rk4[axis]", "2001-02-03", "an abacus"):
-        assert words in text
-        assert words in markdown
 
 
 @pytest.mark.slow

@@ -59,13 +59,9 @@ def test_all_right_hand_sides_on_the_axis_are_the_kernels_own(scene):
     filled, through_c = np.empty(6), np.empty(6)
     common.filling_field(scene.top)(0.0, y, filled)
     callbacks.ode_field(scene.top).ctypes(None, _pointer(through_c), _pointer(y), 0.0)
-    for found in (
-        common.python_field(scene.top)(0.0, y),
-        common.compiled_field(scene.top)(0.0, y),
-        filled,
-        through_c,
-        _vector_field(callbacks.vector_field(scene.top, Core()), y),
-    ):
+    through_vectors = _vector_field(callbacks.vector_field(scene.top, Core()), y)
+    returned = [field(scene.top)(0.0, y) for field in (common.python_field, common.compiled_field)]
+    for found in (*returned, filled, through_c, through_vectors):
         assert np.allclose(found, expected, rtol=1e-15, atol=0.0)
 
 

@@ -68,9 +68,8 @@ def test_noise_is_not_called_a_win():
     data = _stored({"symtop": (1e-4, 1e-4), "rebound": (1.4e-4, 1.4e-4)})
     assert "faster in 2 of 2 comparisons, level or within the noise in 0" in summary.verdict(data)[0]
     data["seconds_samples"].values[:, 0, 0, 0, 0::5] *= 2.0  # one fifth of our batches was slow
-    assert all(
-        "faster in 0 of 2 comparisons, level or within the noise in 2" in said for said in summary.verdict(data)[1:]
-    )
+    level = "faster in 0 of 2 comparisons, level or within the noise in 2"
+    assert all(level in said for said in summary.verdict(data)[1:])
 
 
 def test_methods_on_f_alone_are_counted_by_themselves():
@@ -78,8 +77,6 @@ def test_methods_on_f_alone_are_counted_by_themselves():
     data = _stored({"symtop": (1e-4, 1e-5), "rebound": (2e-4, 2e-4)} | scipys)
     data = data.assign_coords(variant=["series[axis]", *data["variant"].values[1:]])
     assert summary.general(data) == []
-    assert "on f(t, y) alone" not in (caption := study.caption(data)[0])
-    assert "`series[axis]`, which is made of this top's equations" in caption
     slow = data.isel(variant=[0]).assign_coords(variant=["rk4[axis]"])
     for name in ("seconds", "seconds_samples"):
         slow[name] = 4.0 * slow[name]
@@ -87,12 +84,7 @@ def test_methods_on_f_alone_are_counted_by_themselves():
     assert summary.general(both) == ["rk4[axis]"]
     assert summary.score(both, "public", ["rk4[axis]"]).slower == {"rebound": "2 of 2"}
     assert "are faster in 4 of 6 comparisons" in summary.verdict(both)[2]
-    caption = study.caption(both)[0]
-    assert (
-        "Over `rk4[axis]`, which needs f(t, y) alone (spheroid), solve_ivp takes 2 to 2 times and 22.5 to 22.5"
-        in caption
-    )
-    assert "faster than it are rebound in 2 of 2 at the left. " in caption
+    assert "solve_ivp takes 2 to 2 times and 22.5 to 22.5" in study.caption(both)[0]
 
 
 # ---- the report ------------------------------------------------------------------------------------------------------
@@ -118,17 +110,6 @@ def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_p
     assert truth.question in sections
     assert "Measured on 2001-02-03" in text
     assert "an abacus" not in text.partition("## Provenance")[2]  # the studies were run here
-
-
-def test_what_the_readme_cites_is_in_the_checkout():
-    pages = "".join(page.read_text() for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))))
-    cited = set(re.findall(r"results/(?:figures/)?[\w-]+\.(?:nc|json|md|png)", pages)) - {"results/NAME.nc"}
-    assert {"results/bench.json", "results/peers.nc"} <= cited
-    studies = {f"results/{name}.{kind}" for name in runner.names() for kind in ("nc", "json")}
-    kept = subprocess.run(["git", "ls-files", "results"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
-    assert not {path for path in cited - studies if not (ROOT / path).is_file()}
-    if kept:  # a checkout, not an archive
-        assert {path for path in cited - studies if "/figures/" not in path} <= set(kept.split())
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="there is no make here")

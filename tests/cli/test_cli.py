@@ -45,14 +45,12 @@ OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --bod
         ("run sferoid midpoint --step-size 0.1", ["scene 'sferoid'", "spheroid", "symtop scenes", BODY]),
         ("run spheroid midpont --step-size 0.1", ["integrator 'midpont'", "midpoint", "symtop integrators", OWN]),
         ("run midpoint spheroid", ["scene 'midpoint'", "an integrator", "scene comes first"]),
-        ("run rk4[axis] spheroid", ["scene 'rk4[axis]'", "an integrator", "scene comes first"]),
         ("run spheroid goldstein", ["integrator 'goldstein'", "a scene", "scene comes first"]),
         ("run spheroid midpoint[attitude] --step-size 0.1", ["chart of midpoint 'attitude'", "angles"]),
         ("run spheroid rk4[axs] --step-size 0.1", ["'axs'", "axis"]),
         ("run spheroid rk5[axis] --step-size 0.1", ["'rk5", "rk45"]),
         ("run spheroid rk4[axis] --step-size 0.1 --observe attitude", ["cannot show the attitude", "observe axis"]),
         ("run spheroid midpoint", ["needs --step-size", "0.007"]),
-        ("run spheroid rk4[axis]", ["rk4[axis]", "needs --step-size"]),
         ("run spheroid midpoint --step-size 0", ["--step-size", "above zero", "0.0"]),
         ("run spheroid midpoint --step-size 99", ["--step-size", "at most the horizon", "99.0"]),
         ("run spheroid midpoint --step-size 1e-12", ["--step-size 1e-12", "the limit is", "see --budget"]),
@@ -75,11 +73,7 @@ OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --bod
         ("recommend spheroid", ["--accuracy", "--i-use"]),
         ("recommend spheroid --i-use mujoco --quantity theta", ["--quantity", "axis", "'theta'"]),
         ("recommend spheroid --accuracy 1e-3 --step-size 10", ["--step-size", "below the horizon 8", "10"]),
-        (
-            "recommend spheroid --accuracy 1e-3 --step-size 1 --per-nutation 9",
-            ["--step-size", "--per-nutation", "not both"],
-        ),
-        ("recommend spheroid --accuracy 1e-3 --keeps time", ["--keeps 'time'", "energy", "momenta"]),
+        ("recommend spheroid --accuracy 1 --step-size 1 --per-nutation 9", ["--step-size", "not both"]),
         ("recommend spheroid --accuracy 1e-3 --keeps energy,time", ["--keeps 'time'", "energy", "momenta"]),
         ("recommend spheroid --accuracy 5", ["--accuracy", "below pi", "5.0"]),
         ("recommend spheroid --accuracy 1 --needs kicks,luck", ["--needs 'luck'", "derivative", "kicks", "this-top"]),
@@ -104,21 +98,13 @@ def test_a_refusal_names_the_argument_its_value_and_what_is_allowed(words, parts
 
 
 def test_a_plugin_that_registers_nothing_is_told_of(tmp_path):
-    for text, expected in (("x = 1\n", True), (ANOTHER_NAME, False), (REPLACED, False)):
+    replaced = "import dataclasses, symtop\nown = symtop.integrators()['midpoint']\n"
+    replaced += "symtop.register(dataclasses.replace(own, summary='mine'), replace=True)\n"
+    for text, expected in (("x = 1\n", True), (replaced, False)):
         plugin = tmp_path / f"plugin_{len(text)}.py"
         plugin.write_text(text, encoding="utf-8")
         result = call("scenes", "--plugin", plugin)
         assert (f"{plugin.name} registers no integrator and no scene" in result.output) is expected
-
-
-ANOTHER_NAME = """import dataclasses
-import symtop
-symtop.register_scene(dataclasses.replace(symtop.scene("spheroid"), name="a-new-name"))
-"""
-REPLACED = """import dataclasses
-import symtop
-symtop.register(dataclasses.replace(symtop.integrators()["midpoint"], summary="mine"), replace=True)
-"""
 
 
 @pytest.mark.parametrize(
@@ -126,12 +112,10 @@ symtop.register(dataclasses.replace(symtop.integrators()["midpoint"], summary="m
     [
         (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
         (["long", "spheroid", "strang", "--steps", "10"], "symtop.run.long_run.long_run"),
-        (
-            ["ensemble", "strang", "--members", "2", "--step-size", "0.1", "--horizon", "1"],
-            "symtop.run.ensemble.ensemble.ensemble",
-        ),
+        (["ensemble", "strang", "--members", "2", "--step-size", "0.1", "--horizon", "1"],
+         "symtop.run.ensemble.ensemble.ensemble"),
     ],
-)
+)  # fmt: skip
 def test_a_folder_is_no_output_and_nothing_is_computed_for_it(words, computes, tmp_path, monkeypatch):
     call(*words, "--output", tmp_path / "a.nc")
     monkeypatch.setattr(computes, lambda *_, **__: pytest.fail("it computes"))
@@ -212,14 +196,11 @@ def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_pa
 @pytest.mark.parametrize(
     ("line", "completion"),
     [
-        ("symtop run sph", "spheroid"),
-        ("symtop run tennis", "tennis-racket"),
-        ("symtop run spheroid midp", "midpoint"),
-        ("symtop study cl", "claims"),
-        ("symtop run spheroid rk4[", "rk4[axis]"),
+        ("symtop run sph", "spheroid"), ("symtop run tennis", "tennis-racket"), ("symtop study cl", "claims"),
+        ("symtop run spheroid midp", "midpoint"), ("symtop run spheroid rk4[", "rk4[axis]"),
         ("symtop integrators strang[att", "strang[attitude]"),
     ],
-)
+)  # fmt: skip
 def test_the_shell_completes_names(line, completion):
     words = line.split()
     environment = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}

@@ -12,8 +12,8 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import pytest
 
+from symtop import __version__
 from symtop.cli.main import main
-from symtop.judging.claims import order
 from tests.commands import call, ended, symtop
 from tests.judging.conftest import shorten
 from tests.pages import LANGUAGES, ROOT, Block, blocks, pages
@@ -88,7 +88,6 @@ def follow(page, slow, folder, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     if not slow:
         shorten(monkeypatch)
-        monkeypatch.setattr(order, "DRAWS", (96, 8))
     reader = Page(page, slow=slow)
     for block in PAGES[page]:
         reader.follow(block)
@@ -110,10 +109,7 @@ def test_a_page_that_is_wrong_fails(tmp_path, monkeypatch):
     wrong = {
         "```python\nprint(1 + 1)\n```\n```text\n3\n```\n": ("3\n", "2\n"),
         "```sh\nsymtop scenes sphreoid\n```\n": ("sphreoid", "spheroid"),
-        "```console\n$ symtop --version\nsymtop, version 0.0\n```\n": (
-            "0.0",
-            importlib.import_module("symtop").__version__,
-        ),
+        "```console\n$ symtop --version\nsymtop, version 0.0\n```\n": ("0.0", __version__),
         "```python\nimport symtop\nsymtop.scene('no such')\n```\n": ("no such", "spheroid"),
         "```python\n# a.py\nx = 1\n```\n```sh\npython b.py\n```\n": ("b.py", "a.py"),
     }
@@ -159,9 +155,7 @@ def absent(text):
 
 
 def test_the_files_that_pages_name_are_there():
-    assert absent("`methods/framework/loop.py`, `methods/fused.py` and `studies/drift/study.py`") == [
-        "methods/fused.py"
-    ]
+    assert absent("`methods/framework/loop.py`, `methods/no.py` and `studies/drift/study.py`") == ["methods/no.py"]
     texts = {page.name: page.read_text(encoding="utf-8") for page in {*pages(), ROOT / "docs" / "design.md"}}
     assert len(re.findall(r"`[\w/]+/\w+\.py`", texts["design.md"])) > 5
     assert [(page, absent(text)) for page, text in texts.items() if absent(text)] == []

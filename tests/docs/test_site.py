@@ -133,9 +133,8 @@ def test_every_derivation_and_every_public_name_is_there(site):
 @pytest.mark.slow
 def test_every_figure_has_its_study_and_command(site):
     page = (site / "reference" / "gallery.html").read_text(encoding="utf-8")
-    figures = {
-        path.name for path in (ROOT / "docs" / "snapshot" / "figures").iterdir() if path.suffix in {".png", ".gif"}
-    }
+    files = (ROOT / "docs" / "snapshot" / "figures").iterdir()
+    figures = {path.name for path in files if path.suffix in {".png", ".gif"}}
     assert figures
     for name in figures:
         assert f"_images/{name}" in page, name

@@ -9,8 +9,8 @@ import pytest
 import symtop
 from symtop.core.errors import SymtopError
 from symtop.explore import answers
-from symtop.explore.server import STATIC, address
-from tests.browser import FAINT, Browser
+from symtop.explore.server import STATIC
+from tests.browser import FAINT
 from tests.explore.test_explore import answered, fields, unpacked
 
 SOURCE = (STATIC / "stories.js").read_text(encoding="utf-8")
@@ -48,75 +48,70 @@ def text(browser, name):
 
 
 @pytest.mark.slow
-def test_a_story_a_cell_and_a_link(site):
-    with Browser(1280, 900) as browser:
-        browser.open(address(site))
-        browser.wait_for("+document.body.dataset.maps > 0")
-        answered(browser, "#story", "resonance")
-        browser.wait_for("document.querySelector('#status').textContent.startsWith('stormer-verlet: reached t = 20')")
-        answered(browser, "#step_size", 0.21)  # the step that the story names crosses the failure
-        browser.wait_for("document.querySelector('#status').className === 'failed'")
-        assert text(browser, "other").startswith("strang: reached t = 20")
-        state = browser.evaluate("location.href")
-        form = "[...document.querySelectorAll('input[type=number], #scene, #integrator, #second')].map((c) => c.value)"
-        before, status = browser.evaluate(form), text(browser, "status").split(";")[0]
-        answered(browser, "#story", "pole jump")
-        cut = "[...document.querySelectorAll('input[type=number]')].filter((c) => c.scrollWidth > c.clientWidth)"
-        assert browser.evaluate("document.querySelector('#phi_dot').value") == "0.650635"
-        assert browser.evaluate(f"{cut}.map((c) => c.value)") == []
-        answered(browser, "#story", "loop")
-        assert browser.evaluate(form) != before
-        browser.evaluate(f"location.href = {json.dumps(state)}")
-        browser.wait_for(f"document.querySelector('#status').textContent.startsWith({json.dumps(status)})")
-        assert browser.evaluate(form) == before
-        browser.wait_for("document.querySelector('#map-note').textContent.startsWith('stormer-verlet')")
-        said = re.search(r"([\d,]+) runs a second$", text(browser, "map-note"))
-        assert said is not None
-        assert int(said[1].replace(",", "")) > 0
-        spin = browser.evaluate("document.querySelector('#psi_dot').value")
-        key = "document.querySelector('#map').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowDown'}))"
-        browser.evaluate(key)
-        assert browser.evaluate("+document.querySelector('#psi_dot').value") < float(spin)
-        reached = "[...document.querySelectorAll('select, input, button, canvas[tabindex]')]"
-        assert browser.evaluate(f"{reached}.every((c) => c.tabIndex === 0)")
-        for scheme in ("light", "dark"):
-            browser.prefer(scheme)
-            for width in (1280, 390):
-                browser.resize(width, 900)
-                assert browser.too_wide == 0
-        assert browser.problems == []
-        assert browser.outside() == []
+def test_a_story_a_cell_and_a_link(explorer):
+    browser = explorer()
+    browser.wait_for("+document.body.dataset.maps > 0")
+    answered(browser, "#story", "resonance")
+    browser.wait_for("document.querySelector('#status').textContent.startsWith('stormer-verlet: reached t = 20')")
+    answered(browser, "#step_size", 0.21)  # the step that the story names crosses the failure
+    browser.wait_for("document.querySelector('#status').className === 'failed'")
+    assert text(browser, "other").startswith("strang: reached t = 20")
+    state = browser.evaluate("location.href")
+    form = "[...document.querySelectorAll('input[type=number], #scene, #integrator, #second')].map((c) => c.value)"
+    before, status = browser.evaluate(form), text(browser, "status").split(";")[0]
+    answered(browser, "#story", "pole jump")
+    cut = "[...document.querySelectorAll('input[type=number]')].filter((c) => c.scrollWidth > c.clientWidth)"
+    assert browser.evaluate("document.querySelector('#phi_dot').value") == "0.650635"
+    assert browser.evaluate(f"{cut}.map((c) => c.value)") == []
+    answered(browser, "#story", "loop")
+    assert browser.evaluate(form) != before
+    browser.evaluate(f"location.href = {json.dumps(state)}")
+    browser.wait_for(f"document.querySelector('#status').textContent.startsWith({json.dumps(status)})")
+    assert browser.evaluate(form) == before
+    browser.wait_for("document.querySelector('#map-note').textContent.startsWith('stormer-verlet')")
+    said = re.search(r"([\d,]+) runs a second$", text(browser, "map-note"))
+    assert said is not None
+    assert int(said[1].replace(",", "")) > 0
+    spin = browser.evaluate("document.querySelector('#psi_dot').value")
+    key = "document.querySelector('#map').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowDown'}))"
+    browser.evaluate(key)
+    assert browser.evaluate("+document.querySelector('#psi_dot').value") < float(spin)
+    reached = "[...document.querySelectorAll('select, input, button, canvas[tabindex]')]"
+    assert browser.evaluate(f"{reached}.every((c) => c.tabIndex === 0)")
+    for scheme in ("light", "dark"):
+        browser.prefer(scheme)
+        for width in (1280, 390):
+            browser.resize(width, 900)
+            assert browser.too_wide == 0
+    assert browser.outside() == []
 
 
 @pytest.mark.slow
-def test_a_hand_reaches_everything_and_every_text_can_be_read(site):
-    with Browser(1280, 1400) as browser:
-        browser.open(address(site))
-        browser.wait_for("+document.body.dataset.maps > 0")
-        answered(browser, "#second", "strang")
-        for scheme in ("light", "dark"):
-            browser.prefer(scheme)
-            assert browser.evaluate(FAINT) == []
-        browser.evaluate("document.querySelector('#purpose').style.color = '#555'")
-        assert browser.evaluate(FAINT)  # the control: grey on dark
-        browser.prefer("light")
-        shown = (
-            "[...document.querySelectorAll('select, input, button, canvas[tabindex]')].filter((c) => !c.disabled && "
-        )
-        expected = browser.evaluate(f"{shown} c.checkVisibility()).length")
-        browser.evaluate("document.activeElement.blur(); window.reached = new Set()")
-        for _ in range(expected):
-            browser.press("Tab")
-            browser.evaluate("reached.add(document.activeElement) && true")
-        assert browser.evaluate("reached.size") == expected > 20
-        assert not browser.evaluate("reached.has(document.body)")
-        before = browser.evaluate("document.querySelector('#step_size').value")
-        count = browser.evaluate("+document.body.dataset.answers")
-        browser.evaluate("document.querySelector('#map').scrollIntoView()")
-        browser.drag("#map", at=(0.3, 0.4))
-        browser.wait_for(f"+document.body.dataset.answers > {count}")
-        assert browser.evaluate("document.querySelector('#step_size').value") != before
-        assert browser.problems == []
+def test_a_hand_reaches_everything_and_every_text_can_be_read(explorer):
+    browser = explorer()
+    browser.resize(1280, 1400)
+    browser.wait_for("+document.body.dataset.maps > 0")
+    answered(browser, "#second", "strang")
+    for scheme in ("light", "dark"):
+        browser.prefer(scheme)
+        assert browser.evaluate(FAINT) == []
+    browser.evaluate("document.querySelector('#purpose').style.color = '#555'")
+    assert browser.evaluate(FAINT)  # the control: grey on dark
+    browser.prefer("light")
+    controls = "[...document.querySelectorAll('select, input, button, canvas[tabindex]')]"
+    expected = browser.evaluate(f"{controls}.filter((c) => !c.disabled && c.checkVisibility()).length")
+    browser.evaluate("document.activeElement.blur(); window.reached = new Set()")
+    for _ in range(expected):
+        browser.press("Tab")
+        browser.evaluate("reached.add(document.activeElement) && true")
+    assert browser.evaluate("reached.size") == expected > 20
+    assert not browser.evaluate("reached.has(document.body)")
+    before = browser.evaluate("document.querySelector('#step_size').value")
+    count = browser.evaluate("+document.body.dataset.answers")
+    browser.evaluate("document.querySelector('#map').scrollIntoView()")
+    browser.drag("#map", at=(0.3, 0.4))
+    browser.wait_for(f"+document.body.dataset.answers > {count}")
+    assert browser.evaluate("document.querySelector('#step_size').value") != before
 
 
 SHOWN = r'\s+scene: "(.*?)", integrator: "(.*?)", second: "(.*?)", step_size: (.*?),'
@@ -178,27 +173,22 @@ def test_what_the_story_of_the_tennis_racket_says():
     assert symtop.scene("tennis-racket", bodies=True).nutation_period / 0.6 == pytest.approx(10.0, abs=0.6)
 
 
-def test_a_body_is_two_bricks_side_by_side(site):
-    with Browser(1280, 1000) as browser:
-        browser.open(address(site))
-        browser.wait_for("document.body.dataset.answer === 'ok'")
-        browser.click("#play")
-        answered(browser, "#story", "tennis-racket")
-        browser.wait_for("document.querySelector('#status').textContent.startsWith('lie-variational: reached t = 100')")
-        visible = "document.querySelector('{}').checkVisibility()"
-        shown = {
-            name: browser.evaluate(visible.format(name)) for name in ("#plot-middle", "#I2", "#w2", "#map", "#theta")
-        }
-        assert shown == {"#plot-middle": True, "#I2": True, "#w2": True, "#map": False, "#theta": False}
-        before = browser.evaluate("document.querySelector('#sphere').toDataURL().length")
-        answered(browser, "#I1-slider", 0.2)  # and the sides of the bricks
-        browser.wait_for(f"document.querySelector('#sphere').toDataURL().length !== {before}")
-        assert browser.evaluate("document.querySelector('#scene').selectedOptions[0].text") == "tennis-racket (edited)"
-        assert browser.evaluate(
-            "[...document.querySelector('#integrator').options].find((o) => o.value === 'midpoint').disabled"
-        )
-        answered(browser, "#scene", "goldstein")
-        assert browser.evaluate(visible.format("#map"))
-        assert not browser.evaluate(visible.format("#I2"))
-        assert browser.evaluate("document.querySelector('#watch').textContent") == ""
-        assert browser.problems == []
+def test_a_body_is_two_bricks_side_by_side(explorer):
+    browser = explorer()
+    browser.wait_for("document.body.dataset.answer === 'ok'")
+    browser.click("#play")
+    answered(browser, "#story", "tennis-racket")
+    browser.wait_for("document.querySelector('#status').textContent.startsWith('lie-variational: reached t = 100')")
+    visible = "document.querySelector('{}').checkVisibility()"
+    for name, shown in {"#plot-middle": True, "#I2": True, "#w2": True, "#map": False, "#theta": False}.items():
+        assert browser.evaluate(visible.format(name)) is shown, name
+    before = browser.evaluate("document.querySelector('#sphere').toDataURL().length")
+    answered(browser, "#I1-slider", 0.2)  # and the sides of the bricks
+    browser.wait_for(f"document.querySelector('#sphere').toDataURL().length !== {before}")
+    assert browser.evaluate("document.querySelector('#scene').selectedOptions[0].text") == "tennis-racket (edited)"
+    options = "[...document.querySelector('#integrator').options]"
+    assert browser.evaluate(f"{options}.find((o) => o.value === 'midpoint').disabled")
+    answered(browser, "#scene", "goldstein")
+    assert browser.evaluate(visible.format("#map"))
+    assert not browser.evaluate(visible.format("#I2"))
+    assert browser.evaluate("document.querySelector('#watch').textContent") == ""

@@ -5,10 +5,6 @@ None of the three is imported in this process: JAX has threads, which a fork wou
 
 import importlib.util
 import json
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,8 +13,8 @@ import symtop
 from symtop.judging.adapters.external import field_of
 from symtop.judging.claims.subject import open_target
 from symtop.methods.framework.equations import FORMULATIONS
+from tests.commands import ROOT, ended, printed_by, symtop as command
 
-ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "studies" / "examples"
 SPHEROID = symtop.scene("spheroid")
 
@@ -30,13 +26,8 @@ def needs(package):
 
 def judge(*arguments):
     """The exit code, and the findings by claim, or what is said of the refusal."""
-    command = [sys.executable, "-m", "symtop.cli", "judge", *map(str, arguments), "--quick", "--json"]
-    result = subprocess.run(
-        command, capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": str(ROOT)}
-    )
-    if result.returncode == 2:
-        return 2, result.stderr
-    return result.returncode, {one["claim"]: one for one in json.loads(result.stdout)}
+    code, out, err = ended(command("judge", *arguments, "--quick", "--json", PYTHONPATH=ROOT))
+    return code, err if code == 2 else {one["claim"]: one for one in json.loads(out)}
 
 
 @pytest.mark.parametrize("chart", ["axis", "attitude"])
@@ -63,15 +54,9 @@ in_two_parts = diffrax.SemiImplicitEuler()
 @needs("diffrax")
 @pytest.mark.slow
 def test_a_solver_in_a_session_that_has_imported_jax(tmp_path):
-    (tmp_path / "session.py").write_text(
-        SOLVERS + "ledger = symtop.judge(midpoint, order=2, quick=True)\nprint(ledger['order'].verdict)\n"
-        "import jax\nprint(jax.config.jax_enable_x64)\n"
-    )
-    result = subprocess.run(
-        [sys.executable, str(tmp_path / "session.py")], capture_output=True, text=True, check=True,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
-    assert result.stdout.split() == ["confirmed", "False"]
+    code = "ledger = symtop.judge(midpoint, order=2, quick=True)\nprint(ledger['order'].verdict)\n"
+    code += "import jax\nprint(jax.config.jax_enable_x64)\n"
+    assert printed_by(SOLVERS + code, cwd=tmp_path, PYTHONPATH=ROOT).split() == ["confirmed", "False"]
 
 
 BATCHES = """

@@ -105,12 +105,9 @@ def test_what_a_step_is_on_a_body_is_said_in_natural_periods_with_its_momentum(o
     """The control: the summary of a top, which speaks of nutations and knows no such momentum."""
     only("energy", "momentum")
     words = [" ".join(str(symtop.judge(right.rk4, scene=scene, quick=True)).split()) for scene in (HEAVY, "spheroid")]
-    assert "natural periods (118 a natural period)" in words[0]
-    assert "relative to the kinetic one of the start and |mgl|, of the momentum to |L|" in words[0]
-    assert "does not keep the energy and the momentum." in words[0]
-    assert "nutation" not in words[0]
-    assert "the momentum" not in words[1]
-    assert "nutations (118 a nutation)" in words[1]
+    assert ["natural periods (118 a" in one for one in words] == [True, False]
+    assert ["nutations (118 a" in one for one in words] == [False, True]
+    assert ["the energy and the momentum." in one for one in words] == [True, False]
 
 
 def test_the_card_of_a_body_shows_the_errors_that_its_order_was_found_from(only: Callable[..., None]) -> None:
@@ -122,7 +119,9 @@ def test_the_card_of_a_body_shows_the_errors_that_its_order_was_found_from(only:
     assert " steps a natural period for the order" in " ".join(str(ledger).split())
 
 
-def test_a_right_step_is_not_refuted_where_a_body_turns_over_after_a_calm_beginning() -> None:
+def test_a_right_step_is_not_refuted_where_a_body_turns_over(only: Callable[..., None]) -> None:
+    """After a calm beginning."""
+    only("order", "energy", "momentum")
     ledger = symtop.judge(right.midpoint, scene="tennis-racket", order=2, quick=True)
     assert ledger.refuted == []
     assert ledger["order"].verdict == "confirmed"

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import statistics
 import timeit
 
@@ -16,6 +17,7 @@ from symtop.measure.accuracy import error_row
 from symtop.measure.sweep import failed_setting
 from symtop.measure.timing import bare_run
 from tests.commands import call
+from tests.core.test_conventions import lacking
 
 METHODS = ["midpoint", "stormer-verlet", "rk4", "taylor"]
 BUDGET = 2e5
@@ -41,9 +43,8 @@ def test_each_run_is_that_of_simulate(data):
     assert data.attrs["horizon"] == pytest.approx(2.0 * scene.nutation_period)
     cell = data.sel(variant="rk4[axis]")
     place = cheapest(data, 1e-3)[2]
-    row = error_row(
-        scene, symtop.integrator("rk4[axis]"), cell["step_size"].values[place], data.attrs["horizon"], "axis"
-    )
+    step = cell["step_size"].values[place]
+    row = error_row(scene, symtop.integrator("rk4[axis]"), step, data.attrs["horizon"], "axis")
     for name, own in (("axis", "error"), ("axis_bound", "error_bound"), ("energy", "energy"), ("p_psi", "p_psi")):
         assert cell[own].values[place] == row[name]
     assert cell["force_evaluations"].values[place] == row["force_evaluations"]
@@ -55,10 +56,8 @@ def test_what_theory_says_of_the_costs(data):
     assert fine["taylor[axis]"] < fine["rk4[axis]"] < fine["stormer-verlet[angles]"] < fine["midpoint[angles]"]
     assert all(coarse[name] <= fine[name] for name in coarse)
     for name, order in (("stormer-verlet[angles]", 2), ("rk4[axis]", 4)):
-        ratio = math.log10(
-            least(data, 1e-6, "steps_per_nutation")[name] / least(data, 1e-3, "steps_per_nutation")[name]
-        )
-        assert ratio == pytest.approx(3.0 / order, rel=0.2)
+        steps = [least(data, target, "steps_per_nutation")[name] for target in (1e-6, 1e-3)]
+        assert math.log10(steps[0] / steps[1]) == pytest.approx(3.0 / order, rel=0.2)
     for name in ("rk4[axis]", "taylor[axis]"):
         cell = data.sel(variant=name)
         assert (np.diff(cell["force_evaluations"].values[cell["outcome"].values == "ok"]) >= 0.0).all()
@@ -92,10 +91,7 @@ def test_failed_settings_stay_with_their_outcome_and_are_drawn(data):
 
 
 def test_every_variable_has_words_and_units(data):
-    for name, variable in data.variables.items():
-        if name != "variant":
-            assert variable.attrs["long_name"], name
-            assert variable.dtype.kind in "UO" or variable.attrs["units"], name
+    assert [fault for fault in lacking(data) if fault != "long_name of variant"] == []
     assert data["error"].attrs["units"] == "rad"
     assert data.attrs["timed"] == "nothing"
     assert np.isnan(data["seconds"]).all()
@@ -107,9 +103,8 @@ def refusing(top, start, plan):
 
 def test_own_scenes_and_methods_engines_and_scipy_take_part(clean_registry, tmp_path):
     for name, solver in (("on-the-axis", symtop.integrator("rk4").solvers["axis"]), ("refusing", refusing)):
-        symtop.register(
-            symtop.Integrator(name, "other", "of a test", {"axis": solver}, implementation="python", order=4)
-        )
+        own_method = symtop.Integrator(name, "other", "", {"axis": solver}, implementation="python", order=4)
+        symtop.register(own_method)
     top = symtop.SymmetricTop.from_spheroid(mass=1, polar_radius=0.2, equatorial_radius=0.1, pivot_distance=0.25)
     scene = symtop.Scene("mine", top, symtop.Angles(theta=0.4, psi_dot=60.0), horizon=0.2)
     names = ["on-the-axis", "refusing", "mujoco-euler", "rk45", "rk4[axis]", "rk4[angles]", "exact"]
@@ -174,9 +169,7 @@ def test_the_command_prints_a_line_for_each_variant(tmp_path, clean_registry):
     lines = {line.split()[0]: line for line in result.stdout.splitlines() if line}
     assert "not: budget" in lines["midpoint[angles]"]
     assert "not: " not in lines["rk4[axis]"]
-    assert any(
-        line.startswith("midpoint[angles]: ") and "its least error was" in line for line in result.stdout.splitlines()
-    )
+    assert re.search(r"^midpoint\[angles\]: .*its least error was", result.stdout, re.MULTILINE)
     assert figure.stat().st_size > 1000
     stored = netcdf.read(output)
     report = json.loads(call("compare", *words, "--json").stdout)

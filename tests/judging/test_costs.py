@@ -28,9 +28,8 @@ def bytes_a_step(method: Integrator) -> float:
     for count in (few, few, 6 * few):  # whatever is made once is made in the first run
         tracemalloc.start()
         try:
-            run = symtop.simulate(
-                SPHEROID, method, horizon=count * STEP, samples=11, observe="axis", guard=False, **control
-            )
+            plan = {"horizon": count * STEP, "samples": 11, "observe": "axis", "guard": False}
+            run = symtop.simulate(SPHEROID, method, **plan, **control)
             peaks.append(tracemalloc.get_traced_memory()[1])
             steps.append(int(run.attrs["steps"]))
         finally:

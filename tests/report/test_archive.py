@@ -10,7 +10,6 @@ import xarray as xr
 
 import symtop
 from symtop.core import netcdf
-from symtop.core.errors import SymtopError
 from symtop.measure import datasets
 from symtop.report import archive, style
 from symtop.runner import run as runner
@@ -102,9 +101,3 @@ def test_the_same_results_make_the_same_bundle(results, bundled, tmp_path):
         again = {name.removeprefix(f"{archive.NAME}/"): file.read(name) for name in file.namelist()}
     dated = {"results/report.html", "SHA256SUMS"}  # the page says the day
     assert {name for name in bundled if again[name] != bundled[name]} <= dated
-
-
-def test_without_findings_there_is_no_bundle(tmp_path):
-    with pytest.raises(SymtopError, match="no study has left findings"):
-        archive.bundle(tmp_path)
-    assert list(tmp_path.iterdir()) == []

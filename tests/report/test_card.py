@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.judging.claims import order, subject
 from symtop.judging.findings import About, Finding, Ledger, Measured
 from symtop.report.card import badge, card, figures, write_badge
+from tests.judging.conftest import shorten
 
 
 def midpoint(f, t, y, h):
@@ -19,9 +19,7 @@ def midpoint(f, t, y, h):
 @pytest.fixture(scope="module")
 def ledger():
     with pytest.MonkeyPatch.context() as shorter:
-        for module, name in ((subject, "LONG"), (subject, "SLOPES"), (order, "DRAWS")):
-            full, quick = getattr(module, name)
-            shorter.setattr(module, name, (full, type(full)(quick / 3)))
+        shorten(shorter)
         return symtop.judge(midpoint, quick=True, order=2, symplectic=True)
 
 
@@ -29,10 +27,8 @@ def handmade(*findings, name="mine"):
     return Ledger(name, "spheroid", findings, {}, About(name, "axis", "python", 0.0))
 
 
-NOTHING = handmade(
-    Finding("order", "4", Measured(), "undecided", "no <luck>"),
-    Finding("energy", "", Measured(), "undecided", "it stopped"),
-)
+ORDER = Finding("order", "4", Measured(), "undecided", "no <luck>")
+NOTHING = handmade(ORDER, Finding("energy", "", Measured(), "undecided", "it stopped"))
 
 
 def test_the_card_is_one_page_with_two_figures_and_every_verdict(ledger, tmp_path):
@@ -68,7 +64,7 @@ def test_a_card_without_measurements_says_why(tmp_path):
 def test_the_units_of_a_card_are_those_of_its_scene(chart, unit, scale, tmp_path):
     run = {"long_nutations": [1.0, 2.0], "energy_change": [1e-9, 2e-9], "steps_run": np.array(200)}
     energy = Finding("energy", "", Measured("drift", 2e-9), "measured", "it grows", 2e-9, 1e-11)
-    findings, about = (NOTHING["order"], energy), About("mine", chart, "python", 0.0)
+    findings, about = (ORDER, energy), About("mine", chart, "python", 0.0)
     ledger = Ledger("mine", "any", findings, {name: np.asarray(values) for name, values in run.items()}, about)
     axes = figures(ledger)[1].axes[0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == (f"time ({unit})", f"|change|, of the {scale}")
@@ -81,10 +77,8 @@ def test_the_badge_says_what_is_refuted_or_what_the_method_is(ledger, tmp_path):
     root = ET.fromstring(file.read_text(encoding="utf-8"))
     words = [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")]
     assert words == ["symtop", "refuted: symplectic, energy"]
-    good = handmade(
-        Finding("order", "2", Measured("slope", 2.0, text="2.000 +- 0.001"), "confirmed", "a <b>", 2.0, 0.05),
-        name="<mine>",
-    )
+    confirmed = Finding("order", "2", Measured("slope", 2.0, text="2.000 +- 0.001"), "confirmed", "a <b>", 2.0, 0.05)
+    good = handmade(confirmed, name="<mine>")
     assert "order 2" in badge(good)
     assert "refuted" not in badge(good)
     ET.fromstring(badge(good))

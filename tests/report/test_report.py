@@ -14,7 +14,7 @@ import xarray as xr
 import symtop
 from symtop.report import page, style, template
 from symtop.report.html import Writer
-from symtop.runner import run as runner
+from symtop.runner import pool, run as runner
 from tests.browser import FAINT, Browser
 
 FEW = (
@@ -35,7 +35,9 @@ def results(tmp_path_factory):
         if name == "speed":
             few = [dataclasses.replace(case, settings={"lengths": (4.0, 8.0), "settings": 5}) for case in few]
         small = dataclasses.replace(study, cases=lambda _, few=few: few)
-        assert runner.run(small, folder, jobs=1, quiet=True, save=style.sketch)["failures"] == []
+        with pytest.MonkeyPatch.context() as here:  # workers take longer to start than these cases
+            here.setattr(pool, "WORTH_WORKERS", len(few) + 1)
+            assert runner.run(small, folder, jobs=1, quiet=True, save=style.sketch)["failures"] == []
     page.write(folder)
     return folder
 
@@ -92,10 +94,8 @@ def test_the_reader_chooses_the_colours(browser):
 
 
 def test_headings_figures_and_tables_have_addresses_of_their_own(browser):
-    addressed = (
-        "[...document.querySelectorAll('main h2, main h3, figcaption')].filter(one => !one.querySelector('a.anchor'))"
-    )
-    assert browser.evaluate(f"{addressed}.length") <= 1  # the list of the registry
+    titles = "[...document.querySelectorAll('main h2, main h3, figcaption')]"
+    assert browser.evaluate(f"{titles}.filter(one => !one.querySelector('a.anchor')).length") <= 1  # of the registry
     ids = browser.evaluate("[...document.querySelectorAll('[id]')].map(one => one.id)")
     assert len(ids) == len(set(ids))
     local = browser.evaluate("[...document.querySelectorAll('a[href^=\"#\"]')].map(one => one.hash.slice(1))")
@@ -220,10 +220,8 @@ def test_pointing_at_a_run_shows_what_it_was(browser, results):
 
 def test_methods_cost_error_and_run_length_are_chosen(browser, results):
     browser.resize(1280, 900)
-    marks, lines = (
-        "document.querySelectorAll('.chart .mark').length",
-        "document.querySelector('.chart svg').innerHTML.split('<circle')[0]",
-    )
+    marks = "document.querySelectorAll('.chart .mark').length"
+    lines = "document.querySelector('.chart svg').innerHTML.split('<circle')[0]"
     everything, before = browser.evaluate(marks), browser.evaluate(lines)
     data = xr.load_dataset(results / "speed.nc").sel(scene="goldstein").isel(nutations=0)
     good = (data["axis"] > 0.0) & (data["seconds"] > 0.0) & (data["variant"] != "exact")
@@ -280,9 +278,7 @@ def test_the_twin_names_every_figure_and_table(results):
 def test_findings_that_are_not_whole_are_told_of(results, tmp_path):
     shutil.copytree(results, tmp_path, dirs_exist_ok=True)
     (tmp_path / "tables" / "convergence-costs.csv").unlink()
-    with pytest.raises(
-        symtop.SymtopError, match=r"tables/convergence-costs.csv is missing\); run it again: symtop study"
-    ):
+    with pytest.raises(symtop.SymtopError, match=r"convergence-costs.csv is missing\); run it again: symtop study"):
         page.write(tmp_path)
     shutil.copytree(results, tmp_path, dirs_exist_ok=True)
     for file in tmp_path.glob("*.json"):  # findings may be of an earlier day
@@ -301,9 +297,8 @@ def test_markdown_becomes_figures_tables_and_formulas():
     )
     assert '<h2 id="a-question">A question? ' in text
     assert '<h2 id="a-question-1">' in text
-    assert re.search(
-        r'<figure id="a-b">.*width="3" height="4".*alt="alt &lt;b&gt;".*<figcaption>Caption, <code>rk4', text
-    )
+    shown = r'<figure id="a-b">.*width="3" height="4".*alt="alt &lt;b&gt;".*<figcaption>Caption, <code>rk4'
+    assert re.search(shown, text)
     assert "<p>More.</p>" in text
     assert re.search(r'aria-label="Rows"><table data-name="rows">(.|\n)*&lt;i&gt;', text)
     assert "[table x-y]" in text

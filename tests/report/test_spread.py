@@ -10,28 +10,13 @@ SOME = symtop.population(30, seed=7)
 ASKED = {"per_nutation": 30, "nutations": 2, "samples": 41, "quiet": True}
 
 
-def test_errors_are_those_of_each_member_alone():
+def test_errors_are_those_of_the_ensemble():
     data = symtop.ensemble(SOME, "strang[axis]", **ASKED)
-    errors = {name: member_errors(SOME, data, name) for name in ("axis", "energy")}
-    for i in range(0, 30, 7):
-        one = SOME.isel(member=i)
-        top = symtop.SymmetricTop(*(float(one[name]) for name in ("I1", "I3", "mgl")))
-        start = symtop.Angles(
-            *(float(one[name]) for name in ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot"))
-        )
-        alone = symtop.errors(data.isel(member=i), symtop.Scene("one", top, start, float(data.horizon[i])))
-        np.testing.assert_allclose(errors["axis"][i], alone["axis"], rtol=1e-6, atol=1e-14)
-        np.testing.assert_allclose(errors["energy"][i], np.abs(alone["energy"]), rtol=1e-6, atol=1e-13)
-
-
-def test_finer_steps_have_smaller_errors_and_the_closed_form_none():
-    coarse, fine = (
-        largest(member_errors(SOME, symtop.ensemble(SOME, "strang[axis]", **ASKED | {"per_nutation": per}), "axis"))
-        for per in (30, 300)
-    )
-    assert np.median(fine / coarse) == pytest.approx(0.01, rel=0.3)
-    exact = symtop.ensemble(SOME, "exact", nutations=2, samples=41, quiet=True)
-    assert largest(member_errors(SOME, exact, "axis")).max() < 1e-14
+    wrong = symtop.errors(data, SOME)
+    np.testing.assert_allclose(member_errors(SOME, data, "axis"), wrong["axis"], rtol=1e-6, atol=1e-14)
+    some = slice(None, None, 7)  # none of them begins beside a pole, where the start's own energy is rounded
+    changed = np.abs(wrong["energy"].values[some])
+    np.testing.assert_allclose(member_errors(SOME, data, "energy")[some], changed, rtol=1e-6, atol=1e-13)
 
 
 def test_quantiles_are_members_and_a_failed_one_is_infinitely_wrong():

@@ -1,9 +1,8 @@
-"""All templates together: short, few figures, no sentence twice, links that lead somewhere, what is not measured."""
+"""All templates together: figures with titles and captions, links that lead somewhere, what is not measured."""
 
 import json
 import math
 import re
-from collections import Counter
 
 import pytest
 
@@ -16,31 +15,14 @@ OTHERS = {name: TEMPLATES / f"{name}.md" for name in ("front", "measured", "equa
 PAGES = {name: page for name in runner.names() if (page := runner.file_beside(name, "page.md")) is not None}
 TEXTS = {name: page.read_text(encoding="utf-8") for name, page in {**OTHERS, **PAGES}.items()}
 CALL = re.compile(r"{% call figure\((.*?)\) %}(.*?){% endcall %}", re.DOTALL)
-MOST_LINES, MOST_FIGURES, MOST_WORDS = 120, 3, 1100  # of a template
-
-
-def sentences(text: str) -> list[str]:
-    """The sentences of a template in words, numbers and names left out."""
-    prose = re.sub(r"{%.*?%}|{{.*?}}", " ", re.sub(r"^#.*$", " ", text, flags=re.MULTILINE), flags=re.DOTALL)
-    parts = (" ".join(part.split()) for part in re.split(r"(?<=[.:])\s", prose))
-    return [part for part in parts if len(part.split()) >= 6]
-
-
-def test_no_sentence_stands_twice():
-    assert sentences("# Q\n\nOne two three four five {{ f.x }} six. Short one.") == ["One two three four five six."]
-    counts = Counter(part for text in TEXTS.values() for part in sentences(text))
-    assert [part for part, count in counts.items() if count > 1] == []
-    assert sum(counts.values()) > 50
 
 
 @pytest.mark.parametrize("name", ["front", *PAGES])
-def test_a_page_is_short_and_its_figures_have_titles_captions_and_words_for_the_blind(name):
+def test_a_page_asks_its_question_and_its_figures_have_titles_captions_and_words_for_the_blind(name):
     text = TEXTS[name]
     assert text.startswith("# " if name == "front" else "# {{ question }}\n\n")
-    assert text.count("\n") <= MOST_LINES
-    assert len(text.split()) <= MOST_WORDS
     figures = CALL.findall(text)
-    assert len(re.findall(r"figure\(", text)) == len(figures) <= MOST_FIGURES
+    assert len(re.findall(r"figure\(", text)) == len(figures)
     for arguments, caption in figures:
         assert re.search(r'title="[^"]{8,}"', arguments), arguments
         assert re.search(r'alt="[^"]{20,}"', arguments), arguments

@@ -12,18 +12,14 @@ from symtop.runner.pool import Pool
 from tests.commands import PROBE, ended, symtop
 
 distributed = pytest.importorskip("distributed")
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.usefixtures("processes_with_dask"),
-    pytest.mark.filterwarnings("ignore"),
-]  # of the cluster's own making
+ignored = pytest.mark.filterwarnings("ignore")  # of the cluster's own making
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("processes_with_dask"), ignored]
 
 
 @pytest.fixture(scope="module")
 def cluster(processes_with_dask):
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
-    ) as dask_cluster:
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
+    with distributed.LocalCluster(silence_logs=50, **options) as dask_cluster:
         yield dask_cluster
 
 

@@ -92,9 +92,8 @@ def test_a_real_limit_on_the_size_of_files(tmp_path):
     code += "from symtop.cli.main import main; sys.argv[0] = 'symtop'; main()"
     words = ["study", str(PROBE), "--results", str(tmp_path / "small")]
 
-    result = subprocess.run(
-        [sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=240, check=False
-    )
+    command = [sys.executable, "-c", code, *words]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert result.returncode == 2, result.stderr
     assert sentences(result.stderr)[0].startswith("symtop: cannot write")
     assert "Traceback" not in result.stderr
@@ -195,10 +194,8 @@ def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
 @pytest.mark.slow
 def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
     log = tmp_path / "log"
-    runs = [
-        symtop("study", PROBE, "--results", tmp_path / "shared", "--jobs", 2, PROBE_LOG=log, PROBE_PAUSE=0.3)
-        for _ in range(2)
-    ]
+    words = ["study", PROBE, "--results", tmp_path / "shared", "--jobs", 2]
+    runs = [symtop(*words, PROBE_LOG=log, PROBE_PAUSE=0.3) for _ in range(2)]
     for run in runs:
         code, out, err = ended(run)
         assert code == 0, err
@@ -216,11 +213,8 @@ def test_what_a_killed_worker_left_beside_a_case_goes_when_it_is_computed_here(t
     assert code == 0, output
     (case,) = tmp_path.rglob("cases/probe/goldstein--midpoint--*.npz")
     case.unlink()
-    for name in (
-        case.with_name(f".{case.stem}.trace"),
-        files.lock_path(case),
-        case.with_name(f".{case.name}.x.part.nc"),
-    ):
+    left = case.with_name(f".{case.stem}.trace"), files.lock_path(case), case.with_name(f".{case.name}.x.part.nc")
+    for name in left:
         name.touch()
     code, output = probe(tmp_path)
     assert "1 of 4 cases computed" in output
@@ -409,11 +403,8 @@ def test_paths_that_are_not_ascii(tmp_path):
 def test_no_terminal_and_closed_streams(tmp_path, closed):
 
     words = f"{sys.executable} -m symtop.cli study {PROBE} --results {tmp_path / 'r'} --jobs 2"
-    result = subprocess.run(
-        ["/bin/sh", "-c", words + "".join(f" {n}>&-" if n != "0" else " 0<&-" for n in closed)],
-        timeout=240,
-        check=False,
-    )
+    words += "".join(f" {n}>&-" if n != "0" else " 0<&-" for n in closed)
+    result = subprocess.run(["/bin/sh", "-c", words], timeout=240, check=False)
     assert result.returncode == 0
     assert len(contents(tmp_path / "r")) == 13
 

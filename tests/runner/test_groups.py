@@ -75,14 +75,10 @@ def test_a_check_names_the_group_that_differs():
 def test_cases_that_would_replace_each_other_are_refused():
     """A study of three steps of each method, say, whose cases differ in their settings alone."""
     steps = [(Case("spheroid", "rk4", {"n": n}), LONG) for n in (6, 3)]
-    with pytest.raises(
-        SymtopError, match="two cases of rk4 on spheroid measure energy, and one would replace the other"
-    ):
+    with pytest.raises(SymtopError, match="two cases of rk4 on spheroid measure energy, and one would replace the"):
         datasets.combine(steps)
     other = LONG.rename(energy="seconds", outcome="told", steps="calls")
-    both = datasets.combine(
-        [steps[0], (steps[1][0], other)]
-    )  # the control: another round, which measures something else
+    both = datasets.combine([steps[0], (steps[1][0], other)])  # the control: a round that measures something else
     assert {"energy", "seconds"} <= set(both.data_vars)
     separate = datasets.combine([(Case("spheroid", "rk4", {"n": n}, group=f"n-{n}"), LONG) for n in (6, 3)])
     assert set(separate.children) == {"n-6", "n-3"}

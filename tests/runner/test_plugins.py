@@ -44,11 +44,8 @@ def test_functions_count_wherever_they_stand_and_however_they_were_imported(tmp_
     """What a new process says that the method of a plug-in is made of: as it was, moved, and edited."""
     files = {"plug": PLUGIN, "coeffs": "def twice(x):\n    return 2 * x\n\ndef unused():\n    return 1\n",
              "lazily": "def late(x):\n    return x\n", "other": "x = 1\n"}  # fmt: skip
-    same_code = {
-        "plug": f"# moved\n{PLUGIN}",
-        "coeffs": "# a comment\ndef twice(x):\n    return 2 * x\n",
-        "other": "x = 2\n",
-    }
+    commented = "# a comment\ndef twice(x):\n    return 2 * x\n"
+    same_code = {"plug": f"# moved\n{PLUGIN}", "coeffs": commented, "other": "x = 2\n"}
     edits = {"lazily": "def late(x):\n    return -x\n", "coeffs": "def twice(x):\n    return 3 * x\n"}
     folders = [write(tmp_path / name, **files | changed).parent
                for name, changed in (("first", {}), ("moved", same_code), ("edited", edits))]  # fmt: skip

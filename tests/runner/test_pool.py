@@ -116,6 +116,6 @@ def test_the_trial_sees_workers_that_share_a_core(monkeypatch, pool):
     """There a run takes twice as long; the last test of the file, as the workers stay there."""
     monkeypatch.setattr(timing, "TURNS", 3)
     pool.open(2)
-    for worker in {turn.result()[0] for turn in [pool.submit(timing.timed_turn) for _ in range(20)]}:
+    for worker in {turn.result()[0] for turn in [pool.submit(timing.timed_turn) for _ in range(8)]}:
         os.sched_setaffinity(worker, {min(os.sched_getaffinity(0))})
     assert 1.3 < timing.slowdown(pool.submit, 2) < math.inf

@@ -78,11 +78,10 @@ def test_a_setting_that_meets_a_target_meets_it():
     assert (data["order"].values < 4.3).all()
     met = data["met_at"].sel(family=SYMMETRIC, quantity="axis").sel(target=1e-3, method="nearest").values
     at = np.ceil(np.log2(met / FIRST)).astype(int)
+    tops = bodies[SYMMETRIC]
     for k, level in enumerate(at):
-        fine, coarse = (
-            bodies[SYMMETRIC].errors("", run_level(variant, bodies[SYMMETRIC], everyone(), place, 1e6), everyone())
-            for place in (level, level - 1)
-        )
+        runs = (run_level(variant, tops, everyone(), place, 1e6) for place in (level, level - 1))
+        fine, coarse = (tops.errors("", run, everyone()) for run in runs)
         assert fine["axis"][k] <= 1e-3 < coarse["axis"][k]
     own = own_table(integrator("rk4[axis]"), bodies, 2e3)
     ratio = own["met_at"].sel(quantity="axis").sel(target=1e-3, method="nearest").values / met
@@ -168,19 +167,12 @@ def test_prices_do_not_rank_methods_that_reach_nothing():
     half, rows = 1e-6 * 1.6 ** np.arange(20), ([*range(20)],) * 2
     half[10:] = np.inf
     first, second = costs_of(half), costs_of(np.roll(half, 5), seed=1)
-    free = by.bootstrap_tau(
-        first._replace(errors=np.zeros(20)), second._replace(errors=np.zeros(20)), rows, paired=True
+    free, noisy = (
+        by.bootstrap_tau(*(one._replace(errors=np.full(20, error)) for one in (first, second)), rows, paired=True)
+        for error in (0.0, 0.02)
     )
-    noisy = by.bootstrap_tau(first._replace(errors=np.full(20, 0.02)), second._replace(errors=np.full(20, 0.02)), rows,
-                             paired=True)  # fmt: skip
     assert free.low <= free.value <= free.high
     assert (noisy.low, noisy.high) == pytest.approx((free.low, free.high), abs=0.02)
-
-
-def test_no_silent_run_of_tops_or_bodies_is_no_difference():
-    assert by.factor_verdict(facts.over(0.0, 0.0), by.SEVERAL) == by.YES
-    assert by.factor_verdict(facts.over(0.2, 0.0), by.SEVERAL) == by.NO
-    assert facts.over(0.06, 0.02) == pytest.approx(3.0)
 
 
 @pytest.mark.parametrize(("beyond", "verdict"), [(0, by.FACTOR), (1, by.FACTOR), (2, by.PARTLY)])
@@ -196,16 +188,14 @@ def test_verdicts_follow_the_limits_that_were_fixed_before():
         by.YES, by.YES, by.FACTOR, by.FACTOR, by.NO, by.NO,
     ]  # fmt: skip
     assert by.factor_verdict(4.0, by.SEVERAL) == by.FACTOR
+    assert by.factor_verdict(facts.over(0.0, 0.0), by.SEVERAL) == by.YES  # no silent run of tops or bodies
+    assert by.factor_verdict(facts.over(0.2, 0.0), by.SEVERAL) == by.NO
+    assert facts.over(0.06, 0.02) == pytest.approx(3.0)
 
 
 def planted(factor):
     """A dataset of three methods whose steps and silent wrong runs on free bodies are `factor` times those of tops."""
-    variants, families, targets, members = (
-        ["rk4[body]", "strang[body]", "gauss-4[body]"],
-        [*FAMILIES],
-        [1e-3, 1e-6, 1e-9],
-        40,
-    )
+    variants, families, members = ["rk4[body]", "strang[body]", "gauss-4[body]"], [*FAMILIES], 40
     steps = np.array([20.0, 40.0, 10.0])[:, None, None, None] * 2.0 ** np.arange(3)[None, None, :, None]
     spread = np.linspace(0.8, 1.2, members) * np.ones((3, len(families), 3, members))
     met = steps * spread
@@ -225,7 +215,7 @@ def planted(factor):
             "status": (("variant", "family", "kept", "member"), status),
             "control": ("variant", ["step_size"] * 3), "needs": ("variant", ["derivative", "kicks", "derivative"]),
         },
-        {"variant": variants, "family": families, "quantity": ["axis", "attitude"], "target": targets},
+        {"variant": variants, "family": families, "quantity": ["axis", "attitude"], "target": [1e-3, 1e-6, 1e-9]},
     ).expand_dims("scene")  # fmt: skip
     prices = xr.Dataset(
         {name: (("scene", "variant", "priced_at"), np.full((3, 3, 7), value)) for name, value in

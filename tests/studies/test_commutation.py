@@ -14,7 +14,7 @@ import symtop
 from symtop.measure import datasets
 from symtop.measure.order import power_law
 from symtop.methods.framework import registry
-from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, rule_of
+from symtop.methods.lagrangian.discrete_lagrangian import Quadrature
 from tests.conftest import random_scenes
 from tests.templates import checked
 
@@ -77,9 +77,8 @@ def lobatto_step(top, point, h):
 
     def equations(unknown):
         places, momenta = unknown[:3], unknown[3:]
-        return np.concatenate(
-            [places - theta - h * IIIA @ momenta / top.I1, momenta - p_theta + h * IIIB @ slopes(places)]
-        )
+        left = places - theta - h * IIIA @ momenta / top.I1
+        return np.concatenate([left, momenta - p_theta + h * IIIB @ slopes(places)])
 
     stages = root(equations, np.array([theta] * 3 + [p_theta] * 3), tol=1e-14).x
     return theta + h * weights @ stages[3:] / top.I1, p_theta - h * weights @ slopes(stages[:3])
@@ -97,12 +96,6 @@ def test_lobatto_on_the_whole_top_is_galerkin_on_the_routhian_and_not_on_the_top
     assert first == pytest.approx(lobatto, abs=1e-13)
     assert not np.allclose(last, lobatto, rtol=0.0, atol=1e-12)
     assert np.max(np.abs(last - lobatto)) < 1e-3 * np.max(np.abs(np.array(lobatto) - start))
-
-
-def test_a_solver_remembers_its_rule_and_others_have_none():
-    assert rule_of(symtop.integrator("midpoint")).nodes == (0.5,)
-    for name in ("stormer-verlet", "taylor", "midpoint-unreduced"):
-        assert rule_of(symtop.integrator(name)) is None
 
 
 def test_an_unreduced_form_steps_the_same_rule_whatever_it_is_called(monkeypatch):

@@ -65,10 +65,8 @@ def test_a_history_says_with_what_it_ran():
     loose = run_history(on, symtop.integrator("rk45-compiled[angles]"), tolerance=1e-5, **short)
     default = run_history(on, symtop.integrator("taylor[axis]"), **short)
     assert [float(one["steps_a_nutation"]) for one in (step, loose)] == pytest.approx([50.0, math.nan], nan_ok=True)
-    assert [float(one["tolerance"]) for one in (loose, default)] == [
-        1e-5,
-        symtop.integrator("taylor").default_tolerance,
-    ]
+    tolerances = [1e-5, symtop.integrator("taylor").default_tolerance]
+    assert [float(one["tolerance"]) for one in (loose, default)] == tolerances
     assert [float(one["own_tolerance"]) for one in (step, loose, default)] == [0.0, 0.0, 1.0]
     assert float(step["p_phi_largest"]) == 0.0
     other = run_history(on, symtop.integrator("rk4[angles]"), step_size=on.nutation_period / 50.0, **short)
@@ -116,10 +114,8 @@ def histories():
         {key: (("variant", "scene"), values) for key, values in both.items()},
         coords={"variant": NAMES, "scene": ["spheroid", "goldstein"]},
     )
-    times = np.broadcast_to(np.linspace(0.0, 1.0, 3), (5, 2, 3))
-    return data.assign(
-        outcome=(("variant", "scene"), np.full((5, 2), "ok")), sample_time=(("variant", "scene", "sample"), times)
-    )
+    over, times = ("variant", "scene"), np.broadcast_to(np.linspace(0.0, 1.0, 3), (5, 2, 3))
+    return data.assign(outcome=(over, np.full((5, 2), "ok")), sample_time=((*over, "sample"), times))
 
 
 def test_a_constant_is_kept_bounded_or_lost_on_the_worst_scene(histories):
@@ -128,11 +124,8 @@ def test_a_constant_is_kept_bounded_or_lost_on_the_worst_scene(histories):
     assert fates["p_phi_largest"].tolist() == SIZES["p_phi"]
     answers = facts.of_histories(histories)
     assert (answers["variants"], answers["holding"]) == (5, 2)
-    assert (answers["energy_lost"], answers["energy_lost_worst"], answers["energy_lost_most"]) == (
-        2,
-        "rk4[angles]",
-        1e-2,
-    )
+    lost = [answers[f"energy_lost{end}"] for end in ("", "_worst", "_most")]
+    assert lost == [2, "rk4[angles]", 1e-2]
     assert (answers["bounded_runs"], answers["bounded_as_t"], answers["lost_faster"]) == (4, 3, 4)
     ended = histories.assign(outcome=histories["outcome"].where(histories["variant"] != "strang[axis]", "left_chart"))
     assert measures.fates(ended)["energy"]["strang[axis]"] == measures.FAILED
@@ -152,10 +145,7 @@ def test_the_page_says_what_every_group_shows(data, tmp_path):
     answers = facts.facts(data)
     assert None not in set(answers.values())
     assert (answers["variants"], answers["own"], answers["tolerance"]) == (6, 1, TOLERANCE)
-    assert (answers["holding"], answers["energy_lost"]) == (
-        4,
-        2,
-    )  # so short a run of rk4 in angles does not lose it yet
+    assert (answers["holding"], answers["energy_lost"]) == (4, 2)  # so soon rk4 in angles has not lost it
     assert answers["gain_least"] > 3.0
     assert (answers["lost_count"], answers["lost_hits"]) == (4, 4)
     assert [len(one) for one in facts.tables(data).values()][1] == 6

@@ -248,9 +248,8 @@ EFFECT = {
 def synthetic(interaction=1.0):
     """Times that are products of an effect a factor; an interaction makes angles slower in compiled loops alone."""
     grid = []
-    for levels in itertools.product(
-        (DORMAND_PRINCE, "rk4", "Takahashi-Imada"), ("angles", "axis", "attitude"), LANGUAGES, CALLS
-    ):
+    schemes, chart_names = (DORMAND_PRINCE, "rk4", "Takahashi-Imada"), ("angles", "axis", "attitude")
+    for levels in itertools.product(schemes, chart_names, LANGUAGES, CALLS):
         seconds = 1e-6 * math.prod(EFFECT[level] for level in levels)
         if levels[1:3] == ("angles", COMPILED):
             seconds *= interaction
@@ -261,9 +260,8 @@ def synthetic(interaction=1.0):
 def test_the_effect_of_a_factor_is_found_where_effects_multiply_and_spread_where_they_do_not():
     for pair in pairs(synthetic()).to_dict("records"):
         assert pair["ratio"] == pytest.approx(EFFECT[pair["before"]] / EFFECT[pair["after"]], rel=1e-12)
-    answers = (
-        effects(synthetic(interaction=4.0)).set_index(["factor", "before", "after"]).loc["chart", "angles", "axis"]
-    )
+    table = effects(synthetic(interaction=4.0)).set_index(["factor", "before", "after"])
+    answers = table.loc["chart", "angles", "axis"]
     assert (answers["min"], answers["max"]) == (pytest.approx(3.0), pytest.approx(12.0))
     assert answers["count"] == 3 * len(LANGUAGES) * len(CALLS)
 

@@ -27,7 +27,7 @@ from symtop.methods.lagrangian.discrete_lagrangian import rule_of
 from symtop.model import charts, scenes
 from symtop.model.charts import View, axis_of
 from symtop.model.scenes import Scene, closed_form, grazing, sleeping
-from symtop.model.top import Angles, SymmetricTop, effective_force
+from symtop.model.top import Angles, SymmetricTop
 from symtop.run.linear_stability import trace, with_momenta
 
 STEADY = scenes.scene("steady-fast")  # I1, I3, mgl, theta, w3 = 2, 1, 2, 60 degrees, 20
@@ -201,34 +201,6 @@ def test_angles_fail_where_a_step_passes_the_pole_and_splitting_does_not_notice(
     assert all(np.diff(verlet[:5]) > 0.0)
     assert ended[:4] == ["ok"] * 4
     assert all(outcome == "left_chart" for outcome in ended[6:])
-
-
-def verlet_through_the_pole(scene, h, steps):
-    """Verlet that ignores the end of the chart: theta < 0 stands for the other side, |theta| for the inclination."""
-    momenta, top = scene.top.momenta(scene.start), scene.top
-    theta, p = scene.start.theta, top.I1 * scene.start.theta_dot
-    measured = [theta]
-    for _ in range(steps):
-        p -= 0.5 * h * effective_force(theta, momenta.north, momenta.south, top.I1, top.mgl)[0]
-        theta += h * p / top.I1
-        p -= 0.5 * h * effective_force(theta, momenta.north, momenta.south, top.I1, top.mgl)[0]
-        measured.append(theta)
-    return np.abs(measured)
-
-
-@pytest.mark.parametrize("steps", [422, 4220])
-def test_the_error_of_angles_peaks_where_the_gap_is_a_step_and_falls_again_below(steps):
-    """1.1 delta over 1.2 h says how many steps the passage lasts; far below one the top seems to fly through it."""
-    h = 4.22 / steps
-    error = {}
-    for passage in (100.0, 10.0, 3.0, 0.3, 0.1, 1e-3, 1e-4):
-        scene = grazing(passage * 1.2 * h / 1.1)
-        true = closed_form(scene)(np.arange(steps + 1) * h).theta
-        error[passage] = float(np.max(np.abs(verlet_through_the_pole(scene, h, steps) - true)))
-    assert error[100.0] < error[10.0] < error[3.0] < 1e-3
-    assert max(error[0.3], error[0.1]) > 1.0
-    assert error[1e-4] < error[1e-3] < 0.1 * error[0.1]
-    assert error[1e-4] < 1e-3
 
 
 def test_the_benchmark_of_bruls_cardona_arnold_is_no_place_for_angles():

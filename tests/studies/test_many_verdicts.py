@@ -30,9 +30,8 @@ def run_of(scene_, name, chart, step, count):
 def one_pass(scene_, times, states, momenta, followed=True):
     """The verdict and the error of one run, by arrays of one row and one column."""
     phases, outcome = times[None] / scene_.nutation_period, np.zeros((1, 1), dtype=np.int64)
-    judged = judge_runs(
-        truths([scene_]), phases, np.array([followed]), states[None, None], momenta[None, None], outcome
-    )
+    runs = np.array([followed]), states[None, None], momenta[None, None], outcome
+    judged = judge_runs(truths([scene_]), phases, *runs)
     return VERDICTS[judged.verdict[0, 0]], judged.axis_error[0, 0]
 
 
@@ -44,17 +43,12 @@ def padded(values):
 @pytest.mark.parametrize(
     ("name", "chart", "step", "word"),
     [
-        ("strang", "axis", 0.03, "accurate"),
-        ("strang", "axis", 0.12, "bounded_but_wrong"),
-        ("stormer-verlet", "angles", 0.03, "accurate"),
-        ("stormer-verlet", "angles", 0.1, "bounded_but_wrong"),
-        ("rk4", "axis", 0.1, "drifting"),
-        ("rk4", "axis", 0.5, "wrong_regime"),
-        ("rk4", "attitude", 0.03, "accurate"),
-        ("commutator-free-4", "attitude", 0.3, "wrong_regime"),
-        ("rk4", "angles", 0.15, "drifting"),
+        ("strang", "axis", 0.03, "accurate"), ("strang", "axis", 0.12, "bounded_but_wrong"),
+        ("stormer-verlet", "angles", 0.03, "accurate"), ("stormer-verlet", "angles", 0.1, "bounded_but_wrong"),
+        ("rk4", "axis", 0.1, "drifting"), ("rk4", "axis", 0.5, "wrong_regime"), ("rk4", "attitude", 0.03, "accurate"),
+        ("commutator-free-4", "attitude", 0.3, "wrong_regime"), ("rk4", "angles", 0.15, "drifting"),
     ],
-)
+)  # fmt: skip
 def test_one_pass_says_what_judgement_says(name, chart, step, word):
     cusp = scene("cusp")
     times, run, seen, shown = run_of(cusp, name, chart, step, 400)

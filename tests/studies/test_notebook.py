@@ -107,9 +107,8 @@ def test_a_step_of_the_kernels_is_the_discrete_legendre_transform(symbols, metho
         place |= {f"{v}": (b - a) / h for v, a, b in zip(symbols.v, first, last, strict=True)}
         L_d = L_d + h * weight * hy.subs(symbols.ways[2], place)
     slopes = hy.cfunc([*(hy.diff(L_d, a) for a in first), *(hy.diff(L_d, b) for b in last)], [*first, *last])
-    run = symtop.integrator(method).solvers["angles"](
-        scene.top, scene.start, Plan(np.array([0.0, h]), h, h, np.array([0, 1]), math.nan)
-    )
+    plan = Plan(np.array([0.0, h]), h, h, np.array([0, 1]), math.nan)
+    run = symtop.integrator(method).solvers["angles"](scene.top, scene.start, plan)
     q = run.states[:, [0, 2, 3]]
     ends = slopes(np.concatenate([q[0], q[1]]))
     assert -ends[:3] == pytest.approx([run.states[0, 1], run.p_phi[0], run.p_psi[0]], abs=1e-11)
@@ -181,9 +180,8 @@ def test_the_modified_energy_of_another_method_is_not_conserved():
     scene = symtop.scene("spheroid")
     run = symtop.simulate(scene, "midpoint", step_size=0.01, guard=False)
     states, h = np.stack([run["theta"].values, run["p_theta"].values], axis=1), run.attrs["step_size"]
-    its_own, other = (
-        np.ptp(modified_energy(scene, name, "angles", states, h)) for name in ("midpoint", "stormer-verlet")
-    )
+    names = "midpoint", "stormer-verlet"
+    its_own, other = (np.ptp(modified_energy(scene, name, "angles", states, h)) for name in names)
     assert its_own < 0.02 * np.ptp(run["energy"].values) < other
 
 

@@ -86,13 +86,6 @@ def test_the_exponents_are_those_of_the_step_matrix(rule):
         assert eigenvalues.prod() == pytest.approx(np.linalg.det(matrix), abs=1e-13)
 
 
-def test_the_path_is_powers_of_the_step_matrix():
-    oscillator = Oscillator(0.7, 0.2, 1.9)
-    _, position, momentum = discrete_path(oscillator, RULES["trapezoidal"], 1.0, 0.5, 10.0, 200)
-    end = np.linalg.matrix_power(step_matrix(oscillator, RULES["trapezoidal"], 0.05), 200) @ [1.0, 0.35]
-    assert (position[-1], momentum[-1]) == pytest.approx(end, abs=1e-13)
-
-
 def test_undamped_steps_are_symplectic_and_damped_ones_contract():
     for rule in RULES.values():
         assert np.linalg.det(step_matrix(Oscillator(), rule, 0.4)) == pytest.approx(1.0, abs=1e-14)
@@ -181,9 +174,8 @@ def test_the_power_of_the_friction_is_what_the_energy_loses():
     rates = np.gradient(truth[1], times, edge_order=2), np.gradient(truth[2], times, edge_order=2)
     power = FRICTION.precession * rates[0] ** 2 + FRICTION.spin * rates[1] ** 2
     spent = np.sum(0.5 * (power[1:] + power[:-1])) * times[1]
-    assert np.subtract(*(scene.top.energy(symtop.Angles(*truth[:, k])) for k in (0, -1))) == pytest.approx(
-        spent, rel=1e-4
-    )
+    first, last = (scene.top.energy(symtop.Angles(*truth[:, k])) for k in (0, -1))
+    assert first - last == pytest.approx(spent, rel=1e-4)
 
 
 @pytest.fixture(scope="module")

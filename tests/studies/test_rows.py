@@ -28,20 +28,15 @@ def without_a_chart(data: xr.Dataset) -> list[str]:
 
 @pytest.mark.parametrize("study", STUDIES)
 def test_every_stored_dataset_says_in_which_chart_a_method_ran(study, quick_results):
-    groups = [
-        group for group in netcdf.groups(netcdf.read_any(quick_results / f"{study}.nc")).values() if group.variables
-    ]
+    stored = netcdf.groups(netcdf.read_any(quick_results / f"{study}.nc"))
+    groups = [group for group in stored.values() if group.variables]
     assert groups
     assert [name for group in groups for name in without_a_chart(group)] == []
 
 
 @pytest.mark.parametrize(
     ("names", "found"),
-    [
-        (["rk4", "midpoint"], ["rk4"]),
-        (["rk4[axis]", "strang"], ["strang"]),
-        (["rk4[axis]", "rk4[angles]", "exact"], []),
-    ],
+    [(["rk4", "midpoint"], ["rk4"]), (["rk4[axis]", "strang"], ["strang"]), (["rk4[axis]", "exact"], [])],
 )
 def test_a_name_that_leaves_the_chart_open_is_found(names, found):
     data = xr.Dataset({"axis": ("variant", np.zeros(len(names)))}, coords={"variant": names})

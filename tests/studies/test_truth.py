@@ -25,14 +25,7 @@ def test_facts_follow_from_the_errors_and_a_bound_that_is_broken_is_counted(data
     assert answers["quadruple"] is None
     worse = data.assign({ERROR: data[ERROR].where(data["horizon"] < 10.0, 2.0 * data[BOUND])})
     assert facts.facts(worse)["bounds_held"] == 2
-
-
-def test_tables_hold_each_source_at_its_longest_time(data):
-    ends = facts.tables(data)["sources"]
-    assert list(ends["time (s)"]) == [20.0, 20.0]
-    row = ends.set_index("source").loc["closed form"]
-    last = data.sel(scene="spheroid", variant="closed form", horizon=20.0)
-    assert (row["axis error (rad)"], row["claimed bound (rad)"]) == (float(last[ERROR]), float(last[BOUND]))
+    assert facts.tables(data)["sources"]["time (s)"].tolist() == [20.0, 20.0]  # each at its longest
 
 
 def test_the_page_says_what_was_measured(data, tmp_path):

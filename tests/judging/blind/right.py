@@ -345,39 +345,29 @@ separable_heun = in_the_plane(heun)
 
 ALL = ("energy", "p_phi", "p_psi", "axis_length")
 ROTATION, SEPARABLE = {"form": "rotation"}, {"form": "separable"}
-CLAIMS = {  # name: claims, and options of judge
+_TABLE = {  # names: claims, and options of judge
     "euler": ({"order": 1, "explicit": True}, {}),
-    "midpoint": ({"order": 2, "symplectic": False, "symmetric": False}, {}),
+    "midpoint slow": ({"order": 2, "symplectic": False, "symmetric": False}, {}),
     "heun": ({"order": 2, "conserves": ["p_phi"]}, {}),
-    "ralston": ({"order": 2}, {}),
-    "kutta_3": ({"order": 3}, {}),
-    "ssp_3": ({"order": 3, "explicit": True}, {}),
+    "ralston in_place HeunSolver AdamsBashforth": ({"order": 2}, {}),
+    "kutta_3 extrapolated RK23": ({"order": 3}, {}),
+    "ssp_3 as_a_list": ({"order": 3, "explicit": True}, {}),
     "rk4": ({"order": 4, "symplectic": False, "conserves": ["p_phi"]}, {}),
     "three_eighths": ({"order": 4}, {}),
     "dormand_prince": ({"order": 5}, {}),
-    "extrapolated": ({"order": 3}, {}),
-    "in_place": ({"order": 2}, {}),
-    "implicit_midpoint": ({"order": 2, "symmetric": True, "conserves": ALL}, {}),
+    "implicit_midpoint warm": ({"order": 2, "symmetric": True, "conserves": ALL}, {}),
     "trapezoidal": ({"order": 2, "symmetric": True, "energy": "bounded"}, {}),
     "implicit_euler": ({"order": 1, "symmetric": False}, {}),
-    "gauss_4": ({"order": 4, "symmetric": True, "conserves": ALL}, {}),
-    "triple_jump": ({"order": 4, "symmetric": True, "conserves": ALL}, {}),
-    "HeunSolver": ({"order": 2}, {}),
-    "AdamsBashforth": ({"order": 2}, {}),
+    "gauss_4 triple_jump": ({"order": 4, "symmetric": True, "conserves": ALL}, {}),
     "Leaping": ({"order": 2, "explicit": True}, {}),
-    "RK23": ({"order": 3}, {}),
     "RK45": ({"order": 5, "symplectic": False}, {}),
     "DOP853": ({"order": 8, "explicit": True}, {}),
-    "BDF": ({}, {"adaptive": True}),
-    "LSODA": ({}, {"adaptive": True}),
+    "BDF LSODA": ({}, {"adaptive": True}),
     "AtTolerance": ({"symplectic": False, "symmetric": False}, {"adaptive": True}),
     "radau_iia": ({"order": 3, "symplectic": False, "symmetric": False}, {}),
-    "as_a_list": ({"order": 3, "explicit": True}, {}),
     "linearised": ({"order": 2, "symplectic": False}, {}),
     "averaged_field": ({"order": 2, "symmetric": True, "symplectic": False, "conserves": ["p_phi"]}, {}),
-    "warm": ({"order": 2, "symmetric": True, "conserves": ALL}, {}),
     "long_double": ({"order": 2, "symplectic": False}, {"chart": "attitude"}),
-    "slow": ({"order": 2, "symplectic": False, "symmetric": False}, {}),
     "wrapped": ({"order": 2, "symplectic": False, "symmetric": False}, {"chart": "angles"}),
     "halves": ({"order": 2, "conserves": ["p_phi"]}, {"chart": "attitude"}),
     "tr_bdf2": ({"order": 2, "symplectic": False, "explicit": False}, {}),
@@ -385,12 +375,11 @@ CLAIMS = {  # name: claims, and options of judge
     "own_drift": ({"order": 2, "symplectic": True, "symmetric": True, "conserves": ["p_phi", "p_psi"]}, {}),
     "rotation_rk4": ({"order": 4, "symplectic": False}, ROTATION),
     "rotation_strang": ({"order": 2, "symplectic": True, "symmetric": True, "conserves": ["p_phi", "p_psi"]}, ROTATION),
-    "rotation_lie_midpoint": ({"order": 2, "symplectic": False, "conserves": ["axis_length"]}, ROTATION),
-    "rotation_negated": ({"order": 2, "symplectic": False, "conserves": ["axis_length"]}, ROTATION),
+    "rotation_lie_midpoint rotation_negated":
+        ({"order": 2, "symplectic": False, "conserves": ["axis_length"]}, ROTATION),
     "separable_forest_ruth": ({"order": 4, "symplectic": True, "symmetric": True, "explicit": True}, SEPARABLE),
-    "separable_implicit_midpoint": (
-        {"order": 2, "symplectic": True, "symmetric": True, "energy": "bounded"},
-        SEPARABLE,
-    ),
+    "separable_implicit_midpoint":
+        ({"order": 2, "symplectic": True, "symmetric": True, "energy": "bounded"}, SEPARABLE),
     "separable_heun": ({"order": 2, "symplectic": False, "symmetric": False}, SEPARABLE),
-}
+}  # fmt: skip
+CLAIMS = {name: entry for names, entry in _TABLE.items() for name in names.split()}
