@@ -1,5 +1,6 @@
 """Speed as ratios within one run: a run of one step, and all that surrounds a run."""
 
+import functools
 import math
 
 import numpy as np
@@ -55,6 +56,16 @@ def test_a_run_of_one_step_costs_less_than_a_hundred_and_fifty_steps():
     labels = [(one.name, chart) for one in methods for chart in one.charts()]
     for (name, chart), seconds in zip(labels, singles, strict=True):
         assert seconds / (base / 20_000) < (300.0 if name == "sofroniou-spaletta-10" else 150.0), (name, chart)
+
+
+@pytest.mark.slow
+def test_two_samples_cost_no_more_than_501():
+    """They did once: phases were sorted that are always too few, and twice."""
+    ask = functools.partial(symtop.simulate, symtop.scene("spheroid"), "takahashi-imada", step_size=8 / 400)
+    for guard in (False, True):
+        calls = [functools.partial(ask, samples=count, observe="axis", guard=guard) for count in (2, 501)]
+        two, many = (timing.best for timing in timings(calls, batches=80, batch=2e-3))
+        assert two < many
 
 
 @pytest.mark.slow
