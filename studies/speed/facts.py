@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from symtop.measure.timing import NOISY
 from symtop.methods.framework.registry import integrator, integrators, split_name
 from symtop.runner.study import REFERENCE
 
@@ -73,7 +74,11 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         }
     taken, known = costs(data, 1e-6), BESIDE in costs(data, 1e-9)
     both = SCIPY in taken and SAME in taken
+    spread = part["seconds_spread"].values
     return answers | {
+        "spread": float(np.nanmedian(spread)),
+        "noisy": int((spread > NOISY).sum()),
+        "timed": int(np.isfinite(spread).sum()),
         "scipy": taken[SCIPY] / taken[SAME] if both else None,  # times as long, at 1e-6 rad
         "beside": costs(data, 1e-9)[BESIDE] / answers["fastest_9_seconds"] if known else None,
     }

@@ -2,9 +2,11 @@
 
 A few methods on a few scenes, each at settings from coarse to fine: the largest errors of a run, its force evaluations,
 and the seconds that it takes. A method runs in the angles or the axis chart, and again in the attitude chart for the
-error of the attitude, which the axis chart does not show. The closed form, which needs no integrator, is timed beside
-them.
+error of the attitude, which the axis chart does not show. All runs on a scene are timed against each other, since a
+slow minute of the machine would else be a slow method. The closed form, which needs no integrator, is among them.
 """
+
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -29,36 +31,61 @@ METHODS = {  # and the charts that they run in
 SCENES = (facts.SHOWN, "spheroid", "hairer-lubich-wanner", "bruls-cardona-arnold")
 LENGTHS = (10.0, 100.0)  # nutations
 QUANTITIES = ("axis", "attitude", "energy", "p_phi")
-KEPT = ("step_size", "tolerance", "force_evaluations", "seconds", *QUANTITIES, "axis_bound")
+KEPT = ("step_size", "tolerance", "force_evaluations", *QUANTITIES, "axis_bound")
 SETTINGS, MOST_STEPS = 12, 3e5
 
 
 def cases(quick: bool) -> list[Case]:
-    """Every method that is there, in its charts, and the closed form, on every scene."""
+    """Every method that is there, in its charts, and the closed form, on every scene; their times, a case a scene."""
     names = [f"{name}[{chart}]" for name, charts in METHODS.items() if name in integrators() for chart in charts]
+    names.insert(0, REFERENCE)
     asked = {"lengths": LENGTHS[:1] if quick else LENGTHS, "settings": 7 if quick else SETTINGS}
     places = SCENES[:1] if quick else SCENES
-    return [Case(place, name, asked, timed=True) for place in places for name in (REFERENCE, *names)]
+    runs = [Case(place, name, asked) for place in places for name in names]
+    return [*runs, *(Case(place, "together", asked | {"integrators": names}, timed=True) for place in places)]
 
 
 def measure(case: Case) -> xr.Dataset:
-    """Errors, work and seconds over ``nutations`` and ``setting``."""
-    lengths, count = case.settings["lengths"], case.settings["settings"]
-    parts = [runs(scene(case.scene), integrator(case.integrator), length, count) for length in lengths]
-    return xr.concat(parts, xr.DataArray(list(lengths), dims="nutations", name="nutations"))
+    """Errors and work, or seconds, over ``nutations`` and ``setting``."""
+    on, lengths, count = scene(case.scene), list(case.settings["lengths"]), case.settings["settings"]
+    variants = [integrator(name) for name in case.settings.get("integrators", ())]
+    if variants:
+        parts = [times(on, variants, length, count) for length in lengths]
+    else:
+        parts = [runs(on, integrator(case.integrator), length, count) for length in lengths]
+    return xr.concat(parts, xr.DataArray(lengths, dims="nutations", name="nutations"))
 
 
 def runs(on: Scene, variant: Integrator, length: float, count: int) -> xr.Dataset:
-    """A method's runs over so many nutations; those that ended `ok` are timed. The closed form has nothing to set."""
-    horizon, (chart,) = length * on.nutation_period, variant.charts()
-    settings = ladder(variant, on, horizon, count, MOST_STEPS)
-    table = error_table(on, variant, settings, horizon, observe="attitude" if chart == "attitude" else "axis")
+    """A method's errors and work over so many nutations. The closed form has nothing to set."""
+    table, (chart,) = _errors(on, variant, length, count), variant.charts()
     if chart == "attitude" and variant.method != REFERENCE:  # the axis chart has the rest
         table = table.assign({name: table[name] * np.nan for name in ("axis", "energy", "p_phi")})
-    outcomes = zip(settings, table["outcome"].values, strict=True)
-    rows = [{"setting_value": setting, "outcome": outcome, "seconds": np.nan} for setting, outcome in outcomes]
-    timed_rows([(on, variant, horizon, rows)])
-    return table.assign(seconds=("setting", [one["seconds"] for one in rows]))[list(KEPT)]
+    return table[list(KEPT)]
+
+
+def _errors(on: Scene, variant: Integrator, length: float, count: int) -> xr.Dataset:
+    horizon, observe = length * on.nutation_period, "attitude" if variant.charts() == ("attitude",) else "axis"
+    return error_table(on, variant, ladder(variant, on, horizon, count, MOST_STEPS), horizon, observe=observe)
+
+
+def times(on: Scene, variants: list[Integrator], length: float, count: int) -> xr.Dataset:
+    """Seconds (variant, setting) of the runs of all methods that end `ok`, interleaved in random order, and spreads."""
+    horizon, cells = length * on.nutation_period, []
+    for variant in variants:
+        settings = ladder(variant, on, horizon, count, MOST_STEPS)
+        outcomes = _errors(on, variant, length, count)["outcome"].values
+        rows: list[dict[str, Any]] = [
+            {"setting_value": setting, "outcome": outcome} for setting, outcome in zip(settings, outcomes, strict=True)
+        ]
+        cells.append((on, variant, horizon, rows))
+    timed_rows(cells)
+    columns = {name: np.full((len(variants), count), np.nan) for name in ("seconds", "seconds_spread")}
+    for name, column in columns.items():
+        for place, (*_, rows) in enumerate(cells):
+            column[place, : len(rows)] = [one.get(name, np.nan) for one in rows]
+    coordinates = {"variant": [variant.name for variant in variants]}
+    return xr.Dataset({name: (("variant", "setting"), column) for name, column in columns.items()}, coordinates)
 
 
 STUDY = Study(
@@ -66,5 +93,5 @@ STUDY = Study(
     title="Speed",
     question="How fast are well-known methods at the accuracy I need?",
     cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
-    charts=figures.charts, timed=True,
+    charts=figures.charts,
 )  # fmt: skip

@@ -19,6 +19,7 @@ def data():
     asked = {"lengths": (10.0,), "settings": 5}
     names = ("exact", "rk4[axis]", "rk4[attitude]", "strang[axis]", "stormer-verlet[angles]", "taylor[axis]")
     cases = [Case("goldstein", name, asked) for name in names]
+    cases.append(Case("goldstein", "together", asked | {"integrators": list(names)}, timed=True))
     return datasets.combine([(case, study.measure(case)) for case in cases])
 
 
