@@ -96,6 +96,7 @@ bench: $(READY)
 peers: $(PEERS)/.ready
 	@echo "symtop: running the same tops in other libraries (about six minutes; other work on the machine disturbs the times)"
 	@$(PEERS)/bin/python -m benchmarks.peers
+	@rm -f MUJOCO_LOG.TXT # MuJoCo's own warnings on runs whose step is too long
 
 $(PEERS)/.ready: pyproject.toml constraints.txt benchmarks/peers/constraints.txt
 	@echo "symtop: making $(PEERS) and installing other libraries (a gigabyte, some minutes, once)"

@@ -95,7 +95,8 @@ def _over_general(data: xr.Dataset, known: dict[str, list[str]], said: Mapping[s
     sides = zip(("left", "right"), NAMES, strict=True)
     slower = [f"{names} at the {side}" for side, call in sides if (names := said[f"general_slower_{call}"])]
     return (
-        f"Over {said['general']}, which needs f(t, y) alone ({scenes}), solve_ivp takes {' and '.join(gains)} as long"
+        f"Over the fastest that needs f(t, y) alone ({said['general']}; {scenes}), solve_ivp takes "
+        f"{' and '.join(gains)} as long"
         f"{'; faster than it are ' if slower else ''}{' and '.join(slower)}. "
     )
 
