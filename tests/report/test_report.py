@@ -29,11 +29,12 @@ def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("results")
     for name in ("speed", "pitfalls", "convergence"):
         study = runner.load(name)
-        few = [case for case in study.cases(True) if name == "pitfalls" or case.integrator in FEW]
+        few = [case for case in study.cases(True) if name == "pitfalls" or case.integrator in (*FEW, "together")]
         if name == "convergence":
             few = [case for case in few if case.scene == "spheroid"]
         if name == "speed":
-            few = [dataclasses.replace(case, settings={"lengths": (4.0, 8.0), "settings": 5}) for case in few]
+            asked, timed = {"lengths": (4.0, 8.0), "settings": 5}, {"integrators": FEW}
+            few = [dataclasses.replace(case, settings=asked | timed if case.timed else asked) for case in few]
         small = dataclasses.replace(study, cases=lambda _, few=few: few)
         with pytest.MonkeyPatch.context() as here:  # workers take longer to start than these cases
             here.setattr(pool, "WORTH_WORKERS", len(few) + 1)
