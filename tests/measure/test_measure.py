@@ -141,6 +141,19 @@ def test_a_function_whose_three_least_samples_agree_is_asked_no_more(clock):
     assert not agree([1.0, 1.0, 1.0, 1.0], 0.01)
 
 
+def test_a_slow_minute_is_no_slow_function_among_those_that_are_timed_together(clock):
+    """The machine is half as fast in its first second; of functions that are timed one by one the first look so."""
+
+    def work():
+        clock[0] += 0.02 if clock[0] < 1.0 else 0.01
+
+    together = [timing.best for timing in timings([work] * 10, 10, 5e-3, warm=True, exact=False)]
+    clock[0] = 0.0
+    alone = [timings([work], 10, 5e-3, warm=True, exact=False)[0].best for _ in range(10)]
+    assert together == pytest.approx([0.01] * 10)
+    assert alone == pytest.approx([0.02] * 5 + [0.01] * 5)
+
+
 def test_timings_know_when_they_are_noisy():
     assert Timing((1.0, 1.01, 1.02), 1.0).reliable
     assert not Timing((1.0, 1.9, 2.0), 1.0).reliable
