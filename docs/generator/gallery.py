@@ -64,9 +64,9 @@ def markdown(report: str, tracked: set[str], root: Path = ROOT) -> str:
         raise ExtensionError(f"gallery: report and figures of docs/snapshot differ by {sorted(shown ^ tracked)}")
     lines: list[str] = []
     for title, (text, figures) in parts.items():
-        command, code = maker(figures[0].file, root)
         lines += [f"## {title}", ""]
-        lines += [f"Made by `{command}`; the code that draws is in `{code}`.", ""]
+        for command, code in dict.fromkeys(maker(one.file, root) for one in figures):
+            lines += [f"Made by `{command}`; the code that draws is in `{code}`.", ""]
         if reading := re.search(r"^\*\*How to read it\.\*\*.*", text, re.MULTILINE):
             lines += [reading.group(), ""]
         for one in figures:

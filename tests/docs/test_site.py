@@ -117,6 +117,12 @@ def test_pages_fit_and_ask_for_nothing(site, width):
         assert browser.outside() == []
 
 
+def test_every_public_name_is_in_the_api():
+    api = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
+    documented = set(re.findall(r"^\.\. (?:auto|py:)\w+:: (\w+)$", api, re.MULTILINE))
+    assert documented == set(symtop.__all__) - {"__version__"}
+
+
 @pytest.mark.slow
 def test_every_derivation_and_every_public_name_is_there(site):
     api = (site / "reference" / "api.html").read_text(encoding="utf-8")
