@@ -10,8 +10,8 @@ all spin, 5000. Both momenta share one scale because one of them may vanish. Rad
 a body without symmetry the scale of the energy is that of the start, kinetic and |mgl|, and that of p_phi and of the
 vector L is |L|.
 
-Where a method lets the length of e or q leave one, as explicit ones do, that is no part of an angle; the energy and
-the momenta of such a state have it.
+The length of e or q, which explicit methods let leave one, is no part of an angle; it counts in the energy and the
+momenta.
 
 A trajectory of another program is checked first. A quaternion shows the attitude, the axis and theta; theta, phi and
 psi the same; theta and phi the axis; an axis shows theta. Vectors that are not quite of length one are scaled to it.

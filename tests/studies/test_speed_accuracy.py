@@ -38,6 +38,14 @@ def test_a_run_is_that_of_its_setting(data):
     assert not np.isfinite(facts.shown(data)["axis"].sel(variant="rk4[attitude]")).any()
 
 
+def test_all_methods_on_a_scene_are_timed_in_one_case():
+    cases = study.cases(False)
+    for place in study.SCENES:
+        (together,) = [case for case in cases if case.scene == place and study.STUDY.is_timed(case)]
+        alone = [case.integrator for case in cases if case.scene == place and case is not together]
+        assert sorted(together.settings["integrators"]) == sorted(alone)
+
+
 def test_a_cost_lies_between_the_runs_that_miss_and_meet_the_error(data):
     cell = facts.shown(data).sel(variant="strang[axis]")
     error, seconds = cell["axis"].values, cell["force_evaluations"].values
