@@ -236,7 +236,10 @@ def recommend(
     names, source = _candidates(question)
     search = _Search(question, names, _menu(question))
     ranked, beside, fails = search.answers(), search.beside(), search.fails
-    source = f"tried all {search.widened} compiled methods that you can use" if search.widened else source
+    if search.widened:
+        source = f"tried all {search.widened} compiled methods that you can use"
+    elif search.of_table:
+        source = f"tried the {search.of_table} methods that {source}"
     # Times of the user's own methods in plain Python say nothing beside those of compiled ones.
     own = [one.name for one in integrators().values() if one.implementation == "python" and not is_built_in(one.name)]
     if own:
@@ -279,8 +282,10 @@ class _Search:
         self._try(names)
         costs = {name: one.cost(question) for one in self.trials if (name := one.run.integrator.name) in menu}
         first, second, *_ = [*costs.values(), math.inf, math.inf]
+        self.of_table = len(menu[:FEW])  # methods of the table that were tried
         if menu and (len(costs) < AGREED or menu.index(next(iter(costs))) >= AGREED or second < TIED * first):
             self._try(menu[FEW : FEW + 1])
+            self.of_table = len(menu[: FEW + 1])
         self._of_top = [name for name in self._names() if name in of_top][:1]
         self._general = [name for name in self._names() if name not in of_top]
 
@@ -376,8 +381,7 @@ def _candidates(question: _Question) -> tuple[list[str], str]:
     if not menu:
         return everyone, f"tried all {len(everyone)} compiled methods"
     own = [name for name in everyone if not is_built_in(name)]
-    words = f"tried the {len(menu)} methods that a study of random tops found the cheapest for such questions"
-    return list(dict.fromkeys([*menu, *own, *of_top])), words
+    return list(dict.fromkeys([*menu, *own, *of_top])), "a study of random tops found the cheapest for such questions"
 
 
 def _try(question: _Question, method: Integrator, patience: float) -> "_Trial | str | float":

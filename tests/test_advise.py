@@ -184,8 +184,9 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     assert "tried the 5 methods" in advice.reason
     names.clear()
     menu[:5] = menu[4::-1]  # the fastest is the last of five
-    symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
+    advice = symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
     assert sorted(names) == sorted([*menu, "series[axis]"])
+    assert "tried the 6 methods" in advice.reason
     names.clear()
     menu[:] = ["stormer-verlet", "strang[axis]", "midpoint", "trapezoidal", "cayley[axis]", "kahan[axis]"]
     everyone = {*menu, "vern9-fixed[axis]", "srkn-14-6[axis]"}  # of many more: each takes its kernel and its trials

@@ -16,6 +16,7 @@ import symtop
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning
 from symtop.explore import answers, cost
+from symtop.measure.sweep import timed_rows
 from symtop.methods.framework.registry import engines
 from symtop.methods.lagrangian.damped_top import Friction, damped_truth
 from symtop.model import charts
@@ -431,10 +432,8 @@ def costs(**changes):
 
 
 def test_the_first_chart_of_costs_is_there_at_once_and_its_lines_are_those_of_compare(monkeypatch):
-    monkeypatch.setattr(cost, "_lines", {})
+    monkeypatch.setattr(cost, "_charts", {})
     setups = cost.question(fields(integrator="trapezoidal", second="strang", horizon=7.5))
-    cost.chart(setups)
-    cost._lines.clear()
     began = time.thread_time()
     first = cost.chart(setups)
     assert time.thread_time() - began < 1.0
@@ -451,6 +450,17 @@ def test_the_first_chart_of_costs_is_there_at_once_and_its_lines_are_those_of_co
     assert np.argmin(lines["trapezoidal"]["error"]) in slower[-2:]
     again = costs(integrator="trapezoidal", second="strang", horizon=7.5)
     assert again["lines"] == whole["lines"]  # stored; the runs of the page are timed again
+
+
+def test_the_lines_of_a_chart_are_timed_together(monkeypatch):
+    """Timed one by one, a slow moment of the machine would be a slow method."""
+    timed = []
+    monkeypatch.setattr(cost, "_charts", {})
+    monkeypatch.setattr(cost, "timed_rows", lambda cells: (timed.append(cells), timed_rows(cells)))
+    lines = costs(integrator="trapezoidal", horizon=7.5)["lines"]
+    (cells,) = timed
+    assert [variant.method for _, variant, _, _ in cells] == [line["name"] for line in lines]
+    assert all(len(line["seconds"]) > 3 for line in lines)
 
 
 def test_the_chart_of_a_body_has_the_methods_that_step_it():
@@ -476,9 +486,9 @@ def test_a_line_that_cannot_be_measured_says_why(monkeypatch):
     def refused(*args, **options):
         raise SymtopError("the scene is <odd>")
 
-    monkeypatch.setattr(cost, "_lines", {})
+    monkeypatch.setattr(cost, "_charts", {})
     monkeypatch.setattr(cost, "compare", refused)
-    assert {line["message"] for line in costs()["lines"]} == {"the scene is <odd>"}
+    assert {line["message"] for line in costs(theta=0.41)["lines"]} == {"the scene is <odd>"}
 
 
 def test_a_run_is_answered_while_lines_are_measured(site, monkeypatch):
@@ -488,11 +498,11 @@ def test_a_run_is_answered_while_lines_are_measured(site, monkeypatch):
         measured.wait(60.0)
         raise SymtopError("late")
 
-    monkeypatch.setattr(cost, "_lines", {})
+    monkeypatch.setattr(cost, "_charts", {})
     monkeypatch.setattr(cost, "compare", late)
     began = time.monotonic()
     for step in (0.02, 0.03, 0.04):
-        chart = json.loads(request(site, "POST", "/cost", json.dumps(fields(step_size=step)), **JSON)[1])
+        chart = json.loads(request(site, "POST", "/cost", json.dumps(fields(theta=0.42, step_size=step)), **JSON)[1])
         assert chart["missing"] == len(cost.BESIDE) + 1
         assert chart["seconds"][0] > 0.0
     assert json.loads(request(site, "POST", "/run", json.dumps(fields()), **JSON)[1])["outcome"] == "ok"

@@ -203,7 +203,7 @@ async function askMap() {
   askMap();
 }
 
-// Lines come one by one, measured while the page is used: it asks again until all are there.
+// Lines are measured while the page is used, their times together: it asks again until they are there.
 async function askCost() {
   clearTimeout(patient);
   if (document.hidden) { patient = setTimeout(askCost, 1000); return; }

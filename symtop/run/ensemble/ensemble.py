@@ -99,8 +99,9 @@ def ensemble(
     order = job.order() if path is None else None
     ordered = replace(job if order is None else job.of(order), continuous=path is not None)
     chunks = list(ordered.chunks())
+    nouns = ("body", "bodies") if chart == BODY else ("top", "tops")
     words = {
-        "title": f"{method.name} on {n} {'bodies' if chart == BODY else 'tops'}", "units": read.units, "chart": chart,
+        "title": f"{method.name} on {n} {nouns[n != 1]}", "units": read.units, "chart": chart,
         "integrator": method.name, "implementation": method.implementation, "execution": job.execution,
     }  # fmt: skip
 
