@@ -144,7 +144,8 @@ def run_steps(
     """Run the chosen members with so many steps a natural period, sampled after `marks` of them."""
     h = bodies.period[chosen] / steps
     runs = stepped(variant, bodies.rows[chosen], h, np.broadcast_to(marks, (h.size, marks.size)))
-    lost = off_length(BODY, runs.states)  # as one by one, a run ends there
+    with np.errstate(all="ignore"):  # a run may have blown up
+        lost = off_length(BODY, runs.states)  # as one by one, a run ends there
     outcome = np.where(lost.any(axis=1), NOT_NORMALISED, runs.outcome)
     return runs._replace(states=np.where(lost[..., np.newaxis], np.nan, runs.states), outcome=outcome)
 
