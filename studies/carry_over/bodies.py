@@ -19,14 +19,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from symtop_studies.cost.ladder import Level, one_by_one, setting_of
+from symtop_studies.cost.ladder import Level, one_by_one, setting_of, stepped
 from symtop_studies.cost.tops import CLEAR, FIRST, MOMENTA, SAMPLES, Tops
 
 from symtop.core.numbers import EPSILON, GOLDEN
-from symtop.methods.framework.plan import Plan
+from symtop.methods.framework.plan import NOT_NORMALISED, Plan, off_length
 from symtop.methods.framework.registry import Integrator
 from symtop.model.body import Attitude, RigidBody, rotated, vertical
-from symtop.model.charts import Array, attitude_distance, axis_distance
+from symtop.model.charts import BODY, Array, attitude_distance, axis_distance
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.run.ensemble.bodies import body_population, scenes_of
@@ -86,6 +86,11 @@ class Bodies:
         turned = rotated(np.array([start.quaternion for _, start in bodies]), momentum)
         return *map(np.array, parts), momentum, np.array(energy), np.array(scale), turned
 
+    @cached_property
+    def rows(self) -> Array:
+        """Bodies and starts as rows of 14 numbers, (n, 14)."""
+        return np.array([one.top.flat(one.start) for one in self.scenes])
+
     def asked(self, targets: Any) -> dict[str, NDArray[np.bool_]]:
         """Which targets are asked of which members, (targets, n)."""
         levels = np.asarray(targets)[:, np.newaxis]
@@ -128,11 +133,21 @@ def unit(quaternions: Array) -> Array:
 def run_level(variant: Integrator, bodies: Bodies, chosen: NDArray[np.int64], level: int, budget: float) -> Level:
     """Run the chosen members with one setting of the ladder."""
     if variant.fixed_step:
-        h = bodies.period[chosen] / FIRST * 0.5**level
-        plans = [Plan.steps(float(step), bodies.marks << level) for step in h]
-    else:
-        plans = [Plan.until(times, setting_of(variant, level), budget) for times in bodies.times[chosen]]
+        return run_steps(variant, bodies, chosen, FIRST * 2.0**level, bodies.marks << level)
+    plans = [Plan.until(times, setting_of(variant, level), budget) for times in bodies.times[chosen]]
     return one_by_one(variant, bodies.members(chosen), plans)
+
+
+def run_steps(
+    variant: Integrator, bodies: Bodies, chosen: NDArray[np.int64], steps: float, marks: NDArray[np.int64]
+) -> Level:
+    """Run the chosen members with so many steps a natural period, sampled after `marks` of them."""
+    h = bodies.period[chosen] / steps
+    runs = stepped(variant, bodies.rows[chosen], h, np.broadcast_to(marks, (h.size, marks.size)))
+    with np.errstate(all="ignore"):  # a run may have blown up
+        lost = off_length(BODY, runs.states)  # as one by one, a run ends there
+    outcome = np.where(lost.any(axis=1), NOT_NORMALISED, runs.outcome)
+    return runs._replace(states=np.where(lost[..., np.newaxis], np.nan, runs.states), outcome=outcome)
 
 
 @functools.lru_cache(maxsize=2 * len(FAMILIES))

@@ -13,19 +13,18 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from symtop_studies.cost.ladder import KEPT, LEVELS, WRONG, Climb, climb, one_by_one, setting_of, stored, typical_work
+from symtop_studies.cost.ladder import KEPT, LEVELS, WRONG, Climb, climb, setting_of, stored, typical_work
 from symtop_studies.cost.ranking import cost_to_reach
 from symtop_studies.cost.tops import CLEAR, MOMENTA
 
 from symtop.measure.settings import TARGETS
-from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import Array, attitude_distance
 from symtop.model.exact.heavy_body import HeavyBody
 from symtop.run.ensemble.bodies import body_population, growth, scenes_of
 from symtop.run.reference.independent_checks import have_heyoka
 
-from .bodies import ASKED, FREE, SYMMETRIC, Bodies, as_tops, grain, run_level, unit
+from .bodies import ASKED, FREE, SYMMETRIC, Bodies, as_tops, grain, run_level, run_steps, unit
 
 STATUS = tuple(range(2, 8))  # levels whose verdicts are kept: 4.37 to 140 steps a period
 ASYMPTOTE = (1e-9, 1e-3)  # rad
@@ -125,9 +124,7 @@ def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> 
         judged[row] = known.size / count
         if not known.size:
             continue
-        plans = [Plan.steps(float(period) / steps, marks) for period in bodies.period[known]]
-        runs = one_by_one(variant, bodies.members(known), plans)
-        errors = bodies.errors_at(runs.states, known)
+        errors = bodies.errors_at(run_steps(variant, bodies, known, float(steps), marks).states, known)
         for k, time in enumerate(at):
             near = (marks <= np.rint(time * steps)) & (marks > 0.5 * time * steps)
             for place, name in enumerate(("attitude", "energy")):

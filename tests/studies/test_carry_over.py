@@ -7,10 +7,11 @@ from scipy.stats import kendalltau
 from symtop_studies.carry_over import comparison as by, facts, figures, measures
 from symtop_studies.carry_over.bodies import FAMILIES, FREE, SYMMETRIC, Bodies, as_tops, bodies_of, run_level
 from symtop_studies.carry_over.measures import ASYMPTOTE, growth_table, observed_order, own_table, table, verdicts
-from symtop_studies.cost.ladder import LEVELS, Climb, setting_of
+from symtop_studies.cost.ladder import LEVELS, Climb, one_by_one, setting_of
 from symtop_studies.cost.tops import FIRST, MOMENTA
 
 import symtop
+from symtop.methods.framework.plan import NOT_CONVERGED, NOT_NORMALISED, OK, Plan
 from symtop.methods.framework.registry import integrator
 from symtop.model.charts import attitude_distance
 
@@ -38,6 +39,21 @@ def test_errors_of_many_runs_are_those_of_each(family):
         if scene.top.centre == (0.0, 0.0, 1.0):  # `errors` knows the third axis
             assert shown["axis"][k] == pytest.approx(float(wrong["axis"].max()), rel=1e-3, abs=1e-11)
         assert shown[MOMENTA][k] < 1e-2
+
+
+@pytest.mark.parametrize(
+    ("name", "level", "ends"),
+    [("strang", 0, {OK}), ("rk4", 1, {NOT_NORMALISED}), ("rk4", 7, {OK}), ("gauss-4", 1, {OK, NOT_CONVERGED})],
+)
+def test_bodies_in_lanes_run_and_end_as_one_by_one(name, level, ends):
+    variant, bodies = integrator(f"{name}[body]"), drawn("0.3")
+    plans = [Plan.steps(float(period) / FIRST * 0.5**level, bodies.marks << level) for period in bodies.period]
+    lanes, each = (
+        run_level(variant, bodies, everyone(), level, 1e6), one_by_one(variant, bodies.members(everyone()), plans)
+    )  # fmt: skip
+    for field in ("states", "work", "outcome"):
+        np.testing.assert_array_equal(getattr(lanes, field), getattr(each, field))
+    assert {*lanes.outcome.tolist()} == ends
 
 
 @pytest.mark.parametrize("family", [SYMMETRIC, "0.1", "chaotic", FREE])
