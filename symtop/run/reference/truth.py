@@ -92,7 +92,6 @@ ILL = 1e4  # times: beyond it the words say what a rounding of the start costs
 UNCERTIFIED = "none; certify='digits', 'discrete-map' or 'integration' makes one"
 MOST_CACHED = 200_000  # times; larger results are not kept on disk
 MOST_BYTES = 500_000_000  # of the folder on disk; a reference at 1000 times takes 200 kB
-OFTEN_ENOUGH = 1000  # samples that show when the motion of a body is lost
 OFTEN = 50  # files that a process writes between two looks at the size of the folder
 COMPILED = tuple(code_hash.PACKAGE / "core" / name for name in ("jit.py", "sines.py"))  # without importing numba
 
@@ -169,12 +168,10 @@ def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, prec
     """
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
     shown = motion.samples(times) if body.free else motion.samples(times, precise=precise)  # type: ignore[call-arg]
-    if (lost := shown.lost(times)) is None:
-        return shown
-    often = np.linspace(0.0, lost, OFTEN_ENOUGH + 1)[1:]  # the limit is the motion's, and no time that was asked for
-    limit = motion.samples(often).lost(often) or lost
-    words = "its motion is not known to 1e-9 rad from there on"
-    raise SymtopError(f"times must be below about {limit:.2g} on {name}, not {times.max():.6g}: {words}", "times")
+    if (lost := shown.lost(times)) is not None:
+        words = "its motion is not known to 1e-9 rad from there on"
+        raise SymtopError(f"times must be below {lost:.6g} on {name}, not {times.max():.6g}: {words}", "times")
+    return shown
 
 
 def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) -> xr.Dataset:
