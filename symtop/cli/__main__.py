@@ -12,6 +12,7 @@ import threading
 
 from symtop.cli.main import main
 from symtop.core.parallel import VARIABLES
+from symtop.core.signals import UNREAD
 
 
 def run() -> None:
@@ -28,8 +29,8 @@ def run() -> None:
         for stream in filter(None, (sys.stdout, sys.stderr)):  # None, where it was closed
             try:
                 stream.flush()
-            except OSError:  # nobody reads it, or the disk is full
-                code = code or 1
+            except OSError as error:  # nobody reads it, or the disk is full
+                code = code or (UNREAD if isinstance(error, BrokenPipeError) else 1)
         os._exit(code)
 
 

@@ -30,7 +30,7 @@ from symtop.core.errors import (
     positive,
     words_of,
 )
-from symtop.core.signals import INTERRUPTED, told_apart
+from symtop.core.signals import INTERRUPTED, UNREAD, told_apart
 
 if TYPE_CHECKING:
     from symtop.model.scenes import Scene
@@ -208,7 +208,10 @@ class Group(click.Group):
             if error.errno in (errno.ENOSPC, errno.EDQUOT) and error.filename is None:
                 warn(f"cannot write what there is to say: {error.strerror}")
                 ctx.exit(2)
-            if error.errno == errno.EPIPE or error.filename is None:  # a reader that has left is click's
+            if error.errno == errno.EPIPE:
+                sys.stdout = None  # its reader has left
+                ctx.exit(UNREAD)
+            if error.filename is None:
                 raise
             name = str(error.filename)
             warn(f"cannot use {name[:LONGEST_NAME]}{'...' if name[LONGEST_NAME:] else ''}: {error.strerror}")

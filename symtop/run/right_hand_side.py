@@ -2,7 +2,10 @@
 
 The method makes a piece of the run, which is compared with DOP853 at a tight tolerance, since only f is known. Its
 error grows by the law of `symtop.run.guard`, linear to quadratic, or by what the motion makes of a small change, A(t)
-of `symtop.run.motion`, whichever is more; two motions are watched as far as `WATCHED` steps of DOP853 lead. Causes:
+of `symtop.run.motion`, whichever is more; two motions are watched as far as `WATCHED` steps of DOP853 lead. An error
+that fades within the piece, as in a transient, is the largest one and does not grow; a run that leaves the motion for
+good goes on as it does in the second half of the piece; any other error is at most twice the extent of a motion that is
+known whole or goes back and forth. Causes:
 
     stiffness      f has rates far above that of the motion, and they limit an explicit step
     instability    steps multiply a small change more than the motion does, or the motion itself is unstable
@@ -25,7 +28,7 @@ from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import integrator, integrators
 from symtop.methods.runge_kutta.explicit import Tableau
 from symtop.run.guard import OWN, Probe, grown
-from symtop.run.motion import Growth
+from symtop.run.motion import MOST_FOLDS, Growth
 
 SCIPY = {"rk45": ("RK45", 6), "dop853": ("DOP853", 12), "radau": ("Radau", 0), "bdf": ("BDF", 0), "lsoda": ("LSODA", 0)}
 FINE, WATCHED, PROBED = 1e-13, 4000, 5000  # tolerance of the truth; steps of DOP853, and of the method on a piece
@@ -33,6 +36,7 @@ PERIODS, SHARE, POINTS = 10.0, 0.2, 400  # of the motion and of the run in a pie
 TIGHTEST, LOOSEST = 2.3e-14, 0.1  # tolerances: the least of SciPy's solvers, the largest that is advised
 MOVED, SATURATED = 1e-7, 1e-2  # of the extent of the motion: how far two motions are apart, and the most
 UNSTABLE, STIFF = 10.0, 20.0  # times that A grows in the second half; times the rate of the motion
+FIRST, FADED = 1e-7, 0.1  # of a piece, the earliest time that is compared; of the largest error, one that has faded
 
 
 class Outlook(NamedTuple):
@@ -126,6 +130,18 @@ def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
     return OdeSolution(times, parts), times[-1] - t
 
 
+def _expected(times: Array, error: Array, end: float, amplified: float, extent: float) -> float:
+    """The largest error by the end, from that of a piece; the extent of the motion is infinite if it is not known."""
+    largest, middle = float(error.max()), int(np.searchsorted(times, 0.5 * times[-1]))
+    if largest > 2.0 * extent and 0 < middle < times.size - 1:  # the run leaves the motion for good
+        folds = math.log(max(float(error[-1] / error[middle]), 1.0)) / (times[-1] - times[middle])
+        return largest * math.exp(min(folds * (end - times[-1]), MOST_FOLDS))
+    late = float(error[middle:].max())
+    lasting = np.minimum(error, late) if late < FADED * largest else error
+    later = max(grown(Probe(times, lasting, "ok", end, 0), end, straight=False), float(lasting.max()) * amplified)
+    return max(largest, min(later, 2.0 * extent))
+
+
 def _outlook(
     f: Any, t: float, y: Array, end: float, method: str, rule: Tableau | None, setting: float, accuracy: float
 ) -> Outlook:
@@ -138,43 +154,50 @@ def _outlook(
         raise SymtopError(f"horizon must be {words}", "horizon")
     elapsed = watched * np.arange(1.0, POINTS + 1.0) / POINTS
     true = near(t + elapsed)
-    spread, extent = np.std(true, axis=1), float(np.linalg.norm(np.ptp(true, axis=1))) or 1.0
+    path = np.column_stack([y, true])  # from the start, which a transient has left by the first of these times
+    spread, extent = np.std(true, axis=1), float(np.linalg.norm(np.ptp(path, axis=1))) or 1.0
+    turns = 0.5 * float(np.linalg.norm(np.diff(path, axis=1), axis=0).sum()) / extent  # as often there and back
     rates = np.std([f(t + time, state) for time, state in zip(elapsed, true.T, strict=True)], axis=0)
     frequency = float(np.linalg.norm(rates)) / max(float(np.linalg.norm(spread)), TINY)
+    whole = watched >= end or turns >= 1.0  # all that the motion does
+    slow = min(frequency, 2.0 * math.pi * turns / watched)
     moved = y + MOVED * extent / math.sqrt(y.size)
     far, reached = _motion(f, t, moved, watched)
     times = elapsed[elapsed <= reached * (1.0 + EPSILON)]
     apart = np.linalg.norm(far(t + times) - near(t + times), axis=0) / (MOVED * extent)
     growth, kind = Growth.of(times, apart, SATURATED / MOVED), "step" if rule else "tolerance"
     piece = min(end, watched, max(SHARE * end, PERIODS * 2.0 * math.pi / max(frequency, TINY)))
+    places = np.union1d(np.geomspace(FIRST, 1.0, POINTS // 4), elapsed / watched)  # of the piece
 
     def run_piece(start: Array) -> tuple[Array, Array, float]:
         """Times and states of the piece, and the mean step of an explicit method."""
         if rule:
-            marks = np.unique(np.rint(np.linspace(0.0, min(round(piece / setting), PROBED), POINTS + 1)[1:]).clip(1.0))
+            marks = np.unique(np.rint(min(round(piece / setting), PROBED) * places).clip(1.0))
             return marks * setting, _stepped(f, rule, t, start, setting, marks), setting
-        (name, cost), shown = SCIPY[method], np.minimum(t + piece * elapsed / watched, t + piece)
+        (name, cost), shown = SCIPY[method], np.minimum(t + piece * places, t + piece)
         run = solve_ivp(_finite(f), (t, t + piece), start, name, shown, rtol=setting, atol=setting)
         return run.t - t, run.y.T, piece * cost / run.nfev
 
     times, states, mean = run_piece(y)
     error = np.linalg.norm(states - near(t + times).T, axis=1)
-    ended = not np.isfinite(error).all() or times[-1] < 0.99 * min(piece, PROBED * setting if rule else piece)
+    # not finite, ended early by SciPy, or a step beyond what is known of the motion
+    ended = not np.isfinite(error).all() or times[-1] < 0.99 * piece * (not rule) or setting * bool(rule) > watched
     total, since = growth.at(end), growth.at(float(times[-1]))
-    expected = max(grown(Probe(times, error, "ok", end, 0), end, straight=False), float(error.max()) * total / since)
-    expected = math.inf if ended else min(expected, 2.0 * extent)
+    expected = math.inf if ended else _expected(times, error, end, total / since, extent if whole else math.inf)
     better = setting * (accuracy / max(expected, TINY)) ** (1.0 / ((rule and integrator(method).order) or 1))
     better = 0.3 * setting if ended else min(better, end if rule else LOOSEST)
-    better = float(Context(prec=2, rounding=ROUND_DOWN).create_decimal(better))
     change = math.sqrt(EPSILON) * extent
     slopes = [(f(t, y + change * unit) - f(t, y)) / change for unit in np.eye(y.size)]
     fastest, cause = float(np.abs(np.linalg.eigvals(np.array(slopes))).max()), "step"
-    why = f"errors add up over {end * frequency / (2.0 * math.pi):.3g} periods; take a {kind} of about {better:.2g}"
+    if rule and fastest > STIFF * slow:  # no longer than is stable
+        better = min(better, max(setting, 1.0 / fastest))
+    better = float(Context(prec=2, rounding=ROUND_DOWN).create_decimal(better))
+    why = f"errors add up over {end * slow / (2.0 * math.pi):.3g} periods; take a {kind} of about {better:.2g}"
     if not expected > accuracy:
         cause, why = "", f"a {kind} of {better:.2g} would do for {accuracy:.1g}"
-    elif mean * fastest > 1.0 and fastest > STIFF * frequency:
+    elif mean * fastest > 1.0 and fastest > STIFF * slow:
         cause, better = "stiffness", math.nan
-        why = f"f has rates of {fastest:.1g}, the motion of {frequency:.1g}; take an implicit method, such as radau"
+        why = f"f has rates of {fastest:.1g}, the motion of {slow:.1g}; take an implicit method, such as radau"
     elif ended or np.linalg.norm(run_piece(moved)[1] - states, axis=1).max() > OWN * since**2 * MOVED * extent:
         better = min(better, 0.3 * setting)
         cause = "instability"
@@ -188,4 +211,5 @@ def _outlook(
     elif float(error.max()) < 10.0 * FINE * float(np.abs(true).max()):
         cause, better, why = "rounding", math.nan, f"rounding adds up, and no {kind} helps"
     sentence = f"{method}: expect an error of {expected:.1g} by t = {t + end:.4g}: {why}"
+    sentence += "" if whole else f"; the motion was watched to t = {t + watched:.4g} alone"
     return Outlook(expected, better, cause, total, sentence)

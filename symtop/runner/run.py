@@ -183,8 +183,7 @@ def _facts(study: Study, data: Combined) -> Iterator[tuple[str, float | str | bo
     """Facts as JSON holds them: numbers, names, and None for what was not measured."""
     for name, raw in () if study.facts is None else _answers(study, "facts", data, "numbers"):
         if not (isinstance(name, str) and name.isidentifier()):
-            must = f"the name of a fact must be a word of letters, digits and _, not {name!r}"
-            raise StudyError(f"study {study.name}: {must}")
+            raise StudyError(f"study {study.name}: a fact's name must be a word of letters, digits and _, not {name!r}")
         value = raw.item() if getattr(raw, "ndim", None) == 0 else raw  # of NumPy
         if value is not None and not isinstance(value, (bool, int, float, str)):
             must = f"fact {name} must be a number, text or None, not {shown(value)[:LONGEST]}"

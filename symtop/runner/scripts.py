@@ -47,8 +47,7 @@ def install() -> ModuleType:
 def names() -> list[str]:
     """Names of the studies that ship with symtop, in the order of the report, which their package says."""
     shipped = sorted(path.parent.name for path in folder().glob("*/study.py"))
-    order = install().ORDER
-    return sorted(shipped, key=lambda name: [*order, name].index(name))
+    return sorted(shipped, key=lambda name: [*install().ORDER, name].index(name))
 
 
 def file_of(name: str) -> Path:
@@ -87,5 +86,7 @@ def load(name: str) -> Study:
     if not isinstance(study, Study):
         raise SymtopError(f"study {file.name} must define STUDY, a Study, not {study!r}")
     if file.parent.parent != folder():
+        if study.name in names():
+            raise SymtopError(f"study {file.name} must have a name that is not taken, not {study.name!r}")
         _own_scripts[study.name] = file
     return study

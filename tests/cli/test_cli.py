@@ -267,6 +267,18 @@ def test_a_stream_that_was_closed_changes_no_exit_code(words, closed, code):
     assert "Traceback" not in result.stderr
 
 
+@pytest.mark.skipif(not Path("/bin/bash").exists(), reason="a shell with pipefail")
+@pytest.mark.parametrize(
+    ("words", "reader", "code"),
+    [("integrators", "head -1", 141), ("scenes", "true", 141), ("scenes", "cat", 0), ("run nowhere", "true", 2)],
+)
+def test_a_reader_that_leaves_is_no_case_that_has_failed(words, reader, code):
+    command = f"set -o pipefail; {sys.executable} -m symtop.cli {words} | {reader}"
+    result = subprocess.run(["/bin/bash", "-c", command], capture_output=True, text=True, timeout=120, check=False)
+    assert result.returncode == code, result.stderr
+    assert "Traceback" not in result.stderr
+
+
 def test_a_command_whose_threads_work_or_whose_code_is_a_text_ends_as_python_does():
     result = ending(before="threading.Thread(target=work).start()")
     assert result.stdout.splitlines() == ["the answer", "the thread is done", "what was registered", "taken apart"]

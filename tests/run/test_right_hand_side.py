@@ -40,10 +40,12 @@ def swing(_, y):
 def measured(f, y0, horizon, name, **control):
     """The error of the run itself, by SciPy or by steps of rk4."""
     h = control.get("step_size")
-    times = np.linspace(0.0, horizon, 401) if h is None else h * np.arange(round(horizon / h) + 1)
+    early = horizon * np.geomspace(1e-6, 1.0, 200)
+    times = np.union1d(np.linspace(0.0, horizon, 401), early) if h is None else h * np.arange(round(horizon / h) + 1)
     if h is None:
         tolerance = control["tolerance"]
-        states = solve_ivp(f, (0.0, horizon), y0, name.upper(), times, rtol=tolerance, atol=tolerance).y
+        solver = {"radau": "Radau"}.get(name, name.upper())
+        states = solve_ivp(f, (0.0, horizon), y0, solver, times, rtol=tolerance, atol=tolerance).y
     else:
         steps = [np.array(y0)]
         for _ in times[1:]:
@@ -69,6 +71,49 @@ def test_a_regular_motion_is_forecast_within_a_factor_of_three(f, y0, periods, n
     expected = symtop.guard(f, 0.0, y0, horizon, name, **control)
     assert 1.0 / 3.0 < expected.error / measured(f, y0, horizon, name, **control) < 3.0
     assert expected.cause in ("", "step")
+
+
+def prothero_robinson(t, y):
+    return [-1e6 * (y[0] - math.cos(t)) - math.sin(t)]
+
+
+def decay(rate):
+    return lambda _, y: [-rate * y[0]]
+
+
+@pytest.mark.parametrize(("rate", "horizon", "name", "control"), [
+    (1.0, 10.0, "rk4", {"step_size": 0.1}), (1000.0, 10.0, "rk4", {"step_size": 0.002}),
+    (30.0, 10.0, "rk4", {"step_size": 0.1}), (1000.0, 10.0, "radau", {"tolerance": 1e-4}),
+    (1000.0, 10.0, "bdf", {"tolerance": 1e-4}), (1000.0, 10.0, "lsoda", {"tolerance": 1e-4}),
+])  # fmt: skip
+def test_an_error_in_a_transient_counts_and_one_that_grows_beyond_the_motion_goes_on(rate, horizon, name, control):
+    """Of exp(-1000 t) nothing is left at the first of even times; exp(-30 t) ends at 7e13 where h = 0.1."""
+    expected = symtop.guard(decay(rate), 0.0, [1.0], horizon, name, **control)
+    assert 1.0 / 3.0 < expected.error / measured(decay(rate), [1.0], horizon, name, **control) < 3.0
+
+
+@pytest.mark.parametrize(("f", "y0", "step"), [
+    (decay(1000.0), 1.0, 0.1), (decay(1e6), 1.0, 0.1), (lambda _, y: [-200.0 * (y[0] - 1.0)], 0.0, 0.05),
+    (prothero_robinson, 1.0, 0.1),
+], ids=["decay", "fast decay", "relaxation", "Prothero and Robinson"])  # fmt: skip
+def test_steps_that_are_too_long_for_a_stiff_f_are_no_small_error(f, y0, step):
+    expected = symtop.guard(f, 0.0, [y0], 10.0, "rk4", step_size=step)
+    assert expected.error > 1e10
+    assert expected.cause == "stiffness"
+    assert math.isnan(expected.setting)
+
+
+@pytest.mark.parametrize(("horizon", "step"), [(1.0, 0.3), (1.0, 0.4), (2.0, 0.32), (1.0, 0.21)])
+def test_a_run_of_few_steps_is_forecast_as_any_other(horizon, step):
+    expected = symtop.guard(swing, 0.0, [1.0, 0.0], horizon, "rk4", step_size=step)
+    assert 1.0 / 3.0 < expected.error / measured(swing, [1.0, 0.0], horizon, "rk4", step_size=step) < 3.0
+    assert expected.cause == ""
+
+
+def test_what_was_not_watched_to_the_end_says_so():
+    said = str(symtop.guard(prothero_robinson, 0.0, [1.0], 10.0, "radau", tolerance=1e-6))
+    assert "; the motion was watched to t = 0.0" in said
+    assert "watched" not in str(symtop.guard(swing, 0.0, [1.0, 0.0], 3000.0, "rk4", step_size=0.1))
 
 
 def test_chaos_is_told_from_order():

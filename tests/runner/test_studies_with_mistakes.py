@@ -57,6 +57,13 @@ def test_the_study_itself_is_right(tmp_path):
     assert "  worst: 0.25\n" in output
 
 
+def test_a_study_that_ships_is_not_replaced_by_one_of_its_name(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "SCRIPT", SCRIPT.replace('name="mine"', 'name="convergence"'))
+    code, output = run_study(tmp_path, "")
+    assert (code, output) == (2, "symtop: study mine.py must have a name that is not taken, not 'convergence'\n")
+    assert not (tmp_path / "results").exists()
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -83,7 +90,7 @@ def test_a_grid_that_is_none_is_refused(tmp_path, change, says):
     ("change", "says"),
     [
         ("facts = lambda data: None", "facts must return numbers by name, not None"),
-        ("facts = lambda data: {'a b': 1}", "the name of a fact must be a word of letters, digits and _, not 'a b'"),
+        ("facts = lambda data: {'a b': 1}", "a fact's name must be a word of letters, digits and _, not 'a b'"),
         ("facts = lambda data: {'a': [1.0]}", "fact a must be a number, text or None, not [1.0]"),
         ("facts = lambda data: data['no']", "facts failed: KeyError"),
         ("facts = lambda data: [symtop.simulate('spheroid', 'rk4', step_size=np.nan).title]",
