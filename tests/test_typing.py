@@ -50,7 +50,7 @@ def checked(tmp_path_factory):
     folder = tmp_path_factory.mktemp("typed")
     for name, text in (("good", GOOD), ("bad", BAD)):
         (folder / f"{name}.py").write_text(text, encoding="utf-8")
-    # with the settings of `make lint`, whose cache of what mypy knows of the package and of its libraries serves here, too
+    # with the settings of `make lint`, whose cache of the package and of its libraries serves here, too
     words = [sys.executable, "-m", "mypy", "--no-error-summary", str(folder / "good.py"), str(folder / "bad.py")]
     result = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
     assert result.stdout, result.stderr

@@ -17,14 +17,21 @@ def site():
     server.server_close()
 
 
-@pytest.fixture
-def explorer(site):
-    """Opens the page, or the link that follows its address; a test may leave no error on it."""
-    with Browser(1280, 900) as browser:
-
-        def opened(link=""):
-            browser.open(address(site) + link)
-            return browser
-
+@pytest.fixture(scope="module")
+def browser():
+    with Browser(1280, 900) as opened:
         yield opened
-        assert browser.problems == []
+
+
+@pytest.fixture
+def explorer(site, browser):
+    """Opens the page, or the link that follows its address; a test may leave no error on it."""
+
+    def opened(link=""):
+        browser.resize(1280, 900)
+        browser.open("data:text/html,")  # or another link to the page would leave it as it is
+        browser.open(address(site) + link)
+        return browser
+
+    yield opened
+    assert browser.problems == []

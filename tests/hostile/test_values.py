@@ -19,6 +19,7 @@ import xarray as xr
 import symtop
 from symtop.core.numbers import real_numbers
 from symtop.model.exact.closed_form import ClosedForm, ClosedForms
+from tests.judging.conftest import shorten
 
 SECONDS = 20.0  # of processor time for one call
 
@@ -239,7 +240,8 @@ def test_anything_is_used_or_refused(stride):
     assert not faults
 
 
-def test_the_same_calls_with_good_input_are_fine():
+def test_the_same_calls_with_good_input_are_fine(monkeypatch):
+    shorten(monkeypatch)
     for name, (function, good, *_) in CALLS.items():
         if name not in ("register", "register_scene", "judge of nothing"):
             assert came(function, good) == "", name

@@ -197,8 +197,8 @@ def test_the_step_that_is_advised_works_whatever_the_cause():
     """Poles, resonances, steps beyond the stability limit and errors that add up; 2 of 600 were wrong, by 0.0125."""
     draw = random.Random(5)
     names = ("midpoint", "stormer-verlet", "strang", "rk4[axis]", "gauss-4", "generalised-alpha")
-    pairs = [pair for _ in range(220) if (pair := advised(draw, names)) is not None]
-    assert len(pairs) > 100
+    pairs = [pair for _ in range(120) if (pair := advised(draw, names)) is not None]
+    assert len(pairs) > 55
     before, after = np.array(pairs).T
     assert np.mean(after > EXPECTED) <= 0.02
     assert after.max() < 2.0 * EXPECTED

@@ -72,7 +72,7 @@ def test_a_regular_motion_is_forecast_within_a_factor_of_three(f, y0, periods, n
 
 
 def test_chaos_is_told_from_order():
-    y0, horizon = of_energy(1.0 / 6.0, -0.1), 300.0
+    y0, horizon = of_energy(1.0 / 6.0, -0.1), 200.0
     chaotic = symtop.guard(henon_heiles, 0.0, y0, horizon, "rk45", tolerance=1e-6)
     assert chaotic.cause == "instability"
     assert "the motion multiplies a small change" in str(chaotic)
@@ -84,8 +84,8 @@ def test_chaos_is_told_from_order():
 @pytest.mark.parametrize(
     ("f", "y0", "horizon", "name", "control", "cause"),
     [
-        (stiff, [1.0], 10.0, "rk4", {"step_size": 0.01}, "stiffness"),
-        (stiff, [1.0], 10.0, "radau", {"tolerance": 1e-8}, ""),
+        (stiff, [1.0], 3.0, "rk4", {"step_size": 0.01}, "stiffness"),
+        (stiff, [1.0], 3.0, "radau", {"tolerance": 1e-8}, ""),
         (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 3.0}, "instability"),
         (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 0.5}, "step"),
         (swing, [1.0, 0.0], 30.0, "vern9-fixed", {"step_size": 0.1, "accuracy": 1e-15}, "rounding"),
@@ -106,15 +106,15 @@ def test_a_motion_may_begin_at_zero():
         return np.array([y[1], c * math.sin(t) - 2.0 * y[0]])
 
     error = 0.0
-    for k in range(500):
+    for k in range(200):
         z, t = rk4(driven, k * h, z, h), (k + 1) * h
         slope = c * (math.cos(t) - math.cos(t * math.sqrt(2.0)))
         error = max(
             error, math.hypot(z[0] - c * (math.sin(t) - math.sin(t * math.sqrt(2.0)) / math.sqrt(2.0)), z[1] - slope)
         )
-    expected = symtop.guard(driven, 0.0, [0.0, 0.0], 50.0, step_size=h, accuracy=1e-12)
+    expected = symtop.guard(driven, 0.0, [0.0, 0.0], 20.0, step_size=h, accuracy=1e-12)
     assert 1.0 / 3.0 < expected.error / error < 3.0
-    assert symtop.guard(stiff, 0.0, [0.0], 10.0, step_size=0.01).cause == "stiffness"
+    assert symtop.guard(stiff, 0.0, [0.0], 3.0, step_size=0.01).cause == "stiffness"
     still = symtop.guard(lambda _t, y: 0.0 * y, 0.0, [0.0], 10.0, step_size=0.1)
     assert (still.error, still.setting) == (0.0, 10.0)  # no step is longer than the run
 
@@ -128,8 +128,8 @@ def test_f_may_return_one_array_again_and_write_to_its_argument():
         return one
 
     for name, control in (("rk4", {"step_size": 0.1}), ("rk45", {"tolerance": 1e-4})):
-        expected = symtop.guard(swing, 0.0, [1.0, 0.0], 100.0, name, **control)
-        assert symtop.guard(swing_in_place, 0.0, [1.0, 0.0], 100.0, name, **control) == expected
+        expected = symtop.guard(swing, 0.0, [1.0, 0.0], 30.0, name, **control)
+        assert symtop.guard(swing_in_place, 0.0, [1.0, 0.0], 30.0, name, **control) == expected
 
 
 def test_a_horizon_beyond_the_end_of_a_motion_is_refused():
@@ -151,11 +151,11 @@ def test_the_step_that_is_advised_keeps_the_accuracy():
 
 def test_a_step_is_advised_where_the_piece_itself_fails():
     step, stiffening = 0.8, lambda t, y: [y[1], -(y[0] ** 3)]
-    expected = symtop.guard(stiffening, 0.0, [3.0, 0.0], 100.0, step_size=step)
+    expected = symtop.guard(stiffening, 0.0, [3.0, 0.0], 30.0, step_size=step)
     assert math.isinf(expected.error)
     assert 0.2 * step < expected.setting < 0.4 * step
     assert f"try a step of {expected.setting!r}" in str(expected)
-    assert math.isfinite(symtop.guard(stiffening, 0.0, [3.0, 0.0], 100.0, step_size=expected.setting).error)
+    assert math.isfinite(symtop.guard(stiffening, 0.0, [3.0, 0.0], 30.0, step_size=expected.setting).error)
 
 
 @pytest.mark.parametrize(

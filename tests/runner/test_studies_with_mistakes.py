@@ -145,7 +145,8 @@ def test_a_page_that_is_wrong_is_told_of(tmp_path):
         ("# Q\n{{ 1 / (f.worst - 0.25) }}", "page of mine: float division by zero"),
     ):
         (tmp_path / "mine.md").write_text(page)
-        code, output = run_study(tmp_path, "facts = lambda data: {'worst': 0.25, 'endless': np.inf}")
+        change = "facts = lambda data: {'worst': 0.25, 'endless': np.inf}\npictures = lambda data: []"
+        code, output = run_study(tmp_path, change)
         assert code == 2, output
         assert says in output
     (tmp_path / "mine.md").write_text("# {{ question }}\n\nThe worst is {{ f.worst | number }}.\n\n{{ table('one') }}")
