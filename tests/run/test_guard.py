@@ -276,6 +276,7 @@ def test_an_end_at_a_pole_after_many_passages_is_announced(monkeypatch):
         assert bool(caution(scene, "extrapolation[angles]", tolerance=0.0012096342552818213)) is ends
 
 
+@pytest.mark.slow
 def test_the_end_of_a_run_at_the_limit_of_its_work_is_announced():
     """Steps that shrink towards a pole: 2e8 of them end at t = 2361.6; half the horizon is within the limit."""
     top = symtop.SymmetricTop(0.8710803565723452, 0.49843955501086307, 0.13722107388085694)

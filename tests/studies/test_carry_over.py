@@ -64,13 +64,6 @@ def test_a_body_of_epsilon_zero_moves_as_the_top_that_it_is():
     assert (attitude_distance(other.truth[1], drawn("0.1").truth[0]).max(axis=1) > 1e-4).all()  # the negative control
 
 
-def test_members_of_heavy_families_have_the_same_draws_and_other_moments():
-    first, far = drawn(SYMMETRIC), drawn("0.3")
-    for one, other in zip(first.scenes, far.scenes, strict=True):
-        assert one.start == other.start
-        assert other.top.I2 > 1.1 > one.top.I2 == 1.0
-
-
 def test_a_setting_that_meets_a_target_meets_it():
     variant, bodies = integrator("rk4[body]"), {name: drawn(name) for name in (SYMMETRIC, FREE)}
     data = table(variant, bodies, 2e4)
