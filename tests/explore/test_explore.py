@@ -410,6 +410,7 @@ def test_the_first_chart_of_costs_is_there_at_once_and_its_lines_are_those_of_co
     assert again["lines"] == whole["lines"]  # stored; the runs of the page are timed again
 
 
+@pytest.mark.slow
 def test_the_chart_of_a_body_has_the_methods_that_step_it():
     lines = {line["name"]: line for line in costs(name="tennis-racket", integrator="gauss-2", second="strang")["lines"]}
     assert {*lines} == {"gauss-2", "strang", "rk4", "gauss-4", "dop853-compiled"}

@@ -397,7 +397,7 @@ def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch,
     only("order", "symplectic", "symmetric", "energy", "p_phi")
     shutil.copy(STEPS, tmp_path / "mine.py")
     monkeypatch.setenv("HOME", str(tmp_path))
-    files = ("--output=~/found.nc", "--card=~/card.html", "--badge", "~/badge.svg", "--figure", "~/step.png")
+    files = ("--output=~/found.nc", "--card=~/card.html", "--badge", "~/badge.svg")
     code, output = run_judge("~/mine.py:heun", *files)
     assert code == 0, output
     assert re.search(r"^mine-heun in the axis chart on spheroid, \S+ us a step, seed \d+$", output, re.MULTILINE)
@@ -406,12 +406,7 @@ def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch,
     with xr.open_dataset(tmp_path / "found.nc") as data:
         assert str(data.sel(claim="order")["verdict"].values) == "measured"
     assert {"card.html", "badge.svg"} <= {file.name for file in tmp_path.iterdir()}
-    assert (tmp_path / "step.png").stat().st_size > 1000
-    assert f"written to {tmp_path / 'step.png'}" in output
-    ranking = output.partition("Axis error (rad) for ")[2].partition(": ")[2].split(", ")
-    assert ranking[0].startswith(("taylor", "dop853"))
-    assert [words for words in ranking if words.startswith("mine-heun[axis]")]
-    assert len(ranking) == 5
+    assert f"written to {tmp_path / 'card.html'}" in output
 
 
 @pytest.mark.slow

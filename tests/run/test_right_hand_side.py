@@ -84,8 +84,8 @@ def test_chaos_is_told_from_order():
 @pytest.mark.parametrize(
     ("f", "y0", "horizon", "name", "control", "cause"),
     [
-        (stiff, [1.0], 3.0, "rk4", {"step_size": 0.01}, "stiffness"),
-        (stiff, [1.0], 3.0, "radau", {"tolerance": 1e-8}, ""),
+        (stiff, [1.0], 1.5, "rk4", {"step_size": 0.01}, "stiffness"),
+        (stiff, [1.0], 1.5, "radau", {"tolerance": 1e-8}, ""),
         (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 3.0}, "instability"),
         (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 0.5}, "step"),
         (swing, [1.0, 0.0], 30.0, "vern9-fixed", {"step_size": 0.1, "accuracy": 1e-15}, "rounding"),
@@ -114,7 +114,7 @@ def test_a_motion_may_begin_at_zero():
         )
     expected = symtop.guard(driven, 0.0, [0.0, 0.0], 20.0, step_size=h, accuracy=1e-12)
     assert 1.0 / 3.0 < expected.error / error < 3.0
-    assert symtop.guard(stiff, 0.0, [0.0], 3.0, step_size=0.01).cause == "stiffness"
+    assert symtop.guard(stiff, 0.0, [0.0], 1.5, step_size=0.01).cause == "stiffness"
     still = symtop.guard(lambda _t, y: 0.0 * y, 0.0, [0.0], 10.0, step_size=0.1)
     assert (still.error, still.setting) == (0.0, 10.0)  # no step is longer than the run
 
