@@ -1,5 +1,6 @@
 """Engines against their maps: what counts as the same map, and that an engine that is absent or raises is data."""
 
+import importlib
 import sys
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import symtop
 from benchmarks import engines
 from benchmarks.engines import drivers, measure, study
 from benchmarks.engines.common import body_of
+from symtop.methods.framework import registry
 
 SCENES = {body_of(symtop.scene(name)).velocity.tobytes(): symtop.scene(name) for name in measure.STEPS}
 
@@ -101,3 +103,21 @@ def test_a_package_or_a_library_that_is_absent_skips_its_engines_with_the_reason
     assert [one.split(" is not installed here")[0] for one in missing[-3:]] == ["ODE", "Bullet", "Simbody"]
     assert missing[-1].endswith("there is no pkg-config on this machine.")
     assert missing[0].endswith("the npm package @babylonjs/havok is not installed in benchmarks/engines/absent.")
+
+
+@pytest.mark.parametrize("name", engines.DRIVEN)
+def test_each_setting_of_a_driven_engine_names_a_map_of_the_catalogue_or_none(name, monkeypatch):
+    """One of single precision has a map in single precision, and on a joint there is none: its solver takes part."""
+
+    def listed(*arguments):
+        return [engines.Setting(arguments[1], "1", *row, broken) for row in arguments[-1]]
+
+    monkeypatch.setattr(drivers, "of_npm", listed)
+    monkeypatch.setattr(drivers, "native", listed)
+    adapter = importlib.import_module(f"benchmarks.engines.adapters.{name}")
+    made = adapter.settings()
+    assert {setting.method for setting in made} <= {"", *registry.engines()}
+    assert all(not setting.method for setting in made if setting.held == engines.JOINT)
+    single = {setting.method.endswith("-float32") for setting in made if setting.method}
+    expected = {"jolt": {True}, "physx": {True}, "havok": {True}, "bullet": {True, False}, "simbody": set()}
+    assert single == expected.get(name, {False})

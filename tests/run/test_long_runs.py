@@ -275,7 +275,8 @@ def test_the_command_runs_and_says_what_changed(tmp_path):
     files = ["--checkpoint", tmp_path / "c.nc", "--output", tmp_path / "long.nc"]
     assert "modified_energy" in call("long", "spheroid", "cayley", "--steps", "2e4", *files).output
     assert (tmp_path / "long.nc").is_file()
-    call("long", "spheroid", "rk45", "--steps", "10", "--step-size", "0.1", code=2)
+    refused = call("long", "spheroid", "rk45", "--steps", "10", "--step-size", "0.1", code=2)
+    assert "rk45 has no compiled loop of fixed steps, so that it cannot" in refused.stderr
 
 
 @pytest.mark.parametrize("name", ["strang", "gauss-4"])  # one that shows what it steps, and one that turns it back
