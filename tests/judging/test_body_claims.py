@@ -51,7 +51,7 @@ def rotation_swapped(q: Any, w: Any, h: float, inertia: Any, torque: Any) -> Any
 
 
 @pytest.mark.parametrize(("step", "order", "refuted"), [
-    (right.rotation_rk4, 4, []), (right.rotation_lie_midpoint, 2, []), (rotation_swapped, 2, ["order"]),
+    (right.rotation_lie_midpoint, 2, []), (rotation_swapped, 2, ["order"]),
     (right.rotation_strang, 2, ["order"]), (right.rk4, 4, []),
 ])  # fmt: skip
 def test_a_step_of_ones_own_is_judged_on_a_body(step: Callable[..., Any], order: int, refuted: list[str],

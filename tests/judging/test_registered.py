@@ -43,6 +43,7 @@ def claims(plugin, *names):
     return commands.ended(commands.symtop("claims", *names, "--plugin", plugin, "--quick"))
 
 
+@pytest.mark.slow
 def test_a_plug_in_that_fails_is_told_of(tmp_path):
     (tmp_path / "plugin.py").write_text(PLUGIN)
     expected = {"nothing": "must return a Run", "leaves": "ended with code 0", "crashes": "was ended by SIGSEGV"}

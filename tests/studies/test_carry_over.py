@@ -109,6 +109,7 @@ def test_orders_and_exponents_are_read_off():
     assert np.isnan(by.exponent(time, np.full(6, 1e-16), "energy"))
 
 
+@pytest.mark.slow
 def test_errors_grow_on_bodies_whose_truth_is_known_to_the_end(monkeypatch):
     """At epsilon = 0.3 some bodies turn chaotic after the ten periods that choose them."""
     data = growth_table(integrator("kahan-li-8[body]"), 24, 6, 1)

@@ -46,9 +46,13 @@ def measured():
     The second process is this one, which has started.
     """
     answering = iter([fresh_process.call, operator.call])
+
+    def call(*asked):
+        return next(answering)(*asked)
+
     with pytest.MonkeyPatch.context() as once:
         once.setattr(measures, "TRIES", 1)
-        once.setattr(fresh_process, "call", lambda *asked: next(answering)(*asked))
+        once.setattr(fresh_process, "call", call)
         data = factorial(SCENE, [DORMAND_PRINCE, "Takahashi-Imada"], [SHORT], 2, 0.001, 2)
     return combine([(Case("spheroid", "together"), data)])
 
