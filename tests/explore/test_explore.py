@@ -78,6 +78,8 @@ def test_an_answer_on_a_body_is_the_run_beside_its_truth():
     for wrong, word in (({"base": "spheroid"}, "base"), large, (late, "is not known"), (cleared, "^I2 must")):
         with pytest.raises(SymtopError, match=word):
             answers.answer(answers.setup(fields("heavy-chaotic", "rk4", **wrong)))
+    with pytest.raises(SymtopError, match="the question lacks theta"):
+        answers.setup({name: value for name, value in fields().items() if name != "theta"})
     with pytest.raises(SymtopError, match="map must be of a top"):
         answers.grid(fields("tennis-racket", "rk4"))
     with pytest.raises(SymtopError, match="must have the chart body"):

@@ -28,6 +28,9 @@ def test_a_cell_of_the_map_is_the_run_that_a_click_asks_for():
             assert 0.2 * alone["largest"]["axis_error"] < errors[row, column] < 1.001 * alone["largest"]["axis_error"]
     assert 0 < early < 5
     assert errors[8, 10] != pytest.approx(errors[20, 20], rel=0.01)
+    for wrong, word in (({"integrator": "rk45"}, "one with a step"), ({"step_least": 0.7}, "must not be empty")):
+        with pytest.raises(symtop.SymtopError, match=word):
+            answers.grid(fields(**RANGE | wrong))
 
 
 def text(browser, name):

@@ -168,7 +168,7 @@ CALLS = {  # a function, good arguments, names of those of which the usual value
     "long_run": (
         symtop.long_run,
         {"scene": "spheroid", "integrator": "strang", "steps": 10, "step_size": 0.01, "checkpoint": False},
-        "scene integrator steps step_size", {},
+        "scene integrator steps step_size", {"steps": [10**12], "compensated": ["no", 3], "quiet": [3]},
     ),
     "field": (symtop.field, {"chart": "axis", "top": TOP}, "chart top", {}),
     "plot": (symtop.plot, {"data": RUN}, "quantity", {"data": NOT_DATA}),

@@ -163,7 +163,6 @@ def test_a_step_is_advised_where_the_piece_itself_fails():
         (swing, [1.0, 0.0], {"step_size": 1.5}, "step_size must be at most the horizon 1.0, not 1.5"),
         (swing, [1.0, 0.0], {"method": "bdf", "tolerance": 1e-20}, "tolerance must be at least 2.3e-14 and below 1"),
         (swing, [1.0, 0.0], {"step_size": 0.1, "t0": 1e20}, "horizon must be longer than what t0 = 1e+20 is"),
-        (swing, [], {"step_size": 0.1}, "y0 must be at least one number, not none"),
         (swing, [1.0, 0.0, 2.0], {"step_size": 0.1}, "f must return 3 numbers, not an array of shape (2,)"),
         (lambda _t, _y: 1 / 0, [1.0], {"step_size": 0.1}, "f failed: ZeroDivisionError"),
         (lambda _t, _y: [math.nan], [1.0], {"step_size": 0.1}, "f must be finite, not [nan] at t = 0.0"),

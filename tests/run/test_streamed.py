@@ -169,6 +169,9 @@ def test_nothing_is_replaced_that_is_no_netcdf_file(tmp_path, small_pieces):
     with pytest.raises(symtop.SymtopError, match="it is there, and no netCDF file"):
         symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
     assert path.read_text() == "print(1)"
+    for place in (tmp_path, "/proc/no/such/runs.nc"):
+        with pytest.raises(symtop.SymtopError, match="cannot write"):
+            symtop.ensemble(SOME, "strang[axis]", path=place, **SETTINGS)
     assert [file.name for file in tmp_path.iterdir()] == ["mine.py"]
     other = tmp_path / "runs.nc"
     symtop.ensemble(SOME, "strang[axis]", path=other, **SETTINGS).close()

@@ -81,7 +81,6 @@ def test_a_grid_that_is_none_is_refused(tmp_path, change, says):
         ("facts = lambda data: [symtop.simulate('spheroid', 'rk4', step_size=np.nan).title]",
          "facts failed: step_size must be a finite number"),
         ("pictures = lambda data: iter([Figure()])", "pictures must return or yield Pictures; an entry is a Figure"),
-        ("pictures = lambda data: [Picture('a', 'a.png')]", "must be one of matplotlib, not a str"),
         ("pictures = lambda data: [Picture('a', Figure()), Picture('b', Figure()), Picture('a', Figure())]",
          "pictures must have a name each, and two are called a"),
         ("pictures = lambda data: (1 / 0 for _ in 'x')", "pictures failed: ZeroDivisionError"),
