@@ -181,6 +181,9 @@ def test_the_server_answers_this_machine_and_nothing_else(site):
     for path in ("/../cli.py", "/static/page.html", "/favicon.ico", "/run"):
         assert request(site, "GET", path)[0] == 404
     assert request(site, "POST", "/rum", "{}", **JSON)[0] == 404
+    assert [request(site, method, "/")[:2] for method in ("HEAD", "PUT")] == [
+        (200, b""), (405, b"PUT is not answered here; GET, HEAD and POST are\n")
+    ]  # fmt: skip
     assert request(site, "POST", "/run", "a=1", Content_Type="application/x-www-form-urlencoded")[0] == 415
     assert request(site, "POST", "/run", " " * 70_000, **JSON)[0] == 413
     status, body, _ = request(site, "POST", "/run", "{", **JSON)
