@@ -67,7 +67,8 @@ def pytest_collection_finish():
 
 @pytest.fixture(scope="module")
 def processes_with_dask():
-    """Processes that a file's tests start may import dask."""
+    """Processes that a file's tests start may import dask, if a cluster can be made here."""
+    pytest.importorskip("distributed")  # half a second, of those alone who ask
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("SYMTOP_TESTS_DASK", "1")
         yield

@@ -37,10 +37,3 @@ def test_a_method_without_a_known_source_is_said(tmp_path):
     result = cited(netcdf.write(data, tmp_path / "run.nc"))
     assert "no source is known of of-a-user" in result.stderr
     assert result.stdout.count("@") == 1
-
-
-def test_a_file_that_is_no_dataset_is_refused(tmp_path):
-    path = tmp_path / "notes.txt"
-    path.write_text("no netCDF")
-    result = call("cite", path, code=2)
-    assert "cannot read" in result.output

@@ -1,7 +1,5 @@
 """`recommend --i-use`: errors of an engine's settings, its best one, and a method that does as well for less."""
 
-import json
-
 import pytest
 
 import symtop
@@ -49,20 +47,6 @@ def test_an_engine_without_an_error_has_nothing_to_match_either():
     assert (set(advice.errors.values()), advice.advice) == ({0.0}, None)
     assert "the axis is off by\n    0.00e+00 rad  Euler" in str(advice)
     assert i_use("mujoco", upright, accuracy=1e-3).advice is not None
-
-
-@pytest.mark.parametrize(
-    ("engine", "step", "message"),
-    [("frostbite", 0.01, "mujoco"), ("mujoco", -1.0, "step_size"), ("mujoco", 20.0, "below the horizon")],
-)
-def test_bad_input_is_refused_in_a_sentence(engine, step, message):
-    with pytest.raises(symtop.SymtopError, match=message):
-        i_use(engine, "goldstein", step_size=step, horizon=10.0)
-
-
-def test_the_command_says_what_an_engine_does():
-    result = call("recommend", "goldstein", "--i-use", "havok", "--horizon", "10", "--json")
-    assert json.loads(result.output)["errors"]["default"] > 1.5
 
 
 def test_an_accuracy_beside_an_engine_is_advised_at_its_step_below_its_errors():

@@ -47,29 +47,20 @@ def test_json_has_outcomes_and_errors_and_a_finer_step_has_smaller_ones():
     assert fine["steps"] == 10 * coarse["steps"]
 
 
-def test_one_member_is_one():
-    for kind, one in (((), "top"), (("--bodies", "--kind", "regular"), "body")):
-        output = call("--members", 1, *kind, "strang", *STEPS, "--samples", 2).output
-        assert f"strang on 1 {one}: 1 reached the horizon\n60 steps, computed " in output
-        assert f"largest error, 1 {one} " in output
-
-
-def test_members_that_fail_are_counted_and_drawn(tmp_path):
-    result = call("--members", 60, "stormer-verlet", *STEPS, "--samples", 21, "--figure", tmp_path / "f.png")
-    assert "left_chart" in result.output
-    assert (tmp_path / "f.png").stat().st_size > 5000
+def test_members_that_fail_are_counted():
+    assert "left_chart" in call("--members", 60, "stormer-verlet", *STEPS, "--samples", 21).output
     result = call("--members", 20, "--kind", "grazing", "stormer-verlet", *STEPS, "--json", code=3)
     assert json.loads(result.output)["largest_errors"]["axis"] == dict.fromkeys(("0.01", "0.1", "0.5", "0.9", "0.99"))
 
 
-def test_bodies_are_run_compared_written_and_drawn(tmp_path):
+def test_bodies_are_run_compared_and_written(tmp_path):
     """Without epsilon they are other bodies, and a finer step has smaller errors."""
-    path, figure = tmp_path / "runs.nc", tmp_path / "spread.png"
-    kind = ("--bodies", "--kind", "heavy", "--epsilon", 0.1, "--members", 12, "--seed", 3)
-    result = call(*kind, "strang", *STEPS, "--samples", 21, "-o", path, "--figure", figure)
-    assert "strang on 12 bodies: 12 reached the horizon" in result.output
+    path = tmp_path / "runs.nc"
+    kind = ("--bodies", "--kind", "heavy", "--epsilon", 0.1, "--members", 6, "--seed", 3)
+    result = call(*kind, "strang", *STEPS, "--samples", 21, "-o", path)
+    assert "strang on 6 bodies: 6 reached the horizon" in result.output
     assert "angle between attitudes (rad)" in result.output
-    bodies = symtop.body_population(12, seed=3, kind="heavy", epsilon=0.1)
+    bodies = symtop.body_population(6, seed=3, kind="heavy", epsilon=0.1)
     expected = symtop.ensemble(bodies, "strang", per_nutation=30, nutations=2, samples=21, quiet=True)
     data = netcdf.read(path)
     assert data[list(expected.data_vars)].drop_attrs().identical(expected.drop_attrs())
@@ -78,8 +69,6 @@ def test_bodies_are_run_compared_written_and_drawn(tmp_path):
     wrong = symtop.errors(expected, bodies)
     np.testing.assert_array_equal(data["attitude_error"], wrong["attitude"].max("time"))
     np.testing.assert_allclose(data["energy_error"], wrong["energy"].max("time"), rtol=1e-6, atol=1e-15)
-    with Image.open(figure) as picture:
-        assert np.asarray(picture.convert("L")).std() > 10.0
     finer = ("strang", "--per-nutation", 300, "--nutations", 2, "--samples", 21, "--json")
     fine, others = (json.loads(call(*words, *finer).output) for words in (kind, kind[:3] + kind[5:]))
     ratio = fine["largest_errors"]["attitude"]["0.5"] / float(wrong["attitude"].max("time").median())
@@ -91,16 +80,9 @@ def test_bodies_are_run_compared_written_and_drawn(tmp_path):
     ("words", "says"),
     [(["strang"], "needs --step-size or --per-nutation"),
      (["strang", "--step-size", 0.1], "give --horizon or --nutations: these members have no"),
-     (["strang", "--per-nutation", 0.2, "--nutations", 2], "--per-nutation must be at least 0.5"),
-     (["exact", *STEPS], "exact has nothing to tune: leave out --per-nutation = 30"),
      (["strang", *STEPS, "--budget", 10], "member 0 asks for 60 steps; the limit is 10 (see --budget)"),
      (["strang", *STEPS, "--variables", "theta", "--figure", "a.png"], "needs axis or energy among --variables"),
-     (["strang", *STEPS, "--epsilon", 0.1], "--epsilon must come with --bodies"),
-     (["strang", *STEPS, "--bodies", "--kind", "needle", "--epsilon", 0.1], "--epsilon is of heavy bodies"),
-     (["strang", *STEPS, "--bodies", "--epsilon", 0.7], "--epsilon must be from 0.02 to 0.5, not 0.7"),
      (["strang", *STEPS, "--bodies", "--kind", "grazing"], "kind 'grazing' is unknown"),
-     (["strang", *STEPS, "--bodies", "--members", 2_000_000], "--members must be at most 1e+06"),
-     (["midpoint", *STEPS, "--bodies", "--members", 4], "must have the chart body, of a RigidBody"),
      (["strang", *STEPS, "--bodies", "--members", 2, "--variables", "axis", "--figure", "a.png"],
       "needs quaternion or energy among"),
      (["midpoint[attitude]", *STEPS], "known: angles")],
@@ -112,9 +94,9 @@ def test_bad_input_is_one_sentence_and_code_2(words, says):
 
 
 def test_bodies_whose_motion_is_lost_in_chaos_are_counted_and_the_others_compared():
-    words = ("rk4", "--bodies", "--kind", "chaotic", "--members", 6, "--per-nutation", 60, "--samples", 5)
+    words = ("rk4", "--bodies", "--kind", "chaotic", "--members", 3, "--per-nutation", 60, "--samples", 5)
     result = call(*words, "--nutations", 99)
-    assert "the attitudes of 6 bodies are not compared: their motion is not known to 1e-9 rad" in result.output
+    assert "the attitudes of 3 bodies are not compared: their motion is not known to 1e-9 rad" in result.output
     energy, attitude = (next(row for row in result.output.splitlines() if name in row) for name in ("energy", "angle"))
     assert "nan" in attitude
     assert "nan" not in energy

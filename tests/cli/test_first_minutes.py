@@ -48,17 +48,6 @@ def test_the_guard_warns_of_what_the_verdict_calls_wrong():
     assert "judged against the truth: accurate to" in right.stdout
 
 
-def test_a_method_on_the_axis_alone_runs_and_is_judged(axis_only):
-    """Negative control: the attitude is still refused, with the word that helps."""
-    result = call("run", "spheroid", "on-the-axis", "--step-size", "0.01", "--plugin", axis_only)
-    assert "angle between axes" in result.output
-    words = ("run", "spheroid", "on-the-axis", "--step-size", "0.01", "--observe", "attitude", "--plugin", axis_only)
-    refused = call(*words, code=2)
-    assert "cannot show the attitude: observe axis" in refused.stderr
-    runs = symtop.ensemble(["spheroid"], "on-the-axis", step_size=0.01, samples=5)
-    assert runs["outcome"].values.tolist() == ["ok"]
-
-
 def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(axis_only, tmp_path):
     words = ["study", "convergence", "--quick", "--only", "on-the-axis", "--results", tmp_path, "--plugin", axis_only]
     result = call(*words)
@@ -89,11 +78,6 @@ def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(axis_only, 
         assert several.stdout.startswith("convergence: ")
 
 
-def test_advice_says_that_a_method_in_plain_python_was_not_tried(axis_only):
-    result = call("recommend", "goldstein", "--accuracy", "1e-3", "--horizon", "20", "--plugin", axis_only)
-    assert "Not tried, as only compiled methods are timed: on-the-axis." in result.output
-
-
 def test_a_proposed_step_is_of_use():
     """The error that it leads to is between a tenth and ten times the 1e-3 rad that it is proposed for."""
     for name in ("midpoint", "strang", "rk4", "gauss-4"):
@@ -111,27 +95,6 @@ def test_figures_come_in_three_kinds_and_are_the_same_again(tmp_path):
         call("run", "spheroid", "strang", "--step-size", "0.005", "--figure", file)
         assert file.read_bytes().startswith(head)
     assert files[2].read_bytes() == files[3].read_bytes()
-
-
-WORDS = (
-    "run spheroid midpoint --step-size 0.01", "ensemble strang --members 20 --per-nutation 50 --nutations 2",
-    "study convergence --quick --status --results no-such-folder",
-)  # fmt: skip
-SEVERAL = f"""
-from symtop.cli.main import main
-for words in {WORDS}:
-    main(words.split(), standalone_mode=False)
-"""
-
-
-@pytest.mark.slow
-def test_nothing_wraps_on_a_terminal_and_a_list_is_there_within_two_seconds():
-    listed, several = recorded(["integrators"]), recorded([], code=SEVERAL)
-    for recording, longest, text in ((listed, 2.0, ["strang"]), (several, 60.0, ["on spheroid", "20 ", "convergence"])):
-        assert recording.code == 0, recording.text
-        assert all(word in recording.text for word in text)
-        assert recording.widest <= 80
-        assert recording.silence < longest
 
 
 @pytest.mark.slow  # half a minute: lanes of one method are compiled
@@ -194,11 +157,6 @@ def test_a_recording_hears_a_silence_and_sees_what_wraps(tmp_path):
     recording = recorded(["scenes", "--wide", "--plugin", str(tmp_path / "sleeps.py")])
     assert recording.silence > 2.0
     assert recording.widest > 80
-
-
-def test_a_symmetric_body_is_not_told_to_be_without_symmetry():
-    result = call("recommend", "body", "--body", "2,2,1", "--rates", "0.1,0,3", "--i-use", "mujoco", code=2)
-    assert "scene must be one of a SymmetricTop here, not body, a RigidBody" in " ".join(result.stderr.split())
 
 
 def test_the_command_of_a_recommendation_holds_the_options_of_the_body():

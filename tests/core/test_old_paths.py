@@ -5,8 +5,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 import symtop
 from symtop.core.old_paths import table
 
@@ -34,8 +32,3 @@ def test_every_new_path_exists_and_no_old_one_does():
     for old, new in table().items():
         assert new == "" or importlib.util.find_spec(f"symtop.{new}").origin is not None, old
         assert not Path(symtop.__file__).parent.joinpath(*old.split(".")).with_suffix(".py").exists(), old
-
-
-def test_a_path_that_never_was_is_an_import_error():
-    with pytest.raises(ModuleNotFoundError, match="nothing"):
-        importlib.import_module("symtop.methods.nothing")

@@ -14,6 +14,7 @@ import pytest
 
 from symtop import __version__
 from symtop.cli.main import main
+from symtop.run.ensemble.population import population
 from tests.commands import call, ended, symtop
 from tests.judging.conftest import shorten
 from tests.pages import LANGUAGES, ROOT, Block, blocks, pages
@@ -88,6 +89,7 @@ def follow(page, slow, folder, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     if not slow:
         shorten(monkeypatch)
+        monkeypatch.setattr("symtop.population", lambda n, **options: population(min(n, 100), **options))
     reader = Page(page, slow=slow)
     for block in PAGES[page]:
         reader.follow(block)

@@ -52,25 +52,7 @@ def test_the_stored_snapshot_is_whole():
 
 REPORT = """# T
 
-Words.
-
-**Figure 1**
-
 ![A](figures/a.png)
-
-## What do you have?
-
-| x | y |
-|---|---|
-| 1 | 2 |
-
-## What will go wrong
-
-More.
-
-## Which is it? With what I have?
-
-This is it, to `1e-6`.
 
 All: [table](tables/a-b.csv), [CSV](tables/c.csv).
 
@@ -86,25 +68,6 @@ def test_what_is_not_tracked_is_not_linked(results, tmp_path):
     text = (tmp_path / "snapshot" / "report.md").read_text()
     assert "All: table, CSV.\n\nData: a.nc.\n" in text
     assert "![A](figures/a.png)" in text
-
-
-def test_what_is_quoted_is_put_between_the_marks_of_a_page():
-    taker = _taker()
-    page = f"# P\n\n{taker.BEGIN}old\n{taker.END}\nrest\n"
-    said = taker.answer(REPORT, "Which is it?")
-    assert said == "This is it, to `1e-6`.\n"
-    made = taker.quote(said, page)
-    assert made == f"# P\n\n{taker.BEGIN}{said}{taker.END}\nrest\n"
-    assert taker.quote(said, made) == made
-    for bad in ("no marks\n", f"{taker.END}{taker.BEGIN}"):
-        with pytest.raises(SystemExit, match="once, and <!-- to here --> after it"):
-            taker.quote(said, bad)
-    with pytest.raises(SystemExit, match="no page with the question Who"):
-        taker.answer(REPORT, "Who?")
-    both = taker.answer(REPORT, "Which is it?", "All: ")
-    assert both.endswith("1e-6`.\n\n[table](tables/a-b.csv), [CSV](tables/c.csv).\n")
-    with pytest.raises(SystemExit, match=r"no paragraph More"):  # which another page has
-        taker.answer(REPORT, "Which is it?", "More")
 
 
 def test_what_pages_quote_is_what_the_stored_report_says():

@@ -17,14 +17,23 @@ def site():
     server.server_close()
 
 
-@pytest.fixture
-def explorer(site):
-    """Opens the page, or the link that follows its address; a test may leave no error on it."""
-    with Browser(1280, 900) as browser:
-
-        def opened(link=""):
-            browser.open(address(site) + link)
-            return browser
-
+@pytest.fixture(scope="module")
+def browser():
+    with Browser(1280, 900) as opened:
         yield opened
-        assert browser.problems == []
+
+
+@pytest.fixture
+def explorer(site, browser):
+    """Opens the page, or the link that follows its address; a test may leave no error on it."""
+
+    def opened(link=""):
+        browser.resize(1280, 900)
+        browser.open(address(site) + link)
+        return browser
+
+    yield opened
+    problems = browser.problems.copy()
+    browser.problems.clear()
+    browser.open("data:text/html,")  # a page that stays open goes on drawing, and another link would not load it anew
+    assert problems == []

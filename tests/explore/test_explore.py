@@ -79,6 +79,8 @@ def test_an_answer_on_a_body_is_the_run_beside_its_truth():
     for wrong, word in (({"base": "spheroid"}, "base"), large, (late, "is not known"), (cleared, "^I2 must")):
         with pytest.raises(SymtopError, match=word):
             answers.answer(answers.setup(fields("heavy-chaotic", "rk4", **wrong)))
+    with pytest.raises(SymtopError, match="the question lacks theta"):
+        answers.setup({name: value for name, value in fields().items() if name != "theta"})
     with pytest.raises(SymtopError, match="map must be of a top"):
         answers.grid(fields("tennis-racket", "rk4"))
     with pytest.raises(SymtopError, match="must have the chart body"):
@@ -94,12 +96,6 @@ def test_a_failing_run_is_an_answer_with_its_sentence():
     assert answer["steps_per_nutation"] == pytest.approx(answer["period"] / 0.6, rel=0.05)
     assert answers.answer(answers.setup(fields()))["steps_per_nutation"] == pytest.approx(answer["period"] / 0.02)
     json.loads(json.dumps(answer, allow_nan=False))
-
-
-def test_the_guard_is_heard():
-    (warning,) = answers.answer(answers.setup(fields(step_size=0.05)))["warnings"]
-    assert "expect an axis error" in warning
-    assert answers.answer(answers.setup(fields(step_size=1e-4)))["warnings"] == []
 
 
 @pytest.mark.parametrize(
@@ -128,15 +124,6 @@ def test_the_page_says_in_which_chart_a_method_runs_and_a_row_runs_in_its_own():
         runs = [answers.dataset(answers.setup(fields(integrator=one)), lambda _: None) for one in (name, row)]
         assert [run.attrs["chart"] for run in runs] == [offered[name]] * 2
         np.testing.assert_array_equal(runs[0]["theta"].values, runs[1]["theta"].values)
-
-
-def test_a_question_that_lacks_something_says_what():
-    whole = fields()
-    del whole["theta"]
-    with pytest.raises(SymtopError, match="lacks theta"):
-        answers.setup(whole)
-    with pytest.raises(SymtopError, match="mapping"):
-        answers.setup(["spheroid"])
 
 
 @pytest.mark.parametrize(
@@ -195,6 +182,9 @@ def test_the_server_answers_this_machine_and_nothing_else(site):
     for path in ("/../cli.py", "/static/page.html", "/favicon.ico", "/run"):
         assert request(site, "GET", path)[0] == 404
     assert request(site, "POST", "/rum", "{}", **JSON)[0] == 404
+    assert [request(site, method, "/")[:2] for method in ("HEAD", "PUT")] == [
+        (200, b""), (405, b"PUT is not answered here; GET, HEAD and POST are\n")
+    ]  # fmt: skip
     assert request(site, "POST", "/run", "a=1", Content_Type="application/x-www-form-urlencoded")[0] == 415
     assert request(site, "POST", "/run", " " * 70_000, **JSON)[0] == 413
     status, body, _ = request(site, "POST", "/run", "{", **JSON)
@@ -264,25 +254,6 @@ def test_two_runs_that_never_end_do_not_keep_a_small_one_waiting(site):
     status, body, _ = request(site, "POST", "/run", json.dumps(fields()), **JSON)
     assert (status, json.loads(body)["outcome"]) == (200, "ok")
     assert time.monotonic() - began < 25.0  # 5 s on two free cores
-
-
-@pytest.mark.parametrize(("path", "status"), [("/", 200), ("/explore.js?x", 200), ("/catalogue", 200), ("/no", 404)])
-def test_head_is_get_without_a_body(site, path, status):
-    whole, bare = request(site, "GET", path), request(site, "HEAD", path)
-    assert (whole[0], bare[0], bare[1]) == (status, status, b"")
-    assert int(bare[2]["Content-Length"]) == len(whole[1])
-    assert request(site, "HEAD", path, Host="evil.example")[0] == 403
-
-
-@pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "PATCH", "NONSENSE"])
-def test_other_methods_are_refused_in_plain_text(site, method):
-    status, body, headers = request(site, method, "/run", "{}" if method != "OPTIONS" else None)
-    assert (status, body.decode()) == (405, f"{method} is not answered here; GET, HEAD and POST are\n")
-    assert headers["Content-Type"].startswith("text/plain")
-    assert headers["Allow"] == "GET, HEAD, POST"
-    with socket.create_connection(site.server_address) as browser:
-        browser.sendall(b"rubbish\r\n\r\n")
-        assert b"<" not in browser.recv(65536)
 
 
 def test_a_bad_port_is_refused(site):
@@ -359,16 +330,6 @@ def test_a_person_can_use_it(explorer, tmp_path):
     assert browser.outside() == []
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("second", "shown"), [("gone", ""), ("strang", "strang")])
-def test_a_link_with_a_second_method_that_is_not_known_shows_the_first(explorer, second, shown):
-    link = f"#base=spheroid&scene=spheroid&integrator=rk4&second={second}"
-    browser = explorer(link)
-    browser.wait_for("document.querySelector('#status').textContent.startsWith('rk4: reached t = 8')")
-    browser.wait_for("document.querySelector('#now').textContent.endsWith(' s')", 5.0)  # the clock goes
-    assert browser.evaluate("document.querySelector('#second').value") == shown
-
-
 SLOWLY = """(() => {  // answers of the server arrive 0.3 s later
     const fetch = window.fetch, wait = () => new Promise((done) => setTimeout(done, 300));
     window.fetch = async (...all) => { const answer = await fetch(...all); await wait(); return answer; };
@@ -382,6 +343,7 @@ LABELS = """(() => {  // texts on a canvas as it is drawn again
 })()"""
 
 
+@pytest.mark.slow
 def test_an_answer_of_another_scene_or_method_than_the_pages_is_not_shown(explorer):
     browser = explorer("#base=tennis-racket&scene=tennis-racket&integrator=gauss-4&second=rk4")
     status = "document.querySelector('#status').textContent"
@@ -463,6 +425,7 @@ def test_the_lines_of_a_chart_are_timed_together(monkeypatch):
     assert all(len(line["seconds"]) > 3 for line in lines)
 
 
+@pytest.mark.slow
 def test_the_chart_of_a_body_has_the_methods_that_step_it():
     lines = {line["name"]: line for line in costs(name="tennis-racket", integrator="gauss-2", second="strang")["lines"]}
     assert {*lines} == {"gauss-2", "strang", "rk4", "gauss-4", "dop853-compiled"}

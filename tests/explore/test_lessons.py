@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.core.errors import SymtopError
 from symtop.explore import answers
 from symtop.explore.server import STATIC
 from tests.browser import FAINT
@@ -29,18 +28,9 @@ def test_a_cell_of_the_map_is_the_run_that_a_click_asks_for():
             assert 0.2 * alone["largest"]["axis_error"] < errors[row, column] < 1.001 * alone["largest"]["axis_error"]
     assert 0 < early < 5
     assert errors[8, 10] != pytest.approx(errors[20, 20], rel=0.01)
-
-
-@pytest.mark.parametrize(
-    ("changes", "word"),
-    [
-        ({"integrator": "rk45"}, "integrator must be one with a step"), ({"step_least": 0.7}, "must not be empty"),
-        ({"spin_most": None}, "spin_most"), ({"step_least": 1e-5}, "20000000 steps"),
-    ],
-)  # fmt: skip
-def test_a_map_that_cannot_be_is_refused_in_a_sentence(changes, word):
-    with pytest.raises(SymtopError, match=word):
-        answers.grid(fields(**RANGE | changes))
+    for wrong, word in (({"integrator": "rk45"}, "one with a step"), ({"step_least": 0.7}, "must not be empty")):
+        with pytest.raises(symtop.SymtopError, match=word):
+            answers.grid(fields(**RANGE | wrong))
 
 
 def text(browser, name):

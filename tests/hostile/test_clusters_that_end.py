@@ -13,7 +13,6 @@ import pytest
 
 from tests.commands import PROBE, ended, leftovers, same, stop, symtop
 
-pytest.importorskip("distributed")
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("processes_with_dask")]
 
 SECONDS = 30.0  # from what happens to the cluster to the end of the command

@@ -60,7 +60,7 @@ def test_a_correct_method_is_not_refuted(name):
     assert ledger["pole"].verdict in ("measured", "inapplicable")  # never claimed of a step
 
 
-@pytest.mark.parametrize("name", ["AdamsBashforth", "rotation_strang"])
+@pytest.mark.parametrize("name", ["AdamsBashforth", pytest.param("rotation_strang", marks=pytest.mark.slow)])
 def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, only):
     only(*(claim for stage in battery.TABLE for claim in stage.claims))
     claims, options = right.CLAIMS[name]

@@ -1,7 +1,6 @@
 """The claims of a method on a body without symmetry, and those of methods that make false ones."""
 
 import dataclasses
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -52,7 +51,7 @@ def rotation_swapped(q: Any, w: Any, h: float, inertia: Any, torque: Any) -> Any
 
 
 @pytest.mark.parametrize(("step", "order", "refuted"), [
-    (right.rotation_rk4, 4, []), (right.rotation_lie_midpoint, 2, []), (rotation_swapped, 2, ["order"]),
+    (right.rotation_lie_midpoint, 2, []), (rotation_swapped, 2, ["order"]),
     (right.rotation_strang, 2, ["order"]), (right.rk4, 4, []),
 ])  # fmt: skip
 def test_a_step_of_ones_own_is_judged_on_a_body(step: Callable[..., Any], order: int, refuted: list[str],
@@ -75,12 +74,6 @@ def test_what_a_step_on_a_body_cannot_show_is_refused(claims: dict[str, Any], wo
         symtop.judge(right.rk4, scene=FREE, quick=True, **claims)
 
 
-def test_the_command_judges_on_a_body() -> None:
-    result = call("claims", "strang", "--scene", "check-case-2", "--quick", "--json")
-    findings = {one["claim"]: one["verdict"] for one in json.loads(result.stdout)}
-    assert findings == {"order": "confirmed", "energy": "confirmed", "momentum": "confirmed"}
-
-
 @pytest.mark.slow
 def test_a_step_is_drawn_beside_methods_on_a_body(tmp_path: Path) -> None:
     """As in `judge --figure`, and in `compare`, which both take it in the chart of a body."""
@@ -99,15 +92,6 @@ def test_a_run_that_ends_in_its_first_nutation_shows_no_constant(scene: str) -> 
     """Two steps of 1e300 times the state: what did not change in the first is not said to be kept."""
     ledger = symtop.judge(lambda f, t, y, h: 1e300 * y, scene=scene, quick=True)
     assert {ledger[claim].measured.kind for claim in ("energy", "order")} == {""}
-
-
-def test_what_a_step_is_on_a_body_is_said_in_natural_periods_with_its_momentum(only: Callable[..., None]) -> None:
-    """The control: the summary of a top, which speaks of nutations and knows no such momentum."""
-    only("energy", "momentum")
-    words = [" ".join(str(symtop.judge(right.rk4, scene=scene, quick=True)).split()) for scene in (HEAVY, "spheroid")]
-    assert ["natural periods (118 a" in one for one in words] == [True, False]
-    assert ["nutations (118 a" in one for one in words] == [False, True]
-    assert ["the energy and the momentum." in one for one in words] == [True, False]
 
 
 def test_the_card_of_a_body_shows_the_errors_that_its_order_was_found_from(only: Callable[..., None]) -> None:

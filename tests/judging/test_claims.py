@@ -13,7 +13,7 @@ import symtop
 from symtop.judging.battery import CLAIMS, judge
 from symtop.judging.claims import constants, constants as long, order, structure
 from symtop.judging.claims.subject import Subject
-from symtop.judging.findings import NOTHING, VERDICTS, Finding
+from symtop.judging.findings import VERDICTS
 from symtop.measure.conservation import Changed, behaviour
 from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
 from symtop.methods.framework.plan import Run
@@ -404,11 +404,6 @@ def test_no_registered_integrator_is_refuted_and_few_claims_stay_open():
     assert sum(finding.verdict == "undecided" for _, finding in relevant) <= len(relevant) / 10
     assert all(finding.why for _, finding in relevant)
     assert all(math.isfinite(finding.resolution) for _, finding in relevant if finding.verdict == "confirmed")
-
-
-def test_a_finding_without_a_number_is_valid_json():
-    plain = Finding("pole", "", NOTHING, "undecided", "nothing was seen").plain()
-    assert json.loads(json.dumps(plain, allow_nan=False))["value"] is None
 
 
 def test_the_series_of_a_step_beside_a_pole_is_not_taken():

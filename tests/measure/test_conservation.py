@@ -45,15 +45,6 @@ def test_momenta_are_recomputed_and_not_copied(family, rule):
     assert abs(family.observe(par, rule, state, moved, 0.01)[0] - right[0]) > 1e-9
 
 
-def test_trend_sees_a_drift_of_a_few_rounding_units_and_ignores_an_oscillation():
-    t = np.linspace(0.0, 1000.0, 4001) + 0.3 * np.sin(np.arange(4001))
-    wave = 1e-5 * np.sin(5.3 * t)
-    assert not trend(t, wave).significant
-    drifting = trend(t, wave + 1e-8 * t)
-    assert drifting.significant
-    assert drifting.rise == pytest.approx(1e-5, rel=0.3)
-
-
 PLAN = Plan.steps(SPHEROID.nutation_period / 118.02, [0, 40_000])
 
 

@@ -53,13 +53,6 @@ def test_the_closed_form_is_within_its_bounds_and_a_coarse_run_is_not():
         assert float(symtop.errors(coarse)[name].max()) > 1e3 * float(shown[f"{name}_bound"].max())
 
 
-def test_a_run_of_a_scene_that_nobody_registered_is_compared_with_its_own_top():
-    scene = symtop.Scene("mine", symtop.SymmetricTop(2.0, 1.0, 3.0), symtop.Angles(0.7, psi_dot=5.0), 4.0)
-    run = symtop.simulate(scene, "strang", step_size=0.01)
-    assert float(symtop.errors(run)["axis"].max()) < 1e-3
-    assert symtop.errors(run).identical(symtop.errors(run, scene))
-
-
 def test_a_run_is_compared_with_no_other_top_or_start_than_its_own():
     run, spheroid = symtop.simulate("spheroid", "strang", step_size=0.01, guard=False), symtop.scene("spheroid")
     start = symtop.Angles(spheroid.start.theta, psi_dot=1.0)
@@ -219,21 +212,13 @@ AXIS = np.tile([0.0, 0.0, 1.0], (41, 1))
     ("data", "scene", "words"),
     [
         ({"axis": AXIS}, "spheroid", "must hold time"),
-        ({"time": TIMES}, "spheroid", "one of axis, quaternion, theta"),
         ({"time": np.where(TIMES > 7.0, np.nan, TIMES), "axis": AXIS}, "spheroid", "time must be finite"),
-        ({"time": TIMES[::-1], "axis": AXIS}, "spheroid", "increase"),
-        ({"time": TIMES - 1.0, "axis": AXIS}, "spheroid", "at least 0"),
-        ({"time": TIMES[:, None], "axis": AXIS}, "spheroid", "time must be a row"),
-        ({"time": ["a"] * 41, "axis": AXIS}, "spheroid", "time must be an array of real numbers"),
         ({"time": TIMES.astype("timedelta64[s]"), "axis": AXIS}, "spheroid", "time must be an array of real numbers"),
-        ({"time": TIMES, "axis": AXIS + 0j}, "spheroid", "axis must be an array of real numbers"),
         ({"time": TIMES, "axis": AXIS.T}, "spheroid", r"shape \(41, 3\)"),
         ({"time": TIMES, "quaternion": AXIS}, "spheroid", r"shape \(41, 4\)"),
         ({"time": TIMES, "axis": AXIS, "energy": TIMES[:5]}, "spheroid", r"energy must have the shape \(41,\)"),
         ({"time": TIMES, "axis": 2.0 * AXIS}, "spheroid", "length 1 within 0.001"),
-        ({"time": TIMES, "axis": 0.0 * AXIS}, "spheroid", "length is 0 at t = 0"),
         ({"time": TIMES, "theta": 50.0 + TIMES}, "spheroid", r"radians from the vertical"),
-        ({"time": TIMES, "axis": AXIS}, "spheroyd", "did you mean spheroid"),
         ({"time": TIMES, "axis": AXIS}, None, r"give errors\(data, scene\)"),
         (xr.Dataset({"axis": (("time", "c"), AXIS)}, {"time": TIMES}), None, r"give errors\(data, scene\)"),
         (AXIS, "spheroid", "Dataset or a mapping"),

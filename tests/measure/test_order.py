@@ -7,7 +7,7 @@ import pytest
 
 from symtop.measure.order import BESIDE, CLEARLY, Fit, order, order_verdict, power_law
 
-CURVES = 1000
+CURVES = 500
 
 
 def sampled_maximum(rng, scatter, size):

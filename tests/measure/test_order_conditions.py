@@ -52,7 +52,6 @@ def test_a_coefficient_that_is_off_shows_beyond_rounding(off, order):
 
 
 FREE = [2, 1, 2, 3, 6, 9, 18, 30, 56, 99]  # dimensions of the free Lie algebra of two letters: Witt's formula
-ROOT = 19**0.5
 
 
 @pytest.mark.parametrize("longest", [9, pytest.param(10, marks=pytest.mark.slow)])
@@ -80,29 +79,6 @@ def test_known_splittings_have_their_orders():
     a, b = (1.0, -2 / 3, 2 / 3), (-1 / 24, 3 / 4, 7 / 24)
     assert splitting_conditions(a, (0.0, *b)).order == 3  # Ruth 1983
     assert splitting_conditions(a, (0.0, *reversed(b))).order < 3
-
-
-def composed(first, second):
-    """The table of: T for a_i, V for a_i, V for b_i, T for b_i, one i after the other."""
-    inner = [b + a for b, a in zip(second, (*first[1:], 0.0), strict=True)]
-    return (first[0], *inner), (0.0, *(a + b for a, b in zip(first, second, strict=True)), 0.0)
-
-
-def test_a_public_library_composed_a_method_of_order_4_in_the_wrong_order():
-    """McLachlan, SIAM J. Sci. Comput. 16 (1995) 151, five stages: the adjoint comes first (a library had it second)."""
-    alpha = ((146 + 5 * ROOT) / 540, (-2 + 10 * ROOT) / 135, 1 / 5, (-23 - 20 * ROOT) / 270, (14 - ROOT) / 108)
-    right, wrong = composed(alpha[::-1], alpha), composed(alpha, alpha[::-1])
-    assert splitting_conditions(*right).order == 4
-    assert splitting_conditions(*wrong).order == 2
-    assert splitting_conditions(*wrong).defect[2] == pytest.approx(0.0633, rel=1e-2)
-
-
-@pytest.mark.parametrize(("off", "order"), [(3e-8, 2), (1e-11, 2), (1e-13, 4)])
-def test_a_coefficient_of_a_splitting_that_is_off_shows_beyond_rounding(off, order):
-    outer = 1 / (2 - 2 ** (1 / 3)) + off
-    inner = 1 - 2 * outer
-    half = (outer + inner) / 2
-    assert splitting_conditions((outer, inner, outer), (outer / 2, half, half, outer / 2)).order == order
 
 
 def test_gradients_and_processors_count():

@@ -148,13 +148,9 @@ def test_a_cell_that_raised_is_tried_again_and_one_that_ended_early_is_not(tmp_p
     ("words", "says"),
     [
         ({}, "strang has a fixed step: give step_size or per_nutation"),
-        ({"step_size": 0.1, "per_nutation": 9}, "give step_size or per_nutation"),
-        ({"step_size": 99.0}, "step_size must be at most the horizon"),
         ({"step_size": 0.1, "integrators": "rk45"}, "rk45 is adaptive: give tolerance"),
-        ({"step_size": 0.1, "integrators": []}, "integrators must be one or more, each once"),
         ({"step_size": 0.1, "scenes": ["spheroid", "spheroid"]}, "scenes must be one or more, each once"),
         ({"step_size": 0.1, "scenes": {"I1": [1.0]}}, "for a dataset of tops there is ensemble"),
-        ({"step_size": 0.1, "threads": 0}, "threads must be a whole number"),
     ],
 )
 def test_bad_input_is_one_sentence(words, says):

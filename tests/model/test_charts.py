@@ -84,13 +84,6 @@ def test_the_length_of_a_quaternion_is_no_part_of_an_angle():
     assert charts.attitude_distance(base, base, low) == pytest.approx(2.0 * math.sqrt(across @ across), rel=1e-9)
 
 
-def test_the_usual_formula_for_the_distance_has_a_floor_that_ours_has_not():
-    base, turned = charts.quaternion_from_angles(1.0, 0.3, 0.2), charts.quaternion_from_angles(1.0, 0.3, 0.2 + 1e-10)
-    usual = 2.0 * math.acos(min(1.0, float(base @ turned)))
-    assert abs(usual - 1e-10) > 1e-11
-    assert charts.attitude_distance(base, turned) == pytest.approx(1e-10, rel=1e-5)
-
-
 def test_unwrapping_follows_an_error_of_many_turns():
     """The guide supplies the turns between samples, and nothing of the error: it may lag by more than half a turn."""
     t = np.linspace(0.0, 40.0, 60)

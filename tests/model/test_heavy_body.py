@@ -32,14 +32,14 @@ def test_without_weight_it_is_the_exact_free_motion(precise, count):
     for body in bodies(count, 7, KINDS):
         exact = PreciseBody(*body[1:])
         natural = 2.0 * math.pi * float(np.median(body.inertia)) / float(exact.G)
-        times = np.array([0.0, 0.31, -1.7, 10.0]) * natural
+        times = np.array([0.0, -1.7, 10.0]) * natural
         motion = HeavyBody(body.inertia, (0.0, 0.0, 0.0), body.quaternion, body.momentum).samples(
             times, precise=precise
         )
         states = exact.states(times)
         share = worst_share(exact.mp, motion, [state[:4] for state in states])
         assert share < 1.0, body
-        assert apart(exact.mp, motion.momentum[3], states[3][4:]) < 1e-12 * float(exact.G)
+        assert apart(exact.mp, motion.momentum[2], states[2][4:]) < 1e-12 * float(exact.G)
         assert motion.bound.max() < (1e-24 if precise else 1e-9)
         backwards = HeavyBody(body.inertia, (0.0, 0.0, 0.0), body.quaternion, -body.momentum).samples(times)
         assert worst_share(exact.mp, backwards, [state[:4] for state in states]) > 1e6

@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 
 import symtop
+from symtop.measure import sweep
 from symtop.report import page, style, template
 from symtop.report.html import Writer
 from symtop.runner import pool, run as runner
@@ -33,11 +34,12 @@ def results(tmp_path_factory):
         if name == "convergence":
             few = [case for case in few if case.scene == "spheroid"]
         if name == "speed":
-            asked, timed = {"lengths": (4.0, 8.0), "settings": 5}, {"integrators": FEW}
+            asked, timed = {"lengths": (4.0, 8.0), "settings": 4}, {"integrators": FEW}
             few = [dataclasses.replace(case, settings=asked | timed if case.timed else asked) for case in few]
         small = dataclasses.replace(study, cases=lambda _, few=few: few)
         with pytest.MonkeyPatch.context() as here:  # workers take longer to start than these cases
             here.setattr(pool, "WORTH_WORKERS", len(few) + 1)
+            here.setattr(sweep, "BATCHES", 3)
             assert runner.run(small, folder, jobs=1, quiet=True, save=style.sketch)["failures"] == []
     page.write(folder)
     return folder

@@ -124,18 +124,6 @@ def test_a_symmetric_body_has_the_energy_and_the_momenta_of_the_top(mgl: float) 
     assert body.momenta(at) == pytest.approx(top.momenta(start)[:2], rel=1e-14)
 
 
-def test_splittings_keep_what_they_must() -> None:
-    run = symtop.errors(symtop.simulate("check-case-2", "kahan-li-6", step_size=0.3, samples=101, guard=False))
-    assert run["momentum"].max() < 4e-15
-    assert 1e-10 < run["attitude"].max() < 1e-4  # and yet it has an error
-    for name, step, conserved in (("strang", 0.1, True), ("strang", 0.05, True), ("rk4", 0.05, False)):
-        errors = symtop.errors(symtop.simulate("heavy-brick", name, step_size=step, horizon=2000.0, guard=False))
-        energy, half = errors["energy"].values, errors.sizes["time"] // 2
-        assert bool(errors["p_phi"].max() < 2e-14) is conserved
-        assert not conserved or energy[half:].max() < 1.3 * energy[:half].max()  # it swings, and does not grow
-        assert conserved or energy[-1] > 1.7 * energy[half]
-
-
 @pytest.mark.parametrize("mgl", [0.0, 1.0])
 @pytest.mark.parametrize("moments", list(itertools.permutations((0.25, 0.75, 1.0))))
 def test_five_rotations_are_of_order_four_on_one_free_body_in_one_order(moments: tuple[float, ...], mgl: float) -> None:
@@ -218,13 +206,6 @@ def test_a_sweep_and_a_comparison_take_a_body(tmp_path) -> None:  # type: ignore
     assert "natural periods" in symtop.plot(shown).get_title(loc="left")
 
 
-def test_the_command_line_takes_a_body() -> None:
-    done = call("run", "tennis-racket", "rk4", "--step-size", 0.01)
-    assert "rk4[body] on tennis-racket: reached t = 100" in done.output
-    assert "relative error of the momentum" in done.output
-    assert "I2=1.2" in call("scenes", "heavy-brick").output
-
-
 OWN = ["--body", "1,2,3", "--rates", "0.01,1,0"]
 
 
@@ -234,7 +215,6 @@ OWN = ["--body", "1,2,3", "--rates", "0.01,1,0"]
         (["run", "body", "rk4", "--step-size", "0.1", "--mgl", "3"], "--mgl must come with --body I1,I2,I3 on the sce"),
         (["run", "spheroid", "rk4", *OWN], "--body, --rates must come with --body I1,I2,I3 on the scene body, not sph"),
         (["scenes", "body", "--body", "1,2"], "--body must be 3 numbers with commas between, not '1,2'"),
-        (["scenes", "body", "--body", "1,2,x"], "--body must be 3 numbers with commas between, not '1,2,x'"),
         (["scenes", "body", "--body", "1,2,3"], "--body without a weight needs --rates"),
         (["scenes", "body", "--body", "1,2,4", "--mgl", "1"], "I3 must be at most the sum of the other moments"),
     ],
@@ -288,18 +268,13 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     ("make", "words"),
     [
         (lambda: RigidBody(1.0, 1.0, 2.1), "I3 must be at most the sum of the other moments"),
-        (lambda: RigidBody(-1.0, 1.0, 1.0), "I1 must be above zero, not -1.0"),
-        (lambda: RigidBody(1.0, math.nan, 1.0), "I2 must be a finite number, not nan"),
         (lambda: RigidBody(1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0)), "centre must be a direction and of a length"),
         (lambda: RigidBody.from_inertia([[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]), "matrix must be symmetric"),
         (lambda: Attitude((0.0, 0.0, 0.0, 0.0)), "quaternion must have unit length, not 0"),
-        (lambda: Attitude(omega_body=(1.0, 2.0)), "omega_body must be 3 numbers, not 2"),
         (lambda: symtop.Scene("x", RigidBody(1.0, 1.0, 1.0), symtop.Angles(0.3), 1.0), "must be Attitude, not Angles"),
         (lambda: symtop.simulate("heavy-brick", "stormer-verlet", step_size=1), "integrator must have the chart body"),
         (lambda: symtop.simulate("heavy-brick", "rk4", step_size=1, observe="nutation"), "known: axis, attitude"),
-        (lambda: symtop.long_run("heavy-brick", "midpoint", step_size=1, steps=9), "must have the chart body"),
         (lambda: symtop.long_run("heavy-brick", "vern9", step_size=0.1, steps=9), "no compiled loop of fixed steps"),
-        (lambda: symtop.recommend("heavy-chaotic", accuracy=1e-3, horizon=99.0), "horizon must be below"),
         (lambda: symtop.reference("heavy-brick", [1.0], certify="digits"), "certify must be None on heavy-brick"),
     ],
 )  # fmt: skip

@@ -197,8 +197,8 @@ def test_the_step_that_is_advised_works_whatever_the_cause():
     """Poles, resonances, steps beyond the stability limit and errors that add up; 2 of 600 were wrong, by 0.0125."""
     draw = random.Random(5)
     names = ("midpoint", "stormer-verlet", "strang", "rk4[axis]", "gauss-4", "generalised-alpha")
-    pairs = [pair for _ in range(220) if (pair := advised(draw, names)) is not None]
-    assert len(pairs) > 100
+    pairs = [pair for _ in range(120) if (pair := advised(draw, names)) is not None]
+    assert len(pairs) > 55
     before, after = np.array(pairs).T
     assert np.mean(after > EXPECTED) <= 0.02
     assert after.max() < 2.0 * EXPECTED
@@ -276,6 +276,7 @@ def test_an_end_at_a_pole_after_many_passages_is_announced(monkeypatch):
         assert bool(caution(scene, "extrapolation[angles]", tolerance=0.0012096342552818213)) is ends
 
 
+@pytest.mark.slow
 def test_the_end_of_a_run_at_the_limit_of_its_work_is_announced():
     """Steps that shrink towards a pole: 2e8 of them end at t = 2361.6; half the horizon is within the limit."""
     top = symtop.SymmetricTop(0.8710803565723452, 0.49843955501086307, 0.13722107388085694)

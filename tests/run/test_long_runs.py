@@ -232,20 +232,6 @@ def test_a_failed_run_shows_the_windows_it_had():
     assert "stopped at" in data.attrs["outcome_message"]
 
 
-@pytest.mark.parametrize(
-    ("integrator", "settings", "words"),
-    [
-        ("rk45", {"steps": 10, "step_size": 0.1}, "rk45 has no compiled loop of fixed steps"),
-        ("midpoint", {"steps": 10**12, "step_size": 0.1}, "steps must be at most"),
-        ("midpoint", {"steps": 10, "step_size": 0.1, "compensated": "no"}, "compensated must be True or False"),
-        ("midpoint", {"steps": 10, "step_size": 0.1, "quiet": 3}, "quiet must be True or False"),
-    ],
-)
-def test_bad_input_gets_one_sentence(integrator, settings, words):
-    with pytest.raises(SymtopError, match=words):
-        long_run(SCENE, integrator, **{"quiet": True} | settings)
-
-
 def test_memory_does_not_grow_with_the_steps():
     peaks = []
     for steps in (100_000, 1_000_000):
@@ -289,7 +275,8 @@ def test_the_command_runs_and_says_what_changed(tmp_path):
     files = ["--checkpoint", tmp_path / "c.nc", "--output", tmp_path / "long.nc"]
     assert "modified_energy" in call("long", "spheroid", "cayley", "--steps", "2e4", *files).output
     assert (tmp_path / "long.nc").is_file()
-    call("long", "spheroid", "rk45", "--steps", "10", "--step-size", "0.1", code=2)
+    refused = call("long", "spheroid", "rk45", "--steps", "10", "--step-size", "0.1", code=2)
+    assert "rk45 has no compiled loop of fixed steps, so that it cannot" in refused.stderr
 
 
 @pytest.mark.parametrize("name", ["strang", "gauss-4"])  # one that shows what it steps, and one that turns it back

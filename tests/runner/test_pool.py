@@ -111,6 +111,7 @@ def test_few_cases_are_computed_here_and_timed_ones_need_no_trial(tmp_path):
     assert all(math.isnan(case.attrs["timed_slowdown"]) for case in cases)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system puts no process on a core")
 def test_the_trial_sees_workers_that_share_a_core(monkeypatch, pool):
     """There a run takes twice as long; the last test of the file, as the workers stay there."""

@@ -2,12 +2,10 @@
 
 import sys
 
-import numpy as np
 import pytest
 import xarray as xr
 
-from symtop.core.errors import SymtopError
-from symtop.runner.study import Case, StudyError, each
+from symtop.runner.study import StudyError, each
 from tests.commands import answer
 
 SCRIPT = """\
@@ -68,12 +66,8 @@ def test_a_study_that_ships_is_not_replaced_by_one_of_its_name(tmp_path, monkeyp
     ("change", "says"),
     [
         ("cases = lambda quick: None", "cases must return a list of Case, not None"),
-        ("cases = lambda quick: ['rk4']", "cases must return a list of Case; an entry is a str"),
         ("cases = lambda quick: 1 / 0", "cases failed: ZeroDivisionError"),
         ("cases = lambda quick: [Case('spheroid', 'rk4', {'a': np.arange(3.0)})]", "setting 'a' must be numbers"),
-        ("cases = lambda quick: [Case('spheroid', 'rk4', {'step_size': object()})]", "setting 'step_size' must be"),
-        ("cases = lambda quick: [Case('spheroid', 'rk4', [0.1])]", "settings must be a mapping"),
-        ("cases = lambda quick: [Case(3, 'rk4', {})]", "scene must be a name, not 3"),
         ("more = {'uses': lambda case: 1 / 0}", "uses failed: ZeroDivisionError"),
     ],
 )
@@ -91,22 +85,15 @@ def test_a_grid_that_is_none_is_refused(tmp_path, change, says):
     [
         ("facts = lambda data: None", "facts must return numbers by name, not None"),
         ("facts = lambda data: {'a b': 1}", "a fact's name must be a word of letters, digits and _, not 'a b'"),
-        ("facts = lambda data: {'a': [1.0]}", "fact a must be a number, text or None, not [1.0]"),
-        ("facts = lambda data: data['no']", "facts failed: KeyError"),
         ("facts = lambda data: [symtop.simulate('spheroid', 'rk4', step_size=np.nan).title]",
          "facts failed: step_size must be a finite number"),
-        ("pictures = lambda data: None", "pictures must return or yield Pictures, not None"),
         ("pictures = lambda data: iter([Figure()])", "pictures must return or yield Pictures; an entry is a Figure"),
-        ("pictures = lambda data: [Picture('a', 'a.png')]", "must be one of matplotlib, not a str"),
-        ("pictures = lambda data: [Picture('../a', Figure())]", "name of a picture must be"),
         ("pictures = lambda data: [Picture('a', Figure()), Picture('b', Figure()), Picture('a', Figure())]",
          "pictures must have a name each, and two are called a"),
         ("pictures = lambda data: (1 / 0 for _ in 'x')", "pictures failed: ZeroDivisionError"),
         ("tables = lambda data: pd.DataFrame()", "tables must return tables by name, not"),
-        ("tables = lambda data: {'a': [1.0]}", "table a must be a DataFrame, not a list"),
         ("tables = lambda data: {'../a': pd.DataFrame()}", "name of a table must be"),
         ("more = {'charts': lambda data: None}", "charts must return a list of Chart, not None"),
-        ("more = {'follow_up': lambda data: None}", "follow_up must return a list of Case, not None"),
     ],
 )  # fmt: skip
 def test_an_answer_of_the_wrong_kind_is_refused_and_the_cases_are_kept(tmp_path, change, says):
@@ -135,13 +122,6 @@ def test_an_answer_may_come_in_any_order_of_things():
             names(lambda bad=bad: bad)
 
 
-@pytest.mark.parametrize("settings", [{}, {"a": [1, 2.0, None, "x", {"b": True}]}, {"a": np.float64(0.1)}, {"a": (1,)}])
-def test_settings_that_json_can_hold_are_right(settings):
-    assert Case("spheroid", "rk4", settings).settings is settings
-    with pytest.raises(SymtopError, match="setting 'b' must be numbers"):
-        Case("spheroid", "rk4", {**settings, "b": {1, 2}})
-
-
 def test_a_page_that_is_wrong_is_told_of(tmp_path):
     for page, says in (
         ("{{ f.wrost | number }}", "page of mine: 'types.SimpleNamespace object' has no attribute 'wrost'"),
@@ -152,7 +132,8 @@ def test_a_page_that_is_wrong_is_told_of(tmp_path):
         ("# Q\n{{ 1 / (f.worst - 0.25) }}", "page of mine: float division by zero"),
     ):
         (tmp_path / "mine.md").write_text(page)
-        code, output = run_study(tmp_path, "facts = lambda data: {'worst': 0.25, 'endless': np.inf}")
+        change = "facts = lambda data: {'worst': 0.25, 'endless': np.inf}\npictures = lambda data: []"
+        code, output = run_study(tmp_path, change)
         assert code == 2, output
         assert says in output
     (tmp_path / "mine.md").write_text("# {{ question }}\n\nThe worst is {{ f.worst | number }}.\n\n{{ table('one') }}")

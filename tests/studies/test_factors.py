@@ -2,10 +2,12 @@
 
 import itertools
 import math
+import operator
 
 import numpy as np
 import pandas as pd
 import pytest
+from symtop_studies import fresh_process
 from symtop_studies.factors import facts, figures, measures, plain_numpy
 from symtop_studies.factors.cells import (
     CALLS,
@@ -39,9 +41,18 @@ SHORT = Goal(3.0, 1e-5, LANGUAGES, CALLS)
 
 @pytest.fixture(scope="module")
 def measured():
-    """A small factorial as the study's functions see it: two schemes at one goal, short batches."""
+    """A small factorial as the study's functions see it: two schemes at one goal, short batches.
+
+    The second process is this one, which has started.
+    """
+    answering = iter([fresh_process.call, operator.call])
+
+    def call(*asked):
+        return next(answering)(*asked)
+
     with pytest.MonkeyPatch.context() as once:
         once.setattr(measures, "TRIES", 1)
+        once.setattr(fresh_process, "call", call)
         data = factorial(SCENE, [DORMAND_PRINCE, "Takahashi-Imada"], [SHORT], 2, 0.001, 2)
     return combine([(Case("spheroid", "together"), data)])
 
