@@ -1,5 +1,5 @@
 """``python -m symtop`` is ``symtop``."""
 
-from symtop.cli.main import main
+from symtop.cli.__main__ import run
 
-main(prog_name="symtop")
+run("symtop")

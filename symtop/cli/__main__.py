@@ -15,11 +15,11 @@ from symtop.core.parallel import VARIABLES
 from symtop.core.signals import UNREAD
 
 
-def run() -> None:
-    """Run the command line of this process, and end it with its exit code."""
+def run(name: str | None = None) -> None:
+    """Run the command line of this process, which is shown as `name`, and end it with its exit code."""
     os.environ.update({name: "1" for name in VARIABLES if name not in os.environ})  # before NumPy reads them
     try:
-        main()
+        main(prog_name=name)
     except SystemExit as end:
         alone = all(thread.daemon or thread is threading.main_thread() for thread in threading.enumerate())
         if not alone or not (end.code is None or isinstance(end.code, int)):

@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from symtop.cli.main import main
-from symtop.core import netcdf
+from symtop.core import netcdf, parallel
 from symtop.core.errors import SymtopError
 from tests.commands import call
 
@@ -190,7 +190,7 @@ def work():
     time.sleep(0.5)
     print("the thread is done")
 
-def main():
+def main(**_):
     print("the answer")
     {before}
     sys.exit({code})
@@ -254,3 +254,15 @@ def test_a_command_whose_threads_work_or_whose_code_is_a_text_ends_as_python_doe
     assert result.returncode == 3
     result = ending(code="'a text'")
     assert (result.returncode, result.stderr) == (1, "a text\n")
+
+
+@pytest.mark.parametrize("words", [("-m", "symtop"), ("-m", "symtop.cli")])
+def test_however_it_is_called_linear_algebra_has_one_thread(words, tmp_path):
+    """Threads of BLAS wait for each other on busy cores: a fit of 10 ms took 0.7 s."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import atexit, os\natexit.register(lambda: print('threads', os.environ.get('OPENBLAS_NUM_THREADS')))\n"
+    )
+    clean = {name: value for name, value in os.environ.items() if name not in parallel.VARIABLES}
+    command, path = [sys.executable, *words, "scenes"], os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
+    result = subprocess.run(command, capture_output=True, text=True, env=clean | {"PYTHONPATH": path}, check=True)
+    assert result.stdout.endswith("threads 1\n")

@@ -140,3 +140,13 @@ def test_a_line_more_gives_two_orders_more(lines):
     exact = closed_form(SPHEROID).axis(steps)
     errors = [np.linalg.norm(one_step(float(h), lines)[:3] - e) for h, e in zip(steps, exact, strict=True)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2 * lines + 1, abs=0.7)  # of one step
+
+
+def test_a_step_that_is_rounded_to_what_it_was_halved_from_ends_the_run():
+    """The energy has blown up by then, and steps are as long as what times are rounded by; it ran for ever."""
+    top = symtop.SymmetricTop(0.3138360947869337, 0.4179762569907529, 4.007653015081924)
+    rate = 0.4277222539612995
+    scene = symtop.Scene("drawn", top, symtop.Angles(3.0, theta_dot=rate, psi_dot=rate), 46.7593159223593)
+    run = symtop.simulate(scene, "adams[attitude]", tolerance=0.08613785662111073, budget=2000, guard=False)
+    assert run.attrs["outcome"] != "ok"
+    assert run.attrs["reached_time"] < 4.0

@@ -34,6 +34,7 @@ from symtop.methods.runge_kutta.pairs import Method, integrator, nothing_more, r
 from symtop.methods.vectors import zero
 
 HIGHEST = 12  # of k
+MOST_FAILURES = 2000  # of a step: one that is rounded up to what it was halved from would be tried for ever
 SUMS, NUMBERS = HIGHEST + 2, 2 * HIGHEST + 2  # rows of the memory: phi, then sums of phi*, then numbers of order i
 PSI, G, ALPHA, BETA, SIGMA, WORK = range(6)  # of which these are the columns
 LAST = NUMBERS + HIGHEST + 2  # the row of what the last step was, with these columns
@@ -84,7 +85,7 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
         least, grid = 10.0 * (np.nextafter(t, np.inf) - t), 1.5 * end
         k, failures, evaluations, step = max(int(memory[LAST, ORDER]), 1), 0, 0, max(step, least)
         settled = memory[LAST, SETTLED] != 0.0
-        while step >= least:
+        while step >= least and failures < MOST_FAILURES:
             h = (grid + step) - grid  # so that t + h is exact and steps of one length stay so
             h = max(least, h if h > 0.0 else step)
             after = min(t + h, end)
