@@ -325,6 +325,8 @@ def impatient(monkeypatch):
         (raises, r"a step of h = .* raises RuntimeError: no luck"),
         (returns_nothing, "step must return the new state, 6 real numbers, not None"),
         (lambda f, t, y, h: y[:3], r"6 real numbers, not ndarray of shape \(3,\)"),
+        (lambda f, t, y, h: (y, h), "step must return the new state, 6 real numbers, not tuple$"),
+        (lambda f, t, y, h: (y, y), r"6 real numbers, not tuple of shape \(2, 6\)"),
         (lambda f, t, y, h: y * 1j, "6 real numbers, not ndarray .* complex128"),
     ],
 )
