@@ -154,6 +154,14 @@ def order_gap(data: xr.DataTree, family: str) -> tuple[float, str]:
     return max((gap for gap in gaps if not math.isnan(gap[0])), default=(math.nan, ""))
 
 
+def growth_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
+    """Exponents of growth beside those of tops: how many are as near as they may be, and how near all of them are."""
+    (within, known), gap = exponents_within(data, family), exponent_gap(data, family)[0]
+    most = float(np.ceil(100.0 * gap)) / 100.0  # 0.2503 is not within 0.25
+    verdict = YES if gap <= by.EXPONENT else NO
+    return f"{within} of {known} exponents within {by.EXPONENT}, all within {number(most, 2)}", verdict
+
+
 def limit_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
     """Linear limits over those at epsilon = 0: median, and what 5 % fall below."""
     low, middle = limit_ends(data, family)
@@ -193,8 +201,7 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
     tau, best = worst_tau(data, family), worst_winner(data, family)
     taken, own = steps(data, family), own_steps(data, family)
     share, before = silent_share(data, family), silent_share(data, SYMMETRIC)
-    gap, order, first = exponent_gap(data, family)[0], order_gap(data, family)[0], first_steps(data, family)
-    within, known = exponents_within(data, family)
+    order, first = order_gap(data, family)[0], first_steps(data, family)
     but = f"; without needles {own_steps(data, family, NEEDLE).words}" if family == FREE else ""
     own_tau = least([by.own_tau(data, family, target) for target in ASKED])
     return {
@@ -205,8 +212,7 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
         "first": (("beyond the budget" if first == math.inf else f"up to {number(first, 3)} times") +
                   ", without needles" * (family == FREE), by.factor_verdict(first)),
         "silent": (silent_words(data, family), by.factor_verdict(over(share, before), SEVERAL)),
-        "growth": (f"{within} of {known} exponents within {by.EXPONENT}, all within {number(gap, 2)}",
-                   YES if gap <= by.EXPONENT else NO),
+        "growth": growth_cell(data, family),
         "order": (f"lower by at most {number(max(order, 0.0), 2)}, limit {by.LOWER}", YES if order <= by.LOWER else NO),
         "limit": limit_cell(data, family), "resonances": resonance_cell(data, family),
         "engines": engine_cell(data, family),
@@ -254,7 +260,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         "long_methods": data["long"].sizes["variant"] if "long" in data.children else None,
         "long_judged_3": float(data["bodies"]["judged"].isel(variant=0).sel(scene="long", family="0.3")),
         "same": by.SAME, "part": by.PART, "level": LEVEL, "double": by.DOUBLE, "several": SEVERAL, "steps": by.STEPS,
-        "lower": by.LOWER,
+        "lower": by.LOWER, "least": by.LEAST,
         "off_bound": float(about["off_bound"].max()),
         "truth_bound": float(np.nanmedian(about["truth_bound"].values[: len(FAMILIES) - 1])),
         "judged_chaotic": float(about["judged"].sel(family=CHAOTIC)),

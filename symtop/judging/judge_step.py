@@ -44,10 +44,10 @@ from symtop.judging.claims.subject import Subject, open_target, seconds_a_step
 from symtop.judging.findings import About, Finding, Ledger, Measured, error_units, undecided
 from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
 from symtop.measure.conservation import CONSTANTS, constant_of
-from symtop.measure.errors import checked, completed, errors, refuse_other_scene, sampled
+from symtop.measure.errors import checked, completed, errors, refuse_other_order, refuse_other_scene, sampled
 from symtop.methods.framework.registry import ENERGY_ERRORS, Integrator
 from symtop.model.body import rotated
-from symtop.model.charts import CHARTS, body_energy, space_energy
+from symtop.model.charts import CHARTS, axis_distance, axis_from_quaternion, body_energy, space_energy
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.reference.truth import reference
 from symtop.run.trajectory import Trajectory
@@ -59,6 +59,8 @@ VECTORS = {
 }  # fmt: skip
 SCALARS = ("time", "theta", "phi", "psi", *CONSTANTS)
 OF_STATES = ("axis", "attitude", "theta", "momentum", "rates")
+SHOWN = 3  # of what is wrong with a line of names
+AGREE = 1e-3  # rad from the axis to the third axis of the quaternion: more than the digits of a file leave
 FEWEST = 100  # samples by which a law of growth is judged
 SHORTEST, DECADES = 0.2, 2.0  # of the end of a run, in which it is judged
 SEEDS = 1_000_000_000
@@ -167,8 +169,9 @@ def read(target: Any) -> dict[str, Any]:
     path = at_home(target)
     try:
         head, *lines = path.read_text(encoding="utf-8-sig").replace(",", " ").splitlines()
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "it is no text, or empty"
+    except (OSError, ValueError) as error:
+        coded = isinstance(error, UnicodeDecodeError)
+        reason = "it must be text in UTF-8" if coded else getattr(error, "strerror", None) or "it is empty"
         raise SymtopError(f"the trajectory {path} cannot be read: {reason}") from None
     names = head.lstrip("# ").split()
     fields = (*SCALARS, *(part for parts in VECTORS.values() for part in parts))
@@ -177,10 +180,12 @@ def read(target: Any) -> dict[str, Any]:
             raise SymtopError(
                 f"{path.name} must have all of {', '.join(parts)}, and lacks {', '.join(sorted(lacking))}"
             )
-    if not set(names) <= set(fields) or "time" not in names or len(set(names)) < len(names):
-        raise SymtopError(
-            f"{path.name} must begin with a line of names, time and of {', '.join(fields[1:])}, not {head[:60]!r}"
-        )
+    wrong = [f"{name} is none of them" for name in dict.fromkeys(names) if name not in fields]
+    wrong += [f"{name} is there twice" for name in dict.fromkeys(names) if names.count(name) > 1]
+    wrong += ["there is no time"] * ("time" not in names)
+    if wrong:
+        begin = f"{path.name} must begin with a line of names, time and of {', '.join(fields[1:])}"
+        raise SymtopError(f"{begin}, but of {head[:60]!r} {', '.join(wrong[:SHOWN])}{' ...' * (len(wrong) > SHOWN)}")
     if not any(one.partition("#")[0].strip() for one in lines):
         raise SymtopError(f"{path.name} must have a line of numbers below its names, and has none")
     columns = _numbers(path.name, names, lines)
@@ -222,6 +227,7 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
             moments = scene.top.moments if scene.of_body else (scene.top.I1, scene.top.I1, scene.top.I3)
             states = states._replace(momentum=rotated(states.quaternion, rates * np.array(moments)))
             columns["momentum"] = states.momentum
+    _refuse_contradiction(states, scene)
     deviation = errors(columns, scene)
     time = deviation["time"].values
     if rates is not None and scene.of_body:
@@ -238,6 +244,20 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
             remedy = remedy if name in CONSTANTS else ", as its axes are scaled to length one"
             findings.append(undecided(name, declared, f"the trajectory shows no {name}{remedy}"))
     return findings
+
+
+def _refuse_contradiction(states: Trajectory, scene: Scene) -> None:
+    """Refuse an axis that is another one than that of the quaternion beside it, by its order if that explains it."""
+    if states.axis is None or states.quaternion is None:
+        return
+    apart = axis_distance(states.axis, axis_from_quaternion(states.quaternion))
+    if (apart > AGREE).any():  # false where it is NaN
+        refuse_other_order(states.quaternion, reference(scene, states.time))
+        k = int(np.nanargmax(apart))
+        raise SymtopError(
+            f"axis and quaternion must show one attitude within {AGREE:g} rad, but at t = {states.time[k]:.6g} the "
+            f"axis is {apart[k]:.2g} rad from that of the quaternion"
+        )
 
 
 def _of_rates(scene: Scene, time: np.ndarray, rates: np.ndarray) -> dict[str, np.ndarray]:

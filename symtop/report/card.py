@@ -15,7 +15,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from symtop.core import netcdf
-from symtop.core.errors import SymtopError, at_home
+from symtop.core.errors import SymtopError, file_path, shown
 from symtop.judging.findings import Finding, Ledger, claim_name, description
 from symtop.model.charts import BODY
 from symtop.report.figures import SMALLEST
@@ -94,7 +94,9 @@ def _nothing(axis: Any, finding: Finding) -> None:
 
 
 def card(ledger: Ledger, path: str | Path) -> Path:
-    """Write the card, an HTML page; SymtopError for a trajectory and a place that cannot be written to."""
+    """Write the card, an HTML page; SymtopError for what is no ledger of a step, or cannot be written there."""
+    if not isinstance(ledger, Ledger):
+        raise SymtopError(f"a card needs a ledger, which symtop.judge returns, not {shown(ledger)}", "ledger")
     if not ledger.about.chart:
         raise SymtopError("a card shows a method: there is none of a trajectory")
     folder = Path(__file__).parent / "templates"
@@ -132,7 +134,7 @@ def write_badge(ledger: Ledger, path: str | Path) -> Path:
 
 
 def _write(text: str, path: str | Path) -> Path:
-    target = at_home(path)
+    target = file_path("path", path)
     with netcdf.replacing(target, target.suffix) as partial:
         partial.write_text(text, encoding="utf-8")
     return target

@@ -67,12 +67,13 @@ def gather(results: Path) -> list[dict[str, Any]]:
     A target of the Makefile (`make peers`, `make bench`) may leave findings in the form of a study's, as NAME.json.
     They stay as they are when the studies run again, so that their ``measured`` says when, where and with what.
     A study that ships with symtop has the page of its folder, any other the page that its findings hold.
-    Raises SymtopError if findings are incomplete, or there are none.
+    Raises SymtopError if findings are incomplete or a file is damaged, or there are none.
     """
     studies, gathered = list(runner.names()), []
     others = sorted({file.stem for file in results.glob("*.json")} - set(studies))
     for name in [*studies, *others]:
-        findings = netcdf.read_json(results / f"{name}.json")
+        command = f"make {name}" if name in others else f"symtop study {name}"
+        findings = _stored(results / f"{name}.json", command)
         if not isinstance(findings, dict) or (name in others and "pictures" not in findings):
             continue
         shipped = runner.file_beside(name, "page.md") if name in studies else None
@@ -86,13 +87,20 @@ def gather(results: Path) -> list[dict[str, Any]]:
             page = findings["page"] if shipped is None else shipped.read_text(encoding="utf-8")
             gathered.append({**findings, **about, "page": page})
         except (OSError, KeyError, TypeError) as error:
-            command = f"make {name}" if name in others else f"symtop study {name}"
             raise SymtopError(
                 f"the findings of {name} in {results} are incomplete ({error}); run it again: {command}"
             ) from error
     if not gathered:
         raise SymtopError(f"no study has left findings in {results}; run one first, for example: symtop study --all")
     return gathered
+
+
+def _stored(file: Path, command: str) -> Any:
+    """The content of a file, None if there is none; SymtopError if it is damaged."""
+    try:
+        return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
+    except (OSError, ValueError) as error:
+        raise SymtopError(f"{file} is damaged ({error}); run it again: {command}, or remove the file") from error
 
 
 def _image(file: Path, *, embed: bool) -> dict[str, Any]:

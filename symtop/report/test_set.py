@@ -2,7 +2,8 @@
 
 Two free bodies of each of five strata, ten heavy ones, five of them chaotic (`symtop.run.ensemble.bodies`), and ten
 symmetric tops as bodies. The states are those of `symtop.model.exact.body_digits`, whose numbers are whole: the same
-input makes the same files. A state of 17 digits is what doubles hold.
+input makes the same files. A state of 17 digits is what doubles hold. Numbers of a problem and times are the doubles
+nearest to what is printed, in every file.
 """
 
 from collections.abc import Sequence

@@ -255,6 +255,30 @@ def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, onl
     assert symtop.judge(_keeps_its_slope, scene=scene, quick=True)["calls"].verdict == "refuted"
 
 
+def in_single(step):
+    """A step in single precision."""
+
+    def rounded(f, t, y, h):
+        return step(lambda s, z: np.float32(f(s, z)), t, np.float32(y), np.float32(h))
+
+    return rounded
+
+
+@pytest.mark.parametrize("scene", ["spheroid", "heavy-brick"])
+def test_single_precision_is_no_other_motion_and_one_of_a_step_in_it_is(scene, only):
+    """Runs of more steps than their rounding lets be judged end 1e-6 away; an order that it hides is undecided."""
+    only("order")
+    options = {"scene": scene, "quick": True}
+    assert symtop.judge(in_single(midpoint), order=2, **options)["order"].verdict == "confirmed"
+    assert symtop.judge(in_single(midpoint), order=3, **options).refuted == ["order"]
+    hidden = symtop.judge(in_single(rk4), order=4, **options)["order"]
+    assert hidden.verdict == "undecided"
+    assert hidden.why.startswith("single precision hides errors below about 1e-04: ")
+    slow = symtop.judge(in_single(lambda f, t, y, h: midpoint(f, t, y, 0.999 * h)), order=2, **options)["order"]
+    assert (slow.verdict, slow.measured.kind) == ("refuted", "wrong limit")
+    assert "single" not in symtop.judge(midpoint, order=2, **options)["order"].why
+
+
 @pytest.mark.slow
 def test_a_method_of_order_2_goes_to_the_motion_of_a_separatrix_too(only):
     """Its runs do not within these steps: the motion grows their errors a millionfold."""
@@ -315,6 +339,8 @@ def impatient(monkeypatch):
         (raises, r"a step of h = .* raises RuntimeError: no luck"),
         (returns_nothing, "step must return the new state, 6 real numbers, not None"),
         (lambda f, t, y, h: y[:3], r"6 real numbers, not ndarray of shape \(3,\)"),
+        (lambda f, t, y, h: (y, h), "step must return the new state, 6 real numbers, not tuple$"),
+        (lambda f, t, y, h: (y, y), r"6 real numbers, not tuple of shape \(2, 6\)"),
         (lambda f, t, y, h: y * 1j, "6 real numbers, not ndarray .* complex128"),
     ],
 )

@@ -1,6 +1,7 @@
 """A trajectory without a method: what is found is that of the run it was made by."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -137,13 +138,17 @@ def test_the_command_takes_a_file(table, tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("time,x\n0,1\n", "must begin with a line of names"),
+        ("time,x\n0,1\n", "must begin with a line of names, .*, but of 'time x' x is none of them$"),
+        ("ex,ey,ez\n0,0,1\n", "must begin with a line of names, .*, but of 'ex ey ez' there is no time$"),
+        ("time,ex,ey,ez,mass,note\n0,0,0,1,2,3\n", "mass is none of them, note is none of them$"),
+        ("time,theta,theta\n0,1,1\n", "theta is there twice$"),
+        ("0,0.1,0.2,0.3,0.4\n", r"0 is none of them, 0.1 is none of them, 0.2 is none of them \.\.\.$"),
         ("time,theta\n0,0.4\n1\n", "2 numbers in each line: the number of columns changed from 2 to 1"),
         ("time,theta\n0,high\n", "numbers in each line: could not convert string 'high' to float64"),
         ("time,theta\n\n", "run.csv must have a line of numbers below its names, and has none"),
         ("time,theta,energy\n0,0.4\n1,0.4\n", "3 numbers in each line, not 2$"),
         ("time,theta,Lx,Ly\n0,0.4,1,1\n", "run.csv must have all of Lx, Ly, Lz, and lacks Lz"),
-        ("", "it is no text, or empty"),
+        ("", "cannot be read: it is empty"),
     ],
 )
 def test_what_is_no_trajectory_is_told(tmp_path, content, words):
@@ -154,6 +159,37 @@ def test_what_is_no_trajectory_is_told(tmp_path, content, words):
         symtop.judge(str(tmp_path / "run.csv"), order=4)
     with pytest.raises(symtop.SymtopError, match="cannot be read: No such file"):
         symtop.judge("nothing.csv")
+
+
+def test_a_file_in_utf_16_is_told_its_encoding_and_one_in_utf_8_is_read(table, tmp_path):
+    for encoding in ("utf-8", "utf-8-sig"):
+        (tmp_path / "run.csv").write_text(text(table), encoding=encoding)
+        assert symtop.judge(tmp_path / "run.csv")["axis_error"].value > 0.0
+    (tmp_path / "run.csv").write_text(text(table), encoding="utf-16")
+    assert "run.csv cannot be read: it must be text in UTF-8" in call("judge", tmp_path / "run.csv", code=2).stderr
+
+
+def test_an_axis_that_contradicts_its_quaternion_is_refused_and_one_of_few_digits_is_not(tmp_path):
+    truth = symtop.reference(SPHEROID, np.linspace(0.0, 6.0, 61))
+    columns = np.column_stack([truth[name].values for name in ("time", "axis", "quaternion")])
+    head, file = "time,ex,ey,ez,qw,qx,qy,qz", tmp_path / "run.csv"
+    rows = columns.copy()
+    rows[:, 1:] = np.round(columns[:, 1:], 4)
+    rows[7, 1:4] = np.nan  # a sample that was lost
+    file.write_text(text(rows, head), encoding="utf-8")
+    with pytest.warns(symtop.SymtopWarning, match="not a number from t = 0.7"):
+        assert symtop.judge(file)["axis_error"].value < 1e-3
+    turned, swapped = columns.copy(), columns[:, [0, 2, 1, 3, 4, 5, 6, 7]]
+    across = np.cross(turned[40, 1:4], [0.0, 0.0, 1.0])
+    turned[40, 1:4] += 2e-3 * across / np.linalg.norm(across)
+    for wrong, words in ((swapped, r"at t = .* the axis is \d.* rad"), (turned, r"at t = 4 the axis is 0\.002 rad")):
+        file.write_text(text(wrong, head), encoding="utf-8")
+        answer = " ".join(call("judge", file, code=2).stderr.split())
+        assert re.search(f"axis and quaternion must show one attitude within 0.001 rad, but {words}", answer)
+    assert symtop.judge({"time": turned[:, 0], "axis": turned[:, 1:4]})["axis_error"].value > 1e-3  # it is alone
+    turned[:, 1:] = columns[:, 1:] * [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0]
+    file.write_text(text(turned, head), encoding="utf-8")
+    assert "the true one if it is read as from space to body" in " ".join(call("judge", file, code=2).stderr.split())
 
 
 def of_body(scene, change=1.0):

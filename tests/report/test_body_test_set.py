@@ -71,6 +71,19 @@ def test_the_reference_has_nothing_beyond_its_bounds(bodies):
         checked(folder, folder / "problems.csv")
 
 
+def test_times_and_starts_are_the_doubles_that_are_printed_and_the_readme_says_so_of_all_files(bodies):
+    folder, scenes = bodies
+    data, rows = netcdf.read(folder / "states.nc"), read(folder / "states-30.csv")
+    for scene, given in zip(scenes, read(folder / "problems.csv"), strict=True):
+        printed = [float(row["time"]) for row in rows if row["name"] == scene.name]
+        assert printed == data["time"].sel(problem=scene.name).values.tolist()
+        assert [float(given[name]) for name in test_set.GIVEN] == list(scene.top.flat(scene.start))
+    said = " ".join((folder / "README.md").read_text(encoding="utf-8").split())
+    assert (
+        "In all files a number that is given, of a problem or a time, is the double nearest to what is printed" in said
+    )
+
+
 def test_a_sign_in_the_inertia_is_found_by_both_checkers(bodies, tmp_path):
     folder, scenes = bodies
     times = read(folder / "states-17.csv")

@@ -88,3 +88,12 @@ def test_the_badge_says_what_is_refuted_or_what_the_method_is(ledger, tmp_path):
 def test_a_card_that_cannot_be_written_is_told(tmp_path):
     with pytest.raises(symtop.SymtopError, match="it is a folder"):
         card(NOTHING, tmp_path)
+    with pytest.raises(symtop.SymtopError, match="path must be the name of a file, not 3"):
+        card(NOTHING, 3)
+
+
+@pytest.mark.parametrize("other", [3, None, {}, "card.html"])
+def test_a_card_of_anything_but_a_ledger_is_refused(other, tmp_path):
+    with pytest.raises(symtop.SymtopError, match=r"a card needs a ledger, which symtop\.judge returns, not "):
+        symtop.card(other, tmp_path / "card.html")
+    assert symtop.card(NOTHING, tmp_path / "card.html").is_file()

@@ -90,3 +90,15 @@ def test_findings_of_another_kind_are_none(tmp_path):
     (tmp_path / "drift.json").write_text("{}", encoding="utf-8")
     with pytest.raises(SymtopError, match=r"the findings of drift in .* are incomplete"):
         gather(tmp_path)
+
+
+@pytest.mark.parametrize(("name", "command"), [("drift", "symtop study drift"), ("peers", "make peers")])
+def test_a_damaged_file_is_named_and_one_of_another_kind_is_left_out(name, command, tmp_path):
+    findings = {"study": "mine", "question": "Q?", "page": PAGE, "facts": {}, "tables": [], "pictures": []}
+    (tmp_path / "mine.json").write_text(json.dumps(findings), encoding="utf-8")
+    for other in ("null", "[]"):
+        (tmp_path / f"{name}.json").write_text(other, encoding="utf-8")
+        assert [one["study"] for one in gather(tmp_path)] == ["mine"]
+    (tmp_path / f"{name}.json").write_text("{", encoding="utf-8")
+    with pytest.raises(SymtopError, match=rf"{name}\.json is damaged .*; run it again: {command}, or remove the file"):
+        gather(tmp_path)

@@ -1,5 +1,7 @@
 """What carries over: errors and truth of bodies by other ways, planted differences that are seen, verdicts."""
 
+import re
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -239,6 +241,19 @@ def planted(factor):
         {"scene": ["short"], "family": families},
     ).expand_dims("variant")  # fmt: skip
     return xr.DataTree.from_dict({"/short": short, "/prices": prices, "/bodies": about})
+
+
+@pytest.mark.parametrize(
+    ("gap", "verdict", "words"),
+    [(0.2503, by.NO, "1 of 2 exponents within 0.25, all within 0.26"), (0.2497, by.YES, "2 of 2 .*, all within 0.25"),
+     (0.5, by.NO, "1 of 2 .*, all within 0.5$")],
+)  # fmt: skip
+def test_a_gap_that_is_shown_is_no_smaller_than_the_gap(gap, verdict, words, monkeypatch):
+    """0.2503 is not within 0.25."""
+    monkeypatch.setattr(facts, "exponent_gaps", lambda *_: {"rk4, attitude": gap, "rk4, energy": 0.01})
+    why, told = facts.growth_cell(None, "0.3")
+    assert told == verdict
+    assert re.match(words, why)
 
 
 def test_planted_factors_of_steps_and_of_silent_runs_are_found():

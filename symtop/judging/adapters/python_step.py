@@ -63,9 +63,12 @@ def state_like(before: Array, after: Any, what: str = "step") -> Array:
     """What a step returned as an array of floats; SymtopError if it is no state."""
     if type(after) is np.ndarray and after.shape == before.shape and after.dtype == np.float64:
         return after
-    array = np.asarray(after) if after is not None else None
+    array = None
+    with contextlib.suppress(ValueError):  # of a pair of an array and a number, which is no array
+        array = np.asarray(after) if after is not None else None
     if array is None or array.shape != before.shape or array.dtype.kind not in "fiu":
-        form = "None" if array is None else f"{type(after).__name__} of shape {array.shape} and type {array.dtype}"
+        kind = type(after).__name__ if after is not None else "None"
+        form = kind if array is None else f"{kind} of shape {array.shape} and type {array.dtype}"
         raise SymtopError(f"{what} must return the new state, {before.size} real numbers, not {form}")
     return array.astype(float)
 

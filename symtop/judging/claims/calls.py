@@ -72,8 +72,7 @@ def _calls(subject: Subject) -> Finding:
         why = f"it keeps something of its first start: from another one, a step of {step.h:.0e} moves by {gap:.1e}"
         return _refuted("keeps state", why, gap, STANDS)
     traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # in two words, and in a clause
-    single = {"single precision": "its numbers are those of single precision"}
-    traits |= single if (first == first.astype(np.float32)).all() else {}
+    traits |= {"single precision": "its numbers are those of single precision"} if subject.single else {}
     miss, why = _cut(stepper, scene, h / 10.0, PARTS) if stepper.own_loop else (0.0, "")
     if miss > MISSED:
         return _refuted("miscounts steps", why, miss, MISSED)

@@ -73,6 +73,7 @@ DRAWS, DRAWING = (96, 32), (10.0, 3.0)  # starts at which the order of one step 
 HALVINGS, SHORT = 10, 80.0  # steps that are tried from each, and how many of a short one make a nutation
 LOWER, JUMP = 0.6, 3.0  # an order is lower by so much, or jumps by so much
 LARGE, SEEN = 1e-3, 1e-11  # a miss beyond the first is of no power, below the second rounding
+UNITS = 100.0  # of single precision: a miss below so many is rounding there
 UNEVEN, WAVES = 0.6, 0.7  # a, and waves of the clock in a nutation
 BEGIN = 0.23  # of a nutation: t0
 UNSTABLE = 1e4  # times that the motion of the scene grows a change: errors of runs are no power of the step there
@@ -118,7 +119,8 @@ def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
                 step = one_step(subject.method, chart, scene, float(sizes[0]))
                 if restart_gap(step, scene.start) > ONE_MAP:
                     continue
-                order, h = _lower(sizes, _misses(step, scene.start, sizes), power, scale / SHORT)
+                seen = max(SEEN, subject.rounding(UNITS))
+                order, h = _lower(sizes, _misses(step, scene.start, sizes), power, scale / SHORT, seen)
                 if order < power:
                     return order, f"a step of h = {h:.2g} from {name} has order {order:.1f}, in the {chart} chart"
     return None
@@ -133,11 +135,11 @@ def _misses(step: StepMap, start: Angles, sizes: Array) -> Array:
     return misses
 
 
-def _lower(sizes: Array, misses: Array, power: int, short: float) -> tuple[float, float]:
-    """The order where it is lower than `power`, and the step; infinity where it is not."""
+def _lower(sizes: Array, misses: Array, power: int, short: float, seen: float) -> tuple[float, float]:
+    """The order where it is lower than `power`, and the step; infinity where it is not. Below `seen` is rounding."""
     with np.errstate(all="ignore"):
         orders = np.log2(misses[:-1] / misses[1:]) - 1.0
-    clear = (misses[:-1] < LARGE) & (misses[1:] > SEEN)
+    clear = (misses[:-1] < LARGE) & (misses[1:] > seen)
     fine = np.flatnonzero(clear & (sizes[:-1] <= short))[-2:]
     if fine.size == 2 and (orders[fine] < power - LOWER).all():
         return float(orders[fine].max()), float(sizes[fine[0]])
@@ -157,11 +159,12 @@ def on_body(subject: Subject) -> list[Finding]:
     if not fitted.measured:
         error = fitted.error[fitted.step_size <= 10.0 * np.min(fitted.step_size)]
         wrong = float(np.min(error))  # NaN, which is above nothing, where a run ended early
-        if error.size >= FEWEST and wrong > max(STAYS * np.max(error), ABOVE * np.max(fitted.bound), TRUE_LIMIT):
+        least = max(ABOVE * np.max(fitted.bound), TRUE_LIMIT, subject.rounding(subject.finest or 0.0))
+        if error.size >= FEWEST and wrong > max(STAYS * np.max(error), least):
             why = f"however small its step, it goes to a motion that is wrong by {wrong:.1e} rad on {scene.name}"
             verdict = "measured" if claim is None else "refuted"
             return [Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)]
-        return [undecided("order", yes_no(claim), fit.reason)]
+        return [undecided("order", yes_no(claim), _hidden(subject, fit.reason))]
     if verdict == "refuted" and fit.slope - fit.interval > (claim or 0) + CLEARLY:
         verdict, why = "measured", f"{why}: here the error falls with a higher power"
     return [Finding("order", yes_no(claim), fitted.measured, verdict, why, fit.slope, fit.interval)]
@@ -261,12 +264,13 @@ def _by_steps(subject: Subject) -> Finding:
     if method.fixed_step and not (subject.in_plane or (settled and follows)):
         power = max(1, min(method.order or 99, round(main.slope))) if measured else power
         wrong, doubt = limit(method, scene, power, finest)
-        if wrong > max(TRUE_LIMIT, 10.0 * doubt):
+        if wrong > max(TRUE_LIMIT, 10.0 * doubt, subject.rounding(finest or 0.0)):
             why = f"as its step goes to zero it goes to a motion that is wrong by {wrong:.1e} ({slopes})"
             verdict = "measured" if claim is None else "refuted"
             return Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)
     if claim is not None:
-        return _claimed(claim, fitted, fitted.fits.values() if method.fixed_step else (), series, slopes)
+        finding = _claimed(claim, fitted, fitted.fits.values() if method.fixed_step else (), series, slopes)
+        return finding._replace(why=_hidden(subject, finding.why)) if finding.verdict == "undecided" else finding
     if subject.stepper is not None and method.adaptive:
         return _converges(fitted, slopes)
     value, why = main.slope, slopes
@@ -276,8 +280,14 @@ def _by_steps(subject: Subject) -> Finding:
         if not measured or series.order < power:  # the slope, unless the series of a step has a lower order
             measured, value = _terms(series), float(series.order)
     if not measured:
-        return undecided("order", "", main.reason)
+        return undecided("order", "", _hidden(subject, main.reason))
     return Finding("order", "", measured, "measured", why, value, main.interval)
+
+
+def _hidden(subject: Subject, why: str) -> str:
+    """Why an order could not be judged; that single precision hides errors is said first."""
+    least = subject.rounding(subject.finest or 0.0)
+    return f"single precision hides errors below about {least:.0e}: {why}" if least else why
 
 
 def _converges(fitted: Order, slopes: str) -> Finding:

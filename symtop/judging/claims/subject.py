@@ -42,6 +42,7 @@ STEPS = 1_000_000  # most steps of a long run
 SAMPLES = 4000  # intervals of a long run: a program that writes every so many steps needs a multiple
 FINEST = {"compiled": 2e5, "python": 1e4}  # most steps of a run of the order
 FEWEST = 300  # steps of the longest run of the order, however slow
+SINGLE = 1000  # most of them in single precision, whose rounding hides what more would show
 LADDER = 2.5  # times the steps of the longest run: what all of them take
 ENOUGH_STEPS, AT_REST = 50.0, 1e-9  # steps a nutation with a right-hand side of zero, and how far they may go
 STEPS_A_NUTATION = 118.02  # of a long run, and of the steps that are timed: an implicit one costs more if it is long
@@ -124,7 +125,22 @@ class Subject:
         if not self.seconds_a_step:
             return None
         steps = min(SLOPES[self.quick] / self.seconds_a_step / LADDER, FINEST[self.method.implementation])
-        return max(steps, FEWEST)
+        return max(min(steps, SINGLE) if self.single else steps, FEWEST)
+
+    @functools.cached_property
+    def single(self) -> bool:
+        """Are the numbers of a bare step those of single precision?"""
+        if self.stepper is None or not self.method.fixed_step:
+            return False
+        scene = self.scene
+        state, run = self.stepper.from_start(scene.top, generic_start(scene), scene.time_scale() / STEPS_A_NUTATION)
+        end = run(state, 1)[0]
+        with np.errstate(over="ignore"):  # of a step that blows up, whose numbers single precision does not hold
+            return bool((end == end.astype(np.float32)).all() and not (state == state.astype(np.float32)).all())
+
+    def rounding(self, steps: float) -> float:
+        """What rounding to single precision, if it is that, may leave of so many steps, relative: a unit each."""
+        return steps * float(np.finfo(np.float32).eps) * self.single
 
 
 def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
@@ -144,8 +160,9 @@ def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
         cost, finite = seconds(4 * steps)
         steps *= 4 if finite else 1
         if not finite or cost - first > max(ENOUGH, first) or steps > 1e7:  # a start's cost scatters as much as it is
-            cost = min(seconds(steps)[0] for _ in range(3))  # others may have been at work
-            # the start alone may have been disturbed; a process that waited before is told of its waiting later
+            # others may have been at work, and a clock that leaves waiting out may hear of what is past
+            cost = sorted(seconds(steps)[0] for _ in range(3))[1]
+            # the start alone may have been disturbed
             return max(cost - first * finite, 0.5 * cost, LEAST * steps) / steps
 
 

@@ -77,7 +77,7 @@
     const tip = html("div", frame, "", "tip");
     tip.setAttribute("role", "status");
     tip.hidden = true;
-    const key = html("p", root, "Upright: exact motion, no integrator. Grey: below the bound of the truth.", "key");
+    const key = html("p", root, "Dotted, vertical: exact motion, no integrator. Grey: below the bound of the truth.", "key");
     let places = [];
 
     function draw() {
