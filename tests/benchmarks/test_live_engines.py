@@ -1,8 +1,6 @@
 """Engines against their maps: what counts as the same map, and that an engine that is absent or raises is data."""
 
-import importlib
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +9,6 @@ import symtop
 from benchmarks import engines
 from benchmarks.engines import drivers, measure, study
 from benchmarks.engines.common import body_of
-from symtop.methods.framework import registry
 
 SCENES = {body_of(symtop.scene(name)).velocity.tobytes(): symtop.scene(name) for name in measure.STEPS}
 
@@ -59,13 +56,6 @@ def test_an_engine_that_raises_is_a_row_with_its_reason():
     assert found["failures"] == [*found["missing"], "Engine (bad): RuntimeError: no such body"]
 
 
-def test_an_engine_that_is_absent_is_skipped_with_the_reason(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "rapier3d", None)
-    settings, missing = engines.load(("rapier",))
-    assert settings == []
-    assert missing[0].startswith("Rapier is not installed here and was skipped")
-
-
 # ---- programs of other languages -------------------------------------------------------------------------------------
 
 ECHO = """
@@ -92,32 +82,3 @@ def test_a_driver_gets_the_numbers_of_the_body_and_its_quaternions_have_length_o
 def test_a_driver_that_fails_is_an_error_with_its_reason(setting, message):
     with pytest.raises(RuntimeError, match=message):
         drivers.run((sys.executable, "-c", ECHO), setting, "free", body_of(symtop.scene("goldstein")), 0.1, 2)
-
-
-def test_a_package_or_a_library_that_is_absent_skips_its_engines_with_the_reason(monkeypatch):
-    monkeypatch.setattr(drivers, "PACKAGES", Path(measure.__file__).parent / "absent")
-    monkeypatch.setattr(drivers.shutil, "which", lambda name: f"/usr/bin/{name}" if name == "node" else None)
-    drivers.built.cache_clear()
-    settings, missing = engines.load(engines.DRIVEN)
-    assert settings == []
-    assert [one.split(" is not installed here")[0] for one in missing[-3:]] == ["ODE", "Bullet", "Simbody"]
-    assert missing[-1].endswith("there is no pkg-config on this machine.")
-    assert missing[0].endswith("the npm package @babylonjs/havok is not installed in benchmarks/engines/absent.")
-
-
-@pytest.mark.parametrize("name", engines.DRIVEN)
-def test_each_setting_of_a_driven_engine_names_a_map_of_the_catalogue_or_none(name, monkeypatch):
-    """One of single precision has a map in single precision, and on a joint there is none: its solver takes part."""
-
-    def listed(*arguments):
-        return [engines.Setting(arguments[1], "1", *row, broken) for row in arguments[-1]]
-
-    monkeypatch.setattr(drivers, "of_npm", listed)
-    monkeypatch.setattr(drivers, "native", listed)
-    adapter = importlib.import_module(f"benchmarks.engines.adapters.{name}")
-    made = adapter.settings()
-    assert {setting.method for setting in made} <= {"", *registry.engines()}
-    assert all(not setting.method for setting in made if setting.held == engines.JOINT)
-    single = {setting.method.endswith("-float32") for setting in made if setting.method}
-    expected = {"jolt": {True}, "physx": {True}, "havok": {True}, "bullet": {True, False}, "simbody": set()}
-    assert single == expected.get(name, {False})

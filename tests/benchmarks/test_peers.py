@@ -161,20 +161,6 @@ def test_an_inner_loop_that_does_not_start_anew_is_seen(scene):
 # ---- accuracy and the search -----------------------------------------------------------------------------------------
 
 
-def test_odeint_takes_the_steps_of_solve_ivps_lsoda_and_names_its_distribution(scene):
-    new, old = (measure.accuracy(scene, _scipy(row).method, 1e-9)
-                for row in ("scipy-lsoda-numba[axis]", "scipy-odeint-numba[axis]"))  # fmt: skip
-    assert old.error == pytest.approx(new.error, rel=0.1)
-    assert old.evaluations == pytest.approx(new.evaluations, rel=0.01)
-    assert _scipy("scipy-odeint-numba[axis]").distribution == "scipy"
-
-
-def test_an_odeint_that_gives_up_is_a_failure_and_not_a_row_of_zeros(scene, monkeypatch):
-    monkeypatch.setattr("benchmarks.peers.adapters.odeint.MOST_STEPS", 5)
-    with pytest.warns(Warning, match="Excess work"):
-        assert np.isnan(measure.accuracy(scene, _scipy("scipy-odeint-python[axis]").method, 1e-9).error)
-
-
 def test_the_search_finds_the_loosest_setting():
     scene, method = symtop.scene("goldstein"), symtop.integrator("takahashi-imada")
     points = measure.worth_timing(measure.search(scene, method, (1e-6,)), (1e-6,))

@@ -48,22 +48,6 @@ def _stored(times, spread=0.01):
     return netcdf.describe(data, "peers").assign_attrs(facts)
 
 
-def test_both_ratios_against_scipy_stand_side_by_side_for_each_chart_and_language():
-    data = _stored({
-        "symtop": (1e-3, 2e-5), "scipy[axis] C": (6e-3, 4e-3), "scipy[axis] Python": (7e-3, 5e-3),
-        "scipy[angles] Python": (1.2e-2, 1e-2),
-    })  # fmt: skip
-    said = {sentence.partition(":")[0]: sentence for sentence in summary.pairs(data)}
-    for name, public, inner in (
-        ("scipy[axis], C", "6", "200"), ("scipy[axis], Python", "7", "250"), ("scipy[angles], Python", "12", "500"),
-    ):  # fmt: skip
-        assert f"takes {public} to {public} times as long as `simulate` with" in said[name]
-        assert f"takes {inner} to {inner} times as long as the fastest kernel alone" in said[name]
-    assert "spheroid, axis errors of 1e-06 and 1e-09, 10 nutations" in said["All ratios"]
-    ratios = {row[0]: row[1:] for row in summary.tables(data)[0].rows}
-    assert ratios["scipy[angles], Python"] == ["angles", "Python", "12 to 12", "500 to 500"]
-
-
 def test_noise_is_not_called_a_win():
     data = _stored({"symtop": (1e-4, 1e-4), "rebound": (1.4e-4, 1.4e-4)})
     assert "faster in 2 of 2 comparisons, level or within the noise in 0" in summary.verdict(data)[0]

@@ -87,16 +87,6 @@ def test_a_proposed_step_is_of_use():
         assert 1e-5 < error < 1e-2
 
 
-@pytest.mark.slow
-def test_figures_come_in_three_kinds_and_are_the_same_again(tmp_path):
-    """The bytes of an SVG; those of a PNG and a PDF have a test with the figures."""
-    files = [tmp_path / name for name in ("a.png", "A.PDF", "a.svg", "B.SVG")]
-    for file, head in zip(files, (b"\x89PNG", b"%PDF", b"<?xml", b"<?xml"), strict=True):
-        call("run", "spheroid", "strang", "--step-size", "0.005", "--figure", file)
-        assert file.read_bytes().startswith(head)
-    assert files[2].read_bytes() == files[3].read_bytes()
-
-
 @pytest.mark.slow  # half a minute: lanes of one method are compiled
 def test_a_cold_ensemble_is_never_silent_for_long(tmp_path):
     words = "ensemble strang --members 2000 --per-nutation 50 --nutations 2"

@@ -115,13 +115,6 @@ def test_a_number_of_a_title(value, text):
     assert " " not in formats.number(value)
 
 
-def test_a_method_that_wins_twice_is_named_once():
-    pairs = [("strang", "10⁻³"), ("rk4", "10⁻⁶"), ("strang", "10⁻⁹")]
-    assert formats.by_name(pairs) == "`strang` to 10⁻³ and 10⁻⁹, and `rk4` to 10⁻⁶"
-    assert formats.by_name(pairs[:1], "at") == "`strang` at 10⁻³"
-    assert formats.by_name([*pairs, (None, "10⁻¹²")]) is None
-
-
 def test_a_published_figure_has_a_vector_beside_it_and_the_same_bytes_again(tmp_path):
     files = []
     for folder in ("one", "two"):

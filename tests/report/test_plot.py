@@ -82,14 +82,6 @@ def sweep():
     return symtop.sweep(["spheroid", "goldstein"], ["rk4", "rk45"], **options)
 
 
-@pytest.mark.parametrize("x", ["outcome", "message", "chart", "scene", "no-such", 3])
-def test_what_is_no_number_of_each_run_is_no_x_of_a_sweep(sweep, x):
-    message = r"^x .* is unknown; (known: step_size, tolerance, steps|did you mean)"
-    with pytest.raises(SymtopError, match=message) as info:
-        symtop.plot(sweep, plt.figure().gca(), x=x)
-    assert "outcome," not in str(info.value)
-
-
 def test_one_integrator_or_scene_of_a_sweep_is_drawn(sweep):
     whole = {line.get_label(): line for line in symtop.plot(sweep, plt.figure().gca(), x="steps").get_lines()}
     assert len(whole) == 4

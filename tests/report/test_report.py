@@ -271,13 +271,6 @@ def test_words_follow_from_the_stored_data_and_from_nothing_else(results, tmp_pa
     assert study.facts(later) != findings["facts"]  # they read the data, they do not remember it
 
 
-def test_the_twin_names_every_figure_and_table(results):
-    twin = (results / "report.md").read_text(encoding="utf-8")
-    for kind, shown in (("figures", r"!\[[^]]+\]\((figures/[^)]+)\)"), ("tables", r"\[CSV\]\((tables/[^)]+)\)")):
-        files = re.findall(shown, twin)
-        assert sorted(files) == sorted(f"{kind}/{path.name}" for path in (results / kind).iterdir())
-
-
 def test_findings_that_are_not_whole_are_told_of(results, tmp_path):
     shutil.copytree(results, tmp_path, dirs_exist_ok=True)
     (tmp_path / "tables" / "convergence-costs.csv").unlink()
