@@ -180,8 +180,8 @@ def _outlook(
 
     times, states, mean = run_piece(y)
     error = np.linalg.norm(states - near(t + times).T, axis=1)
-    # not finite, ended early by SciPy, or a step beyond what is known of the motion
-    ended = not np.isfinite(error).all() or times[-1] < 0.99 * piece * (not rule) or setting * bool(rule) > watched
+    short = setting > watched if rule else times[-1] < 0.99 * piece  # of what is known, or of what SciPy had to reach
+    ended = bool(short) or not np.isfinite(error).all()
     total, since = growth.at(end), growth.at(float(times[-1]))
     expected = math.inf if ended else _expected(times, error, end, total / since, extent if whole else math.inf)
     better = setting * (accuracy / max(expected, TINY)) ** (1.0 / ((rule and integrator(method).order) or 1))
