@@ -140,15 +140,16 @@ def _of_members(runs: xr.Dataset, members: Any, precision: str) -> xr.Dataset:
         for i, (top, start) in enumerate(members_of(given.numbers)):
             one = runs.isel(member=i)
             end = float(one["horizon"]) if "horizon" in one else float(np.nanmax(one["time"].values))
-            table = errors(one, Scene(f"member-{i}", top, start, end), precision=precision)
-            tables.append(table.pad(time=(0, runs.sizes["time"] - table.sizes["time"])))
+            tables.append(errors(one, Scene(f"member-{i}", top, start, end), precision=precision))
     if doubtful:
         words = f"{len(doubtful)} warnings on members, the first: {doubtful[0].message}"
         warnings.warn(words, SymtopWarning, stacklevel=3)
-    columns = {
-        name: (("member", "time"), np.array([table[name].values for table in tables]), tables[0][name].attrs)
-        for name in ("time", *tables[0].data_vars)
-    }
+    columns = {}
+    for name in ("time", *tables[0].data_vars):
+        rows = np.full((n, runs.sizes["time"]), np.nan)  # a member that ended early has fewer samples
+        for row, table in zip(rows, tables, strict=True):
+            row[: table.sizes["time"]] = table.variables[name].values
+        columns[name] = ("member", "time"), rows, tables[0].variables[name].attrs
     clock = {"time": columns.pop("time"), **runs["member"].coords}
     return xr.Dataset(columns, clock, {**tables[0].attrs, "title": f"errors of {n} members", "scene": ""})
 
