@@ -390,7 +390,8 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
     second, period = motion.scene.second, motion.scene.period_word
     reached = min(expected.axis_error, math.pi)
     size = f"expect an {motion.watches} error of {reached:.1g} rad by t = {plan.horizon:.4g}{second}"
-    if (coarse := _coarse(motion, method, chart, plan, expected, size)) is not None:
+    limited = expected.outcome == "out_of_budget"  # no error is the cause, and no length of step
+    if not limited and (coarse := _coarse(motion, method, chart, plan, expected, size)) is not None:
         return coarse
     if expected.outcome != "ok":
         end = sentence(expected.outcome, expected.reached, plan.horizon, second)

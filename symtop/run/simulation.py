@@ -136,7 +136,7 @@ def make_plan(
             raise SymtopError(f"step_size {step!r} {words}", "step_size", "budget")
         steps = max(1, round(horizon / step))
         _, marks, dithered = sample_times(horizon, samples, period, steps)
-        return Plan.steps(horizon / steps, marks, horizon), dithered
+        return Plan.steps(horizon / steps, marks, horizon, budget), dithered
     bound = method.check_tolerance(tolerance) if method.adaptive else math.nan
     swings = horizon * max(1.0 / period, math.sqrt(abs(scene.top.mgl) / scene.top.I1) / (2.0 * math.pi))
     if method.adaptive and swings > MOST_SWINGS:
@@ -166,7 +166,7 @@ def simulate(
     error is expected; the run is the same either way. It compares a piece of the run with the closed form ("exact", of
     tops) or with an accurate integration ("series", as of bodies). Give a function to be handed the sentence instead,
     or False for no warning. `budget` is the most steps of a fixed-step run (`MOST_STEPS` by default; more are refused)
-    and the most force evaluations, or Taylor steps, of an adaptive one, which then ends `out_of_budget`.
+    and the most force evaluations, or Taylor steps, of one with steps of several lengths, which ends `out_of_budget`.
 
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """

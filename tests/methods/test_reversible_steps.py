@@ -202,3 +202,15 @@ def test_runs_that_fail_say_how(monkeypatch):
         assert np.isnan(done.p_phi[-1])
     assert too_long.steps == 50
     assert np.isfinite(too_long.states[1]).all()
+
+
+def test_a_budget_ends_a_run_whose_steps_become_too_many_alone_and_as_a_member():
+    scene, setting = grazing(1e-4), {"step_size": 0.05, "horizon": 4.0, "samples": 5}
+    needed = symtop.simulate(scene, METHOD, **setting, guard=False).attrs["steps"]
+    for budget, outcome, steps in ((needed, "ok", needed), (300.5, "out_of_budget", 301), (100, "out_of_budget", 100)):
+        alone = symtop.simulate(scene, METHOD, **setting, guard=False, budget=budget).attrs
+        member = symtop.ensemble([scene], METHOD, **setting, budget=budget).isel(member=0)
+        assert (alone["outcome"], alone["steps"]) == (str(member.outcome.values), int(member.steps)) == (outcome, steps)
+    sentences = []
+    symtop.simulate(scene, METHOD, **setting, guard=sentences.append, budget=100)
+    assert "expect the run to be stopped at t = " in sentences[0]

@@ -27,14 +27,16 @@ class Plan(NamedTuple):
     step_size: float  # nan for an adaptive method
     marks: NDArray[np.int64]  # (samples,) whole steps, increasing; empty for an adaptive method
     tolerance: float  # nan for a fixed-step method
-    budget: float | None = None  # of an adaptive method: force evaluations or Taylor steps; None for its own limit
+    budget: float | None = None  # force evaluations, steps of a Taylor method; None for the method's own limit
 
     @classmethod
-    def steps(cls, h: float, marks: ArrayLike, horizon: float | None = None) -> Self:
+    def steps(
+        cls, h: float, marks: ArrayLike, horizon: float | None = None, budget: float | None = None
+    ) -> Self:
         """Steps of h, sampled after `marks` of them; `horizon` if it is not their product to the last bit."""
         whole_steps = np.asarray(marks, dtype=np.int64)
         end = float(whole_steps[-1]) * h if horizon is None else horizon
-        return cls(np.multiply(whole_steps, h, dtype=float), end, h, whole_steps, math.nan)
+        return cls(np.multiply(whole_steps, h, dtype=float), end, h, whole_steps, math.nan, budget)
 
     @classmethod
     def until(cls, times: ArrayLike, tolerance: float, budget: float | None = None) -> Self:

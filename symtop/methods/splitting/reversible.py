@@ -77,20 +77,20 @@ def march(par, k, eps, turn, times, budget, seen, place, states, momenta):  # ty
 
 
 def _limit(count: int) -> int:
-    """The steps at which a run is stopped for so many of a plan."""
+    """The steps at which a run without a budget is stopped for so many of a plan."""
     return max(min(BLOCK + SHARE * count, STEPS), 8 * count)
 
 
-def _run(top: SymmetricTop, start: Angles, k: float, parts: Sequence[tuple[float, Array]], count: int) -> Run:
+def _run(top: SymmetricTop, start: Angles, k: float, parts: Sequence[tuple[float, Array]], limit: float) -> Run:
     """The samples of the last part, each part with an eps and times of its own."""
     par, state = on_angles(top, start)
     place: Any = (state, NONE, NONE[:3], NONE[:1], NONE[:1], 1.0 / math.sin(start.theta) ** k)
-    done, outcome, before, turn, most = 0, OK, 0.0, BEGIN, _limit(count)
+    done, outcome, before, turn, most = 0, OK, 0.0, BEGIN, limit
     for eps, times in parts:
         seen, before, turn = 0, eps, RETRACE if eps * before < 0.0 else turn
         states, momenta = np.full((times.size, 4), np.nan), np.full((2, times.size), np.nan)
         while seen < times.size and outcome == OK:
-            given = min(BLOCK, most - done), seen, place, states, momenta
+            given = min(BLOCK, math.ceil(most - done)), seen, place, states, momenta
             seen, steps, outcome, place = march(par, k, eps, turn, times, *given)
             done, turn = done + steps, ONWARD
             outcome = OUT_OF_BUDGET if outcome == OK and done >= most and seen < times.size else outcome
@@ -106,16 +106,16 @@ class Reversible:
 
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         """The run of a plan, whose step size is eps."""
-        return _run(top, start, self.k, [(plan.step_size, plan.times)], int(plan.marks[-1]))
+        return _run(top, start, self.k, [(plan.step_size, plan.times)], self.limit(plan))
 
     def limit(self, plan: Plan) -> float:
         """The force evaluations at which a run is stopped."""
-        return float(_limit(int(plan.marks[-1])))
+        return plan.most(_limit(int(plan.marks[-1])))
 
     def onward(self, top: SymmetricTop, start: Angles, lengths: Sequence[float]) -> Run:
         """A step of each length from where the last one stood, with its rho: a negative one retraces what was made."""
         ends = np.cumsum(lengths)
-        return _run(top, start, self.k, [(h, ends[i : i + 1]) for i, h in enumerate(lengths)], len(lengths))
+        return _run(top, start, self.k, [(h, ends[i : i + 1]) for i, h in enumerate(lengths)], _limit(len(lengths)))
 
 
 def built_in() -> list[Integrator]:

@@ -293,7 +293,7 @@ class Job:
         """What `simulate` would ask a solver for."""
         count, horizon = plan.counts[i], float(self.horizon[i])
         if self.steps is not None:
-            return Plan.steps(float(plan.step_size[i]), plan.marks[i, :count], horizon)
+            return Plan.steps(float(plan.step_size[i]), plan.marks[i, :count], horizon, self.budget)
         tolerance = np.nan if self.tolerance is None else float(self.tolerance[i])
         return Plan.until(plan.times[i, :count], tolerance, self.budget)
 
