@@ -23,10 +23,10 @@ from symtop_studies.cost.ladder import Level, one_by_one, setting_of, stepped
 from symtop_studies.cost.tops import CLEAR, FIRST, MOMENTA, SAMPLES, Tops
 
 from symtop.core.numbers import EPSILON, GOLDEN
-from symtop.methods.framework.plan import NOT_NORMALISED, Plan, off_length
+from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model.body import Attitude, RigidBody, rotated, vertical
-from symtop.model.charts import BODY, Array, attitude_distance, axis_distance
+from symtop.model.charts import Array, attitude_distance, axis_distance
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.run.ensemble.bodies import body_population, scenes_of
@@ -143,11 +143,7 @@ def run_steps(
 ) -> Level:
     """Run the chosen members with so many steps a natural period, sampled after `marks` of them."""
     h = bodies.period[chosen] / steps
-    runs = stepped(variant, bodies.rows[chosen], h, np.broadcast_to(marks, (h.size, marks.size)))
-    with np.errstate(all="ignore"):  # a run may have blown up
-        lost = off_length(BODY, runs.states)  # as one by one, a run ends there
-    outcome = np.where(lost.any(axis=1), NOT_NORMALISED, runs.outcome)
-    return runs._replace(states=np.where(lost[..., np.newaxis], np.nan, runs.states), outcome=outcome)
+    return stepped(variant, bodies.rows[chosen], h, np.broadcast_to(marks, (h.size, marks.size)))
 
 
 @functools.lru_cache(maxsize=2 * len(FAMILIES))

@@ -40,7 +40,7 @@ from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.loop import inside
-from symtop.methods.framework.plan import OUTCOMES, Plan
+from symtop.methods.framework.plan import NOT_NORMALISED, OUTCOMES, Plan, off_length
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import DIMENSIONS, Array
 from symtop.model.scenes import Scene
@@ -110,7 +110,7 @@ def run_level(variant: Integrator, tops: Tops, chosen: Members, level: int, budg
     if isinstance(solver, Adaptive):
         n, samples = times.shape
         done, _ = solver.many(tops.numbers[chosen], np.full(n, tolerance), times, np.full(n, samples), budget)
-        return Level(done.states, done.momenta, done.work.astype(float), done.outcome)
+        return of_length_one(variant, Level(done.states, done.momenta, done.work.astype(float), done.outcome))
     plans = [Plan.until(row_times, tolerance, budget) for row_times in times]
     return one_by_one(variant, tops.members(chosen), plans)
 
@@ -122,7 +122,15 @@ def stepped(variant: Integrator, numbers: Array, h: Array, marks: NDArray[np.int
         return in_turn(variant, numbers, [Plan.steps(float(step), ends) for step, ends in zip(h, marks, strict=True)])
     many = solver.many(numbers, h, marks)
     work = np.asarray(solver.counts(many.steps, many.work)[0], dtype=float)
-    return Level(many.states, many.momenta, work, many.outcome)
+    return of_length_one(variant, Level(many.states, many.momenta, work, many.outcome))
+
+
+def of_length_one(variant: Integrator, runs: Level) -> Level:
+    """Runs end where their quaternion has left length one, as they do one by one."""
+    with np.errstate(all="ignore"):  # a run may have blown up
+        lost = off_length(next(iter(variant.solvers)), runs.states)
+    outcome = np.where(lost.any(axis=1), NOT_NORMALISED, runs.outcome)
+    return runs._replace(states=np.where(lost[..., np.newaxis], np.nan, runs.states), outcome=outcome)
 
 
 def in_turn(variant: Integrator, numbers: Array, plans: Sequence[Plan]) -> Level:

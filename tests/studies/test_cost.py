@@ -17,6 +17,7 @@ from symtop.measure import datasets
 from symtop.measure.accuracy import error_row
 from symtop.measure.settings import TARGETS
 from symtop.measure.verdicts import barriers
+from symtop.methods.framework.plan import NOT_NORMALISED, Plan
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
@@ -300,6 +301,19 @@ def test_errors_of_many_runs_are_those_of_each(tops, name):
         for quantity in set(ASKED) & many.keys():  # a dozen samples against a thousand
             assert 0.3 * alone[quantity] <= many[quantity][k] <= 1.001 * alone[quantity] + 1e-14
         assert many[MOMENTA][k] <= max(alone["p_phi"], alone["p_psi"]) * 1.001 + 1e-14
+
+
+@pytest.mark.parametrize("name", ["rk4[attitude]", "tsit5-fixed[attitude]", "strang[attitude]"])
+def test_coarse_runs_end_in_the_ladder_as_they_end_alone(tops, name):
+    row, chosen = integrator(name), np.flatnonzero(tops.known)
+    shown = ladder.run_level(row, tops, chosen, 0, 1e6)
+    plans = [Plan.steps(float(tops.period[member]) / FIRST, tops.marks) for member in chosen]
+    alone = ladder.one_by_one(row, tops.members(chosen), plans)
+    lost = alone.outcome == NOT_NORMALISED
+    assert np.array_equal(shown.outcome == NOT_NORMALISED, lost)
+    assert np.array_equal(np.isnan(shown.states[lost]).all(axis=2), np.isnan(alone.states[lost]).all(axis=2))
+    assert lost.any() == ("strang" not in name)
+    assert (tops.errors("attitude", shown, chosen)["axis"][lost] == INF).all()
 
 
 def test_a_failed_run_has_an_infinite_error(tops):
