@@ -279,6 +279,45 @@ def test_single_precision_is_no_other_motion_and_one_of_a_step_in_it_is(scene, o
     assert "single" not in symtop.judge(midpoint, order=2, **options)["order"].why
 
 
+def _in_single(kick, then):
+    """A step of the plane in single precision: a kick, and what follows with it."""
+    real = np.float32
+
+    def step(state, h, dT, dV):
+        return tuple(map(real, then(*map(real, kick(*map(real, state), real(h), dT, dV)), real(h), dT, dV)))
+
+    return step
+
+
+def test_single_precision_refutes_no_structure_that_a_step_has_and_confirms_none(only):
+    """Rounding moves a step forth and back by 1e-8, and a bracket from differences by 1e-6."""
+    only("symplectic", "symmetric", "energy")
+    euler = _in_single(lambda x, p, h, dT, dV: (x, p - h * dV(x)), lambda x, p, h, dT, _: (x + h * dT(p), p))
+    explicit = _in_single(lambda x, p, h, dT, dV: (x + h * dT(p), p - h * dV(x)), lambda x, p, *_: (x, p))
+    options = {"form": "separable", "quick": True, "symplectic": True, "symmetric": True, "energy": "bounded"}
+    good, bad = (symtop.judge(step, **options) for step in (euler, explicit))
+    assert (good.refuted, good["symplectic"].verdict, good["energy"].verdict) == (["symmetric"], "undecided", "confirmed")
+    assert good["symplectic"].why.startswith("single precision hides errors below about 4e-04: ")
+    assert bad.refuted == ["symplectic", "symmetric", "energy"]
+
+
+def test_single_precision_refutes_no_constant_that_it_rounds(only):
+    def implicit(f, t, y, h):
+        slope = f(t, y)
+        for _ in range(30):
+            slope = f(t + h / 2, y + h / 2 * slope)
+        return y + h * slope
+
+    only("symmetric", "energy", "p_psi")
+    claims = {"symmetric": True, "conserves": ("p_phi", "p_psi"), "energy": "kept", "quick": True}
+    fine, single = symtop.judge(implicit, **claims), symtop.judge(in_single(implicit), **claims)
+    hidden = symtop.judge(in_single(lambda f, t, y, h: y + h * f(t, y)), **claims)
+    names = ("symmetric", "energy", "p_psi")
+    assert [fine[name].verdict for name in names] == 3 * ["confirmed"]
+    assert [single[name].verdict for name in names] == 3 * ["undecided"]
+    assert [hidden[name].verdict for name in names] == 3 * ["refuted"]
+
+
 @pytest.mark.slow
 def test_a_method_of_order_2_goes_to_the_motion_of_a_separatrix_too(only):
     """Its runs do not within these steps: the motion grows their errors a millionfold."""

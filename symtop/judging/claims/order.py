@@ -40,7 +40,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError
 from symtop.judging.claims.structure import ONE_MAP, map_of
-from symtop.judging.claims.subject import FINEST, Subject
+from symtop.judging.claims.subject import FINEST, Subject, hidden_by_single
 from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, undecided, yes_no
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import BESIDE, CLEARLY, LARGEST_ERROR, Fit, order_verdict
@@ -287,7 +287,7 @@ def _by_steps(subject: Subject) -> Finding:
 def _hidden(subject: Subject, why: str) -> str:
     """Why an order could not be judged; that single precision hides errors is said first."""
     least = subject.rounding(subject.finest or 0.0)
-    return f"single precision hides errors below about {least:.0e}: {why}" if least else why
+    return hidden_by_single(least, why) if least else why
 
 
 def _converges(fitted: Order, slopes: str) -> Finding:

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims.subject import Subject, declared
+from symtop.judging.claims.subject import Subject, declared, hidden_by_single
 from symtop.judging.findings import Finding, Measured, agreement, undecided
 from symtop.measure import step_map as maps
 from symtop.measure.errors import errors
@@ -37,6 +37,7 @@ STANDS = 0.2  # the raw defect of a symplectic map falls to 1/256 over the width
 RETURNED = 1e-10  # a return as close as this is exact
 MISSED = 1e-8
 GONE = 4096.0  # times smaller at half the step, as of order 12: no step of this
+BRACKET_UNITS, RETURN_UNITS = 8.0, 64.0  # of single precision: in a difference of two steps, in a step forth and back
 ONE_MAP = 1e-9  # two steps are twice one step within this
 DRAWS, DRAWING = (8, 4), (10.0, 2.0)  # starts that are drawn, and seconds for them; the second with --quick
 POLE_STEPS = 400
@@ -61,6 +62,9 @@ def measure(subject: Subject) -> list[Finding]:
             answers.append(_answer_at(_returned, step, start))
             if subject.method.fixed_step and not subject.in_plane:
                 answers = _elsewhere(subject, step, answers)
+            finest = maps.WIDEST / 2.0 ** (maps.WIDTHS - 1)
+            hidden = subject.rounding(BRACKET_UNITS) / finest, subject.rounding(RETURN_UNITS)
+            answers = [_above(level, *answer) for level, answer in zip(hidden, answers, strict=True)]
         except SymtopError as error:
             answers += [(None, math.nan, math.nan, undecided("", "", str(error)).why)] * (2 - len(answers))
         by_chart.append(
@@ -120,6 +124,13 @@ def _answer_at(ask: Callable[..., Answer], step: maps.StepMap, start: Angles, *t
     return answer
 
 
+def _above(hidden: float, yes: bool | None, value: float, least: float, why: str) -> Answer:
+    """The answer, or none where single precision hides the difference."""
+    if yes is False and value <= hidden:
+        return None, value, hidden, hidden_by_single(hidden, why)
+    return yes, value, least, why
+
+
 def _bracket(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None = None) -> Answer:
     defect, gap = maps.symplectic_defect(step, start), maps.restart_gap(step, start)
     if traces is not None:
@@ -164,11 +175,12 @@ class Passage(NamedTuple):
     outcome: str
     error: float  # of the axis, rad
     finer: float  # with half the step or a tenth of the tolerance
+    right: float = POLE_RIGHT
 
     @property
     def passes(self) -> bool:
         """Did it come out on the other side, with an error that falls with the step?"""
-        return self.outcome == "ok" and (self.finer < 0.7 * self.error or self.finer < POLE_RIGHT)
+        return self.outcome == "ok" and (self.finer < 0.7 * self.error or self.finer < self.right)
 
     @property
     def word(self) -> str:
@@ -180,8 +192,8 @@ class Passage(NamedTuple):
         return f"{self.chart}: {self.word}{how if self.outcome == 'ok' else f' ({self.outcome})'}"
 
 
-def passages(method: Integrator) -> list[Passage]:
-    """What happens at a pole, in every chart of the method."""
+def passages(method: Integrator, right: float = POLE_RIGHT) -> list[Passage]:
+    """What happens at a pole, in every chart of the method; an error below `right` (rad) is none."""
     rows = []
     for chart in method.charts():
         settings = [max(tolerance, method.least_tolerance) for tolerance in (1e-6, 1e-7)]
@@ -191,17 +203,19 @@ def passages(method: Integrator) -> list[Passage]:
         controls = [options | method.given(setting) for setting in settings]
         runs = [simulate(POLE, method.variant(chart), guard=False, **control) for control in controls]
         ends = {str(run.attrs["outcome"]) for run in runs} - {"ok"}
-        rows.append(Passage(chart, max(ends, default="ok"), *(float(errors(run)["axis"].max()) for run in runs)))
+        error, finer = (float(errors(run)["axis"].max()) for run in runs)
+        rows.append(Passage(chart, max(ends, default="ok"), error, finer, right))
     return rows
 
 
 def pole(subject: Subject) -> list[Finding]:
     """The finding on the pole; of a bare step it is measured alone, for its chart may be the simplest and no claim."""
-    claim, rows = "" if subject.stepper else declared(subject.method, "pole"), passages(subject.method)
+    right = max(POLE_RIGHT, subject.rounding(2.0 * POLE_STEPS))
+    claim, rows = "" if subject.stepper else declared(subject.method, "pole"), passages(subject.method, right)
     relevant = [one for one in rows if one.chart != "angles"] or rows
     verdict = "measured" if not claim else "confirmed" if all(one.passes for one in relevant) else "refuted"
     if claim and any(one.outcome not in ("ok", "left_chart", "not_finite", "not_normalised") for one in relevant):
         verdict = "undecided"
     measured = Measured(", ".join(dict.fromkeys(one.word for one in relevant)))
     value = max(one.finer for one in relevant)
-    return [Finding("pole", claim, measured, verdict, "; ".join(map(str, rows)), value, POLE_RIGHT)]
+    return [Finding("pole", claim, measured, verdict, "; ".join(map(str, rows)), value, right)]

@@ -143,6 +143,11 @@ class Subject:
         return steps * float(np.finfo(np.float32).eps) * self.single
 
 
+def hidden_by_single(size: float, why: str) -> str:
+    """Why a claim is undecided, with the size below which single precision hides an error."""
+    return f"single precision hides errors below about {size:.0e}: {why}"
+
+
 def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
     """Seconds a step, from runs of more and more steps without what a run costs at its start; SymtopError without one.
 
