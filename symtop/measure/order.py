@@ -109,14 +109,9 @@ def power_law(x: ArrayLike, y: ArrayLike, used: ArrayLike | None = None) -> Fit:
 
 
 def order(
-    step_size: ArrayLike,
-    error: ArrayLike,
-    bound: ArrayLike,
-    omega: float,
-    claim: int | None = None,
-    *,
+    step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, omega: float, claim: int | None = None, *,
     symmetric: bool | None = None,
-) -> Fit:
+) -> Fit:  # fmt: skip
     """The order of a method as h -> 0, from errors at several steps; `bound` is the least error that can be judged.
 
     `claim` is the declared order and only widens the range of steps. The series of a `symmetric` method goes on in h^2.
