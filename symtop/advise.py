@@ -153,6 +153,11 @@ class _Question(NamedTuple):
         """An answer."""
         return Advice(self.scene.name, self.quantity, self.accuracy, self.horizon, **facts)
 
+    def trial(self, run: settings.Met) -> "_Trial":
+        """A candidate that was run to the horizon."""
+        confidence = "checked" if run.error + run.bound <= self.accuracy else "at the reference's limit"
+        return _Trial(run, run.error, math.nan, confidence, self.horizon)
+
     def allows(self, method: Integrator) -> bool:
         """Is a method what the user can use, before its error is known?"""
         claims = [claim for kept in self.keeps for claim in KEPT[kept]]
@@ -388,32 +393,25 @@ def _try(question: _Question, method: Integrator, patience: float) -> "_Trial | 
     """A candidate's setting and cost from short runs, or the reason why it has none, or its error at the step."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
-        return _at_step(question, method, question.step)
+        try:
+            run = settings.attempt(scene, method, question.step, horizon, quantity)
+        except SymtopError as error:  # a start at a pole, for a method in the angles chart
+            return f"Not run, as {error}"
+        if not run.error <= accuracy:
+            return run.error if math.isfinite(run.error) else "No run ends well at this step"
+        return question.trial(run)
     period = scene.nutation_period
     short = min(horizon, settings.SHORT * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** settings.growth(method, quantity)
-    run = settings.search(
+    best = settings.search(
         scene, method, accuracy * law, quantity, short, patience=patience, longest=question.max_step
     )  # fmt: skip
-    if isinstance(run, str):
-        dear = run == settings.BUDGET and patience < settings.MOST_EVALUATIONS[method.implementation]
-        return f"Not within {TOO_DEAR:g} times the work of the best" if dear else run
-    if method.fixed_step and horizon / run.setting > MOST_STEPS:
+    if isinstance(best, str):
+        dear = best == settings.BUDGET and patience < settings.MOST_EVALUATIONS[method.implementation]
+        return f"Not within {TOO_DEAR:g} times the work of the best" if dear else best
+    if method.fixed_step and horizon / best.setting > MOST_STEPS:
         return f"Would need more than {MOST_STEPS:.0e} steps"
-    return _Trial(run, run.error / law, math.nan, "extrapolated", horizon)
-
-
-def _at_step(question: _Question, method: Integrator, step: float) -> "_Trial | str | float":
-    """A run to the horizon with the step that the user has, or its error if that is too large, or why it failed."""
-    scene, accuracy, quantity, horizon = question[:4]
-    try:
-        run = settings.attempt(scene, method, step, horizon, quantity)
-    except SymtopError as error:  # a start at a pole, for a method in the angles chart
-        return f"Not run, as {error}"
-    if not run.error <= accuracy:
-        return run.error if math.isfinite(run.error) else "No run ends well at this step"
-    confidence = "checked" if run.error + run.bound <= accuracy else "at the reference's limit"
-    return _Trial(run, run.error, math.nan, confidence, horizon)
+    return _Trial(best, best.error / law, math.nan, "extrapolated", horizon)
 
 
 def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]], rounds: int = 5) -> list[_Trial]:
@@ -443,9 +441,7 @@ def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
     )  # fmt: skip
     if isinstance(best, str):
         return f"Good enough over a short run but not to the end ({best[0].lower()}{best[1:]})"
-    run = settings.rounded(scene, best, MARGIN * accuracy, quantity)
-    confidence = "checked" if run.error + run.bound <= accuracy else "at the reference's limit"
-    return _Trial(run, run.error, math.nan, confidence, horizon)
+    return question.trial(settings.rounded(scene, best, MARGIN * accuracy, quantity))
 
 
 def _advice(
@@ -582,10 +578,10 @@ class EngineAdvice:
     def __str__(self) -> str:
         default, maps = next(iter(self.errors)), _settings()[self.engine]
         run = f"step {self.step_size:g}{self.unit}, to t = {self.horizon:g}{self.unit}"
-        lines = [
-            f"{self.engine} on {self.scene}, {run}: the axis is off by",
-            *(f"    {_error_text(value)}  {name} ({maps[name]})" for name, value in self.errors.items()),
-        ]
+        lines = [f"{self.engine} on {self.scene}, {run}: the axis is off by"]
+        for name, value in self.errors.items():
+            error = f"{value:.2e} rad" if value < math.pi else "ended early "
+            lines.append(f"    {error}  {name} ({maps[name]})")
         near = self.errors[self.best] <= WORST
         if self.best != default and near:
             times = self.errors[default] / (self.errors[self.best] or math.nan)
@@ -603,11 +599,6 @@ class EngineAdvice:
         much = f"{self.gain:.3g} times fewer" if self.gain >= 1.0 else f"{1.0 / self.gain:.3g} times more"
         lines.append(f"As near as {self.best} with {much} force evaluations: {self.advice.reason}")
         return "\n".join(lines)
-
-
-def _error_text(error: float) -> str:
-    """An axis error of an engine's map, or that its run ended early."""
-    return f"{error:.2e} rad" if error < math.pi else "ended early "
 
 
 def _settings() -> dict[str, dict[str, str]]:

@@ -1,7 +1,7 @@
 """What is computed and stored of the damped oscillator and of the damped top.
 
 The oscillator (m = k = 1, released from x = 1 at rest; times in units of sqrt(m/k)) has an analytic solution. The
-damped top has none: its truth is a pair of integrations (see `symtop.methods.lagrangian.damped_top`).
+damped top has none: its truth is a pair of integrations (see `damping`).
 """
 
 from collections.abc import Sequence
@@ -15,14 +15,15 @@ from symtop.measure.order import Fit, power_law
 from symtop.methods.lagrangian.damped_oscillator import (
     Array,
     Oscillator,
-    discrete_exponents,
     discrete_path,
     legendre,
     notebook_positions,
     rule_sums,
 )
-from symtop.methods.lagrangian.damped_top import Friction, damped_run, damped_truth, six_variables
+from symtop.methods.lagrangian.damped_top import Friction, damped_run
 from symtop.model.scenes import Scene
+
+from .damping import damped_truth, discrete_exponents, six_variables
 
 OSCILLATORS = {f"damping-{b:g}": Oscillator(damping=b) for b in (0.0, 0.1, 1.0, 2.0, 3.0, 4.0)}  # by scene
 AGAINST_RK45 = ("damping-0", "damping-0.1")

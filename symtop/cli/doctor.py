@@ -220,18 +220,6 @@ def kernels() -> int:
     return sum(1 for _ in (cache_root() / "kernels").glob("*"))
 
 
-def compile_all(jobs: int | None = None) -> tuple[int, list[str]]:
-    """Compile what is not on disk; returns how many kernels came to the cache, and which runs could not be done."""
-    from symtop.core.parallel import OneThreadEach, cores
-
-    before, names = kernels(), ["", *variants()]
-    with concurrent.futures.ProcessPoolExecutor(jobs or cores(), OneThreadEach()) as pool:
-        runs = pool.map(_run, names)
-        with progress_bar("compiling", iterable=runs, total=len(names), unit="run") as bar:
-            reasons = list(filter(None, bar))
-    return kernels() - before, reasons
-
-
 @click.command(short_help="Check the installation; say what to do about faults.")
 @results_option
 @click.option("--warm", is_flag=True, help="First compile every kernel, so that no later run waits for the compiler.")
@@ -242,8 +230,14 @@ def doctor(results: str, warm: bool, as_json: bool) -> None:
     The exit code is 1 if there is a fault. It takes some seconds; with --warm, some minutes the first time.
     """
     if warm:
-        count, failed = compile_all()
-        click.echo(f"kernels compiled: {count}; every method was run in each of its charts", err=as_json)
+        from symtop.core.parallel import OneThreadEach, cores
+
+        before, names = kernels(), ["", *variants()]
+        with concurrent.futures.ProcessPoolExecutor(cores(), OneThreadEach()) as pool:
+            runs = pool.map(_run, names)
+            with progress_bar("compiling", iterable=runs, total=len(names), unit="run") as bar:
+                failed = list(filter(None, bar))
+        click.echo(f"kernels compiled: {kernels() - before}; every method was run in each of its charts", err=as_json)
         for why in failed:
             click.echo(f"  not run: {why}", err=True)
     findings = examine(Path(results))

@@ -132,20 +132,14 @@ def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree
     return data
 
 
-def _of_python(value: Any) -> Any:
-    """A number of NumPy's, as somebody's solver may count steps with, as one of Python's; anything else as it is."""
-    if isinstance(value, np.integer):
-        return int(value)
-    return float(value) if isinstance(value, np.floating) else value
-
-
 def attributes_of(title: str, **attributes: Any) -> dict[str, Any]:
     """The attributes of a dataset: conventions, title, those given, as text or numbers of 64 bits, and provenance."""
-    plain = {
-        key: value if isinstance(value, (str, float)) or (type(value) is int and abs(value) < 2**63) else
-        json.dumps(value, sort_keys=True, default=str)
-        for key, value in ((key, _of_python(value)) for key, value in attributes.items())
-    }  # fmt: skip
+    plain: dict[str, Any] = {}
+    for key, value in attributes.items():  # of NumPy, too, as somebody's solver may count steps
+        number = int(value) if isinstance(value, np.integer) else value
+        number = float(value) if isinstance(value, np.floating) else number
+        is_plain = isinstance(number, (str, float)) or (type(number) is int and abs(number) < 2**63)
+        plain[key] = number if is_plain else json.dumps(number, sort_keys=True, default=str)
     return {**CONVENTIONS, "title": title, **plain, **provenance()}
 
 

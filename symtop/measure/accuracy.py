@@ -68,15 +68,9 @@ def as_table(rows: Sequence[Mapping[str, float | str]]) -> xr.Dataset:
 
 
 def error_row(
-    scene: Scene,
-    method: Integrator,
-    setting: float,
-    horizon: float,
-    observe: str | None = None,
-    *,
-    phases: bool = False,
-    budget: float | None = None,
-) -> dict[str, float | str]:
+    scene: Scene, method: Integrator, setting: float, horizon: float, observe: str | None = None, *,
+    phases: bool = False, budget: float | None = None,
+) -> dict[str, float | str]:  # fmt: skip
     """One run's entries in an error table; with `phases` also the errors of its frequencies (see `phase`).
 
     `budget` is that of `simulate`.

@@ -257,7 +257,16 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         raise SymtopError(
             f"data must be a Dataset or a mapping with time and axis, quaternion or theta, not {type(data).__name__}"
         )
-    time = _times(data)
+    if "time" not in data:
+        raise SymtopError("data must hold time, elapsed since the start of the scene; there is none")
+    time = _numbers("time", data["time"])
+    if time.ndim != 1 or time.size == 0:
+        raise SymtopError(f"time must be a row of numbers, not of shape {time.shape}")
+    bad = ~np.isfinite(time) | (np.diff(time, prepend=-1.0 if time[0] == 0.0 else 0.0) <= 0.0)
+    if bad.any():
+        k = int(np.argmax(bad))
+        after = f" after {time[k - 1]:g}" if k else ""
+        raise SymtopError(f"time must be finite, at least 0 and increase, but sample {k} is at {time[k]:g}{after}")
     columns: dict[str, Any] = {name: _numbers(name, data[name]) for name in SHAPES if name in data}
     check_shapes(columns, time.size)
     if not set(ENOUGH) & set(columns):
@@ -281,20 +290,6 @@ def check_shapes(columns: Mapping[str, charts.Array], count: int) -> None:
     for name, values in columns.items():
         if values.shape != (shape := (count, *SHAPES[name])):
             raise SymtopError(f"{name} must have the shape {shape}, one row for each time, not {values.shape}")
-
-
-def _times(data: Mapping[Any, Any]) -> charts.Array:
-    if "time" not in data:
-        raise SymtopError("data must hold time, elapsed since the start of the scene; there is none")
-    time = _numbers("time", data["time"])
-    if time.ndim != 1 or time.size == 0:
-        raise SymtopError(f"time must be a row of numbers, not of shape {time.shape}")
-    bad = ~np.isfinite(time) | (np.diff(time, prepend=-1.0 if time[0] == 0.0 else 0.0) <= 0.0)
-    if bad.any():
-        k = int(np.argmax(bad))
-        after = f" after {time[k - 1]:g}" if k else ""
-        raise SymtopError(f"time must be finite, at least 0 and increase, but sample {k} is at {time[k]:g}{after}")
-    return time
 
 
 def completed(data: Trajectory) -> Trajectory:

@@ -109,14 +109,9 @@ def power_law(x: ArrayLike, y: ArrayLike, used: ArrayLike | None = None) -> Fit:
 
 
 def order(
-    step_size: ArrayLike,
-    error: ArrayLike,
-    bound: ArrayLike,
-    omega: float,
-    claim: int | None = None,
-    *,
+    step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, omega: float, claim: int | None = None, *,
     symmetric: bool | None = None,
-) -> Fit:
+) -> Fit:  # fmt: skip
     """The order of a method as h -> 0, from errors at several steps; `bound` is the least error that can be judged.
 
     `claim` is the declared order and only widens the range of steps. The series of a `symmetric` method goes on in h^2.
@@ -180,10 +175,7 @@ def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> s
 
 @functools.lru_cache(maxsize=4096)  # the words, tables and figures of a study ask for the same 1,600
 def _widest(steps: bytes, errors: bytes, bounds: bytes, power: int) -> tuple[float, float, float, slice] | None:
-    """Slope, interval and constant of the series over the widest window of points, fine to coarse, that it describes.
-
-    The window comes last; None without one.
-    """
+    """Slope, interval and constant of the series over the widest window of points that it describes; the window."""
     h, e, b = (np.frombuffer(values) for values in (steps, errors, bounds))
     first, last = 0, h.size
     while last - first >= LEAST:

@@ -117,10 +117,7 @@ Words = list[Array]  # coefficients of the words of length 0, 1, 2 ..., shapes (
 
 def product(first: Words, second: Words) -> Words:
     """The product of two series of words."""
-    return [
-        np.sum([np.multiply.outer(first[j], second[k - j]).ravel() for j in range(k + 1)], axis=0)
-        for k in range(len(first))
-    ]
+    return [np.sum([np.kron(first[j], second[k - j]) for j in range(k + 1)], axis=0) for k in range(len(first))]
 
 
 def commutator(first: Words, second: Words) -> Words:
@@ -171,7 +168,9 @@ def _vanishing(length: int, letters: int) -> Array:
         columns += [_spread(column, 0) for column in _vanishing(length - 1, letters).T]
         columns += [_spread(column, 1) for column in _vanishing(length - 1, letters - 1).T]
         if letters > length - letters + 1:
-            columns += [_nested(word, length) for word in range(2**length) if word.bit_count() == letters]
+            for word in (word for word in range(2**length) if word.bit_count() == letters):
+                bits = [word >> place & 1 for place in range(length)]  # [x1, [x2, ... [x(n-1), xn]]], the last first
+                columns.append(functools.reduce(_spread, bits[1:], np.eye(2)[bits[0]]))
     if not columns:
         return np.zeros((2**length, 0))
     left, sizes, _ = np.linalg.svd(np.stack(columns, axis=1), full_matrices=False)
@@ -181,15 +180,7 @@ def _vanishing(length: int, letters: int) -> Array:
 def _spread(column: Array, letter: int) -> Array:
     """[X, column] for the letter X."""
     one = np.eye(2)[letter]
-    return np.asarray(np.multiply.outer(one, column).ravel() - np.multiply.outer(column, one).ravel())
-
-
-def _nested(word: int, length: int) -> Array:
-    """[x1, [x2, ... [x(n-1), xn]]] of the letters of a word."""
-    column: Array = np.eye(2)[word & 1]
-    for place in range(1, length):
-        column = _spread(column, word >> place & 1)
-    return column
+    return np.asarray(np.kron(one, column) - np.kron(column, one))
 
 
 def splitting_conditions(

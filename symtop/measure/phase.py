@@ -127,14 +127,12 @@ def _split(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Split:
     turns = np.rint((np.unwrap(lag, period=period) - lag) / period)
     off = np.abs(x * across - y * along) / np.hypot(along, across)
     turn = phi - phi_true - rate * rest - turns * closed_form(scene).phi_per_period
-    return Split(off, lag + turns * period, _steadied(t, turn, np.sqrt(np.maximum(1.0 - u_true * u_true, 0.0))))
-
-
-def _steadied(t: Array, turn: Array, sine: Array) -> Array:
-    """The lag without whole turns that it seems to make while the axis is next to a pole, where phi may jump by pi."""
+    # next to a pole phi may jump by pi, and the lag seem to make whole turns
+    sine = np.sqrt(np.maximum(1.0 - u_true * u_true, 0.0))
     clear = sine > CLEAR * np.max(sine)
     guide = np.interp(t, t[clear], np.unwrap(turn[clear]))
-    return turn - 2.0 * math.pi * np.rint((turn - guide) / (2.0 * math.pi))
+    turn = turn - 2.0 * math.pi * np.rint((turn - guide) / (2.0 * math.pi))
+    return Split(off, lag + turns * period, turn)
 
 
 def _slope(t: Array, values: Array, bound: Array, weights: Array) -> tuple[float, float]:

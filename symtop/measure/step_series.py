@@ -13,6 +13,7 @@ What a run carries from step to step is not seen in one step from a start; `step
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, III.1 (the elementary differentials of a step).
 """
 
+import contextlib
 import functools
 import math
 from collections.abc import Callable
@@ -108,7 +109,7 @@ def compared(
             fitted = _fitted(image, motion, width, chart, backward=backward)
         except SymtopError as error:
             refusal = error
-            if backward and _refuses(image, width):
+            if backward and _steps(image, 1e-3 * width) and not _steps(image, -1e-3 * width):
                 backward = False
                 continue
         else:
@@ -122,15 +123,10 @@ def compared(
     return best[1]
 
 
-def _refuses(image: Callable[[float], Array], width: float) -> bool:
-    """Does it make a step of h and none of -h?"""
-    try:
-        image(1e-3 * width)
-    except SymtopError:
-        return False
-    try:
-        image(-1e-3 * width)
-    except SymtopError:
+def _steps(image: Callable[[float], Array], h: float) -> bool:
+    """Does it make a step of h?"""
+    with contextlib.suppress(SymtopError):
+        image(h)
         return True
     return False
 

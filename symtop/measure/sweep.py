@@ -246,10 +246,7 @@ def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
 
 
 def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Dataset]]:
-    """Scenes and variants of an earlier sweep, and its error tables by their digests.
-
-    Raises SymtopError for a file that is no sweep's.
-    """
+    """Scenes and variants of an earlier sweep, and its error tables by their digests; SymtopError for another file."""
     if file is None or not file.exists():
         return [], {}
     data = netcdf.read(file).drop_attrs()

@@ -76,16 +76,9 @@ def _calibrate(function: Callable[[], object], batch: float) -> tuple[int, float
 
 
 def timings(
-    functions: Sequence[Callable[[], object]],
-    batches: int = 5,
-    batch: float = BATCH,
-    *,
-    warm: bool = False,
-    patience: float = math.inf,
-    close: float = 0.0,
-    least: int = 2,
-    exact: bool = True,
-) -> list[Timing]:
+    functions: Sequence[Callable[[], object]], batches: int = 5, batch: float = BATCH, *, warm: bool = False,
+    patience: float = math.inf, close: float = 0.0, least: int = 2, exact: bool = True,
+) -> list[Timing]:  # fmt: skip
     """Time several functions against each other.
 
     Those that are `warm`, called before, have no first call (NaN), and a call that turns out to be longer than a batch

@@ -197,8 +197,15 @@ def long_run(
                     checkpoints.note(at, rows)
         with foreign_code(f"integrator {method.name} on {chosen.name}"):
             ended = ending(outcome)
+        columns = np.array(rows).reshape(len(rows), len(quantities), 3)
+        variables: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
+        for i, name in enumerate(quantities):
+            words, units = ("theta", "rad") if name == "theta" else (f"relative change of {name} since the start", "1")
+            for m, part in enumerate(("least", "largest", "mean")):
+                attributes = {"long_name": f"{words}, {part} over the window", "units": units}
+                variables[f"{name}_{part}"] = ("window", columns[:, i, m], attributes)
         data = netcdf.describe(
-            _windowed(rows, ends, quantities), title=f"{title}, {count} steps", units=chosen.units,
+            xr.Dataset(variables), title=f"{title}, {count} steps", units=chosen.units,
             integrator=method.name, scene=chosen.name, step_size=h, horizon=count * h,
             compensated=str(compensated).lower(), outcome=ended, reached_time=reached * h,
             outcome_message=sentence(ended, reached * h, count * h, chosen.second),
@@ -209,27 +216,13 @@ def long_run(
     return data
 
 
-def _windowed(rows: list[list[float]], ends: list[int], quantities: tuple[str, ...]) -> xr.Dataset:
-    columns = np.array(rows).reshape(len(rows), len(quantities), 3)
-    variables: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
-    for i, name in enumerate(quantities):
-        words, units = ("theta", "rad") if name == "theta" else (f"relative change of {name} since the start", "1")
-        for m, part in enumerate(("least", "largest", "mean")):
-            attributes = {"long_name": f"{words}, {part} over the window", "units": units}
-            variables[f"{name}_{part}"] = ("window", columns[:, i, m], attributes)
-    return xr.Dataset(variables)
-
-
 def summary(values: dict[str, Array]) -> list[float]:
     """Least, largest and mean of each quantity, in their order."""
     return [float(part) for value in values.values() for part in (value.min(), value.max(), value.mean())]
 
 
 def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:
-    """A hash of all that decides the bits of a run; one name may stand for other coefficients or code next time.
-
-    Code counts as it is compiled (`symtop.core.code_hash`), so that a checkpoint outlives a comment.
-    """
+    """A hash of all that decides the bits of a run; code counts as it is compiled: a checkpoint outlives a comment."""
     numbers = [[getattr(record, name) for name in record.__slots__] for record in (scene.top, scene.start)]
     settings = [numbers, h, steps, compensated, FIRST, PER_DECADE, LONGEST, SAMPLES]
     made = by_file(code_of((method, watch, windows, scattered, summary)))

@@ -170,7 +170,8 @@ def simulate(
 
     Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
     """
-    report = guard if callable(guard) else _warn if isinstance(guard, str) or boolean("guard", guard) else None
+    warn = functools.partial(warnings.warn, category=SymtopWarning, stacklevel=3)  # where `simulate` was called
+    report = guard if callable(guard) else warn if isinstance(guard, str) or boolean("guard", guard) else None
     arguments = scene, integrator, step_size, tolerance, horizon, samples, observe, budget
     chosen, method, chart, plan, dithered = _prepared(*arguments)
     if isinstance(guard, str) and one_of("guard", guard, ("exact", "series")) == "exact" and chosen.of_body:
@@ -222,10 +223,6 @@ def _guarded(
         guard(caution)
     states = solve(method, chart, scene.top, scene.start, plan, f" on {scene.name}")
     return Trajectory.of_run(scene, chart, plan, states), caution
-
-
-def _warn(sentence: str) -> None:
-    warnings.warn(sentence, SymtopWarning, stacklevel=4)  # where `simulate` was called
 
 
 @functools.lru_cache(maxsize=256)

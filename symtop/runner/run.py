@@ -23,7 +23,7 @@ from symtop.measure import columns
 from symtop.measure.datasets import Combined, combine
 from symtop.model.scenes import all_scenes
 from symtop.run import plugins
-from symtop.runner import fingerprint, manifest, store
+from symtop.runner import fingerprint, store
 from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool, prepare
 from symtop.runner.scripts import file_beside, file_of, folder, load, names
@@ -70,7 +70,7 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
     first = next(rounds)
     drawing = drawing_digest(study, save)
     made_of = code_hash.hashed(*sorted(path.name for path in first), drawing)
-    if not fresh and manifest.is_current(results, study.name, made_of):
+    if not fresh and store.is_current(results, study.name, made_of):
         stored = netcdf.read_json(results / f"{study.name}.json")
         if isinstance(stored, dict):
             return Started(lambda: stored | {"computed": 0, "seconds": time.monotonic() - began})
@@ -148,7 +148,7 @@ def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> 
         if not cases.failures and made_of:
             pictures = [results / "figures" / picture["file"] for picture in findings["pictures"]]
             tables = [results / "tables" / table["file"] for table in findings["tables"]]
-            manifest.note(results, study.name, made_of, [dataset, words, *pictures, *tables, *cases.cases])
+            store.note(results, study.name, made_of, [dataset, words, *pictures, *tables, *cases.cases])
     return findings
 
 

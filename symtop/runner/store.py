@@ -6,13 +6,18 @@ results/cases/STUDY/.SCENE--INTEGRATOR--SETTINGS--DIGEST.lock          while it 
 results/STUDY.nc                                                       all of them, with labelled dimensions
 results/STUDY.json                                                     facts, and names of figures and tables
 results/figures/STUDY-NAME.png, results/tables/STUDY-NAME.csv
-results/cases/manifest.json                                            what these were made of (`manifest`)
+results/cases/manifest.json                                            what these were made of
 
 SETTINGS is a hash of what the case was asked to do, DIGEST one of everything that its numbers depend on; its file holds
 both in full, and a hash of all its content: a truncated, damaged or foreign file counts as none. It is removed when a
 case with the same SETTINGS and another DIGEST takes its place. The operating system ends a lock with its process.
+
+The entry of a study in the manifest holds a hash of what its files were made of, and size and time of the last change
+of each. A disk that loses bits by itself is found by ``symtop study --check``. Without the manifest everything is read
+and drawn again, and nothing is computed again.
 """
 
+import contextlib
 import json
 import tempfile
 from collections.abc import Collection, Iterable
@@ -144,3 +149,40 @@ def tidy(results: Path, study: Study) -> None:
                 netcdf.sweep(file)
             for partial in (results / "figures").glob(f".{study.name}-*.part*"):
                 partial.unlink(missing_ok=True)
+
+
+def manifest(results: Path) -> Path:
+    """The manifest of a folder."""
+    return results / "cases" / "manifest.json"
+
+
+def _entries(results: Path) -> dict[str, Any]:
+    content = netcdf.read_json(manifest(results))
+    return content if isinstance(content, dict) else {}
+
+
+def _marks(results: Path, paths: Iterable[Path]) -> dict[str, list[int] | None]:
+    """Size and time of the last change (ns) of files by their place in the folder; None for one that is missing."""
+    marks: dict[str, list[int] | None] = {path.relative_to(results).as_posix(): None for path in paths}
+    for name in marks:
+        with contextlib.suppress(OSError):
+            facts = (results / name).stat()
+            marks[name] = [facts.st_size, facts.st_mtime_ns]
+    return marks
+
+
+def is_current(results: Path, name: str, made_of: str) -> bool:
+    """Was an entry of the manifest made of that, and is every file of it there and unchanged?"""
+    entry = _entries(results).get(name)
+    if not isinstance(entry, dict) or entry.get("made_of") != made_of or not isinstance(entry.get("files"), dict):
+        return False
+    marks = entry["files"]
+    return None not in marks.values() and marks == _marks(results, [results / file for file in marks])
+
+
+def note(results: Path, name: str, made_of: str, paths: Iterable[Path]) -> None:
+    """Write that the files of an entry are up to date; another process may be writing another entry."""
+    with locked(manifest(results), wait=True):
+        netcdf.sweep(manifest(results))
+        entry = {"made_of": made_of, "files": _marks(results, paths)}
+        netcdf.write_json(manifest(results), _entries(results) | {name: entry})

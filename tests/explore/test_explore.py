@@ -11,6 +11,7 @@ import warnings
 
 import numpy as np
 import pytest
+from symtop_studies.oscillators.damping import damped_truth
 
 import symtop
 from symtop.core import netcdf
@@ -18,7 +19,7 @@ from symtop.core.errors import SymtopError, SymtopWarning
 from symtop.explore import answers, cost
 from symtop.measure.sweep import timed_rows
 from symtop.methods.framework.registry import engines
-from symtop.methods.lagrangian.damped_top import Friction, damped_truth
+from symtop.methods.lagrangian.damped_top import Friction
 from symtop.model import charts
 from symtop.model.scenes import closed_form
 from symtop.run.simulation import integrate

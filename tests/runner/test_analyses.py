@@ -11,7 +11,7 @@ import xarray as xr
 
 import symtop
 from symtop.core import files
-from symtop.runner import manifest, run as runner, store
+from symtop.runner import run as runner, store
 from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool
 from symtop.runner.run import analyse_stored, drawing_digest
@@ -122,10 +122,10 @@ def test_a_study_that_is_edited_before_it_is_concluded_is_drawn_again(script, tm
         cases = StudyCases(study, tmp_path / "r")
         runner.run(study, tmp_path / "r", quiet=True)
         cases.add(study.grid())
-        manifest.path_of(tmp_path / "r").unlink()
+        store.manifest(tmp_path / "r").unlink()
         drawing = drawing_digest(study, None) if name == "second" else "before the edit"
         analyse_stored(file, (), tmp_path / "r", cases.cases, [], "made of", drawing, None, quick=False)
-        assert manifest.is_current(tmp_path / "r", name, "made of") is (name == "second")
+        assert store.is_current(tmp_path / "r", name, "made of") is (name == "second")
 
 
 @pytest.mark.usefixtures("shared")

@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from symtop.core import netcdf
-from symtop.runner import manifest, run as runner, store
+from symtop.runner import run as runner, store
 from tests.commands import PROBE
 from tests.runner.test_rounds import ROUNDS
 
@@ -79,7 +79,7 @@ def test_a_dataset_that_is_gone_or_damaged_is_made_again(bring):
 def test_a_damaged_manifest_is_not_believed(bring):
     computed, _ = bring()
     for nonsense in ("", "[]", '{"probe": 1, "rounds": 1}', '{"probe": {}, "rounds": {"files": []}}'):
-        manifest.path_of(bring.folder).write_text(nonsense)
+        store.manifest(bring.folder).write_text(nonsense)
         again, read = bring()
         assert (again, read >= computed) == (0, True), nonsense
         assert bring() == (0, 0)

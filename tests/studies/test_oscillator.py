@@ -7,6 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 from symtop_studies.oscillators import facts, figures, study
+from symtop_studies.oscillators.damping import damped_truth, discrete_exponents
 from symtop_studies.oscillators.measures import convergence, damped_top_table, decay, notebook_history
 from symtop_studies.oscillators.quartic_measures import QUARTICS
 
@@ -16,12 +17,11 @@ from symtop.measure.order import power_law
 from symtop.methods.lagrangian.damped_oscillator import (
     ONE_SIDED,
     Oscillator,
-    discrete_exponents,
     discrete_path,
     notebook_positions,
     rule_sums,
 )
-from symtop.methods.lagrangian.damped_top import Friction, damped_run, damped_truth
+from symtop.methods.lagrangian.damped_top import Friction, damped_run
 from symtop.runner.study import Case
 from tests.templates import checked
 

@@ -5,6 +5,7 @@ that fits its plan. A run whose states cease to be finite without its saying so 
 """
 
 import contextlib
+import copy
 from numbers import Real
 from typing import Any
 
@@ -27,29 +28,21 @@ def solve(method: Integrator, chart: str, top: Any, start: Any, plan: Plan, cont
     A run that blows up is data: NumPy says nothing of overflow or NaN. Raises SymtopError if the solver raises, changes
     the top or the start, or returns anything but a Run that fits.
     """
-    solver, records = method.solvers[chart], (top, start)
+    solver = method.solvers[chart]
     with foreign_code(f"integrator {method.name}{context}"):
-        own = getattr(solver, "__module__", "").startswith(OWN)
-        fields = (
-            [] if own else [(record, name, getattr(record, name)) for record in records for name in record.__slots__]
-        )
-        given = plan if own else plan._replace(times=plan.times.copy(), marks=plan.marks.copy())
+        own, given = getattr(solver, "__module__", "").startswith(OWN), (top, start, plan)
+        if not own:
+            plain = plan._replace(times=plan.times.copy(), marks=plan.marks.copy())
+            given = copy.copy(top), copy.copy(start), plain
         backwards = not own and plan.step_size < 0.0  # a loop that counts on a step forwards never ends
         try:
             with np.errstate(all="ignore"), at_most(PATIENCE) if backwards else contextlib.nullcontext():
-                run = solver(top, start, given)
-        finally:  # also where it raises: others use the top and the start, too
-            _restore(method, fields)
+                run = solver(*given)
+        finally:  # also where it raises: a change is the likelier cause
+            if not own and given[:2] != (top, start):
+                raise SymtopError(f"integrator {method.name} must not change the top or the start that it is given")
         checked = _checked(method, (plan.times.size, DIMENSIONS[chart]), plan, run, copy=not own)
         return _of_length_one(plan, checked, chart) if chart in QUATERNIONS else checked
-
-
-def _restore(method: Integrator, fields: list[tuple[Any, str, Any]]) -> None:
-    """Undo what a solver has changed of the top or the start, and refuse it."""
-    if any(getattr(record, name) != value for record, name, value in fields):
-        for record, name, value in fields:
-            object.__setattr__(record, name, value)
-        raise SymtopError(f"integrator {method.name} must not change the top or the start that it is given")
 
 
 def _checked(method: Integrator, shape: tuple[int, int], plan: Plan, run: Any, *, copy: bool) -> Run:

@@ -19,7 +19,6 @@ conserved. The trapezoidal rule moves critical damping from b^2 = 4 m k to 4 m k
 Source: Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357, part three.
 """
 
-import cmath
 import math
 from typing import Any, NamedTuple
 
@@ -146,29 +145,6 @@ def discrete_path(
     h, start = horizon / steps, (position, oscillator.mass * velocity)
     states = _march(oscillator, rule, start, h, marks).states
     return marks.astype(np.float64) * h, states[:, 0], states[:, 1]
-
-
-def discrete_exponents(oscillator: Oscillator, rule: Sums, h: float) -> tuple[complex, complex]:
-    """log(z)/h of the two eigenvalues z of the step map, the slower decay first: the exponents of the discrete motion.
-
-    In positions alone the step reads A q2 - B q1 + C q0 = 0 with A - C = b, whatever the rule, and the discriminant
-    B^2 - 4 A C = (b + h k (r-l))^2 - 4 m k + 4 (h k)^2 (s - r^2) + 4 b h k (f - r), free of cancellation
-    (l, r, s, f: the sums `left`, `right`, `square`, `pull`).
-    """
-    first, last = _stiffnesses(oscillator, rule, h)
-    b, spring = oscillator.damping, h * oscillator.stiffness
-    middle = first + last - spring * rule.left
-    discriminant = (b + spring * (rule.right - rule.left)) ** 2 - 4.0 * oscillator.mass * oscillator.stiffness
-    discriminant += 4.0 * spring * (spring * (rule.square - rule.right**2) + b * (rule.pull - rule.right))
-    root = cmath.sqrt(discriminant)
-    if b < 0.5 * first and abs(root) < 0.5 * middle:  # z near 1: its logarithm without cancellation
-        mean, half = complex(math.log1p(-b / first) / (2.0 * h)), cmath.atanh(root / middle) / h
-        exponents = [mean + half, mean - half]
-    else:
-        eigenvalues = ((middle + root) / (2.0 * first), (middle - root) / (2.0 * first))
-        exponents = [cmath.log(z) / h if z != 0.0 else complex(-math.inf) for z in eigenvalues]
-    slow, fast = sorted(exponents, key=lambda exponent: (-exponent.real, -exponent.imag))
-    return slow, fast
 
 
 def notebook_positions(damping: float, h: float, first: float, second: float, steps: int) -> tuple[Array, Array]:

@@ -11,8 +11,8 @@ and psi likewise, so that the momenta are not conserved but balanced, p_phi1 - p
 the motion itself has the same invariants p_phi + c_phi phi and p_psi + c_psi psi, and the discrete one keeps them to
 rounding. Order 2. The kernel is that of `unreduced`. Not in the registry, whose methods step the free top.
 
-The motion has no closed form; its truth is a pair of integrations by DOP853 at tolerance 1e-13. One has the six
-Euler-Lagrange equations, the other the four that remain when both momenta are eliminated by their balance.
+The motion has no closed form; its truth is integrated by DOP853 at tolerance 1e-13, in the four equations that remain
+when both momenta are eliminated by their balance.
 Source: Marsden and West, Acta Numerica 10 (2001) 357, part three.
 """
 
@@ -21,10 +21,7 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from symtop.core.errors import SymtopError
-from symtop.methods.framework.angles import accelerations, with_rates
 from symtop.methods.framework.loop import March, Marks
 from symtop.methods.lagrangian.discrete_lagrangian import RULES, quadrature
 from symtop.methods.lagrangian.unreduced import march, with_momenta
@@ -53,22 +50,7 @@ def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Mar
     return march(damped, quadrature(*RULES[rule][:2])[0], state, h, marks)
 
 
-def _six_equations(scene: Scene, friction: Friction) -> Rates:
-    """y' for y = (theta, phi, psi, theta', phi', psi') with friction: M q'' gains (0, -c_phi phi', -c_psi psi')."""
-    top = scene.top
-
-    def rates(_: float, y: Any) -> tuple[float, ...]:
-        theta, _phi, _psi, theta_dot, phi_dot, psi_dot = y
-        nod, swing, spin = accelerations(top.I1, top.I3, top.mgl, theta, theta_dot, phi_dot, psi_dot)
-        s, c = math.sin(theta), math.cos(theta)
-        torque = -friction.spin * psi_dot
-        turn = (-friction.precession * phi_dot - c * torque) / (top.I1 * s * s)
-        return theta_dot, phi_dot, psi_dot, nod, swing + turn, spin + torque / top.I3 - c * turn
-
-    return rates
-
-
-def _four_equations(scene: Scene, friction: Friction) -> tuple[Rates, tuple[float, ...]]:
+def four_equations(scene: Scene, friction: Friction) -> tuple[Rates, tuple[float, ...]]:
     """y' for y = (theta, phi, psi, p_theta), the momenta p = p0 - c (angle - angle0) eliminated, and y at the start."""
     top, start = scene.top, scene.start
     momenta = top.momenta(start)
@@ -84,20 +66,6 @@ def _four_equations(scene: Scene, friction: Friction) -> tuple[Rates, tuple[floa
     return rates, (start.theta, start.phi, start.psi, top.I1 * start.theta_dot)
 
 
-def six_variables(scene: Scene, friction: Friction, times: Array, solver: str, tolerance: float) -> Array:
-    """(theta, phi, psi, theta', phi', psi') by one of SciPy's solvers, shape (6, times); SymtopError if it fails."""
-    start = with_rates(scene.top, scene.start)[1]
-    return integrated(_six_equations(scene, friction), start, times, solver, tolerance)
-
-
-def damped_truth(scene: Scene, friction: Friction, times: Array) -> tuple[Array, float]:
-    """The same at tolerance 1e-13, and its largest distance (rad) in any angle from the four equations' motion."""
-    solver = ("DOP853", 1e-13)
-    six = six_variables(scene, friction, times, *solver)
-    four = integrated(*_four_equations(scene, friction), times, *solver)
-    return six, float(np.max(np.abs(six[:3] - four[:3])))
-
-
 def _near_pole(_: float, y: Any) -> float:
     """Falls through zero where the axis comes within `NEAR` of a pole."""
     return math.sin(y[0]) - math.sin(NEAR)
@@ -111,7 +79,7 @@ def theta_before_pole(scene: Scene, friction: Friction, times: Array, most: int)
 
     SymtopError if it takes more than `most` evaluations.
     """
-    (rates, start), count = _four_equations(scene, friction), itertools.count(1)
+    (rates, start), count = four_equations(scene, friction), itertools.count(1)
 
     def counted(t: float, y: Any) -> tuple[float, ...]:
         if next(count) > most:

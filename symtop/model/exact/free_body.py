@@ -425,12 +425,9 @@ class FreeBody:
     """
 
     def __init__(
-        self,
-        inertia: ArrayLike,
-        quaternion: ArrayLike,
-        momentum_body: ArrayLike,
+        self, inertia: ArrayLike, quaternion: ArrayLike, momentum_body: ArrayLike,
         momentum_lo: ArrayLike = (0.0, 0.0, 0.0),
-    ) -> None:
+    ) -> None:  # fmt: skip
         given = checked_body(inertia, quaternion, momentum_body, momentum_lo)
         given[3:7] /= math.hypot(*given[3:7])
         self._constants = np.zeros(SIZE)

@@ -74,13 +74,9 @@ class HeavyBody:
     """
 
     def __init__(
-        self,
-        inertia: ArrayLike,
-        weight: ArrayLike,
-        quaternion: ArrayLike,
-        momentum_body: ArrayLike,
+        self, inertia: ArrayLike, weight: ArrayLike, quaternion: ArrayLike, momentum_body: ArrayLike,
         momentum_lo: ArrayLike = (0.0, 0.0, 0.0),
-    ) -> None:
+    ) -> None:  # fmt: skip
         row = checked_body(inertia, quaternion, momentum_body, momentum_lo).tolist()
         heavy = real_numbers("weight", weight)
         if heavy.shape != (3,) or not np.isfinite(heavy).all():

@@ -262,18 +262,11 @@ def judged_integration(scene: Scene, times: Array, precision: str, run: Integrat
     grain = 8.0 * max(heyoka.arithmetic(precision).epsilon, 2.0 * EPSILON**2)  # what a pair of doubles can hold
     columns: dict[str, Array] = {}
     for name, value in values.items():
-        columns[name], columns[f"{name}_lo"] = _split(value)
+        columns[name] = value.astype(np.float64)
+        columns[f"{name}_lo"] = (value - columns[name].astype(value.dtype)).astype(np.float64)
     bounds = _bounds(times, columns, checks, grain)
     _raise_to_distance(bounds, columns, closed_values(scene, times))
     return _dataset(scene, times, columns, bounds)
-
-
-def _split(values: Any) -> tuple[Array, Array]:
-    """High and low halves, each a double."""
-    high = values.astype(np.float64)
-    if values.dtype == np.float64:
-        return high, np.zeros_like(high)
-    return high, (values - high.astype(values.dtype)).astype(np.float64)
 
 
 def _bounds(times: Array, shown: dict[str, Any], checks: Checks, grain: float) -> dict[str, Array]:
