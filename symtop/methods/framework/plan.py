@@ -30,9 +30,7 @@ class Plan(NamedTuple):
     budget: float | None = None  # force evaluations, steps of a Taylor method; None for the method's own limit
 
     @classmethod
-    def steps(
-        cls, h: float, marks: ArrayLike, horizon: float | None = None, budget: float | None = None
-    ) -> Self:
+    def steps(cls, h: float, marks: ArrayLike, horizon: float | None = None, budget: float | None = None) -> Self:
         """Steps of h, sampled after `marks` of them; `horizon` if it is not their product to the last bit."""
         whole_steps = np.asarray(marks, dtype=np.int64)
         end = float(whole_steps[-1]) * h if horizon is None else horizon
