@@ -36,7 +36,10 @@ def least(data, target, variable="force_evaluations"):
     }
 
 
-def test_each_run_is_that_of_simulate(data):
+def test_each_run_is_that_of_simulate_and_every_variable_has_words_and_units(data):
+    assert [fault for fault in lacking(data) if fault != "long_name of variant"] == []
+    assert (data["error"].attrs["units"], data.attrs["timed"]) == ("rad", "nothing")
+    assert np.isnan(data["seconds"]).all()
     charts = ["midpoint[angles]", "stormer-verlet[angles]", "rk4[axis]", "taylor[axis]"]
     assert data["variant"].values.tolist() == charts
     scene = symtop.scene("goldstein")
@@ -51,7 +54,7 @@ def test_each_run_is_that_of_simulate(data):
     assert cell["steps_per_nutation"].values[place] == pytest.approx(scene.nutation_period / row["step_size"])
 
 
-def test_what_theory_says_of_the_costs(data):
+def test_what_theory_says_of_the_costs_and_why_some_are_not_reached(data):
     coarse, fine = least(data, 1e-3), least(data, 1e-6)
     assert fine["taylor[axis]"] < fine["rk4[axis]"] < fine["stormer-verlet[angles]"] < fine["midpoint[angles]"]
     assert all(coarse[name] <= fine[name] for name in coarse)
@@ -61,9 +64,6 @@ def test_what_theory_says_of_the_costs(data):
     for name in ("rk4[axis]", "taylor[axis]"):
         cell = data.sel(variant=name)
         assert (np.diff(cell["force_evaluations"].values[cell["outcome"].values == "ok"]) >= 0.0).all()
-
-
-def test_what_is_not_reached_says_why(data):
     reached = data["reached"].sel(variant="midpoint[angles]").values.tolist()
     assert reached[0] == "met"
     assert reached[-1] == "budget"
@@ -88,13 +88,6 @@ def test_failed_settings_stay_with_their_outcome_and_are_drawn(data):
     assert f"stormer-verlet[angles]: {words}" in labels
     assert len({text.split(":")[0] for text in labels} & set(data["variant"].values)) == data.sizes["variant"]
     plt.close(ax.figure)
-
-
-def test_every_variable_has_words_and_units(data):
-    assert [fault for fault in lacking(data) if fault != "long_name of variant"] == []
-    assert data["error"].attrs["units"] == "rad"
-    assert data.attrs["timed"] == "nothing"
-    assert np.isnan(data["seconds"]).all()
 
 
 def refusing(top, start, plan):

@@ -20,11 +20,11 @@ def seeing(below):
     return symtop.Integrator("seeing", "other", "sees its plan", {"axis": solver}, order=4)
 
 
-@pytest.mark.parametrize("below", [300, 5000, 20_000])
-def test_a_solver_that_sees_its_plan_contradicts_itself(below):
-    ledger = judge(seeing(below), symtop.scene("spheroid"), quick=True)
-    assert ledger.refuted == ["reported"]
-    assert "a run contradicts itself" in ledger["reported"].why
+def test_a_solver_that_sees_its_plan_contradicts_itself():
+    for below in (300, 5000, 20_000):
+        ledger = judge(seeing(below), symtop.scene("spheroid"), quick=True)
+        assert ledger.refuted == ["reported"]
+        assert "a run contradicts itself" in ledger["reported"].why
 
 
 PLUGIN = """
