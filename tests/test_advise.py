@@ -80,14 +80,11 @@ def test_an_error_grows_over_horizons_as_the_traits_promise(name, quantity):
     assert method.adaptive or promised == 0
 
 
-@pytest.mark.parametrize(
-    ("name", "accuracy", "patience", "why"),
-    [
-        ("rk45-compiled", 1e-15, math.inf, settings.STOPPED),  # its least tolerance
-        ("gauss-10", 1e-15, math.inf, settings.STOPPED),  # a finer step that gains nothing
-        ("stormer-verlet", 1e-6, 1e3, settings.BUDGET),
-    ],
-)
+@pytest.mark.parametrize(("name", "accuracy", "patience", "why"), [
+    ("rk45-compiled", 1e-15, math.inf, settings.STOPPED),  # its least tolerance
+    ("gauss-10", 1e-15, math.inf, settings.STOPPED),  # a finer step that gains nothing
+    ("stormer-verlet", 1e-6, 1e3, settings.BUDGET),
+])  # fmt: skip
 def test_a_search_says_why_it_found_nothing(name, accuracy, patience, why):
     scene, method = symtop.scene("spheroid"), symtop.integrator(name)
     reason = settings.search(scene, method, accuracy, "axis", 5.0, None, patience)

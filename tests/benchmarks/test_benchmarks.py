@@ -20,9 +20,6 @@ FEW = [("stormer-verlet", "angles"), ("takahashi-imada", "attitude"), ("rk4", "a
 needs_gcc = pytest.mark.skipif(twin.compiler() is None, reason="the twins are built with gcc")
 
 
-# ---- C twins ---------------------------------------------------------------------------------------------------------
-
-
 def test_every_compiled_fixed_step_kernel_has_a_twin():
     marches = {inside(methods()[name].solvers[chart]).loop for name, chart in KEYS}
     assert marches <= set(twin.FAMILIES)
@@ -77,9 +74,6 @@ def test_an_ensemble_costs_little_around_its_steps():
     assert seconds["`simulate`"] > 50.0 * seconds["`ensemble`, axis and energy"]
 
 
-# ---- lanes -----------------------------------------------------------------------------------------------------------
-
-
 def test_the_tops_that_lanes_are_timed_on_stay_in_lanes_and_reach_the_error():
     """A member that is given up would be timed alone; the closed form says how far the others are off."""
     solver, numbers, steps = lanes.solver_of(*lanes.RIVAL), lanes.members(), 45
@@ -91,9 +85,6 @@ def test_the_tops_that_lanes_are_timed_on_stay_in_lanes_and_reach_the_error():
     errors = charts.axis_distance(done.states[:, 0, :3], true)
     assert 1e-8 < errors.max() < 2e-6
     assert len(np.unique(true, axis=0)) == lanes.MEMBERS  # neighbours, not copies
-
-
-# ---- the closed form -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -115,9 +106,6 @@ def test_a_closed_form_is_set_up_and_sampled_in_ten_microseconds():
     constants, kept = (row for row in others if row not in samples)
     assert constants.median < 10e-6  # of one top among many
     assert kept.median < 10e-3  # a reference at 1001 times, asked for again
-
-
-# ---- adaptive steps in C ---------------------------------------------------------------------------------------------
 
 
 @needs_gcc

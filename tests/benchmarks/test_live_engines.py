@@ -27,14 +27,11 @@ def broken(body, h, steps):
     raise RuntimeError("no such body")
 
 
-@pytest.mark.parametrize(
-    ("method", "stepped", "same"),
-    [
-        ("bullet", "bullet", True), ("bullet", "mujoco-implicit", False), ("rkmk4", "mujoco3-rk4", False),
-        ("jolt-float32", "jolt-float32", True), ("jolt-float32", "jolt", True), ("jolt", "jolt-float32", False),
-        ("no-squish", "no-squish", True),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("method", "stepped", "same"), [
+    ("bullet", "bullet", True), ("bullet", "mujoco-implicit", False), ("rkmk4", "mujoco3-rk4", False),
+    ("jolt-float32", "jolt-float32", True), ("jolt-float32", "jolt", True), ("jolt", "jolt-float32", False),
+    ("no-squish", "no-squish", True),
+])  # fmt: skip
 def test_a_map_is_an_engines_own_if_one_step_agrees(method, stepped, same):
     assert measure.agrees(measure.row(engine(method, stepped))) is same
 
@@ -55,8 +52,6 @@ def test_an_engine_that_raises_is_a_row_with_its_reason():
     found = study.findings([made], ["Other is not installed here and was skipped: reason."], "today")
     assert found["failures"] == [*found["missing"], "Engine (bad): RuntimeError: no such body"]
 
-
-# ---- programs of other languages -------------------------------------------------------------------------------------
 
 ECHO = """
 import sys

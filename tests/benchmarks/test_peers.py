@@ -29,9 +29,6 @@ def _pointer(row):
     return row.ctypes.data_as(DOUBLES)
 
 
-# ---- right-hand sides ------------------------------------------------------------------------------------------------
-
-
 @cfunc(types.voidptr(types.voidptr))
 def _numbers_of(vector):
     return callbacks._pointer_at(vector, 0)
@@ -99,9 +96,6 @@ def test_the_axis_as_a_particle_has_the_acceleration_of_the_axis(scene):
     assert not np.allclose(particle[6:], np.cross(torque, e) / top.I1)  # gravity alone
 
 
-# ---- the two calls ---------------------------------------------------------------------------------------------------
-
-
 def test_a_peer_that_is_not_installed_is_named_and_skipped(monkeypatch):
     for module in ("diffrax", "mujoco"):
         monkeypatch.setitem(sys.modules, module, None)  # an import of it fails
@@ -156,9 +150,6 @@ def test_an_inner_loop_that_does_not_start_anew_is_seen(scene):
         return state[0]
 
     assert measure.end_error(scene, peer, common.Inner(call, lambda last: last)) > 1e-2
-
-
-# ---- accuracy and the search -----------------------------------------------------------------------------------------
 
 
 def test_the_search_finds_the_loosest_setting():

@@ -71,9 +71,6 @@ def test_methods_on_f_alone_are_counted_by_themselves():
     assert "solve_ivp takes 2 to 2 times and 22.5 to 22.5" in study.caption(both)[0]
 
 
-# ---- the report ------------------------------------------------------------------------------------------------------
-
-
 def _peers_into(folder):
     data = _stored({"symtop": (1e-3, 2e-5), "scipy[axis] C": (6e-3, 4e-3)})
     found = study.findings(data, [], folder, ["drake was skipped."])
@@ -120,9 +117,6 @@ def test_the_stored_measurement_is_whole_and_its_inner_loops_did_the_work():
     for asked in itertools.product(summary.NAMES, ("spheroid", "goldstein"), names, summary.JUDGED):
         call, scene, name, target = asked
         assert summary.best_of(data, call, scene, summary.groups(data)[name], target) is not None, asked
-
-
-# ---- many tops at once -----------------------------------------------------------------------------------------------
 
 
 def test_all_ways_of_running_many_tops_end_at_the_same_axes():

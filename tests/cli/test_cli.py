@@ -39,25 +39,22 @@ def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):
 OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --body I1,I2,I3 or --plugin FILE)"
 
 
-@pytest.mark.parametrize(
-    ("words", "parts"),
-    [
-        ("run sferoid midpoint --step-size 0.1", ["scene 'sferoid'", "spheroid", "symtop scenes", BODY]),
-        ("run spheroid midpont --step-size 0.1", ["integrator 'midpont'", "midpoint", "symtop integrators", OWN]),
-        ("run midpoint spheroid", ["scene 'midpoint'", "an integrator", "scene comes first"]),
-        ("run spheroid midpoint[attitude] --step-size 0.1", ["chart of midpoint 'attitude'", "angles"]),
-        ("run spheroid midpoint", ["needs --step-size", "0.007"]),
-        ("run spheroid rk45", ["needs a tolerance", "1e-6"]),
-        ("run spheroid taylor --figure no-such/x.png", ["--figure", "folder that is there", "no-such/x.png"]),
-        ("run spheroid taylor --output run.csv", ["--output is written as netCDF", "run.nc", "'run.csv'"]),
-        ("run spheroid rk4 --step-size 0.1 --output a.png --figure ./a.png", ["--output and --figure", "two files"]),
-        ("recommend spheroid", ["--accuracy", "--i-use"]),
-        ("recommend spheroid --accuracy 1 --step-size 1 --per-nutation 9", ["--step-size", "not both"]),
-        ("study convergense", ["'convergense'", "convergence"]),
-        ("study", ["name a study", "--all", "convergence"]),
-        ("study convergence --status --check", ["--status and --check"]),
-    ],
-)
+@pytest.mark.parametrize(("words", "parts"), [
+    ("run sferoid midpoint --step-size 0.1", ["scene 'sferoid'", "spheroid", "symtop scenes", BODY]),
+    ("run spheroid midpont --step-size 0.1", ["integrator 'midpont'", "midpoint", "symtop integrators", OWN]),
+    ("run midpoint spheroid", ["scene 'midpoint'", "an integrator", "scene comes first"]),
+    ("run spheroid midpoint[attitude] --step-size 0.1", ["chart of midpoint 'attitude'", "angles"]),
+    ("run spheroid midpoint", ["needs --step-size", "0.007"]),
+    ("run spheroid rk45", ["needs a tolerance", "1e-6"]),
+    ("run spheroid taylor --figure no-such/x.png", ["--figure", "folder that is there", "no-such/x.png"]),
+    ("run spheroid taylor --output run.csv", ["--output is written as netCDF", "run.nc", "'run.csv'"]),
+    ("run spheroid rk4 --step-size 0.1 --output a.png --figure ./a.png", ["--output and --figure", "two files"]),
+    ("recommend spheroid", ["--accuracy", "--i-use"]),
+    ("recommend spheroid --accuracy 1 --step-size 1 --per-nutation 9", ["--step-size", "not both"]),
+    ("study convergense", ["'convergense'", "convergence"]),
+    ("study", ["name a study", "--all", "convergence"]),
+    ("study convergence --status --check", ["--status and --check"]),
+])  # fmt: skip
 def test_a_refusal_names_the_argument_its_value_and_what_is_allowed(words, parts, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = call(*words.split(), code=2)
@@ -77,15 +74,12 @@ def test_a_plugin_that_registers_nothing_is_told_of(tmp_path):
         assert (f"{plugin.name} registers no integrator and no scene" in result.output) is expected
 
 
-@pytest.mark.parametrize(
-    ("words", "computes"),
-    [
-        (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
-        (["long", "spheroid", "strang", "--steps", "10"], "symtop.run.long_run.long_run"),
-        (["ensemble", "strang", "--members", "2", "--step-size", "0.1", "--horizon", "1"],
-         "symtop.run.ensemble.ensemble.ensemble"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("words", "computes"), [
+    (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
+    (["long", "spheroid", "strang", "--steps", "10"], "symtop.run.long_run.long_run"),
+    (["ensemble", "strang", "--members", "2", "--step-size", "0.1", "--horizon", "1"],
+     "symtop.run.ensemble.ensemble.ensemble"),
+])  # fmt: skip
 def test_a_folder_is_no_output_and_nothing_is_computed_for_it(words, computes, tmp_path, monkeypatch):
     call(*words, "--output", tmp_path / "a.nc")
     monkeypatch.setattr(computes, lambda *_, **__: pytest.fail("it computes"))
@@ -95,14 +89,11 @@ def test_a_folder_is_no_output_and_nothing_is_computed_for_it(words, computes, t
         assert f"{option} must be a file, not the folder" in result.output
 
 
-@pytest.mark.parametrize(
-    ("words", "called"),
-    [
-        (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
-        (["recommend", "spheroid", "--accuracy", "1e-3"], "symtop.advise.recommend"),
-        (["claims", "strang", "--quick"], "symtop.judging.judge_step.judge_separately"),
-    ],
-)
+@pytest.mark.parametrize(("words", "called"), [
+    (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
+    (["recommend", "spheroid", "--accuracy", "1e-3"], "symtop.advise.recommend"),
+    (["claims", "strang", "--quick"], "symtop.judging.judge_step.judge_separately"),
+])  # fmt: skip
 def test_ctrl_c_is_neither_a_failed_case_nor_bad_input(words, called, monkeypatch):
     def interrupts(*_, **__):
         os.kill(os.getpid(), signal.SIGINT)
@@ -163,14 +154,11 @@ def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_pa
     assert "NAME[CHART]" in call("integrators").output
 
 
-@pytest.mark.parametrize(
-    ("line", "completion"),
-    [
-        ("symtop run sph", "spheroid"), ("symtop run tennis", "tennis-racket"), ("symtop study cl", "claims"),
-        ("symtop run spheroid midp", "midpoint"), ("symtop run spheroid rk4[", "rk4[axis]"),
-        ("symtop integrators strang[att", "strang[attitude]"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("line", "completion"), [
+    ("symtop run sph", "spheroid"), ("symtop run tennis", "tennis-racket"), ("symtop study cl", "claims"),
+    ("symtop run spheroid midp", "midpoint"), ("symtop run spheroid rk4[", "rk4[axis]"),
+    ("symtop integrators strang[att", "strang[attitude]"),
+])  # fmt: skip
 def test_the_shell_completes_names(line, completion):
     words = line.split()
     environment = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
@@ -222,12 +210,9 @@ def test_what_cannot_be_printed_is_told_in_a_sentence():
 
 
 @pytest.mark.skipif(not Path("/bin/sh").exists(), reason="a shell of Unix")
-@pytest.mark.parametrize(
-    ("words", "closed", "code"),
-    [
-        ("scenes", "1>&-", 0), ("run nowhere", "0<&- 1>&- 2>&-", 2),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("words", "closed", "code"), [
+    ("scenes", "1>&-", 0), ("run nowhere", "0<&- 1>&- 2>&-", 2),
+])  # fmt: skip
 def test_a_stream_that_was_closed_changes_no_exit_code(words, closed, code):
     """Python has None in its place; a refusal (the control) is one all the same."""
     command = ["/bin/sh", "-c", f"{sys.executable} -m symtop.cli {words} {closed}"]

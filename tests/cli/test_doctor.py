@@ -29,17 +29,14 @@ def test_all_is_well_here_and_it_says_what_it_saw(tmp_path):
     assert topics["published values"] == f"{count} of {count} reproduced"
 
 
-@pytest.mark.parametrize(
-    ("requirement", "result", "healthy"),
-    [
-        ("numpy[some-extra]>=2.0", "2.4.6", True), ("numpy[some-extra]>=3.0", "2.4.6", False),
-        ("numpy~=2.0", "2.4.6", True), ("numpy~=1.26", "2.4.6", False), ("numpy>=2,!=2.4.6", "2.4.6", False),
-        ("no-such-package", "absent", False), ("no-such-package; extra == 'peers'", "absent, an extra", True),
-        ("numpy<2; extra == 'peers'", "2.4.6", False), ("no-such-package; sys_platform == 'amiga'", None, True),
-        ("no-such-package; extra == 'peers' and sys_platform == 'amiga'", None, True),
-        ("no-such-package; python_version >= '3.8'", "absent", False),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("requirement", "result", "healthy"), [
+    ("numpy[some-extra]>=2.0", "2.4.6", True), ("numpy[some-extra]>=3.0", "2.4.6", False),
+    ("numpy~=2.0", "2.4.6", True), ("numpy~=1.26", "2.4.6", False), ("numpy>=2,!=2.4.6", "2.4.6", False),
+    ("no-such-package", "absent", False), ("no-such-package; extra == 'peers'", "absent, an extra", True),
+    ("numpy<2; extra == 'peers'", "2.4.6", False), ("no-such-package; sys_platform == 'amiga'", None, True),
+    ("no-such-package; extra == 'peers' and sys_platform == 'amiga'", None, True),
+    ("no-such-package; python_version >= '3.8'", "absent", False),
+])  # fmt: skip
 def test_every_form_of_a_requirement_is_read(monkeypatch, requirement, result, healthy):
     real = importlib.metadata.version
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: [requirement])

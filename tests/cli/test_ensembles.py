@@ -76,17 +76,16 @@ def test_bodies_are_run_compared_and_written(tmp_path):
     assert fine["largest_errors"] != others["largest_errors"]
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [(["strang"], "needs --step-size or --per-nutation"),
-     (["strang", "--step-size", 0.1], "give --horizon or --nutations: these members have no"),
-     (["strang", *STEPS, "--budget", 10], "member 0 asks for 60 steps; the limit is 10 (see --budget)"),
-     (["strang", *STEPS, "--variables", "theta", "--figure", "a.png"], "needs axis or energy among --variables"),
-     (["strang", *STEPS, "--bodies", "--kind", "grazing"], "kind 'grazing' is unknown"),
-     (["strang", *STEPS, "--bodies", "--members", 2, "--variables", "axis", "--figure", "a.png"],
-      "needs quaternion or energy among"),
-     (["midpoint[attitude]", *STEPS], "known: angles")],
-)  # fmt: skip
+@pytest.mark.parametrize(("words", "says"), [
+    (["strang"], "needs --step-size or --per-nutation"),
+    (["strang", "--step-size", 0.1], "give --horizon or --nutations: these members have no"),
+    (["strang", *STEPS, "--budget", 10], "member 0 asks for 60 steps; the limit is 10 (see --budget)"),
+    (["strang", *STEPS, "--variables", "theta", "--figure", "a.png"], "needs axis or energy among --variables"),
+    (["strang", *STEPS, "--bodies", "--kind", "grazing"], "kind 'grazing' is unknown"),
+    (["strang", *STEPS, "--bodies", "--members", 2, "--variables", "axis", "--figure", "a.png"],
+     "needs quaternion or energy among"),
+    (["midpoint[attitude]", *STEPS], "known: angles"),
+])  # fmt: skip
 def test_bad_input_is_one_sentence_and_code_2(words, says):
     result = call(*words, code=2)
     assert says in result.output

@@ -133,9 +133,6 @@ def test_an_import_inside_a_function_is_followed_at_every_level():
         assert f"function symtop/{name}" in labels
 
 
-# ---- kernels ---------------------------------------------------------------------------------------------------------
-
-
 def kernels_of(root: Path, store: Path) -> dict[str, int]:
     """The machine code in the cache and when they were written, after one run; and what it returned."""
     code = (

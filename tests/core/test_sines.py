@@ -60,13 +60,10 @@ def test_the_second_part_of_a_quarter_turn_keeps_the_digits_at_the_pole(monkeypa
     assert errors(x, np.transpose([sines.polynomials(angle) for angle in x]))[1] > 1e10
 
 
-@pytest.mark.parametrize(
-    ("coefficients", "remainder", "largest"),
-    [
-        (sines.SINE, lambda r, z, p: (r + r * z * p) / mpmath.sin(r) - 1, 3.9e-18),
-        (sines.COSINE, lambda r, z, p: (1 - z / 2 + z * z * p) / mpmath.cos(r) - 1, 9.0e-20),
-    ],
-)
+@pytest.mark.parametrize(("coefficients", "remainder", "largest"), [
+    (sines.SINE, lambda r, z, p: (r + r * z * p) / mpmath.sin(r) - 1, 3.9e-18),
+    (sines.COSINE, lambda r, z, p: (1 - z / 2 + z * z * p) / mpmath.cos(r) - 1, 9.0e-20),
+])  # fmt: skip
 def test_no_polynomial_of_the_degree_is_much_better(coefficients, remainder, largest):
     """Seven errors of alternating signs: the best polynomial has at least the least of them (de la Vallee Poussin)."""
 

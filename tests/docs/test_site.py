@@ -149,14 +149,11 @@ def test_every_figure_has_its_study_and_command(site):
         assert f"Made by symtop study {study} ;" in spoken, study
 
 
-@pytest.mark.parametrize(
-    ("report", "tracked"),
-    [
-        (SMALL, {"convergence-a.png", "drift-b.png"}),  # a figure that the report does not show
-        (SMALL, set()),  # one that is not there
-        (SMALL.replace("convergence-a", "nobody-a"), {"nobody-a.png"}),  # one that nothing makes
-    ],
-)
+@pytest.mark.parametrize(("report", "tracked"), [
+    (SMALL, {"convergence-a.png", "drift-b.png"}),  # a figure that the report does not show
+    (SMALL, set()),  # one that is not there
+    (SMALL.replace("convergence-a", "nobody-a"), {"nobody-a.png"}),  # one that nothing makes
+])  # fmt: skip
 def test_a_figure_out_of_place_ends_the_build(report, tracked):
     with pytest.raises(gallery.ExtensionError, match="gallery"):
         gallery.markdown(report, tracked)

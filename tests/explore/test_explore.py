@@ -98,16 +98,13 @@ def test_a_failing_run_is_an_answer_with_its_sentence():
     json.loads(json.dumps(answer, allow_nan=False))
 
 
-@pytest.mark.parametrize(
-    ("changes", "word"),
-    [
-        ({"I3": 30.0}, "I3"), ({"I1": "heavy"}, "I1"), ({"theta": 4.0}, "theta"), ({"step_size": 0.0}, "step_size"),
-        ({"step_size": None}, "step_size"), ({"step_size": 1e-9}, "2000000 steps"), ({"horizon": "nan"}, "horizon"),
-        ({"integrator": "midpont"}, "midpoint"), ({"integrator": "rk4[axis]"}, "cannot show the attitude"),
-        ({"integrator": "rk45", "tolerance": -1.0}, "tolerance"),
-        ({"mgl": float("inf")}, "mgl"), ({"psi_dot": []}, "psi_dot"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("changes", "word"), [
+    ({"I3": 30.0}, "I3"), ({"I1": "heavy"}, "I1"), ({"theta": 4.0}, "theta"), ({"step_size": 0.0}, "step_size"),
+    ({"step_size": None}, "step_size"), ({"step_size": 1e-9}, "2000000 steps"), ({"horizon": "nan"}, "horizon"),
+    ({"integrator": "midpont"}, "midpoint"), ({"integrator": "rk4[axis]"}, "cannot show the attitude"),
+    ({"integrator": "rk45", "tolerance": -1.0}, "tolerance"),
+    ({"mgl": float("inf")}, "mgl"), ({"psi_dot": []}, "psi_dot"),
+])  # fmt: skip
 def test_bad_questions_are_refused_in_one_sentence(changes, word):
     with pytest.raises(SymtopError, match=word):
         answers.setup(fields(**changes))
@@ -126,13 +123,10 @@ def test_the_page_says_in_which_chart_a_method_runs_and_a_row_runs_in_its_own():
         np.testing.assert_array_equal(runs[0]["theta"].values, runs[1]["theta"].values)
 
 
-@pytest.mark.parametrize(
-    ("method", "scene", "changes"),
-    [
-        *((method, "goldstein", {"theta": 0.7123456789}) for method in ("trapezoidal", "rk45", "exact")),
-        ("strang", "tennis-racket", {"w1": 0.0123456789, "horizon": 70.0}),
-    ],
-)
+@pytest.mark.parametrize(("method", "scene", "changes"), [
+    *((method, "goldstein", {"theta": 0.7123456789}) for method in ("trapezoidal", "rk45", "exact")),
+    ("strang", "tennis-racket", {"w1": 0.0123456789, "horizon": 70.0}),
+])  # fmt: skip
 def test_the_script_makes_the_same_dataset_to_the_bit(method, scene, changes, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     chosen = answers.setup(fields(scene, method, **changes))
@@ -203,17 +197,14 @@ def test_exports_over_http(site, tmp_path):
     assert body.decode() == answers.script(answers.setup(chosen))
 
 
-@pytest.mark.parametrize(
-    ("method", "tolerance", "seconds"),
-    [
-        ("taylor-quad", 1e-30, 0.5),
-        ("rk45", 1e-9, 0.5),
-        *(
-            pytest.param(*one, answers.MOST_SECONDS, marks=pytest.mark.slow)
-            for one in (("taylor-quad", 1e-6), ("taylor-longdouble", 1e-12), ("radau", 1e-6))
-        ),
-    ],
-)
+@pytest.mark.parametrize(("method", "tolerance", "seconds"), [
+    ("taylor-quad", 1e-30, 0.5),
+    ("rk45", 1e-9, 0.5),
+    *(
+        pytest.param(*one, answers.MOST_SECONDS, marks=pytest.mark.slow)
+        for one in (("taylor-quad", 1e-6), ("taylor-longdouble", 1e-12), ("radau", 1e-6))
+    ),
+])  # fmt: skip
 def test_a_run_to_its_budget_takes_its_seconds_within_a_factor_of_two(method, tolerance, seconds, monkeypatch):
     """Processor time of this thread: other processes do not count."""
     monkeypatch.setattr(answers, "MOST_SECONDS", seconds)

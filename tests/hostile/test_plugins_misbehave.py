@@ -105,17 +105,14 @@ symtop.register(
 """
 
 
-@pytest.mark.parametrize(
-    ("returns", "says"),
-    [
-        ("(0.0,) * 4, carry, 1, 0", None),
-        ("(0.0, 0.0), carry, 1, 0",
-         "TypingError: Cannot unify UniTuple(float64 x 4) and UniTuple(float64 x 2) for 'dstate.3'"),
-        ("unknown(state)", "TypingError: NameError: name 'unknown' is not defined"),
-        ("(0.0,) * 4, carry, 1, 9", "must return an outcome from 0 to 6, not 9"),
-        ("(0.0,) * 4, carry, 1, -1", "must return an outcome from 0 to 6, not -1"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("returns", "says"), [
+    ("(0.0,) * 4, carry, 1, 0", None),
+    ("(0.0, 0.0), carry, 1, 0",
+     "TypingError: Cannot unify UniTuple(float64 x 4) and UniTuple(float64 x 2) for 'dstate.3'"),
+    ("unknown(state)", "TypingError: NameError: name 'unknown' is not defined"),
+    ("(0.0,) * 4, carry, 1, 9", "must return an outcome from 0 to 6, not 9"),
+    ("(0.0,) * 4, carry, 1, -1", "must return an outcome from 0 to 6, not -1"),
+])  # fmt: skip
 def test_a_kernel_that_does_not_compile_or_returns_no_outcome_is_one_sentence(returns, says, tmp_path):
     file = tmp_path / "own.py"
     file.write_text(KERNEL.format(returns=returns))

@@ -37,9 +37,6 @@ def run_of(stepper, steps=200):
     return symtop.simulate(SPHEROID, method, step_size=0.8 / steps, horizon=0.8, samples=5, observe="axis", guard=False)
 
 
-# ---- what fits -------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("chart", ["angles", "axis", "attitude"])
 def test_a_python_step_makes_the_steps_of_the_tableau_that_it_is(chart):
     tableau = symtop.runge_kutta("midpoint-tableau", ((), (0.5,)), (0.0, 1.0))
@@ -128,16 +125,13 @@ def test_a_program_gets_one_line_and_writes_states(tmp_path, body):
     np.testing.assert_array_equal(states, [state] * 3)
 
 
-@pytest.mark.parametrize(
-    ("body", "words"),
-    [
-        ("print(1, 2, 3)", "must write 4 states of 6 numbers .* 24 in all, not 3"),
-        ("print('moved to', *numbers)", "must write numbers, as text or as raw doubles, not 'moved to"),
-        ("sys.exit('no licence')", "ended with code 1: no licence"),
-        ("print(*range(24))", "must write the start that it was given as the first of its states, not 0, 1, 2"),
-        ("import time; time.sleep(9)", "had not ended 1 s after it was asked for 3 steps of 0.1"),
-    ],
-)
+@pytest.mark.parametrize(("body", "words"), [
+    ("print(1, 2, 3)", "must write 4 states of 6 numbers .* 24 in all, not 3"),
+    ("print('moved to', *numbers)", "must write numbers, as text or as raw doubles, not 'moved to"),
+    ("sys.exit('no licence')", "ended with code 1: no licence"),
+    ("print(*range(24))", "must write the start that it was given as the first of its states, not 0, 1, 2"),
+    ("import time; time.sleep(9)", "had not ended 1 s after it was asked for 3 steps of 0.1"),
+])  # fmt: skip
 def test_a_program_that_writes_anything_else_is_told_so(tmp_path, body, words, monkeypatch):
     monkeypatch.setattr(heartbeat, "patience", 0.6)
     stepper = open_target(program(tmp_path, body), "program", "axis")
@@ -159,22 +153,16 @@ def test_a_slow_program_has_the_time_that_earlier_runs_took_also_after_a_short_o
         fresh.march(SPHEROID.top, None, np.full(6, 5.0), 0.1, np.array([0, 200]))
 
 
-# ---- what does not fit -----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("target", "options", "words"),
-    [
-        ("nothing.py:step", {}, "FILE.py:NAME with a file that is there"),
-        ("no-such-program-anywhere -x", {"form": "program"}, "must be a command that can be run"),
-        ("my 'engine -x", {"form": "program"}, 'must be a command that can be run, not "my \'engine -x"'),
-        ("true", {}, "or a command with form program, not 'true'"),
-        (midpoint, {"form": "rotation"}, r"must take \(q, w, h, inertia, torque\), not \(f, t, y, h\)"),
-        (lambda y, h: y, {}, r"must take \(f, t, y, h\), not \(y, h\)"),
-        (midpoint, {"adaptive": True}, "need a class derived from OdeSolver"),
-        (dict, {}, "must be derived from scipy.integrate.OdeSolver, not dict"),
-    ],
-)
+@pytest.mark.parametrize(("target", "options", "words"), [
+    ("nothing.py:step", {}, "FILE.py:NAME with a file that is there"),
+    ("no-such-program-anywhere -x", {"form": "program"}, "must be a command that can be run"),
+    ("my 'engine -x", {"form": "program"}, 'must be a command that can be run, not "my \'engine -x"'),
+    ("true", {}, "or a command with form program, not 'true'"),
+    (midpoint, {"form": "rotation"}, r"must take \(q, w, h, inertia, torque\), not \(f, t, y, h\)"),
+    (lambda y, h: y, {}, r"must take \(f, t, y, h\), not \(y, h\)"),
+    (midpoint, {"adaptive": True}, "need a class derived from OdeSolver"),
+    (dict, {}, "must be derived from scipy.integrate.OdeSolver, not dict"),
+])  # fmt: skip
 def test_what_cannot_be_judged_is_refused_in_one_sentence(target, options, words):
     with pytest.raises(symtop.SymtopError, match=words):
         symtop.judge(target, quick=True, **options)
@@ -192,9 +180,6 @@ def test_a_file_beside_others_one_that_fails_and_a_name_that_is_not_there(tmp_pa
         open_target(str(file), None, "axis")
     assert label_of("./my engine (new)") == "my-engine-new"
     assert OFFERED == FORMS
-
-
-# ---- what misbehaves -------------------------------------------------------------------------------------------------
 
 
 def hangs(f, t, y, h):
@@ -320,19 +305,16 @@ def impatient(monkeypatch):
     monkeypatch.setattr("symtop.judging.adapters.adapter.QUICK_PATIENCE", 0.5)
 
 
-@pytest.mark.parametrize(
-    ("step", "words"),
-    [
-        (hangs, r"a step of h = \d.* had not returned after \d+ s"),
-        (crashes, r"its process was ended by SIGSEGV in a step of h = "),
-        (raises, r"a step of h = .* raises RuntimeError: no luck"),
-        (returns_nothing, "step must return the new state, 6 real numbers, not None"),
-        (lambda f, t, y, h: y[:3], r"6 real numbers, not ndarray of shape \(3,\)"),
-        (lambda f, t, y, h: (y, h), "step must return the new state, 6 real numbers, not tuple$"),
-        (lambda f, t, y, h: (y, y), r"6 real numbers, not tuple of shape \(2, 6\)"),
-        (lambda f, t, y, h: y * 1j, "6 real numbers, not ndarray .* complex128"),
-    ],
-)
+@pytest.mark.parametrize(("step", "words"), [
+    (hangs, r"a step of h = \d.* had not returned after \d+ s"),
+    (crashes, r"its process was ended by SIGSEGV in a step of h = "),
+    (raises, r"a step of h = .* raises RuntimeError: no luck"),
+    (returns_nothing, "step must return the new state, 6 real numbers, not None"),
+    (lambda f, t, y, h: y[:3], r"6 real numbers, not ndarray of shape \(3,\)"),
+    (lambda f, t, y, h: (y, h), "step must return the new state, 6 real numbers, not tuple$"),
+    (lambda f, t, y, h: (y, y), r"6 real numbers, not tuple of shape \(2, 6\)"),
+    (lambda f, t, y, h: y * 1j, "6 real numbers, not ndarray .* complex128"),
+])  # fmt: skip
 def test_a_step_that_never_works_cannot_be_judged(step, words, impatient):
     with pytest.raises(symtop.SymtopError, match=words):
         symtop.judge(step, quick=True)
@@ -398,8 +380,6 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset(monkeypat
     assert f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation)" in str(ledger)
 
 
-# ---- the examples ----------------------------------------------------------------------------------------------------
-
 EXAMPLES = Path(__file__).resolve().parents[2] / "studies" / "examples"
 STEPS = EXAMPLES / "judged_steps.py"
 
@@ -431,17 +411,14 @@ def test_a_claim_is_implied_if_it_follows_from_those_that_are_made(only):
         assert run_judge(f"{STEPS}:heun", "--order", "2", *words)[1].endswith(f"Implied by them {end}\n")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ((f"{STEPS}:heun", "--order", "2"), "It is: order 2, not symplectic"),
-        ((f"{STEPS}:leapfrog", "--form", "separable", "--order", "2", "--symplectic", "--symmetric"),
-         "It is: order 2, symplectic, reversible, the energy bounded"),
-        *(pytest.param(words, f"It is: order {words[-1]}, not symplectic", marks=pytest.mark.slow) for words in (
-            (f"{STEPS}:Ralston", "--order", "3"), (f"{STEPS}:engine", "--form", "rotation", "--order", "1"),
-            (f"{sys.executable} {EXAMPLES / 'judged_program.py'}", "--form", "program", "--order", "2"))),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("arguments", "words"), [
+    ((f"{STEPS}:heun", "--order", "2"), "It is: order 2, not symplectic"),
+    ((f"{STEPS}:leapfrog", "--form", "separable", "--order", "2", "--symplectic", "--symmetric"),
+     "It is: order 2, symplectic, reversible, the energy bounded"),
+    *(pytest.param(words, f"It is: order {words[-1]}, not symplectic", marks=pytest.mark.slow) for words in (
+        (f"{STEPS}:Ralston", "--order", "3"), (f"{STEPS}:engine", "--form", "rotation", "--order", "1"),
+        (f"{sys.executable} {EXAMPLES / 'judged_program.py'}", "--form", "program", "--order", "2"))),
+])  # fmt: skip
 def test_the_example_of_a_form_is_what_it_says(arguments, words, only):
     only("order", "symplectic", "symmetric", *(["energy"] if "energy" in words else []))
     code, output = run_judge(*arguments)
@@ -459,9 +436,6 @@ def test_a_path_with_a_space_is_a_path_and_a_program_must_be_named(tmp_path, onl
     for target in (f"touch {mark}", f"touch {mark}.py:step"):
         code, output = run_judge(target)
         assert (code, "form program" in output, mark.exists()) == (2, True, False)
-
-
-# ---- rotation matrices -----------------------------------------------------------------------------------------------
 
 
 def euler_of_matrices(R, w, h, inertia, torque):

@@ -47,9 +47,6 @@ def confirmed(ledger, *claims):
     assert {ledger[claim].verdict for claim in claims} <= {"confirmed"}, str(ledger)
 
 
-# ---- what is right ---------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", right.CLAIMS)
 def test_a_correct_method_is_not_refuted(name):
@@ -99,25 +96,22 @@ def slowly(*values):
 
 
 @needs_compiler
-@pytest.mark.parametrize(
-    ("source", "options", "claims", "refuted"),
-    [
-        ("strang.c", (), {"order": 2, **SPLIT}, ""),
-        slowly(EXAMPLES / "judged.c", (), {"order": 1, "symplectic": True, "conserves": ["p_phi", "p_psi"]}, ""),
-        slowly("strang.c", ("-DYOSHIDA",), {"order": 4, **SPLIT}, ""),
-        slowly("strang.c", ("-DMCLACHLAN",), {"order": 4, **SPLIT}, ""),
-        slowly("tricks.c", ("-DKIND=3",), {"order": 2, "symplectic": False}, ""),
-        slowly("strang.c", (), {"order": 2, **SPLIT, **PROGRAM}, ""),
-        ("wrong.c", ("-DKIND=0",), {"order": 3}, "order"),
-        slowly("wrong.c", ("-DKIND=1",), {"order": 4}, "order"),
-        slowly("wrong.c", ("-DKIND=2",), {"order": 4}, "order"),
-        slowly("wrong.c", ("-DKIND=3",), {"order": 2}, "order"),
-        slowly("tricks.c", ("-DKIND=0",), {"order": 2}, "order"),
-        slowly("tricks.c", ("-DKIND=1",), {"order": 2}, "calls"),
-        slowly("tricks.c", ("-DKIND=2",), {"order": 1, "symplectic": True}, "symplectic"),
-        slowly("wrong.c", ("-DKIND=9",), {"order": 2, **PROGRAM}, "calls"),  # time is summed in single precision
-    ],
-)
+@pytest.mark.parametrize(("source", "options", "claims", "refuted"), [
+    ("strang.c", (), {"order": 2, **SPLIT}, ""),
+    slowly(EXAMPLES / "judged.c", (), {"order": 1, "symplectic": True, "conserves": ["p_phi", "p_psi"]}, ""),
+    slowly("strang.c", ("-DYOSHIDA",), {"order": 4, **SPLIT}, ""),
+    slowly("strang.c", ("-DMCLACHLAN",), {"order": 4, **SPLIT}, ""),
+    slowly("tricks.c", ("-DKIND=3",), {"order": 2, "symplectic": False}, ""),
+    slowly("strang.c", (), {"order": 2, **SPLIT, **PROGRAM}, ""),
+    ("wrong.c", ("-DKIND=0",), {"order": 3}, "order"),
+    slowly("wrong.c", ("-DKIND=1",), {"order": 4}, "order"),
+    slowly("wrong.c", ("-DKIND=2",), {"order": 4}, "order"),
+    slowly("wrong.c", ("-DKIND=3",), {"order": 2}, "order"),
+    slowly("tricks.c", ("-DKIND=0",), {"order": 2}, "order"),
+    slowly("tricks.c", ("-DKIND=1",), {"order": 2}, "calls"),
+    slowly("tricks.c", ("-DKIND=2",), {"order": 1, "symplectic": True}, "symplectic"),
+    slowly("wrong.c", ("-DKIND=9",), {"order": 2, **PROGRAM}, "calls"),  # time is summed in single precision
+])  # fmt: skip
 def test_what_is_written_in_c(tmp_path, source, options, claims, refuted):
     target = compiled(tmp_path, source, *options, program="form" in claims)
     ledger = symtop.judge(target, quick=True, **claims)
@@ -158,8 +152,6 @@ def test_the_stages_of_an_implicit_class_are_solved_and_newton_is_left_as_it_was
     assert radau.NEWTON_MAXITER == 6
 
 
-# ---- what is wrong ---------------------------------------------------------------------------------------------------
-
 QUICKLY = (
     "stale_force", "symplectic_euler", "half_symmetric", "adams_from_memory", "edits_the_judge",
     "euler_in_a_spot", "WrongSum", "separable_stale", "separable_damped",
@@ -188,9 +180,6 @@ def test_a_step_that_tires_after_a_hundred_thousand_is_found_in_full(monkeypatch
     monkeypatch.setitem(calls.LATE, False, (calls.LATE[False][0], 60.0))  # enough for as many on a slow machine
     wrong._steps[0] = -80_000
     assert "calls" in symtop.judge(wrong.tires, order=4).refuted
-
-
-# ---- what is said ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["noisy", "sometimes_noisy"])

@@ -34,9 +34,6 @@ def one_finding(subject, method, claim):
     return {one.claim: one for one in subject.measure(Subject(method, SPHEROID, quick=True))}[claim]
 
 
-# ---- the bracket -----------------------------------------------------------------------------------------------------
-
-
 def still(chart, change=lambda y: y):
     """A method whose step changes nothing, or just what `change` does to the state."""
 
@@ -83,45 +80,37 @@ def test_only_a_real_defect_stays_and_a_step_is_one_map_unless_it_looks_at_the_s
         assert (return_miss(step, start) > 1e-9) is tuned
 
 
-# ---- growth ----------------------------------------------------------------------------------------------------------
-
 TIME = np.linspace(0.0, 8000.0, 4001)
 WAVE = 1e-5 * np.sin(37.1 * TIME)  # not commensurate with the samples
 
 
-@pytest.mark.parametrize(
-    ("residual", "kind"),
-    [
-        (1e-14 * np.sqrt(TIME), "kept"),
-        (WAVE, "bounded"),
-        (WAVE + 1e-9 * TIME, "drift"),  # most of it below the wave
-        (1e-9 * TIME, "drift"),
-        (1e-12 * np.sqrt(TIME) * np.sin(37.1 * TIME), "random walk"),
-        (1e-7 * np.sqrt(TIME) * np.sin(37.1 * TIME), "growing"),  # too large for a walk of rounding
-        (np.full(4001, np.nan), "unknown"),
-        (np.where(TIME > 4.0, 1e-15 * 500.0 * TIME, 0.0), "drift"),  # 1e-15 a step, 2 ms each
-    ],
-)
+@pytest.mark.parametrize(("residual", "kind"), [
+    (1e-14 * np.sqrt(TIME), "kept"),
+    (WAVE, "bounded"),
+    (WAVE + 1e-9 * TIME, "drift"),  # most of it below the wave
+    (1e-9 * TIME, "drift"),
+    (1e-12 * np.sqrt(TIME) * np.sin(37.1 * TIME), "random walk"),
+    (1e-7 * np.sqrt(TIME) * np.sin(37.1 * TIME), "growing"),  # too large for a walk of rounding
+    (np.full(4001, np.nan), "unknown"),
+    (np.where(TIME > 4.0, 1e-15 * 500.0 * TIME, 0.0), "drift"),  # 1e-15 a step, 2 ms each
+])  # fmt: skip
 def test_residuals_are_classified_by_how_they_grow(residual, kind):
     assert long.change_of(TIME, residual, residual[:100], 1_000_000).kind == kind
 
 
-@pytest.mark.parametrize(
-    ("size", "slope", "interval", "kind"),
-    [
-        (1e-12, 1.0, 0.01, "kept"),
-        (1e-5, 0.02, 0.1, "bounded"),
-        (1e-5, 0.1, 0.5, "growing"),  # 0 or 1/2
-        (2e-11, 0.5, 0.2, "random walk"),
-        (2e-5, 0.5, 0.2, "growing"),  # not by rounding
-        (2e-11, 0.74, 0.28, "growing"),  # 1/2 or 1
-        (2e-11, 0.4, 0.45, "growing"),  # 0 or 1/2
-        (1e-5, 1.0, 0.1, "drift"),
-        (1e-5, 2.0, 0.1, "drift"),
-        (1e-5, 0.9, 0.45, "growing"),  # 1/2 or 1
-        (1e-5, math.nan, math.nan, "growing"),
-    ],
-)
+@pytest.mark.parametrize(("size", "slope", "interval", "kind"), [
+    (1e-12, 1.0, 0.01, "kept"),
+    (1e-5, 0.02, 0.1, "bounded"),
+    (1e-5, 0.1, 0.5, "growing"),  # 0 or 1/2
+    (2e-11, 0.5, 0.2, "random walk"),
+    (2e-5, 0.5, 0.2, "growing"),  # not by rounding
+    (2e-11, 0.74, 0.28, "growing"),  # 1/2 or 1
+    (2e-11, 0.4, 0.45, "growing"),  # 0 or 1/2
+    (1e-5, 1.0, 0.1, "drift"),
+    (1e-5, 2.0, 0.1, "drift"),
+    (1e-5, 0.9, 0.45, "growing"),  # 1/2 or 1
+    (1e-5, math.nan, math.nan, "growing"),
+])  # fmt: skip
 def test_a_law_is_named_only_if_the_interval_excludes_its_neighbours(size, slope, interval, kind):
     assert behaviour(size, slope, interval, rounding=1e-11) == kind
 
@@ -184,9 +173,6 @@ def test_a_claim_about_several_charts_is_judged_in_the_worst_of_them():
     assert finding.why.endswith("in the angles chart")
 
 
-# ---- order -----------------------------------------------------------------------------------------------------------
-
-
 def test_the_limit_of_an_honest_method_is_the_true_motion_and_of_one_whose_step_is_wrong_by_a_billionth_it_is_not():
     for name in ("midpoint", "strang", "gauss-4", "rk4"):
         method = symtop.integrator(name)
@@ -210,20 +196,17 @@ def triple(shift):
     return symtop.composition("triple", kicks, drifts, chart="space", order=4)
 
 
-@pytest.mark.parametrize(
-    ("method", "verdict", "why"),
-    [
-        (symtop.runge_kutta("classical", *CLASSICAL, order=4), "confirmed", "meets the conditions up to order 4"),
-        (symtop.runge_kutta("classical", *CLASSICAL), "measured", "meets the conditions up to order 4"),
-        (symtop.runge_kutta("classical", *CLASSICAL, order=5), "refuted", "misses a condition of order 5 by"),
-        (
-            symtop.runge_kutta("off", (*CLASSICAL[0][:3], (1e-9, 0.0, 1.0 - 1e-9)), CLASSICAL[1], order=4), "refuted",
-            "misses a condition of order 3 by 8.3e-11",
-        ),
-        (triple(0.0), "confirmed", "meets the conditions up to order 4 to"),
-        (triple(1e-11), "refuted", "misses a condition of order 3 by 1.1e-11"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("method", "verdict", "why"), [
+    (symtop.runge_kutta("classical", *CLASSICAL, order=4), "confirmed", "meets the conditions up to order 4"),
+    (symtop.runge_kutta("classical", *CLASSICAL), "measured", "meets the conditions up to order 4"),
+    (symtop.runge_kutta("classical", *CLASSICAL, order=5), "refuted", "misses a condition of order 5 by"),
+    (
+        symtop.runge_kutta("off", (*CLASSICAL[0][:3], (1e-9, 0.0, 1.0 - 1e-9)), CLASSICAL[1], order=4), "refuted",
+        "misses a condition of order 3 by 8.3e-11",
+    ),
+    (triple(0.0), "confirmed", "meets the conditions up to order 4 to"),
+    (triple(1e-11), "refuted", "misses a condition of order 3 by 1.1e-11"),
+])  # fmt: skip
 def test_a_table_that_is_off_is_refuted_before_any_run(method, verdict, why):
     finding = one_finding(order, method, "order")
     assert (finding.verdict, finding.why.startswith(f"its table {why}")) == (verdict, True), finding.why
@@ -236,20 +219,14 @@ def test_every_splitting_of_the_catalogue_has_the_order_that_it_claims():
     assert order.table_of(symtop.integrator("gauss-4")) is None
 
 
-# ---- cost and pole ---------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "declared", "verdict"),
-    [
-        ("radau", True, "undecided"),
-        ("dop853", True, "undecided"),  # rejected steps cost forces too: see test_costs
-        ("rk4", True, "confirmed"),
-        ("rk4", None, "measured"),
-        ("rk4", False, "undecided"),  # a Rosenbrock method costs as evenly
-        ("midpoint", True, "refuted"),
-    ],
-)
+@pytest.mark.parametrize(("name", "declared", "verdict"), [
+    ("radau", True, "undecided"),
+    ("dop853", True, "undecided"),  # rejected steps cost forces too: see test_costs
+    ("rk4", True, "confirmed"),
+    ("rk4", None, "measured"),
+    ("rk4", False, "undecided"),  # a Rosenbrock method costs as evenly
+    ("midpoint", True, "refuted"),
+])  # fmt: skip
 def test_a_method_is_not_explicit_because_it_says_so(name, declared, verdict):
     claiming = dataclasses.replace(symtop.integrator(name), explicit=declared)
     run = long.long_run(claiming, SPHEROID, "angles", quick=True)
@@ -262,9 +239,6 @@ def test_the_angles_end_at_a_pole_and_the_space_frame_does_not():
     assert (angles.chart, angles.outcome, angles.passes) == ("angles", "left_chart", False)
     assert [one.chart for one in others] == ["axis", "attitude"]
     assert all((one.outcome, one.passes) == ("ok", True) for one in others)
-
-
-# ---- the ledger ------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["midpoint", "strang", "rk4"])
@@ -316,8 +290,6 @@ def test_a_method_whose_every_step_is_exact_is_judged_by_its_errors():
         dataclasses.replace(symtop.integrator("rk4"), exact_steps=True)
 
 
-# ---- liars -----------------------------------------------------------------------------------------------------------
-
 # file: what is refuted first of all, and in which words; `FOLLOWS` has what follows from the lie, and what a liar that
 # looks at its start leaves open
 CAUGHT = {
@@ -363,8 +335,6 @@ def test_a_liar_is_caught_for_the_right_reason(liar, clean_registry):
     refuted = {name for name, row in findings.items() if row["verdict"] == "refuted"}
     assert refuted <= {claim} | FOLLOWS.get(liar, set())
 
-
-# ---- false alarms ----------------------------------------------------------------------------------------------------
 
 HONEST = [
     "midpoint", "stormer-verlet", "strang", "cayley", "rk4", "gauss-4", "takahashi-imada", "yoshida-4", "gauss-2",

@@ -132,15 +132,12 @@ def test_another_quantity_takes_the_chart_that_shows_it(quantity):
     assert (data["reached"].sel(target=1e-6) == "met").all()
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        ({"methods": ["rk4", "rk4[axis]"]}, "one or more, each once"),
-        ({"methods": ["rk4[axis]"], "quantity": "attitude"}, "cannot show the attitude"),
-        ({"scene": "tennis-racket", "methods": "gauss-4", "quantity": "p_psi"}, "quantity 'p_psi' is unknown"),
-        ({"horizon": 1.0, "nutations": 2.0}, "not both"),
-    ],
-)
+@pytest.mark.parametrize(("words", "sentence"), [
+    ({"methods": ["rk4", "rk4[axis]"]}, "one or more, each once"),
+    ({"methods": ["rk4[axis]"], "quantity": "attitude"}, "cannot show the attitude"),
+    ({"scene": "tennis-racket", "methods": "gauss-4", "quantity": "p_psi"}, "quantity 'p_psi' is unknown"),
+    ({"horizon": 1.0, "nutations": 2.0}, "not both"),
+])  # fmt: skip
 def test_bad_input_is_one_sentence(words, sentence):
     with pytest.raises(symtop.SymtopError, match=sentence.replace("[", r"\[")):
         symtop.compare(**{"scene": "spheroid", "methods": "strang", "quiet": True} | words)

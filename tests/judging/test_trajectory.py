@@ -135,22 +135,19 @@ def test_the_command_takes_a_file(table, tmp_path):
     call("judge", file, "--output", tmp_path / "a.nc", "--badge", tmp_path / "a.svg")
 
 
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        ("time,x\n0,1\n", "must begin with a line of names, .*, but of 'time x' x is none of them$"),
-        ("ex,ey,ez\n0,0,1\n", "must begin with a line of names, .*, but of 'ex ey ez' there is no time$"),
-        ("time,ex,ey,ez,mass,note\n0,0,0,1,2,3\n", "mass is none of them, note is none of them$"),
-        ("time,theta,theta\n0,1,1\n", "theta is there twice$"),
-        ("0,0.1,0.2,0.3,0.4\n", r"0 is none of them, 0.1 is none of them, 0.2 is none of them \.\.\.$"),
-        ("time,theta\n0,0.4\n1\n", "2 numbers in each line: the number of columns changed from 2 to 1"),
-        ("time,theta\n0,high\n", "numbers in each line: could not convert string 'high' to float64"),
-        ("time,theta\n\n", "run.csv must have a line of numbers below its names, and has none"),
-        ("time,theta,energy\n0,0.4\n1,0.4\n", "3 numbers in each line, not 2$"),
-        ("time,theta,Lx,Ly\n0,0.4,1,1\n", "run.csv must have all of Lx, Ly, Lz, and lacks Lz"),
-        ("", "cannot be read: it is empty"),
-    ],
-)
+@pytest.mark.parametrize(("content", "words"), [
+    ("time,x\n0,1\n", "must begin with a line of names, .*, but of 'time x' x is none of them$"),
+    ("ex,ey,ez\n0,0,1\n", "must begin with a line of names, .*, but of 'ex ey ez' there is no time$"),
+    ("time,ex,ey,ez,mass,note\n0,0,0,1,2,3\n", "mass is none of them, note is none of them$"),
+    ("time,theta,theta\n0,1,1\n", "theta is there twice$"),
+    ("0,0.1,0.2,0.3,0.4\n", r"0 is none of them, 0.1 is none of them, 0.2 is none of them \.\.\.$"),
+    ("time,theta\n0,0.4\n1\n", "2 numbers in each line: the number of columns changed from 2 to 1"),
+    ("time,theta\n0,high\n", "numbers in each line: could not convert string 'high' to float64"),
+    ("time,theta\n\n", "run.csv must have a line of numbers below its names, and has none"),
+    ("time,theta,energy\n0,0.4\n1,0.4\n", "3 numbers in each line, not 2$"),
+    ("time,theta,Lx,Ly\n0,0.4,1,1\n", "run.csv must have all of Lx, Ly, Lz, and lacks Lz"),
+    ("", "cannot be read: it is empty"),
+])  # fmt: skip
 def test_what_is_no_trajectory_is_told(tmp_path, content, words):
     (tmp_path / "run.csv").write_text(content, encoding="utf-8")
     with pytest.raises(symtop.SymtopError, match=words):

@@ -208,23 +208,20 @@ def test_single_precision_may_round_beyond_the_pole():
 AXIS = np.tile([0.0, 0.0, 1.0], (41, 1))
 
 
-@pytest.mark.parametrize(
-    ("data", "scene", "words"),
-    [
-        ({"axis": AXIS}, "spheroid", "must hold time"),
-        ({"time": np.where(TIMES > 7.0, np.nan, TIMES), "axis": AXIS}, "spheroid", "time must be finite"),
-        ({"time": TIMES.astype("timedelta64[s]"), "axis": AXIS}, "spheroid", "time must be an array of real numbers"),
-        ({"time": TIMES, "axis": AXIS.T}, "spheroid", r"shape \(41, 3\)"),
-        ({"time": TIMES, "quaternion": AXIS}, "spheroid", r"shape \(41, 4\)"),
-        ({"time": TIMES, "axis": AXIS, "energy": TIMES[:5]}, "spheroid", r"energy must have the shape \(41,\)"),
-        ({"time": TIMES, "axis": 2.0 * AXIS}, "spheroid", "length 1 within 0.001"),
-        ({"time": TIMES, "theta": 50.0 + TIMES}, "spheroid", r"radians from the vertical"),
-        ({"time": TIMES, "axis": AXIS}, None, r"give errors\(data, scene\)"),
-        (xr.Dataset({"axis": (("time", "c"), AXIS)}, {"time": TIMES}), None, r"give errors\(data, scene\)"),
-        (AXIS, "spheroid", "Dataset or a mapping"),
-        (None, None, "scene is missing"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("data", "scene", "words"), [
+    ({"axis": AXIS}, "spheroid", "must hold time"),
+    ({"time": np.where(TIMES > 7.0, np.nan, TIMES), "axis": AXIS}, "spheroid", "time must be finite"),
+    ({"time": TIMES.astype("timedelta64[s]"), "axis": AXIS}, "spheroid", "time must be an array of real numbers"),
+    ({"time": TIMES, "axis": AXIS.T}, "spheroid", r"shape \(41, 3\)"),
+    ({"time": TIMES, "quaternion": AXIS}, "spheroid", r"shape \(41, 4\)"),
+    ({"time": TIMES, "axis": AXIS, "energy": TIMES[:5]}, "spheroid", r"energy must have the shape \(41,\)"),
+    ({"time": TIMES, "axis": 2.0 * AXIS}, "spheroid", "length 1 within 0.001"),
+    ({"time": TIMES, "theta": 50.0 + TIMES}, "spheroid", r"radians from the vertical"),
+    ({"time": TIMES, "axis": AXIS}, None, r"give errors\(data, scene\)"),
+    (xr.Dataset({"axis": (("time", "c"), AXIS)}, {"time": TIMES}), None, r"give errors\(data, scene\)"),
+    (AXIS, "spheroid", "Dataset or a mapping"),
+    (None, None, "scene is missing"),
+])  # fmt: skip
 def test_bad_data_are_refused_in_one_sentence(data, scene, words):
     with pytest.raises(symtop.SymtopError, match=words) as caught:
         symtop.errors(data, scene)
@@ -277,13 +274,10 @@ def test_an_ensemble_and_other_members_are_refused():
         symtop.errors(many, drawn)
 
 
-@pytest.mark.parametrize(
-    ("top", "start", "integrator"),
-    [
-        (symtop.RigidBody(1.0, 1.2, 0.6, mgl=1.0, centre=(0.1, 0.0, 1.0)), symtop.Attitude(), "vern9-fixed"),
-        (symtop.SymmetricTop(1.0, 0.5, mgl=1.0), symtop.Angles(theta=1.0, phi=0.3), "rkmk-se3-4"),
-    ],
-)
+@pytest.mark.parametrize(("top", "start", "integrator"), [
+    (symtop.RigidBody(1.0, 1.2, 0.6, mgl=1.0, centre=(0.1, 0.0, 1.0)), symtop.Attitude(), "vern9-fixed"),
+    (symtop.SymmetricTop(1.0, 0.5, mgl=1.0), symtop.Angles(theta=1.0, phi=0.3), "rkmk-se3-4"),
+])  # fmt: skip
 def test_momenta_of_what_is_let_go_at_rest_are_measured_by_what_the_weight_gives(top, start, integrator):
     scene = symtop.Scene("at-rest", top, start, horizon=5.0)
     assert scene.momentum_scale == pytest.approx(1.0)  # sqrt(mgl I1)

@@ -39,16 +39,13 @@ def test_one_stray_point_does_not_take_the_finer_ones_with_it():
     assert fit.used[6:].all()
 
 
-@pytest.mark.parametrize(
-    ("error", "reason"),
-    [
-        (np.full(16, 3e-3), "does not fall"),
-        (np.full(16, 0.5), "does not fall"),
-        (1e-4 + STEPS**2, "does not fall"),
-        (np.full(16, np.nan), "every run failed"),
-        (np.full(16, 3e-15), "fewer than five points"),
-    ],
-)
+@pytest.mark.parametrize(("error", "reason"), [
+    (np.full(16, 3e-3), "does not fall"),
+    (np.full(16, 0.5), "does not fall"),
+    (1e-4 + STEPS**2, "does not fall"),
+    (np.full(16, np.nan), "every run failed"),
+    (np.full(16, 3e-15), "fewer than five points"),
+])  # fmt: skip
 def test_what_is_not_a_power_of_the_step_is_not_judged_and_says_why(error, reason):
     fit = order(STEPS, error, 1e-15, 1.0)
     assert math.isnan(fit.slope)

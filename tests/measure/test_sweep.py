@@ -144,15 +144,12 @@ def test_a_cell_that_raised_is_tried_again_and_one_that_ended_early_is_not(tmp_p
         xr.testing.assert_identical(netcdf.read(file).drop_attrs(), data.drop_attrs())
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        ({}, "strang has a fixed step: give step_size or per_nutation"),
-        ({"step_size": 0.1, "integrators": "rk45"}, "rk45 is adaptive: give tolerance"),
-        ({"step_size": 0.1, "scenes": ["spheroid", "spheroid"]}, "scenes must be one or more, each once"),
-        ({"step_size": 0.1, "scenes": {"I1": [1.0]}}, "for a dataset of tops there is ensemble"),
-    ],
-)
+@pytest.mark.parametrize(("words", "says"), [
+    ({}, "strang has a fixed step: give step_size or per_nutation"),
+    ({"step_size": 0.1, "integrators": "rk45"}, "rk45 is adaptive: give tolerance"),
+    ({"step_size": 0.1, "scenes": ["spheroid", "spheroid"]}, "scenes must be one or more, each once"),
+    ({"step_size": 0.1, "scenes": {"I1": [1.0]}}, "for a dataset of tops there is ensemble"),
+])  # fmt: skip
 def test_bad_input_is_one_sentence(words, says):
     with pytest.raises(symtop.SymtopError, match=says):
         symtop.sweep(**{"scenes": "spheroid", "integrators": "strang", **words})

@@ -19,16 +19,13 @@ def judged(scene, name, **controls):
     return judgement(scene, run, error)
 
 
-@pytest.mark.parametrize(
-    ("scene", "name", "controls", "word", "says"),
-    [
-        ("goldstein", "strang", {"step_size": 0.01}, "accurate", "accurate to"),
-        ("goldstein", "strang", {"step_size": 0.3}, "bounded_but_wrong", "while the energy stayed within"),
-        ("goldstein", "rk4", {"step_size": 1.0, "horizon": 400.0, "observe": "axis"}, "drifting", "grew on"),
-        ("sleeping", "strang", {"step_size": 2.55, "horizon": 400.0}, "wrong_regime", "never goes"),
-        ("spheroid", "stormer-verlet", {"step_size": 1.0, "horizon": 50.0}, "left_chart", "stopped at"),
-    ],
-)
+@pytest.mark.parametrize(("scene", "name", "controls", "word", "says"), [
+    ("goldstein", "strang", {"step_size": 0.01}, "accurate", "accurate to"),
+    ("goldstein", "strang", {"step_size": 0.3}, "bounded_but_wrong", "while the energy stayed within"),
+    ("goldstein", "rk4", {"step_size": 1.0, "horizon": 400.0, "observe": "axis"}, "drifting", "grew on"),
+    ("sleeping", "strang", {"step_size": 2.55, "horizon": 400.0}, "wrong_regime", "never goes"),
+    ("spheroid", "stormer-verlet", {"step_size": 1.0, "horizon": 50.0}, "left_chart", "stopped at"),
+])  # fmt: skip
 def test_each_fate_is_judged_with_its_time_and_cause(scene, name, controls, word, says):
     result = judged(scene, name, **controls)
     assert result.verdict == word, result

@@ -50,9 +50,6 @@ def one_step(name, scene, h, chart="attitude"):
     return solve(symtop.integrator(name), chart, scene.top, scene.start, Plan.steps(h, [1])).states[-1]
 
 
-# ---- formulas --------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", AXIS_ERROR)
 def test_a_step_is_the_engines_formula_in_body_axes(name):
     """Kernels on the axis, with equations solved by hand, against matrices in body axes: the same to rounding."""
@@ -115,9 +112,6 @@ def test_explicit_maps_fly_apart(name, time):
     assert run["time"].values[np.argmax(np.abs(energy) > 1e6)] == pytest.approx(time, abs=0.2)
 
 
-# ---- without the gyroscopic term -------------------------------------------------------------------------------------
-
-
 def test_without_the_gyroscopic_term_an_engine_follows_the_spherical_top():
     """Agreement of order h with the closed form of the top with I3 := I1, none with its own."""
     top = GOLDSTEIN.top
@@ -142,9 +136,6 @@ def test_no_test_of_conservation_sees_that_it_is_another_top():
     assert wobble == pytest.approx(0.10, abs=0.01)  # L_z alone shows it, and nobody looks
 
 
-# ---- at rest ---------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", registry.engines())
 def test_a_top_that_starts_at_rest_falls_and_a_free_one_stays(name):
     """Jolt, PhysX and rapier rescale a momentum to its length, and each asks first whether it has one."""
@@ -155,9 +146,6 @@ def test_a_top_that_starts_at_rest_falls_and_a_free_one_stays(name):
             run = symtop.simulate(scene, f"{name}[{chart}]", step_size=0.005, observe=shown, samples=11, guard=False)
             assert run.attrs["outcome"] == "ok"
             assert float(symtop.errors(run)["axis"].max()) < (0.02 if mgl else 1e-6)
-
-
-# ---- charts and momenta ----------------------------------------------------------------------------------------------
 
 
 def _spun(scene, psi):
@@ -198,9 +186,6 @@ def test_a_member_of_an_ensemble_has_the_bits_of_the_run_alone(name):
     assert_runs_alone(solver, numbers, h, marks, solver.many(numbers, h, marks))
 
 
-# ---- single precision ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ROUNDED)
 def test_in_single_precision_a_step_is_the_same_but_for_rounding(name):
     exact, rounded = (one_step(one, GOLDSTEIN, 0.01) for one in (name, name + "-float32"))
@@ -223,9 +208,6 @@ def test_in_single_precision_there_is_a_best_step(name, best, error):
     assert finest > 1.5 * fine
     if name == "rapier":  # the control: in double it goes on
         assert axis_error(f"{name}[attitude]", counts[2]) < 0.2 * finest
-
-
-# ---- among the other integrators -------------------------------------------------------------------------------------
 
 
 def test_comparisons_and_recommendations_leave_engines_out():

@@ -35,9 +35,6 @@ def true_orbit(scene, h, steps):
     return rule, [value * np.exp(0.5j * par.twist * times) * turn for value, turn in zip(chi, turns, strict=True)]
 
 
-# ---- exactness -------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", PERIODIC)
 @pytest.mark.parametrize("steps", [100, 20, 4.37, 2.3, 2.0, 0.61, 2.0 / 3.0])
 def test_the_step_is_the_motion_whatever_its_size(name, steps):
@@ -120,9 +117,6 @@ def test_the_separatrix_is_climbed_and_large_steps_are_divided_there():
     assert run(ordinary.top, ordinary.start, ordinary.nutation_period / 2.3, 8).force_evaluations == 8
 
 
-# ---- the discrete Lagrangian -----------------------------------------------------------------------------------------
-
-
 def lagrangian(A, B, r, q0, q1):
     """L_d of one oscillator on two points of the plane, shape (2,), complex for a complex step."""
     apart = q1 - q0
@@ -194,9 +188,6 @@ def test_the_discrete_routhians_of_both_oscillators_are_one_map_of_the_height(na
                 heights.append(sign * (2.0 * s - 1.0))
             gaps.append(np.abs(np.array(heights) - true[2:]).max())
         assert min(gaps) > 1e-8 if wrong else max(gaps) < 1e-12
-
-
-# ---- long runs and rounding ------------------------------------------------------------------------------------------
 
 
 def test_constants_stay_where_they_are_over_long_runs():

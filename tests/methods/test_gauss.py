@@ -94,8 +94,6 @@ def test_gauss_methods_are_not_poisson():
     assert defect(12, 0.2) < 1e-9  # the exact map, as far as differences see
 
 
-# ---- any step is stable ----------------------------------------------------------------------------------------------
-
 LARGE = (2.0, 5.0, 10.0)  # h omega; sweeps converge up to about 1.6 with one stage
 STEADY = symtop.scene("steady-fast")
 OMEGA = STEADY.top.nutation_frequency(STEADY.top.momenta(STEADY.start))
@@ -187,9 +185,6 @@ def test_the_frame_turns_with_the_body():
     attitude = frame_to_attitude(par, h * marks, states)
     exact = symtop.ClosedForm(top, start).quaternion(h * marks)
     assert np.max(charts.attitude_distance(attitude[:, :4], exact)) < 1e-13
-
-
-# ---- Newton for the stages ------------------------------------------------------------------------------------------
 
 
 def jacobian(par, y):

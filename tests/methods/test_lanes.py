@@ -293,8 +293,6 @@ def test_a_rule_that_is_a_table_of_stages_runs_in_lanes():
         np.testing.assert_array_equal(one, other)
 
 
-# ---- methods on Lie groups -------------------------------------------------------------------------------------------
-
 CHARTS = ("axis", "attitude")
 
 

@@ -53,9 +53,6 @@ def energies(scene, rows):
     return 0.5 * np.sum(rows[:, 3:] ** 2, axis=1) / scene.top.I1 + scene.top.mgl * rows[:, 2]
 
 
-# ---- what is kept ----------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", [*LIE_TABLES, *COLLECTIVE, *VARIATIONAL])
 def test_casimirs_are_exact_where_rk4_loses_them(name):
     scene = symtop.scene("spheroid")
@@ -63,9 +60,6 @@ def test_casimirs_are_exact_where_rk4_loses_them(name):
         done = states(method, scene, scene.nutation_period / 40.0, 400, "axis")
         lost = np.abs(np.sum(done[:, :3] * done[:, 3:], axis=1) / (done[0, :3] @ done[0, 3:]) - 1.0).max()
         assert bool(lost < 3e-14) is exact
-
-
-# ---- variational methods ---------------------------------------------------------------------------------------------
 
 
 def kicked(scene, rows, h):
@@ -165,9 +159,6 @@ def test_the_scalar_equations_are_solved_for_every_shape_and_size():
         assert k == pytest.approx(top.I1 * square / (i * i + bent**2) + top.I3 * x * x, rel=1e-9, abs=1e-14)
 
 
-# ---- energy and momentum ---------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("scene", random_scenes(4, seed=13), ids=lambda scene: scene.name)
 def test_a_step_is_simo_and_wongs(scene):
     """R_1 = R_0 cay(h (W_0 + W_1)/2) and L_1 = L_0 + h tau at the mean of both axes."""
@@ -236,9 +227,6 @@ def test_the_discrete_gradients_are_the_midpoint_rule_and_the_mean_field_loses_t
     assert abs(energy.value(mean_field) / energy.value(before) - 1.0) > 1e-8
 
 
-# ---- Kahan -----------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("scene", random_scenes(4, seed=14), ids=lambda scene: scene.name)
 def test_kahan_is_its_runge_kutta_form(scene):
     """y_1 = y_0 + h (2 f((y_0 + y_1)/2) - (f(y_0) + f(y_1))/2)."""
@@ -248,9 +236,6 @@ def test_kahan_is_its_runge_kutta_form(scene):
     for before, after in itertools.pairwise(rows):
         f0, fm, f1 = (np.array(field_axis(par, y)) for y in (before, 0.5 * (before + after), after))
         np.testing.assert_allclose(after - before, h * (2.0 * fm - 0.5 * f0 - 0.5 * f1), atol=2e-14)
-
-
-# ---- collective methods ----------------------------------------------------------------------------------------------
 
 
 def flipped(q):
@@ -293,9 +278,6 @@ def test_collective_methods_bound_the_energy_that_gauss_keeps_to_rounding():
     assert lost["commutator-free-4"][-1] > 5.0 * lost["commutator-free-4"][2000]
 
 
-# ---- generalised-alpha -----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("scene", random_scenes(3, seed=15), ids=lambda scene: scene.name)
 @pytest.mark.parametrize("radius", [0.0, 0.6, 1.0])
 def test_two_steps_are_those_of_the_generalised_alpha_method(radius, scene):
@@ -330,9 +312,6 @@ def test_two_steps_are_those_of_the_generalised_alpha_method(radius, scene):
 def test_a_spectral_radius_out_of_range_is_refused(radius):
     with pytest.raises(symtop.SymtopError, match="spectral_radius"):
         generalised_alpha("alpha", radius)
-
-
-# ---- published values ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("name", "steps", "band"), [("simo-wong", 128000, 1e-5), ("collective-gauss-6", 2000, 6e-6)])

@@ -73,11 +73,10 @@ def test_the_interpolant_of_tsit5_has_order_four():
 
 
 @pytest.mark.parametrize("chart", list(FORMULATIONS))
-@pytest.mark.parametrize(
-    ("name", "scene", "tolerance", "close"),
-    [("dop853", "spheroid", 1e-6, 2e-8), ("dop853", "spheroid", 1e-10, 2e-8), ("dop853", "goldstein", 1e-4, 2e-8),
-     ("rk45", "spheroid", 1e-6, 1e-9), ("rk45", "spheroid", 1e-7, 1e-9), ("rk45", "goldstein", 1e-4, 1e-9)],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "scene", "tolerance", "close"), [
+    ("dop853", "spheroid", 1e-6, 2e-8), ("dop853", "spheroid", 1e-10, 2e-8), ("dop853", "goldstein", 1e-4, 2e-8),
+    ("rk45", "spheroid", 1e-6, 1e-9), ("rk45", "spheroid", 1e-7, 1e-9), ("rk45", "goldstein", 1e-4, 1e-9),
+])  # fmt: skip
 def test_a_pair_accepts_and_rejects_scipys_steps(name, scene, tolerance, close, chart):
     """In angles rounding grows from step to step: a start of spheroid that is off by 1e-15 gives SciPy 462 or 449 steps
     of order 8 instead of 460 until t = 40."""

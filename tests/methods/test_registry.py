@@ -44,17 +44,14 @@ def test_two_threads_that_make_the_very_first_call_together_see_every_integrator
     assert results == [shipped] * 4
 
 
-@pytest.mark.parametrize(
-    ("fields", "says"),
-    [
-        ({"symplectic": "yes"}, "symplectic must be True, False or None, not 'yes'"),
-        ({"exact_steps": "no"}, "exact_steps must be True or False, not 'no'"),
-        ({"default_tolerance": -1}, "default_tolerance must be above zero"),
-        ({"default_tolerance": 1e-9, "least_tolerance": 1e-6}, "default_tolerance must be above zero, at least 1e-06"),
-        ({"least_tolerance": -1.0}, "least_tolerance must be at least 0"),
-        ({"reference": 5}, "reference must be text, not 5"),
-    ],
-)
+@pytest.mark.parametrize(("fields", "says"), [
+    ({"symplectic": "yes"}, "symplectic must be True, False or None, not 'yes'"),
+    ({"exact_steps": "no"}, "exact_steps must be True or False, not 'no'"),
+    ({"default_tolerance": -1}, "default_tolerance must be above zero"),
+    ({"default_tolerance": 1e-9, "least_tolerance": 1e-6}, "default_tolerance must be above zero, at least 1e-06"),
+    ({"least_tolerance": -1.0}, "least_tolerance must be at least 0"),
+    ({"reference": 5}, "reference must be text, not 5"),
+])  # fmt: skip
 def test_a_field_that_makes_no_sense_is_refused_and_one_that_does_is_not(fields, says):
     right = {"name": "mine", "family": "other", "summary": "", "solvers": {"angles": print}}
     with pytest.raises(SymtopError, match=f"^{re.escape(says)}"):

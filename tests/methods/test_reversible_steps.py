@@ -33,9 +33,6 @@ def energies(scene, states):
     return 0.5 * states[:, 1] ** 2 / par.I1 + height
 
 
-# ---- the steps -------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["spheroid", "goldstein"])
 @pytest.mark.parametrize("quantity", ["attitude", "energy"])
 def test_the_error_falls_with_the_square_of_the_step(name, quantity):
@@ -103,9 +100,6 @@ def test_both_momenta_stay():
             assert np.abs(values / first - 1.0).max() < 1e-12
 
 
-# ---- structure -------------------------------------------------------------------------------------------------------
-
-
 def read_off(scene, eps, marks):
     """The same steps with h = eps sin(theta_n), which nothing retraces: states, and those of the way back.
 
@@ -155,9 +149,6 @@ def test_the_energy_stays_bounded_where_that_of_steps_read_off_drifts():
     assert np.abs(errors).max() < 1.1 * np.abs(errors[:200]).max()
     assert abs(trend(marks, errors).rise) < 0.01 * np.abs(errors).max()
     assert trend(marks, lost).rise > 100.0 * np.abs(errors).max()
-
-
-# ---- poles -----------------------------------------------------------------------------------------------------------
 
 
 def forces_for(scene, method, error):

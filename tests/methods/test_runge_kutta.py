@@ -23,15 +23,12 @@ from tests.measure.test_step_series import series
 KUTTA_A, KUTTA_B, _ = CLASSICAL
 
 
-@pytest.mark.parametrize(
-    ("a", "b", "order"),
-    [
-        (KUTTA_A, KUTTA_B, 4),
-        (((),), (1.0,), 1),
-        (((0.0, 0.0), (0.5, 0.0)), (0.0, 1.0), 2),
-        (((), (1 / 3,), (0.0, 2 / 3)), (1 / 4, 0.0, 3 / 4), 3),
-    ],
-)
+@pytest.mark.parametrize(("a", "b", "order"), [
+    (KUTTA_A, KUTTA_B, 4),
+    (((),), (1.0,), 1),
+    (((0.0, 0.0), (0.5, 0.0)), (0.0, 1.0), 2),
+    (((), (1 / 3,), (0.0, 2 / 3)), (1 / 4, 0.0, 3 / 4), 3),
+])  # fmt: skip
 def test_a_step_of_a_users_tableau_is_the_definition_and_has_its_order(a, b, order):
     scene, method, h = symtop.scene("spheroid"), runge_kutta("mine", a, b), 0.01
     par, state = with_rates(scene.top, scene.start)
@@ -49,26 +46,21 @@ def test_a_tableau_may_be_made_of_arrays():
     assert runge_kutta("heun", rows, heun[1]).solvers["axis"].rule == rules[0]
 
 
-@pytest.mark.parametrize(
-    ("a", "b", "c", "words"),
-    [
-        (KUTTA_A, (1 / 6, 1 / 3, 1 / 3, 1 / 3), None, "b must sum to 1"),
-        (KUTTA_A, KUTTA_B, (0.0, 0.5, 0.5, 0.9), "c must be the row sums"),
-        (KUTTA_A[:3], KUTTA_B, None, "a must have one row for each"),
-        (((0.5,),), (1.0,), None, "row 1 of a"),
-        (((), (0.5, 0.1, 0.0), (0.0, 0.5, 0.5)), (0.2, 0.3, 0.5), None, "row 2 of a"),
-        (np.zeros((2, 3)), np.array([0.5, 0.5]), None, "row 1 of a must have 0 entries"),
-        (np.array([[0.0, 1.0], [1.0, 0.0]]), (0.5, 0.5), None, "row 1 of a must have 0 entries"),
-        (np.zeros((3, 3)), (0.5, 0.5), None, "a must have one row for each of the 2"),
-        (np.zeros((2, 2, 2)), (0.5, 0.5), None, "an entry of a must be a finite number"),
-    ],
-)
+@pytest.mark.parametrize(("a", "b", "c", "words"), [
+    (KUTTA_A, (1 / 6, 1 / 3, 1 / 3, 1 / 3), None, "b must sum to 1"),
+    (KUTTA_A, KUTTA_B, (0.0, 0.5, 0.5, 0.9), "c must be the row sums"),
+    (KUTTA_A[:3], KUTTA_B, None, "a must have one row for each"),
+    (((0.5,),), (1.0,), None, "row 1 of a"),
+    (((), (0.5, 0.1, 0.0), (0.0, 0.5, 0.5)), (0.2, 0.3, 0.5), None, "row 2 of a"),
+    (np.zeros((2, 3)), np.array([0.5, 0.5]), None, "row 1 of a must have 0 entries"),
+    (np.array([[0.0, 1.0], [1.0, 0.0]]), (0.5, 0.5), None, "row 1 of a must have 0 entries"),
+    (np.zeros((3, 3)), (0.5, 0.5), None, "a must have one row for each of the 2"),
+    (np.zeros((2, 2, 2)), (0.5, 0.5), None, "an entry of a must be a finite number"),
+])  # fmt: skip
 def test_bad_tableaux_are_refused(a, b, c, words):
     with pytest.raises(symtop.SymtopError, match=words):
         runge_kutta("bad", a, b, c)
 
-
-# --- one right-hand side a chart ------------------------------------------------------------------------------------
 
 ADAPTIVE = ("rk45", "rk45-compiled", "dop853", "lsoda", "radau")
 
@@ -167,9 +159,6 @@ def test_a_state_of_another_shape_is_refused(chart, compiled):
         np.testing.assert_array_equal(f(0.0, same), f(0.0, y))
 
 
-# --- Dormand-Prince -------------------------------------------------------------------------------------------------
-
-
 def _walk(scene, tolerance, pair=pairs.RK45, **limits):
     plan, _ = make_plan(scene, integrator("rk45-compiled"), None, tolerance, horizon=8.0, samples=301)
     return plan, replace(pairs.solver(FORMULATIONS["angles"], pair, pair.rows), **limits)(scene.top, scene.start, plan)
@@ -184,9 +173,6 @@ def test_adaptive_outcomes():
     assert run.outcome == "out_of_budget"
     assert 0.0 < run.reached < 8.0
     assert np.array_equal(np.isfinite(run.states[:, 0]), plan.times <= run.reached)
-
-
-# --- libraries ------------------------------------------------------------------------------------------------------
 
 
 def _error(name, tolerance, quantity="axis", **controls):

@@ -50,9 +50,6 @@ def called(function, *arguments):
     return njit(call)(arguments)
 
 
-# ---- vectors ---------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("of_order", "size"), [(axis_sum, 6), (attitude_sum, 7)])
 def test_components_compute_what_vectors_compute(of_order, size):
     """To the last bit, as lanes need it; another order is another sum."""
@@ -60,9 +57,6 @@ def test_components_compute_what_vectors_compute(of_order, size):
     result = called(of_order(16, Components), state, 0.1, 0.2)
     assert result == called(of_order(16), state, 0.1, 0.2)
     assert result != called(of_order(12), state, 0.1, 0.2)
-
-
-# ---- coefficients ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -98,9 +92,6 @@ def test_the_attitudes_sum_shows_the_axis_of_the_axis_sum(order):
     assert np.linalg.norm(moved) == pytest.approx(1.0, abs=1e-13)
 
 
-# ---- orders ----------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("chart", CHARTS)
 @pytest.mark.parametrize(("order", "window"), [(8, (14, 60)), (12, (9, 25)), (16, (7, 12)), (20, (6, 8))])
 def test_the_error_of_a_step_falls_with_one_power_more_than_the_order(chart, order, window):
@@ -132,9 +123,6 @@ def test_constants_of_the_present_state_keep_a_long_run_at_rounding():
     assert np.abs(energy / energy[0] - 1.0).max() < 3e-12
     assert np.ptp(done.p_phi) == 0.0
     assert np.abs(done.p_psi / done.p_psi[0] - 1.0).max() < 3e-12
-
-
-# ---- tolerance -------------------------------------------------------------------------------------------------------
 
 
 def test_the_order_follows_from_the_tolerance():
@@ -186,8 +174,6 @@ def test_a_hyphen_before_a_chart_names_a_row_too():
     with pytest.raises(KeyError):
         symtop.integrators()["serious-axis"]
 
-
-# ---- by recurrence, of any equations ---------------------------------------------------------------------------------
 
 GENERAL = series_general.CHARTS
 OF_TOPS = [chart for chart in GENERAL if chart != "body"]

@@ -23,9 +23,6 @@ def run(method, scene, h, marks, chart="attitude"):
     return method.solvers[chart](scene.top, scene.start, Plan.steps(h, marks))
 
 
-# ---- coefficients ----------------------------------------------------------------------------------------------------
-
-
 def quadrature_defect(table, order):
     """Largest |sum b t^k - 1/(k+1)| for k < order, t the time at each kick."""
     times = np.array([math.fsum(table.drift[:i]) for i in range(len(table.kick))])
@@ -46,8 +43,6 @@ def test_tables_sum_to_one_read_the_same_from_both_ends_and_integrate_polynomial
     wrong = table._replace(kick=(table.kick[0] + 1e-9, *table.kick[1:-1], table.kick[-1] - 1e-9))
     assert quadrature_defect(wrong, order) > 1e-10
 
-
-# ---- structure -------------------------------------------------------------------------------------------------------
 
 TOP = symtop.SymmetricTop(2.0, 0.7, 3.0)
 START = symtop.Angles(theta=0.7, phi=0.3, psi=-0.2, theta_dot=0.4, phi_dot=0.9, psi_dot=2.0)
@@ -81,9 +76,6 @@ def test_a_table_without_a_last_kick_kicks_with_the_newest_axis(chart):
         errors[kick] = abs(float(once["energy"][-1] - once["energy"][0]))
         assert once.attrs["force_evaluations"] == once.attrs["steps"]
     assert 0.5 < errors[1.0, 0.0] / errors[0.0, 1.0] < 2.0  # adjoint methods: errors of one size
-
-
-# ---- constants -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["strang", "cayley", "yoshida-4", "srkn-14-6"])
@@ -146,9 +138,6 @@ def test_the_mean_square_momentum_is_that_of_the_closed_form(name):
     assert space.mean_square_momentum(scene.top, scene.start) == pytest.approx(mean, rel=1e-13)
 
 
-# ---- what each is good at --------------------------------------------------------------------------------------------
-
-
 def largest_error(name, scene, h, horizon):
     return float(error_table(scene, METHODS[name], [h], horizon, observe="attitude")["axis"][0])
 
@@ -179,9 +168,6 @@ def test_generalised_orders_remove_the_first_power_of_gravity(name):
     assert spin_power("suzuki-4") < 2.2  # order 4 too, but its error is of the first power
 
 
-# ---- use -------------------------------------------------------------------------------------------------------------
-
-
 def test_a_new_composition_compiles_nothing():
     """One kernel takes tables of any length, but for those of one and two drifts, which are compiled for it."""
     scene = symtop.scene("spheroid")
@@ -196,17 +182,14 @@ def test_a_new_composition_compiles_nothing():
     assert METHODS["strang"].solvers["axis"]._whole.alone[0] is not march
 
 
-@pytest.mark.parametrize(
-    ("words", "arguments", "more"),
-    [
-        ("kick must have one coefficient more", ((1.0,), (1.0,)), {}),
-        ("drift coefficients must sum to 1", ((0.9,), (0.5, 0.5)), {}),
-        ("gradient must have as many", ((1.0,), (0.5, 0.5), (0.0,)), {"chart": "space"}),
-        ("gradient must be zero where kick is", ((0.5, 0.5), (0.0, 1.0, 0.0), (0.1, 0.0, 0.0)), {"chart": "space"}),
-        ("chart must be 'space'", ((1.0,), (0.5, 0.5), (0.1, 0.1)), {}),
-        ("rotation 'caley' is unknown; did you mean cayley", ((1.0,), (0.5, 0.5)), {"rotation": "caley"}),
-    ],
-)
+@pytest.mark.parametrize(("words", "arguments", "more"), [
+    ("kick must have one coefficient more", ((1.0,), (1.0,)), {}),
+    ("drift coefficients must sum to 1", ((0.9,), (0.5, 0.5)), {}),
+    ("gradient must have as many", ((1.0,), (0.5, 0.5), (0.0,)), {"chart": "space"}),
+    ("gradient must be zero where kick is", ((0.5, 0.5), (0.0, 1.0, 0.0), (0.1, 0.0, 0.0)), {"chart": "space"}),
+    ("chart must be 'space'", ((1.0,), (0.5, 0.5), (0.1, 0.1)), {}),
+    ("rotation 'caley' is unknown; did you mean cayley", ((1.0,), (0.5, 0.5)), {"rotation": "caley"}),
+])  # fmt: skip
 def test_bad_tables_are_refused_in_one_sentence(words, arguments, more):
     with pytest.raises(symtop.SymtopError, match=words):
         composition("bad", *arguments, **more)

@@ -114,9 +114,6 @@ def test_the_last_resort_gives_the_same_motion(named, monkeypatch):
     np.testing.assert_allclose(ours.axis(times), digits.axis(times), rtol=0, atol=2 * EPS)
 
 
-# --------------------------------------------------------------------------------------------------- compiled
-
-
 def test_compiled_and_interpreted_functions_give_the_same_bits():
     closed_form.compile_now()
     times = np.array([0.0, 0.3, -17.1, 1e3, 1e6, 1e17])
@@ -142,17 +139,14 @@ def test_compiled_and_interpreted_functions_give_the_same_bits():
         assert ours.tobytes() == theirs.tobytes()
 
 
-@pytest.mark.parametrize(
-    "numbers",
-    [
-        (1.0, 0.5, 1.0, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0),
-        (1.0, 0.5, 1e-70, 1.0, 0.0, 0.0, 0.1, 0.2, 0.3),
-        (1e-40, 1e-40, 1e40, 1.0, 0.0, 0.0, 1e40, -1e40, 1e40),
-        (1.0, 0.5, 1.0, 1e-130, 0.0, 0.0, 0.0, 1e-59, 1e-59),
-        (1.0, 0.5, 1e40, 3.0, 0.0, 0.0, 1e-59, 0.0, 0.0),
-        (1e40, 1e40, 1e-59, 1.0, 0.0, 0.0, 1e-59, 1e40, 1e-59),
-    ],
-)
+@pytest.mark.parametrize("numbers", [
+    (1.0, 0.5, 1.0, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0),
+    (1.0, 0.5, 1e-70, 1.0, 0.0, 0.0, 0.1, 0.2, 0.3),
+    (1e-40, 1e-40, 1e40, 1.0, 0.0, 0.0, 1e40, -1e40, 1e40),
+    (1.0, 0.5, 1.0, 1e-130, 0.0, 0.0, 0.0, 1e-59, 1e-59),
+    (1.0, 0.5, 1e40, 3.0, 0.0, 0.0, 1e-59, 0.0, 0.0),
+    (1e40, 1e40, 1e-59, 1.0, 0.0, 0.0, 1e-59, 1e40, 1e-59),
+])  # fmt: skip
 def test_values_at_the_ends_of_the_range_end_in_a_status(numbers):
     """Neither way raises, and both say the same."""
     closed_form.compile_now()
@@ -180,9 +174,6 @@ def test_many_samples_are_worth_compiling(monkeypatch):
     monkeypatch.setattr(kernel, "compile", lambda: setattr(kernel, "compiled", True))
     assert kernel.ready(0.11)
     assert kernel.ready(0.0)
-
-
-# --------------------------------------------------------------------------------------------------- separatrix
 
 
 @pytest.mark.parametrize("rate", [2.0, -2.0])
@@ -234,9 +225,6 @@ def test_next_to_the_separatrix_the_motion_is_periodic():
     assert ClosedForm(top, Angles(0.0, theta_dot=2.0, psi_dot=1e-9)).nutation_period < 100.0
 
 
-# ---------------------------------------------------------------------------------------------- against 50 digits
-
-
 @pytest.mark.parametrize("count", [1, pytest.param(40, marks=pytest.mark.slow)])
 def test_every_family_keeps_the_accuracy_that_is_claimed(count):
     """So many of each; `python -m benchmarks.accuracy` measures ten thousand."""
@@ -258,9 +246,6 @@ def test_a_form_that_is_wrong_in_the_fifteenth_digit_breaks_the_claim(monkeypatc
 
     monkeypatch.setattr(accuracy, "ClosedForm", wrong)
     assert accuracy.examine("generic", 2, 0).broken
-
-
-# ------------------------------------------------------------------------------------------------------ many tops
 
 
 TIMES = np.array([0.0, 0.3, -17.1, 1e3, 1e6])
@@ -344,16 +329,13 @@ def test_a_member_without_a_form_fails_alone():
         assert np.isfinite(values[[0, 2]]).all()
 
 
-@pytest.mark.parametrize(
-    ("column", "value", "words"),
-    [
-        ("I1", -1.0, "member 1: I1 must be above zero, not -1.0"),
-        ("I3", 2.5, "member 1: I3 must be at most 2 I1"),
-        ("mgl", math.nan, "member 1: mgl must be a finite number"),
-        ("theta", 3.2, "member 1: theta must lie in"),
-        ("psi_dot", 1e41, "member 1: psi_dot must be between"),
-    ],
-)
+@pytest.mark.parametrize(("column", "value", "words"), [
+    ("I1", -1.0, "member 1: I1 must be above zero, not -1.0"),
+    ("I3", 2.5, "member 1: I3 must be at most 2 I1"),
+    ("mgl", math.nan, "member 1: mgl must be a finite number"),
+    ("theta", 3.2, "member 1: theta must lie in"),
+    ("psi_dot", 1e41, "member 1: psi_dot must be between"),
+])  # fmt: skip
 def test_a_row_that_is_no_top_is_named(column, value, words):
     rows = np.array([flat(*ASLEEP)] * 3)
     rows[1, NUMBERS.index(column)] = value

@@ -38,9 +38,6 @@ def _digits():
         yield
 
 
-# ------------------------------------------------------------------------------------------------ published digits
-
-
 CONSTANTS = {name: name for name in ("p_phi", "p_psi", "a", "b", "alpha", "beta", "m", "Omega", "K", "nutation_period")}
 CONSTANTS |= {"E": "energy", "dphi_per_period": "phi_per_period", "dpsi_per_period": "psi_per_period"}
 
@@ -61,9 +58,6 @@ def test_thirty_digits_of_the_published_states(name):
     last = [mp.mpf(10) ** Decimal(y).as_tuple().exponent for _, y in printed]  # units of the last digits
     assert all(abs(x - mp.mpf(y)) <= unit for (x, y), unit in zip(printed, last, strict=True))
     assert all(abs(x - mp.mpf(y)) < 1e-12 for x, y in pairs)
-
-
-# ----------------------------------------------------------------------------------------- double against 50 digits
 
 
 def _times(form, random):
@@ -128,11 +122,10 @@ def test_theta_functions_and_elliptic_integrals_give_the_same_attitude(kind):
         assert gap > 1e-10
 
 
-@pytest.mark.parametrize(
-    "kind",
-    ["generic", "fast", "nearly steady", "near the separatrix", "threshold of sleep", "grazes the top", "asleep",
-     "pendulum to the top"],
-)  # fmt: skip
+@pytest.mark.parametrize("kind", [
+    "generic", "fast", "nearly steady", "near the separatrix", "threshold of sleep", "grazes the top", "asleep",
+    "pendulum to the top",
+])  # fmt: skip
 def test_as_many_digits_are_right_as_are_asked_for(kind):
     random = np.random.default_rng([4, REGIMES.index(kind)])
     top, start = random_top(kind, random)
@@ -142,18 +135,14 @@ def test_as_many_digits_are_right_as_are_asked_for(kind):
         assert all(abs(x - y) <= mp.mpf(10) ** -30 * max(1, abs(y)) for x, y in zip(short, long, strict=True))
 
 
-# ----------------------------------------------------------------------------------------- the equations of motion
-
-
 def _momentum(top, start):
     return space_state("axis", top, start)[3:]
 
 
-@pytest.mark.parametrize(
-    "kind",
-    ["generic", "turning point", "cusp", "plane pendulum", "grazes the top", "grazes the bottom", "through the top",
-     "through the bottom", "flat body", "free", "hanging", "from the top", "asleep below", "nearly steady", "fast"],
-)  # fmt: skip
+@pytest.mark.parametrize("kind", [
+    "generic", "turning point", "cusp", "plane pendulum", "grazes the top", "grazes the bottom", "through the top",
+    "through the bottom", "flat body", "free", "hanging", "from the top", "asleep below", "nearly steady", "fast",
+])  # fmt: skip
 def test_an_integration_of_the_attitude_ends_where_the_closed_form_says(kind):
     pytest.importorskip("heyoka")
     top, start = random_top(kind, np.random.default_rng([6, REGIMES.index(kind)]))
@@ -164,9 +153,6 @@ def test_an_integration_of_the_attitude_ends_where_the_closed_form_says(kind):
     assert np.abs(form.momentum(times) - states[:, 4:]).max() < 3e-13 * reach
     late = attitude_distance(form.quaternion(times + 1e-9), states[:, :4]).max()
     assert late > 1e-10
-
-
-# --------------------------------------------------------------------------------------------- particular solutions
 
 
 def _woodhouse(I1, I3, mgl):
@@ -270,9 +256,6 @@ def test_a_start_at_the_pole_moves_the_way_it_is_pushed(facing, rate, kind):
     assert [float(value) for value in form(0.0)[:4]] == pytest.approx([0.0, 0.3, 0.0, rate], rel=2 * EPS)
 
 
-# ---------------------------------------------------------------------------------------- consistency of one motion
-
-
 @pytest.mark.parametrize("kind", REGIMES)
 def test_views_of_one_motion_agree(kind):
     top, start = random_top(kind, np.random.default_rng([7, REGIMES.index(kind)]))
@@ -303,17 +286,14 @@ def test_one_period_adds_the_precession_and_the_spin():
     assert (double.phi_per_period, double.psi_per_period) == (float(form.phi_per_period), float(form.psi_per_period))
 
 
-@pytest.mark.parametrize(
-    ("body", "state", "words"),
-    [
-        (("1", "1"), ("1", 0, 0, 0, 0, 0), "numbers"),
-        (("1", "x", "1"), ("1", 0, 0, 0, 0, 0), "I3 must be a finite number"),
-        (("1", "1", math.nan), ("1", 0, 0, 0, 0, 0), "mgl must be a finite number"),
-        (("1", "2.1", "1"), ("1", 0, 0, 0, 0, 0), "I3 must be at most"),
-        (("1", "1", "1"), ("3.2", 0, 0, 0, 0, 0), "theta must lie in"),
-        (("-1", "1", "1"), ("1", 0, 0, 0, 0, 0), "I1 must be above zero"),
-    ],
-)
+@pytest.mark.parametrize(("body", "state", "words"), [
+    (("1", "1"), ("1", 0, 0, 0, 0, 0), "numbers"),
+    (("1", "x", "1"), ("1", 0, 0, 0, 0, 0), "I3 must be a finite number"),
+    (("1", "1", math.nan), ("1", 0, 0, 0, 0, 0), "mgl must be a finite number"),
+    (("1", "2.1", "1"), ("1", 0, 0, 0, 0, 0), "I3 must be at most"),
+    (("1", "1", "1"), ("3.2", 0, 0, 0, 0, 0), "theta must lie in"),
+    (("-1", "1", "1"), ("1", 0, 0, 0, 0, 0), "I1 must be above zero"),
+])  # fmt: skip
 def test_values_outside_the_model_are_refused(body, state, words):
     with pytest.raises(SymtopError, match=words):
         PreciseForm(body, state)

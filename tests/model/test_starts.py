@@ -95,22 +95,19 @@ def test_a_body_from_its_moments_about_the_centre_is_the_spheroid():
     )
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (
-            lambda: symtop.Angles.from_quaternion([1, 0, 0, 0], omega_body=[1, 1, 1], omega_space=[1, 1, 1]),
-            "give omega_body or omega_space, not both",
-        ),
-        (lambda: symtop.Angles.from_axis(symtop.SymmetricTop(1, 1, 1), [0, 0, 2], [0, 0, 1]), "axis must have unit"),
-        (lambda: symtop.SymmetricTop.from_inertia(1, 1, 3, 1), "axial must be at most 2 at_centre"),
-        (lambda: symtop.RigidBody.from_inertia(5.0), "matrix must be rows of 3 numbers, not 5.0"),
-        (lambda: symtop.RigidBody.from_points(2.0, [[0, 0, 1]]), "masses must be a row of numbers, not 2.0"),
-        (lambda: symtop.RigidBody.from_points([2.0], 1.0), "places must be rows of 3 numbers, not 1.0"),
-        (lambda: symtop.RigidBody.from_inertia(np.eye(3), mass=2.0), "needs mgl, which is mass times gravity times"),
-        (lambda: symtop.SymmetricTop.from_inertia(1, 1, 1, 1, gravity=-9.81), "gravity must be at least 0"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("call", "words"), [
+    (
+        lambda: symtop.Angles.from_quaternion([1, 0, 0, 0], omega_body=[1, 1, 1], omega_space=[1, 1, 1]),
+        "give omega_body or omega_space, not both",
+    ),
+    (lambda: symtop.Angles.from_axis(symtop.SymmetricTop(1, 1, 1), [0, 0, 2], [0, 0, 1]), "axis must have unit"),
+    (lambda: symtop.SymmetricTop.from_inertia(1, 1, 3, 1), "axial must be at most 2 at_centre"),
+    (lambda: symtop.RigidBody.from_inertia(5.0), "matrix must be rows of 3 numbers, not 5.0"),
+    (lambda: symtop.RigidBody.from_points(2.0, [[0, 0, 1]]), "masses must be a row of numbers, not 2.0"),
+    (lambda: symtop.RigidBody.from_points([2.0], 1.0), "places must be rows of 3 numbers, not 1.0"),
+    (lambda: symtop.RigidBody.from_inertia(np.eye(3), mass=2.0), "needs mgl, which is mass times gravity times"),
+    (lambda: symtop.SymmetricTop.from_inertia(1, 1, 1, 1, gravity=-9.81), "gravity must be at least 0"),
+])  # fmt: skip
 def test_bad_input_is_one_sentence(call, words):
     with pytest.raises(symtop.SymtopError, match=words):
         call()

@@ -105,11 +105,10 @@ def test_labels_keep_their_order_and_their_distance(places):
     assert figures.spread([0.1, 0.5], 0.05) == [0.1, 0.5]
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(1e-6, "10⁻⁶"), (1.4e-13, "1.4 × 10⁻¹³"), (0.0123, "0.012"), (185.3, "185"), (1093.0, "1093"),
-     (30012.0, "3 × 10⁴"), (7.0, "7"), (99.4, "99"), (99.6, "100"), (-99.6, "-100"), (9999.7, "10⁴")],
-)  # fmt: skip
+@pytest.mark.parametrize(("value", "text"), [
+    (1e-6, "10⁻⁶"), (1.4e-13, "1.4 × 10⁻¹³"), (0.0123, "0.012"), (185.3, "185"), (1093.0, "1093"),
+    (30012.0, "3 × 10⁴"), (7.0, "7"), (99.4, "99"), (99.6, "100"), (-99.6, "-100"), (9999.7, "10⁴"),
+])  # fmt: skip
 def test_a_number_of_a_title(value, text):
     assert formats.number(value).replace(formats.FIRM, " ") == text
     assert " " not in formats.number(value)

@@ -75,11 +75,10 @@ def test_members_of_other_labels_are_refused():
         member_errors(other, data, "axis")
 
 
-@pytest.mark.parametrize(
-    ("members", "quantity", "reason"),
-    [(SOME, "phi", "quantity 'phi' is unknown"), (SOME.isel(member=slice(3)), "axis", "members must be the 30"),
-     (SOME, "energy", "without the variable energy")],
-)  # fmt: skip
+@pytest.mark.parametrize(("members", "quantity", "reason"), [
+    (SOME, "phi", "quantity 'phi' is unknown"), (SOME.isel(member=slice(3)), "axis", "members must be the 30"),
+    (SOME, "energy", "without the variable energy"),
+])  # fmt: skip
 def test_what_cannot_be_compared_is_refused(members, quantity, reason):
     data = symtop.ensemble(SOME, "strang[axis]", variables=["axis"], **ASKED)
     with pytest.raises(symtop.SymtopError, match=reason):

@@ -23,11 +23,10 @@ def scenes():
     return scenes_of(bodies())
 
 
-@pytest.mark.parametrize(
-    ("name", "execution"),
-    [("rk4", chunks.IN_LANES), ("strang", chunks.IN_LANES), ("suzuki-4", chunks.IN_LANES),
-     ("chin-4a", chunks.IN_LANES), ("five-rotations", chunks.IN_LANES), ("gauss-4", chunks.IN_TURN)],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "execution"), [
+    ("rk4", chunks.IN_LANES), ("strang", chunks.IN_LANES), ("suzuki-4", chunks.IN_LANES),
+    ("chin-4a", chunks.IN_LANES), ("five-rotations", chunks.IN_LANES), ("gauss-4", chunks.IN_TURN),
+])  # fmt: skip
 @pytest.mark.parametrize("per_nutation", [4, 30])  # a turn of more than a radian leaves its lane
 def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, execution, per_nutation):
     data = symtop.ensemble(bodies(), name, per_nutation=per_nutation, nutations=12, samples=6, quiet=True)
@@ -73,15 +72,14 @@ def test_plain_numbers_are_a_body_to_the_bit():
     assert from_flat(list(scene.top.flat(scene.start))) == (scene.top, scene.start)
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [(lambda data: data.assign(I3=data.I3 + 9.0), "member 0: I3 must be at most the sum of the other moments"),
-     (lambda data: data.drop_vars("omega_body"), "members must have the variables I1, I2, I3, omega_body, not lack"),
-     (lambda data: data.assign(centre=data.I1), "centre of members must be rows of 3 numbers over member"),
-     (lambda data: data.assign(quaternion=2.0 * data.quaternion), "member 0: quaternion must have unit length"),
-     (lambda data: data.rename(mgl="MGL"), "members have no variable 'MGL'; did you mean mgl?"),
-     (lambda data: [*scenes()[:2], "spheroid"], "members must be all tops or all bodies without symmetry")],
-)  # fmt: skip
+@pytest.mark.parametrize(("change", "words"), [
+    (lambda data: data.assign(I3=data.I3 + 9.0), "member 0: I3 must be at most the sum of the other moments"),
+    (lambda data: data.drop_vars("omega_body"), "members must have the variables I1, I2, I3, omega_body, not lack"),
+    (lambda data: data.assign(centre=data.I1), "centre of members must be rows of 3 numbers over member"),
+    (lambda data: data.assign(quaternion=2.0 * data.quaternion), "member 0: quaternion must have unit length"),
+    (lambda data: data.rename(mgl="MGL"), "members have no variable 'MGL'; did you mean mgl?"),
+    (lambda data: [*scenes()[:2], "spheroid"], "members must be all tops or all bodies without symmetry"),
+])  # fmt: skip
 def test_bad_bodies_are_refused_in_one_sentence(change, words):
     with pytest.raises(symtop.SymtopError) as refused:
         symtop.ensemble(change(bodies()), "rk4", step_size=0.1, horizon=1.0)

@@ -209,16 +209,13 @@ def test_a_sweep_and_a_comparison_take_a_body(tmp_path) -> None:  # type: ignore
 OWN = ["--body", "1,2,3", "--rates", "0.01,1,0"]
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["run", "body", "rk4", "--step-size", "0.1", "--mgl", "3"], "--mgl must come with --body I1,I2,I3 on the sce"),
-        (["run", "spheroid", "rk4", *OWN], "--body, --rates must come with --body I1,I2,I3 on the scene body, not sph"),
-        (["scenes", "body", "--body", "1,2"], "--body must be 3 numbers with commas between, not '1,2'"),
-        (["scenes", "body", "--body", "1,2,3"], "--body without a weight needs --rates"),
-        (["scenes", "body", "--body", "1,2,4", "--mgl", "1"], "I3 must be at most the sum of the other moments"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("words", "sentence"), [
+    (["run", "body", "rk4", "--step-size", "0.1", "--mgl", "3"], "--mgl must come with --body I1,I2,I3 on the sce"),
+    (["run", "spheroid", "rk4", *OWN], "--body, --rates must come with --body I1,I2,I3 on the scene body, not sph"),
+    (["scenes", "body", "--body", "1,2"], "--body must be 3 numbers with commas between, not '1,2'"),
+    (["scenes", "body", "--body", "1,2,3"], "--body without a weight needs --rates"),
+    (["scenes", "body", "--body", "1,2,4", "--mgl", "1"], "I3 must be at most the sum of the other moments"),
+])  # fmt: skip
 def test_a_body_of_ones_own_that_is_none(words: list[str], sentence: str) -> None:
     assert sentence in call(*words, code=2).stderr
 
@@ -264,20 +261,17 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     assert sorted(points.moments) == pytest.approx([15.0, 30.0, 39.0])
 
 
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: RigidBody(1.0, 1.0, 2.1), "I3 must be at most the sum of the other moments"),
-        (lambda: RigidBody(1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0)), "centre must be a direction and of a length"),
-        (lambda: RigidBody.from_inertia([[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]), "matrix must be symmetric"),
-        (lambda: Attitude((0.0, 0.0, 0.0, 0.0)), "quaternion must have unit length, not 0"),
-        (lambda: symtop.Scene("x", RigidBody(1.0, 1.0, 1.0), symtop.Angles(0.3), 1.0), "must be Attitude, not Angles"),
-        (lambda: symtop.simulate("heavy-brick", "stormer-verlet", step_size=1), "integrator must have the chart body"),
-        (lambda: symtop.simulate("heavy-brick", "rk4", step_size=1, observe="nutation"), "known: axis, attitude"),
-        (lambda: symtop.long_run("heavy-brick", "vern9", step_size=0.1, steps=9), "no compiled loop of fixed steps"),
-        (lambda: symtop.reference("heavy-brick", [1.0], certify="digits"), "certify must be None on heavy-brick"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: RigidBody(1.0, 1.0, 2.1), "I3 must be at most the sum of the other moments"),
+    (lambda: RigidBody(1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0)), "centre must be a direction and of a length"),
+    (lambda: RigidBody.from_inertia([[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]), "matrix must be symmetric"),
+    (lambda: Attitude((0.0, 0.0, 0.0, 0.0)), "quaternion must have unit length, not 0"),
+    (lambda: symtop.Scene("x", RigidBody(1.0, 1.0, 1.0), symtop.Angles(0.3), 1.0), "must be Attitude, not Angles"),
+    (lambda: symtop.simulate("heavy-brick", "stormer-verlet", step_size=1), "integrator must have the chart body"),
+    (lambda: symtop.simulate("heavy-brick", "rk4", step_size=1, observe="nutation"), "known: axis, attitude"),
+    (lambda: symtop.long_run("heavy-brick", "vern9", step_size=0.1, steps=9), "no compiled loop of fixed steps"),
+    (lambda: symtop.reference("heavy-brick", [1.0], certify="digits"), "certify must be None on heavy-brick"),
+])  # fmt: skip
 def test_what_is_no_body_or_takes_none_is_refused(make, words: str) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(symtop.SymtopError) as refused:
         make()

@@ -44,26 +44,24 @@ def assert_alone(members, name, data, samples, **setting):
         assert bool(one.dithered) == (run.attrs["sampling"] == "dithered")
 
 
-@pytest.mark.parametrize(
-    ("name", "settings", "samples"),
-    [("strang[axis]", {"per_nutation": 40, "nutations": 10}, 101),
-     ("strang[attitude]", {"per_nutation": 40.5, "nutations": 10.3}, 33),
-     ("strang[axis]", {"step_size": 0.02, "horizon": 2.0}, 60),
-     ("midpoint[angles]", {"per_nutation": 12, "nutations": 20}, 45),
-     ("cayley-tuned[axis]", {"per_nutation": 12, "nutations": 3}, 20),
-     ("gauss-4[attitude]", {"per_nutation": 12, "nutations": 5.5}, 50)],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "settings", "samples"), [
+    ("strang[axis]", {"per_nutation": 40, "nutations": 10}, 101),
+    ("strang[attitude]", {"per_nutation": 40.5, "nutations": 10.3}, 33),
+    ("strang[axis]", {"step_size": 0.02, "horizon": 2.0}, 60),
+    ("midpoint[angles]", {"per_nutation": 12, "nutations": 20}, 45),
+    ("cayley-tuned[axis]", {"per_nutation": 12, "nutations": 3}, 20),
+    ("gauss-4[attitude]", {"per_nutation": 12, "nutations": 5.5}, 50),
+])  # fmt: skip
 def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, settings, samples):
     data = symtop.ensemble(SOME, name, samples=samples, quiet=True, **settings)
     assert_alone(SOME, name, data, samples)
     assert data.sizes["time"] == samples
 
 
-@pytest.mark.parametrize(
-    ("name", "setting"),
-    [("rk45-compiled[axis]", {"tolerance": 1e-8}), ("rk45-compiled[angles]", {"tolerance": 1e-6}),
-     ("rk45", {"tolerance": 1e-4}), ("exact", {})],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "setting"), [
+    ("rk45-compiled[axis]", {"tolerance": 1e-8}), ("rk45-compiled[angles]", {"tolerance": 1e-6}),
+    ("rk45", {"tolerance": 1e-4}), ("exact", {}),
+])  # fmt: skip
 def test_methods_that_choose_their_steps_run_as_well(name, setting):
     some = SOME.isel(member=slice(0, 8))
     data = symtop.ensemble(some, name, nutations=2.7, samples=20, quiet=True, **setting)
@@ -93,11 +91,10 @@ def test_threads_and_pieces_change_nothing(monkeypatch):
     assert symtop.ensemble(SOME, "strang[axis]", threads=2, **settings).identical(one)
 
 
-@pytest.mark.parametrize(
-    ("n", "steps", "most"),
-    [(10_000, 1000, 0.1), (10_000, np.geomspace(10, 4000, 10_000).astype(int), 0.1), (10_000, None, 0.1),
-     (40, 10, 1.0), (1, 10**9, 1.0), (3, 10**7, 0.4)],
-)  # fmt: skip
+@pytest.mark.parametrize(("n", "steps", "most"), [
+    (10_000, 1000, 0.1), (10_000, np.geomspace(10, 4000, 10_000).astype(int), 0.1), (10_000, None, 0.1),
+    (40, 10, 1.0), (1, 10**9, 1.0), (3, 10**7, 0.4),
+])  # fmt: skip
 def test_pieces_are_shares_of_the_work_and_whole_blocks(n, steps, most):
     """What is worth more than a millisecond is shared evenly; a few short runs stay in one piece."""
     counts = None if steps is None else np.broadcast_to(steps, n)
@@ -168,12 +165,11 @@ def test_a_member_that_fails_fails_alone():
         assert np.isnan(other.theta[4]).all()
 
 
-@pytest.mark.parametrize(
-    ("spoilt", "reason"),
-    [({"I3": 5.0}, "member 2: I3 must be at most 2 I1"), ({"theta": np.nan}, "member 2: theta must be a finite number"),
-     ({"theta": -0.1}, r"member 2: theta must lie in \[0, pi\]"), ({"I1": 0.0}, "member 2: I1 must be"),
-     ({"mgl": np.inf}, "member 2: mgl"), ({"I1": 1e308, "I3": 1e308}, "member 2: I1 must be between")],
-)  # fmt: skip
+@pytest.mark.parametrize(("spoilt", "reason"), [
+    ({"I3": 5.0}, "member 2: I3 must be at most 2 I1"), ({"theta": np.nan}, "member 2: theta must be a finite number"),
+    ({"theta": -0.1}, r"member 2: theta must lie in \[0, pi\]"), ({"I1": 0.0}, "member 2: I1 must be"),
+    ({"mgl": np.inf}, "member 2: mgl"), ({"I1": 1e308, "I3": 1e308}, "member 2: I1 must be between"),
+])  # fmt: skip
 def test_bad_members_are_refused_by_number_and_reason(spoilt, reason):
     members = xr.Dataset({name: ("member", np.array([1.0] * 4)) for name in ("I1", "I3", "mgl", "theta")})
     for name, value in spoilt.items():
@@ -186,24 +182,23 @@ STRANG, RK45 = "strang[axis]", "rk45-compiled"
 FIXED = {"step_size": 0.1, "horizon": 2.0}
 
 
-@pytest.mark.parametrize(
-    ("name", "settings", "reason"),
-    [(STRANG, {"horizon": 2.0}, "needs step_size or per_nutation"), (STRANG, FIXED | {"per_nutation": 9}, "not both"),
-     (STRANG, FIXED | {"tolerance": 1e-6}, "fixed step"),
-     (STRANG, FIXED | {"step_size": [0.1, 0.2]}, "one for each of 36 members"),
-     (STRANG, FIXED | {"step_size": [0.1] * 35 + [np.nan]}, "step_size of member 35 must be a finite number"),
-     (STRANG, FIXED | {"step_size": 1e-12}, "member 0 asks for"),
-     (STRANG, FIXED | {"samples": 10_000_000}, "give a path to stream them"),
-     (STRANG, FIXED | {"variables": ["psi"]}, "variables in the axis chart are theta, .* not 'psi'"),
-     (STRANG, FIXED | {"variables": "axis"}, "a list of names"), (STRANG, FIXED | {"budget": 5}, "limit is 5"),
-     (STRANG, {"nutations": 2, "per_nutation": 0.3}, "per_nutation must be at least 0.5.* not 0.3 as of member 0"),
-     (STRANG, {"nutations": 1e308, "per_nutation": 20}, "nutations must be fewer"),
-     (RK45, FIXED, "chooses its own steps"), (RK45, {"horizon": 2.0, "tolerance": 2.0}, "below 1"),
-     (RK45, {"horizon": 2.0, "tolerance": [1e-6] * 35 + [3.0]}, "below 1"),
-     (RK45, {"horizon": 1e14, "tolerance": 1e-6}, "swings"),
-     ("exact", {"horizon": 2.0, "tolerance": 0.1}, "nothing to tune: leave out tolerance = 0.1"),
-     ("strong", FIXED, "did you mean strang")],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "settings", "reason"), [
+    (STRANG, {"horizon": 2.0}, "needs step_size or per_nutation"), (STRANG, FIXED | {"per_nutation": 9}, "not both"),
+    (STRANG, FIXED | {"tolerance": 1e-6}, "fixed step"),
+    (STRANG, FIXED | {"step_size": [0.1, 0.2]}, "one for each of 36 members"),
+    (STRANG, FIXED | {"step_size": [0.1] * 35 + [np.nan]}, "step_size of member 35 must be a finite number"),
+    (STRANG, FIXED | {"step_size": 1e-12}, "member 0 asks for"),
+    (STRANG, FIXED | {"samples": 10_000_000}, "give a path to stream them"),
+    (STRANG, FIXED | {"variables": ["psi"]}, "variables in the axis chart are theta, .* not 'psi'"),
+    (STRANG, FIXED | {"variables": "axis"}, "a list of names"), (STRANG, FIXED | {"budget": 5}, "limit is 5"),
+    (STRANG, {"nutations": 2, "per_nutation": 0.3}, "per_nutation must be at least 0.5.* not 0.3 as of member 0"),
+    (STRANG, {"nutations": 1e308, "per_nutation": 20}, "nutations must be fewer"),
+    (RK45, FIXED, "chooses its own steps"), (RK45, {"horizon": 2.0, "tolerance": 2.0}, "below 1"),
+    (RK45, {"horizon": 2.0, "tolerance": [1e-6] * 35 + [3.0]}, "below 1"),
+    (RK45, {"horizon": 1e14, "tolerance": 1e-6}, "swings"),
+    ("exact", {"horizon": 2.0, "tolerance": 0.1}, "nothing to tune: leave out tolerance = 0.1"),
+    ("strong", FIXED, "did you mean strang"),
+])  # fmt: skip
 def test_settings_that_make_no_sense_are_refused_as_they_were_given(name, settings, reason):
     with pytest.raises(symtop.SymtopError, match=reason):
         symtop.ensemble(SOME, name, quiet=True, **settings)
@@ -357,11 +352,10 @@ def test_a_solver_that_raises_on_every_member_is_refused_and_leaves_nothing(tmp_
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("name", "meant"),
-    [("thetadot", "theta_dot"), ("dphi_dt", "phi_dot"), ("psi_rate", "psi_dot"), ("Phi", "phi"), ("theta0", "theta"),
-     ("phi_dto", "phi_dot")],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "meant"), [
+    ("thetadot", "theta_dot"), ("dphi_dt", "phi_dot"), ("psi_rate", "psi_dot"), ("Phi", "phi"), ("theta0", "theta"),
+    ("phi_dto", "phi_dot"),
+])  # fmt: skip
 def test_a_misspelled_variable_of_members_is_refused(name, meant):
     settings = {"per_nutation": 20, "nutations": 2, "quiet": True}
     for members in (SOME.rename({meant: name}), SOME.assign({name: 1.0}), SOME.assign_coords({name: SOME.theta})):

@@ -33,22 +33,16 @@ def caution(scene, name, **controls):
     return sentences[0] if sentences else ""
 
 
-# ---- silence, and the run untouched ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "control"),
-    [
-        ("stormer-verlet", {"step_size": 2e-3}),
-        ("midpoint", {"step_size": 2e-3}),
-        ("strang", {"step_size": 2e-3}),
-        ("gauss-4", {"step_size": 1e-2}),
-        ("rk4", {"step_size": 1e-6, "horizon": 0.5}),  # so fine that rounding hides growth
-        ("rk45-compiled", {"tolerance": 1e-8}),
-        ("taylor", {}),
-        ("exact", {}),
-    ],
-)
+@pytest.mark.parametrize(("name", "control"), [
+    ("stormer-verlet", {"step_size": 2e-3}),
+    ("midpoint", {"step_size": 2e-3}),
+    ("strang", {"step_size": 2e-3}),
+    ("gauss-4", {"step_size": 1e-2}),
+    ("rk4", {"step_size": 1e-6, "horizon": 0.5}),  # so fine that rounding hides growth
+    ("rk45-compiled", {"tolerance": 1e-8}),
+    ("taylor", {}),
+    ("exact", {}),
+])  # fmt: skip
 def test_a_good_run_is_met_with_silence_and_any_run_with_the_same_bits(name, control):
     assert caution("spheroid", name, **control) == ""
     quiet, watched = (symtop.simulate("spheroid", name, samples=41, guard=guard, **control) for guard in (False, True))
@@ -70,9 +64,6 @@ def test_a_bad_run_is_the_same_run_with_a_warning():
         quiet = symtop.simulate("spheroid", "midpoint", guard=False, **controls)
     del quiet.attrs["guard"]
     assert watched.identical(quiet)
-
-
-# ---- the numbers behind it -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("law", "straight"), [(lambda t: 3e-6 * t, True), (lambda t: 1e-6 * t + 4e-7 * t * t, False)])
@@ -135,9 +126,6 @@ def test_landmarks_are_those_of_the_closed_form():
     assert math.degrees(lower.gap) == pytest.approx(4.15e-5, rel=1e-2)
 
 
-# ---- causes and remedies ---------------------------------------------------------------------------------------------
-
-
 def test_each_cause_is_named():
     fast = steady(20.0)
     frequency = landmarks(fast).frequency
@@ -155,14 +143,11 @@ def test_each_cause_is_named():
     assert "a step is 1/2.36 of a nutation" in caution("spheroid", "gauss-2", step_size=0.5, observe="axis")  # goes on
 
 
-@pytest.mark.parametrize(
-    ("scene", "name", "control", "horizon"),
-    [
-        ("spheroid", "midpoint", {"step_size": 0.05}, 40.0),
-        ("spheroid", "rk45-compiled", {"tolerance": 1e-4}, 100.0),
-        ("cusp", "gauss-4", {"step_size": 0.3}, 300.0),
-    ],
-)
+@pytest.mark.parametrize(("scene", "name", "control", "horizon"), [
+    ("spheroid", "midpoint", {"step_size": 0.05}, 40.0),
+    ("spheroid", "rk45-compiled", {"tolerance": 1e-4}, 100.0),
+    ("cusp", "gauss-4", {"step_size": 0.3}, 300.0),
+])  # fmt: skip
 def test_a_remedy_is_a_remedy(scene, name, control, horizon):
     """What the sentence advises silences the guard and makes the run right, and is not ten times too careful."""
     warned = caution(scene, name, horizon=horizon, **control)
@@ -290,9 +275,6 @@ def test_the_end_of_a_run_at_the_limit_of_its_work_is_announced():
             assert float(re.search(r"stopped at t = ([\d.]+) of", warned)[1]) == pytest.approx(2361.6, rel=0.01)
         else:
             assert warned == ""
-
-
-# ---- without a closed form -------------------------------------------------------------------------------------------
 
 
 BODIES = [

@@ -45,16 +45,13 @@ def test_the_energy_is_that_of_simulate_whether_or_not_the_momenta_are_kept(name
         assert np.ptp(dense["p_psi"].values) > 1e-6  # the control: it does not keep this one
 
 
-@pytest.mark.parametrize(
-    ("files", "words"),
-    [
-        ({"output": "keep.py"}, "no netCDF file"),
-        ({"output": ""}, "output must be a file, not the folder"),
-        ({"checkpoint": ""}, "checkpoint must be a file, not the folder"),
-        ({"output": "a.nc", "checkpoint": "a.nc"}, "output and checkpoint must be two files"),
-        ({"output": "a.nc", "checkpoint": "b/../a.nc"}, "output and checkpoint must be two files"),
-    ],
-)
+@pytest.mark.parametrize(("files", "words"), [
+    ({"output": "keep.py"}, "no netCDF file"),
+    ({"output": ""}, "output must be a file, not the folder"),
+    ({"checkpoint": ""}, "checkpoint must be a file, not the folder"),
+    ({"output": "a.nc", "checkpoint": "a.nc"}, "output and checkpoint must be two files"),
+    ({"output": "a.nc", "checkpoint": "b/../a.nc"}, "output and checkpoint must be two files"),
+])  # fmt: skip
 def test_a_file_that_would_replace_something_else_is_refused_before_a_step(tmp_path, monkeypatch, files, words):
     (tmp_path / "keep.py").write_text("x = 1\n")
     settings = {"steps": 10, "step_size": H, "quiet": True}
@@ -79,14 +76,13 @@ def test_windows_and_samples_cover_a_run_once(steps):
         assert np.unique(np.diff(marks)).size > 1  # no fixed stride
 
 
-@pytest.mark.parametrize(
-    ("name", "h"),
-    [*((name, H) for name in ("stormer-verlet", "midpoint", "galerkin-simpson", "takahashi-imada", "gauss-4", "rk4",
-                              "jsbsim-buss2", "jolt-float32", "no-squish", "lammps-rigid")),
-     ("exact-discrete", SCENE.nutation_period / 4.37),
-     *((f"gauss-{order}", phase * SCENE.nutation_period / (2.0 * np.pi)) for order in (2, 4, 12)
-       for phase in (1.3, 5.0, 10.0))],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "h"), [
+    *((name, H) for name in ("stormer-verlet", "midpoint", "galerkin-simpson", "takahashi-imada", "gauss-4", "rk4",
+                             "jsbsim-buss2", "jolt-float32", "no-squish", "lammps-rigid")),
+    ("exact-discrete", SCENE.nutation_period / 4.37),
+    *((f"gauss-{order}", phase * SCENE.nutation_period / (2.0 * np.pi)) for order in (2, 4, 12)
+      for phase in (1.3, 5.0, 10.0)),
+])  # fmt: skip
 def test_a_run_in_stretches_has_the_bits_of_one_in_one_piece(name, h):
     """With large steps some of a Gauss method are swept and others are solved by Newton."""
     solver = chart_of(symtop.integrator(name))[1]

@@ -11,29 +11,24 @@ import symtop
 from symtop.model import charts
 from symtop.model.scenes import grazing, steady
 
-# ---- outcomes in the kernels -----------------------------------------------------------------------------------------
-
 HUGE = symtop.Scene("huge", symtop.SymmetricTop(1.0, 1.0, 1e30), symtop.Angles(theta=1.0, psi_dot=1.0), 8.0)
 
 
-@pytest.mark.parametrize(
-    ("scene", "name", "controls", "outcome"),
-    [
-        ("spheroid", "stormer-verlet", {"step_size": 1.0, "horizon": 50.0}, "left_chart"),
-        ("spheroid", "rk4", {"step_size": 0.4, "horizon": 40.0}, "left_chart"),
-        ("bruls-cardona-arnold", "rk45", {"tolerance": 0.5}, "left_chart"),
-        ("spheroid", "gauss-2", {"step_size": 10.0, "horizon": 200.0, "observe": "axis"}, "not_converged"),
-        ("sleeping", "trapezoidal", {"step_size": 2.0, "horizon": 4000.0}, "not_converged"),
-        ("simo-wong", "rk4", {"step_size": 1.0, "observe": "axis"}, "not_finite"),
-        (grazing(1e-14), "rk45-compiled", {"tolerance": 1e-12}, "step_too_small"),
-        ("spheroid", "rk45-compiled", {"tolerance": 1e-9, "budget": 100}, "out_of_budget"),
-        ("spheroid", "dop853", {"tolerance": 1e-9, "budget": 100}, "out_of_budget"),
-        ("spheroid", "taylor", {"budget": 3}, "out_of_budget"),
-        ("spheroid", "taylor", {"tolerance": 1e-9, "budget": 40, "samples": 2}, "out_of_budget"),
-        ("spheroid", "rk45-compiled", {"tolerance": 1e-9, "budget": 40, "samples": 2}, "out_of_budget"),
-        ("spheroid", "rk4[attitude]", {"step_size": 0.2}, "not_normalised"),
-    ],
-)
+@pytest.mark.parametrize(("scene", "name", "controls", "outcome"), [
+    ("spheroid", "stormer-verlet", {"step_size": 1.0, "horizon": 50.0}, "left_chart"),
+    ("spheroid", "rk4", {"step_size": 0.4, "horizon": 40.0}, "left_chart"),
+    ("bruls-cardona-arnold", "rk45", {"tolerance": 0.5}, "left_chart"),
+    ("spheroid", "gauss-2", {"step_size": 10.0, "horizon": 200.0, "observe": "axis"}, "not_converged"),
+    ("sleeping", "trapezoidal", {"step_size": 2.0, "horizon": 4000.0}, "not_converged"),
+    ("simo-wong", "rk4", {"step_size": 1.0, "observe": "axis"}, "not_finite"),
+    (grazing(1e-14), "rk45-compiled", {"tolerance": 1e-12}, "step_too_small"),
+    ("spheroid", "rk45-compiled", {"tolerance": 1e-9, "budget": 100}, "out_of_budget"),
+    ("spheroid", "dop853", {"tolerance": 1e-9, "budget": 100}, "out_of_budget"),
+    ("spheroid", "taylor", {"budget": 3}, "out_of_budget"),
+    ("spheroid", "taylor", {"tolerance": 1e-9, "budget": 40, "samples": 2}, "out_of_budget"),
+    ("spheroid", "rk45-compiled", {"tolerance": 1e-9, "budget": 40, "samples": 2}, "out_of_budget"),
+    ("spheroid", "rk4[attitude]", {"step_size": 0.2}, "not_normalised"),
+])  # fmt: skip
 def test_every_outcome_is_produced_said_and_timed(scene, name, controls, outcome):
     run = symtop.simulate(scene, name, guard=False, **{"samples": 201, **controls})
     reached, unit = run.attrs["reached_time"], symtop.scene(scene).second
@@ -81,25 +76,19 @@ def test_implicit_steps_are_solved_where_nothing_moves_but_rounding(name, turn):
         assert float(np.abs(run["theta"] - math.pi / 3.0).max()) < 1e-11
 
 
-# ---- a run never hangs -----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("scene", "name", "controls"),
-    [
-        ("spheroid", "midpoint", {"step_size": 1e-300}),
-        ("spheroid", "midpoint", {"step_size": 0.01, "horizon": 1e300}),
-        ("spheroid", "strang", {"step_size": 1e299, "horizon": 1e300}),
-        ("spheroid", "rk45", {"tolerance": 1e-6, "horizon": 1e300}),
-        ("separatrix", "rk45-compiled", {"tolerance": 1e-6, "horizon": 1e300}),
-        ("spheroid", "taylor", {"horizon": 1e300}),
-        ("spheroid", "exact", {"horizon": 1e300}),
-        ("spheroid", "dop853", {"tolerance": 1e300}),
-        *((HUGE, name, {"step_size": 0.01}) for name in ("midpoint", "galerkin-simpson", "stormer-verlet", "strang")),
-        *((HUGE, name, {"step_size": 0.01}) for name in ("gauss-8", "rk4")),
-        *((HUGE, name, {"tolerance": 1e-6}) for name in ("rk45", "rk45-compiled", "taylor")),
-    ],
-)
+@pytest.mark.parametrize(("scene", "name", "controls"), [
+    ("spheroid", "midpoint", {"step_size": 1e-300}),
+    ("spheroid", "midpoint", {"step_size": 0.01, "horizon": 1e300}),
+    ("spheroid", "strang", {"step_size": 1e299, "horizon": 1e300}),
+    ("spheroid", "rk45", {"tolerance": 1e-6, "horizon": 1e300}),
+    ("separatrix", "rk45-compiled", {"tolerance": 1e-6, "horizon": 1e300}),
+    ("spheroid", "taylor", {"horizon": 1e300}),
+    ("spheroid", "exact", {"horizon": 1e300}),
+    ("spheroid", "dop853", {"tolerance": 1e300}),
+    *((HUGE, name, {"step_size": 0.01}) for name in ("midpoint", "galerkin-simpson", "stormer-verlet", "strang")),
+    *((HUGE, name, {"step_size": 0.01}) for name in ("gauss-8", "rk4")),
+    *((HUGE, name, {"tolerance": 1e-6}) for name in ("rk45", "rk45-compiled", "taylor")),
+])  # fmt: skip
 def test_absurd_runs_end_at_once_with_a_sentence(scene, name, controls):
     usual = {None: {}, "step_size": {"step_size": 0.1}, "tolerance": {"tolerance": 1e-3}}
     symtop.simulate("spheroid", name, guard=False, **usual[symtop.integrator(name).control])
@@ -143,8 +132,6 @@ def test_a_quaternion_that_keeps_its_length_has_not_failed():
     far = charts.attitude_distance(np.array([3e116, 0.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 0.0]))
     assert far == np.pi
 
-
-# ---- a run that ends well shows finite numbers -----------------------------------------------------------------------
 
 DOUBTFUL = symtop.Scene(
     "doubtful", symtop.SymmetricTop(0.1862, 0.2285, 0.1828), symtop.Angles(0.00337, psi_dot=-1.61), 87.0

@@ -71,11 +71,10 @@ def check_bounds(count, precision, seed):
     return float(np.median(ratios))
 
 
-@pytest.mark.parametrize(
-    ("precision", "count", "seed"),
-    [("longdouble", 1, 11), ("double", 1, 11), ("closed-form", 1, 11),
-     *(pytest.param(precision, 56, 2026, marks=pytest.mark.slow) for precision in ("longdouble", "closed-form"))],
-)  # fmt: skip
+@pytest.mark.parametrize(("precision", "count", "seed"), [
+    ("longdouble", 1, 11), ("double", 1, 11), ("closed-form", 1, 11),
+    *(pytest.param(precision, 56, 2026, marks=pytest.mark.slow) for precision in ("longdouble", "closed-form")),
+])  # fmt: skip
 def test_bounds_hold_on_random_tops_and_are_tight(precision, count, seed):
     assert check_bounds(count, precision, seed) < 100.0
 

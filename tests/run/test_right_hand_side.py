@@ -119,16 +119,13 @@ def test_chaos_is_told_from_order():
     assert chaotic.amplification > 100.0 * regular.amplification
 
 
-@pytest.mark.parametrize(
-    ("f", "y0", "horizon", "name", "control", "cause"),
-    [
-        (prothero_robinson(1e3), [1.0], 1.5, "rk4", {"step_size": 0.01}, "stiffness"),
-        (prothero_robinson(1e3), [1.0], 1.5, "radau", {"tolerance": 1e-8}, ""),
-        (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 3.0}, "instability"),
-        (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 0.5}, "step"),
-        (swing, [1.0, 0.0], 30.0, "vern9-fixed", {"step_size": 0.1, "accuracy": 1e-15}, "rounding"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("f", "y0", "horizon", "name", "control", "cause"), [
+    (prothero_robinson(1e3), [1.0], 1.5, "rk4", {"step_size": 0.01}, "stiffness"),
+    (prothero_robinson(1e3), [1.0], 1.5, "radau", {"tolerance": 1e-8}, ""),
+    (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 3.0}, "instability"),
+    (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 0.5}, "step"),
+    (swing, [1.0, 0.0], 30.0, "vern9-fixed", {"step_size": 0.1, "accuracy": 1e-15}, "rounding"),
+])  # fmt: skip
 def test_each_cause_is_named(f, y0, horizon, name, control, cause):
     expected = symtop.guard(f, 0.0, y0, horizon, name, **control)
     assert expected.cause == cause, str(expected)
@@ -196,20 +193,17 @@ def test_a_step_is_advised_where_the_piece_itself_fails():
     assert math.isfinite(symtop.guard(stiffening, 0.0, [3.0, 0.0], 30.0, step_size=expected.setting).error)
 
 
-@pytest.mark.parametrize(
-    ("f", "y0", "control", "words"),
-    [
-        (swing, [1.0, 0.0], {"step_size": 0.1, "tolerance": 1.0}, "rk4 takes step_size, not tolerance"),
-        (swing, [1.0, 0.0], {"method": "taylor", "tolerance": 1e-9}, "method 'taylor' is unknown"),
-        (swing, [1.0, 0.0], {"step_size": 1.5}, "step_size must be at most the horizon 1.0, not 1.5"),
-        (swing, [1.0, 0.0], {"method": "bdf", "tolerance": 1e-20}, "tolerance must be at least 2.3e-14 and below 1"),
-        (swing, [1.0, 0.0], {"step_size": 0.1, "t0": 1e20}, "horizon must be longer than what t0 = 1e+20 is"),
-        (swing, [1.0, 0.0, 2.0], {"step_size": 0.1}, "f must return 3 numbers, not an array of shape (2,)"),
-        (lambda _t, _y: 1 / 0, [1.0], {"step_size": 0.1}, "f failed: ZeroDivisionError"),
-        (lambda _t, _y: [math.nan], [1.0], {"step_size": 0.1}, "f must be finite, not [nan] at t = 0.0"),
-        (lambda t, y: y if t < 0.5 else y * math.nan, [1.0], {"step_size": 0.1}, "not [nan] at t = 0."),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("f", "y0", "control", "words"), [
+    (swing, [1.0, 0.0], {"step_size": 0.1, "tolerance": 1.0}, "rk4 takes step_size, not tolerance"),
+    (swing, [1.0, 0.0], {"method": "taylor", "tolerance": 1e-9}, "method 'taylor' is unknown"),
+    (swing, [1.0, 0.0], {"step_size": 1.5}, "step_size must be at most the horizon 1.0, not 1.5"),
+    (swing, [1.0, 0.0], {"method": "bdf", "tolerance": 1e-20}, "tolerance must be at least 2.3e-14 and below 1"),
+    (swing, [1.0, 0.0], {"step_size": 0.1, "t0": 1e20}, "horizon must be longer than what t0 = 1e+20 is"),
+    (swing, [1.0, 0.0, 2.0], {"step_size": 0.1}, "f must return 3 numbers, not an array of shape (2,)"),
+    (lambda _t, _y: 1 / 0, [1.0], {"step_size": 0.1}, "f failed: ZeroDivisionError"),
+    (lambda _t, _y: [math.nan], [1.0], {"step_size": 0.1}, "f must be finite, not [nan] at t = 0.0"),
+    (lambda t, y: y if t < 0.5 else y * math.nan, [1.0], {"step_size": 0.1}, "not [nan] at t = 0."),
+])  # fmt: skip
 def test_what_makes_no_sense_is_refused_in_one_sentence(f, y0, control, words):
     with pytest.raises(symtop.SymtopError) as refused:
         symtop.guard(f, control.pop("t0", 0.0), y0, 1.0, **control)

@@ -39,9 +39,6 @@ def refused(results, says):
     assert not leftovers(Path(results)) if Path(results).is_dir() else True
 
 
-# ---- the place -------------------------------------------------------------------------------------------------------
-
-
 def test_a_full_disk_ends_the_run_and_what_was_computed_is_kept(tmp_path, monkeypatch):
     real, count = np.savez, []
 
@@ -61,13 +58,10 @@ def test_a_full_disk_ends_the_run_and_what_was_computed_is_kept(tmp_path, monkey
     assert "2 of 4 cases computed" in output
 
 
-@pytest.mark.parametrize(
-    ("place", "name", "error", "says"),
-    [
-        (xr.Dataset, "to_netcdf", RuntimeError("NetCDF: HDF error"), "NetCDF: HDF error"),
-        (store.tempfile, "TemporaryFile", OSError(errno.EROFS, os.strerror(errno.EROFS)), "Read-only file system"),
-    ],
-)
+@pytest.mark.parametrize(("place", "name", "error", "says"), [
+    (xr.Dataset, "to_netcdf", RuntimeError("NetCDF: HDF error"), "NetCDF: HDF error"),
+    (store.tempfile, "TemporaryFile", OSError(errno.EROFS, os.strerror(errno.EROFS)), "Read-only file system"),
+])  # fmt: skip
 def test_what_the_netcdf_library_or_the_system_refuses_to_write(tmp_path, monkeypatch, place, name, error, says):
     def refuse(*arguments, **options):
         raise error
@@ -130,9 +124,6 @@ def test_a_folder_where_a_file_should_be(tmp_path):
     case.unlink()
     case.mkdir()
     refused(tmp_path, "it is a folder")
-
-
-# ---- what is on disk -------------------------------------------------------------------------------------------------
 
 
 def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
@@ -221,9 +212,6 @@ def test_what_a_killed_worker_left_beside_a_case_goes_when_it_is_computed_here(t
     assert not leftovers(tmp_path)
 
 
-# ---- signals ---------------------------------------------------------------------------------------------------------
-
-
 def wait_for_cases(log: Path, count: int, process) -> None:
     """Wait until so many cases have begun."""
     end = time.monotonic() + 120.0
@@ -286,8 +274,6 @@ def test_a_worker_that_is_killed_costs_no_more_than_what_it_was_computing(tmp_pa
     names = log.read_text().split()
     assert len(names) - len(set(names)) <= 2  # one case a worker
 
-
-# ---- methods ---------------------------------------------------------------------------------------------------------
 
 BAD = """
 import itertools, os, time
@@ -376,9 +362,6 @@ def test_the_limit_is_heard_by_the_runner(tmp_path, monkeypatch):
     assert code == 2  # not one case could be measured
     assert "TimeoutError: it was not done after 0.05 s" in output
     assert probe(tmp_path, "--limit", -1)[0] == 2
-
-
-# ---- surroundings ----------------------------------------------------------------------------------------------------
 
 
 def test_a_clock_that_jumps(tmp_path, monkeypatch):

@@ -62,15 +62,12 @@ def test_a_study_that_ships_is_not_replaced_by_one_of_its_name(tmp_path, monkeyp
     assert not (tmp_path / "results").exists()
 
 
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ("cases = lambda quick: None", "cases must return a list of Case, not None"),
-        ("cases = lambda quick: 1 / 0", "cases failed: ZeroDivisionError"),
-        ("cases = lambda quick: [Case('spheroid', 'rk4', {'a': np.arange(3.0)})]", "setting 'a' must be numbers"),
-        ("more = {'uses': lambda case: 1 / 0}", "uses failed: ZeroDivisionError"),
-    ],
-)
+@pytest.mark.parametrize(("change", "says"), [
+    ("cases = lambda quick: None", "cases must return a list of Case, not None"),
+    ("cases = lambda quick: 1 / 0", "cases failed: ZeroDivisionError"),
+    ("cases = lambda quick: [Case('spheroid', 'rk4', {'a': np.arange(3.0)})]", "setting 'a' must be numbers"),
+    ("more = {'uses': lambda case: 1 / 0}", "uses failed: ZeroDivisionError"),
+])  # fmt: skip
 def test_a_grid_that_is_none_is_refused(tmp_path, change, says):
     for words in [(), ("--status",), ("--only", "rk4")][: 3 if "uses" in change else 1]:  # by whichever command
         code, output = run_study(tmp_path, change, *words)
@@ -80,22 +77,19 @@ def test_a_grid_that_is_none_is_refused(tmp_path, change, says):
         assert says in output
 
 
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ("facts = lambda data: None", "facts must return numbers by name, not None"),
-        ("facts = lambda data: {'a b': 1}", "a fact's name must be a word of letters, digits and _, not 'a b'"),
-        ("facts = lambda data: [symtop.simulate('spheroid', 'rk4', step_size=np.nan).title]",
-         "facts failed: step_size must be a finite number"),
-        ("pictures = lambda data: iter([Figure()])", "pictures must return or yield Pictures; an entry is a Figure"),
-        ("pictures = lambda data: [Picture('a', Figure()), Picture('b', Figure()), Picture('a', Figure())]",
-         "pictures must have a name each, and two are called a"),
-        ("pictures = lambda data: (1 / 0 for _ in 'x')", "pictures failed: ZeroDivisionError"),
-        ("tables = lambda data: pd.DataFrame()", "tables must return tables by name, not"),
-        ("tables = lambda data: {'../a': pd.DataFrame()}", "name of a table must be"),
-        ("more = {'charts': lambda data: None}", "charts must return a list of Chart, not None"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("change", "says"), [
+    ("facts = lambda data: None", "facts must return numbers by name, not None"),
+    ("facts = lambda data: {'a b': 1}", "a fact's name must be a word of letters, digits and _, not 'a b'"),
+    ("facts = lambda data: [symtop.simulate('spheroid', 'rk4', step_size=np.nan).title]",
+     "facts failed: step_size must be a finite number"),
+    ("pictures = lambda data: iter([Figure()])", "pictures must return or yield Pictures; an entry is a Figure"),
+    ("pictures = lambda data: [Picture('a', Figure()), Picture('b', Figure()), Picture('a', Figure())]",
+     "pictures must have a name each, and two are called a"),
+    ("pictures = lambda data: (1 / 0 for _ in 'x')", "pictures failed: ZeroDivisionError"),
+    ("tables = lambda data: pd.DataFrame()", "tables must return tables by name, not"),
+    ("tables = lambda data: {'../a': pd.DataFrame()}", "name of a table must be"),
+    ("more = {'charts': lambda data: None}", "charts must return a list of Chart, not None"),
+])  # fmt: skip
 def test_an_answer_of_the_wrong_kind_is_refused_and_the_cases_are_kept(tmp_path, change, says):
     code, output = run_study(tmp_path, change)
     assert code == 2, output

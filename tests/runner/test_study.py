@@ -33,9 +33,6 @@ def test_every_study_leaves_figures_and_findings_that_follow_from_its_dataset(qu
             assert (tmp_path / file).read_bytes() == (quick_results / file).read_bytes(), file
 
 
-# ---- status, fresh, check --------------------------------------------------------------------------------------------
-
-
 def probe(results, *words):
     return call("study", PROBE, "--quick", "--results", results, *words, code=None)
 
@@ -138,9 +135,6 @@ def test_the_full_grid_and_the_ordinary_one_keep_each_others_cases(tmp_path):
         assert len(cases) == (2 if words == [] and count else 4)
         assert netcdf.read(tmp_path / "r" / "grids.nc")["steps"].values.max() == (1000.0 if words else 10.0)
     assert [row["state"] for row in computed("--status")["grids"]] == ["done", "done"]
-
-
-# ---- failures --------------------------------------------------------------------------------------------------------
 
 
 def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path, clean_registry):

@@ -324,9 +324,6 @@ def test_the_midpoint_rule_is_known_by_its_nodes_and_not_by_its_name():
     assert "plain_energy" not in sampling_table("goldstein", integrator("trapezoidal"), settings)
 
 
-# ---- the page --------------------------------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def measured():
     """Some quick cases of two variants in all parts of the study, with fewer settings."""

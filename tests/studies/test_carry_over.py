@@ -243,11 +243,10 @@ def planted(factor):
     return xr.DataTree.from_dict({"/short": short, "/prices": prices, "/bodies": about})
 
 
-@pytest.mark.parametrize(
-    ("gap", "verdict", "words"),
-    [(0.2503, by.NO, "1 of 2 exponents within 0.25, all within 0.26"), (0.2497, by.YES, "2 of 2 .*, all within 0.25"),
-     (0.5, by.NO, "1 of 2 .*, all within 0.5$")],
-)  # fmt: skip
+@pytest.mark.parametrize(("gap", "verdict", "words"), [
+    (0.2503, by.NO, "1 of 2 exponents within 0.25, all within 0.26"), (0.2497, by.YES, "2 of 2 .*, all within 0.25"),
+    (0.5, by.NO, "1 of 2 .*, all within 0.5$"),
+])  # fmt: skip
 def test_a_gap_that_is_shown_is_no_smaller_than_the_gap(gap, verdict, words, monkeypatch):
     """0.2503 is not within 0.25."""
     monkeypatch.setattr(facts, "exponent_gaps", lambda *_: {"rk4, attitude": gap, "rk4, energy": 0.01})

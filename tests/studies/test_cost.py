@@ -35,9 +35,6 @@ def scene_of(tops, member):
     return Scene(f"m{member}", SymmetricTop(*numbers[:3]), Angles(*numbers[3:]), horizon=float(tops.times[member, -1]))
 
 
-# ---- the arithmetic of costs -----------------------------------------------------------------------------------------
-
-
 def test_a_cost_lies_on_the_line_between_the_last_miss_and_the_first_hit():
     work = np.array([[10.0], [20.0], [40.0]])
     errors = np.array([[1e-2], [1e-4], [1e-6]])  # two decades for each doubling
@@ -45,18 +42,15 @@ def test_a_cost_lies_on_the_line_between_the_last_miss_and_the_first_hit():
     assert reached[:, 0] == pytest.approx([10.0, 10.0 * math.sqrt(2.0), 20.0, 20.0 * math.sqrt(2.0), INF])
 
 
-@pytest.mark.parametrize(
-    ("errors", "cost"),
-    [
-        ([1e-5, 1e-1, 1e-2, 1e-4], 20.0 * 2.0**1.5),  # the first was luck
-        ([INF, INF, 1e-4, 1e-6], 40.0),  # nothing to interpolate from: the hit itself
-        ([1e-2, 1e-4, 1e-2, 1e-2], INF),  # the hit is missed again
-        ([1e-1, 1e-2, NAN, NAN], INF),  # it left before
-        ([1e-4, NAN, NAN, NAN], 10.0),  # the coarsest run is enough
-        ([NAN, NAN, NAN, NAN], INF),
-        ([1e-2, 0.0, NAN, NAN], 10.0),  # an error of zero: close to the miss, and never below it
-    ],
-)
+@pytest.mark.parametrize(("errors", "cost"), [
+    ([1e-5, 1e-1, 1e-2, 1e-4], 20.0 * 2.0**1.5),  # the first was luck
+    ([INF, INF, 1e-4, 1e-6], 40.0),  # nothing to interpolate from: the hit itself
+    ([1e-2, 1e-4, 1e-2, 1e-2], INF),  # the hit is missed again
+    ([1e-1, 1e-2, NAN, NAN], INF),  # it left before
+    ([1e-4, NAN, NAN, NAN], 10.0),  # the coarsest run is enough
+    ([NAN, NAN, NAN, NAN], INF),
+    ([1e-2, 0.0, NAN, NAN], 10.0),  # an error of zero: close to the miss, and never below it
+])  # fmt: skip
 def test_what_counts_as_a_hit(errors, cost):
     work = np.where(np.isnan(errors), NAN, [10.0, 20.0, 40.0, 80.0])[:, np.newaxis]
     assert cost_to_reach(work, np.array(errors)[:, np.newaxis], [1e-3])[0, 0] == pytest.approx(cost, rel=0.01)
@@ -74,8 +68,6 @@ def test_run_lengths_are_shares_of_the_tops_that_were_asked():
     budgets = np.array([0.5, 1.0, 2.0, 10.0])
     assert run_lengths(np.array([1.0, 2.0, 3.0, INF, NAN]), budgets).tolist() == [0.0, 0.25, 0.5, 0.75]
 
-
-# ---- winners with intervals ------------------------------------------------------------------------------------------
 
 QUIET = np.array([0.01, 0.01])
 
@@ -156,9 +148,6 @@ def test_a_safe_lead_inside_the_prices_is_not_called():
         assert safe([steps("a", met, 1.0, error), steps("b", met, 1.08, error)])[1] is called
 
 
-# ---- prices ----------------------------------------------------------------------------------------------------------
-
-
 def tree_of(price, names=("a", "b", "c"), **others):
     """Prices (processes, variants) in a dataset of the study."""
     price = np.asarray(price, dtype=float)
@@ -227,9 +216,6 @@ def test_variants_whose_order_follows_the_tolerance_have_a_price_at_each():
                            NAN)  # fmt: skip
     price, _ = known.at("a", np.array([1e-2, 1e-3, 1e-4, NAN]))
     assert price[:3] == pytest.approx([8.0, 4.0, 2.0])
-
-
-# ---- many tops against one -------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -321,9 +307,6 @@ def test_targets_are_asked_where_they_mean_something(tops):
     assert not asked["axis"][0].all()  # sleeping tops nutate less than 1e-3
 
 
-# ---- a method on the tops --------------------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def strang(tops):
     return ladder.table(integrator("strang[axis]"), tops, 2e4, twin=False, guarded=4)
@@ -381,9 +364,6 @@ def test_the_work_of_the_typical_top_grows_with_the_setting(strang):
     work = strang["work"].values[:, KINDS.index(NATURAL)]
     assert (np.diff(work) > 0.0).all()
     assert work[5] == pytest.approx(10.0 * FIRST * 2.0**5, rel=0.15)  # one evaluation a step over ten nutations
-
-
-# ---- what is said ----------------------------------------------------------------------------------------------------
 
 
 def test_no_method_of_this_top_takes_part_in_a_contest_for_any_body():

@@ -22,16 +22,13 @@ from symtop.run.long_run import QUANTITIES, long_run
 from tests.templates import checked
 
 
-@pytest.mark.parametrize(
-    ("sizes", "exponents", "interval", "word"),
-    [
-        ((1e-13, 2e-13), (0.5, 1.0), 0.1, "kept"),
-        ((1e-4, 1e-4), (0.0, 0.1), 0.1, "bounded"),
-        ((1e-4, 1e-4), (0.0, 0.1), 0.6, "growing"),  # the interval does not exclude a walk
-        ((1e-4, 1e-4), (0.0, 1.0), 0.1, "drift"),  # the worse of two scenes
-        ((1e-12, 1e-13), (0.5, 0.5), 0.1, "random walk"),
-    ],
-)
+@pytest.mark.parametrize(("sizes", "exponents", "interval", "word"), [
+    ((1e-13, 2e-13), (0.5, 1.0), 0.1, "kept"),
+    ((1e-4, 1e-4), (0.0, 0.1), 0.1, "bounded"),
+    ((1e-4, 1e-4), (0.0, 0.1), 0.6, "growing"),  # the interval does not exclude a walk
+    ((1e-4, 1e-4), (0.0, 1.0), 0.1, "drift"),  # the worse of two scenes
+    ((1e-12, 1e-13), (0.5, 0.5), 0.1, "random walk"),
+])  # fmt: skip
 def test_the_behaviour_of_a_quantity_is_that_on_its_worst_scene(sizes, exponents, interval, word):
     cell = xr.Dataset({
         "outcome": ("scene", ["ok", "ok"]),

@@ -69,9 +69,6 @@ def rows(measured):
     return timed(measured)
 
 
-# ---- the cells -------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("plain", "name"), [(plain_numpy.RK4, "rk4"), (plain_numpy.STRANG, "strang")])
 def test_the_loops_in_numpy_return_the_trajectory_of_the_compiled_ones(plain, name):
     for chart in plain.charts():
@@ -109,9 +106,6 @@ def test_a_cell_is_named_once_and_is_one_method_in_one_chart():
     schemes = {cell.scheme for cell in every}
     compiled = {cell.scheme for cell in every if cell.language == COMPILED}
     assert {scheme for members in FAMILIES.values() for scheme in members} == compiled == schemes - {"DOP853"}
-
-
-# ---- equal accuracy --------------------------------------------------------------------------------------------------
 
 
 def test_every_timed_run_meets_its_target_when_it_is_run_again(rows):
@@ -153,9 +147,6 @@ def test_what_is_not_within_the_budget_has_a_reason_and_no_time(monkeypatch):
     slow, fast = (data.sel(variant=name, call=KERNEL).squeeze() for name in ("strang-numpy[axis]", "strang[axis]"))
     assert (str(slow["reason"].values), bool(np.isnan(slow["seconds"]))) == (settings.BUDGET, True)
     assert (str(fast["reason"].values), bool(np.isnan(fast["seconds"]))) == ("", False)
-
-
-# ---- measured times --------------------------------------------------------------------------------------------------
 
 
 def test_every_time_is_the_median_of_its_processes(measured, rows):
@@ -214,9 +205,6 @@ def test_the_page_is_rendered_with_numbers_and_without(quiet, tmp_path):
     text = checked("factors", quiet, tmp_path)
     assert f"becomes {number(facts.facts(quiet)['whole'], 3)} times faster" in text
     assert "busy" not in text
-
-
-# ---- one factor at a time --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("call_first", [False, True])

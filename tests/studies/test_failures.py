@@ -49,9 +49,6 @@ def axis_errors(name, scene, h, steps, marks=None):
     return charts.axis_distance(axis_of(chart, done.states), closed_form(scene).axis(marks * h)), done.outcome
 
 
-# ---- the linear limit ------------------------------------------------------------------------------------------------
-
-
 def test_verlet_is_stable_up_to_h_omega_2():
     limit, _ = linear_limits(integrator("stormer-verlet"), STEADY, np.linspace(0.05, 4.0, 80) / OMEGA)
     assert limit * OMEGA == pytest.approx(2.0, abs=1e-8)
@@ -177,9 +174,6 @@ def test_a_window_between_two_steps_of_the_grid_is_seen(name, phase, unstable):
         assert swings(name, phase, 20_000, 1e-6)[-1] < 1e-5
 
 
-# ---- a pole next to the path -----------------------------------------------------------------------------------------
-
-
 def test_angles_fail_where_a_step_passes_the_pole_and_splitting_does_not_notice():
     """The axis misses the pole by 1.1 delta at 1.2 rad/s: the angles lose it once 1.1 delta is about 1.2 h."""
     h, steps = 4.22 / 4220, 4220
@@ -213,9 +207,6 @@ def test_the_benchmark_of_bruls_cardona_arnold_is_no_place_for_angles():
     ladder = [axis_errors("strang", scene, 2.0 / n, n, marks=np.linspace(0, n, 201))[0].max() for n in (8000, 16000)]
     assert math.log2(ladder[0] / ladder[1]) == pytest.approx(2.0, abs=0.05)
     assert ladder[1] < 1e-3
-
-
-# ---- the sleeping top ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["strang", "cayley"])
@@ -266,9 +257,6 @@ def test_the_splitting_window():
     assert not sign_changes(lambda h: sleep_margin(integrator("cayley"), 6.0, h), np.linspace(0.5, 1.5, 201) * unit)
 
 
-# ---- the separatrix --------------------------------------------------------------------------------------------------
-
-
 def test_errors_grow_by_half_of_g_and_the_horizon_is_their_logarithm():
     """Negative control: elsewhere they do not grow like that."""
     scene, h = scenes.scene("separatrix"), 0.0125
@@ -297,9 +285,6 @@ def test_a_run_that_leaves_its_chart_before_it_is_wrong_is_told_from_one_that_is
     assert separatrix_horizon(integrator("strang"), scene, 0.1).broken == 0.0
 
 
-# ---- the solver ------------------------------------------------------------------------------------------------------
-
-
 def test_one_newton_iteration_drifts_to_3e_2_and_beyond():
     scene = scenes.scene("goldstein")
     one = [textbook_midpoint(scene, 0.1, steps, 0.0, 1) for steps in (10_000, 100_000, 1_000_000)]
@@ -326,9 +311,6 @@ def test_the_kernels_momenta_drift_as_the_solver_and_not_as_the_method():
     assert measured[2].momentum < 1e-14
     coarse = solver_sweep(midpoint, scene, 0.3, 100_000, math.inf).energy
     assert coarse > 0.05 > 10.0 * solver_sweep(midpoint, scene, 0.3, 100_000, 1e-8).energy
-
-
-# ---- resonance -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("name", "place"), [("stormer-verlet", math.sqrt(3.0)), ("midpoint", math.sqrt(12.0))])
@@ -364,9 +346,6 @@ def test_what_is_measured_is_the_first_displacement_that_is_lost_and_larger_ones
     assert not survives(verlet, STEADY, STEADY.start.theta, [0.03, 0.1, 0.2], math.sqrt(3.0) / OMEGA, 3000).any()
 
 
-# ---- adaptive Runge-Kutta --------------------------------------------------------------------------------------------
-
-
 def test_rk45_loses_energy_and_momenta_linearly():
     rk45 = symtop.simulate("spheroid", "rk45", tolerance=1e-6, horizon=200.0, samples=401, guard=False)
     lost = {name: rk45[name].values - rk45[name].values[0] for name in ("energy", "p_phi", "p_psi")}
@@ -377,9 +356,6 @@ def test_rk45_loses_energy_and_momenta_linearly():
         assert values[200] / values[-1] == pytest.approx(0.5, abs=0.1)
 
 
-# ---- sampling --------------------------------------------------------------------------------------------------------
-
-
 def test_sampled_once_a_nutation_an_error_of_2_5e_4_reads_some_1e_9():
     once, every = sampled_energy_error(integrator("stormer-verlet"), scenes.scene("goldstein"), 100, 3)
     assert every == pytest.approx(2.5e-4, rel=0.03)
@@ -388,9 +364,6 @@ def test_sampled_once_a_nutation_an_error_of_2_5e_4_reads_some_1e_9():
         integrator("rk4"), scenes.scene("goldstein"), 100, 3
     )  # a drift is seen all the same
     assert once > 0.3 * every
-
-
-# ---- the tools -------------------------------------------------------------------------------------------------------
 
 
 NOT_ONE_MAP = {  # of theta and p_theta, so that its samples are no iterates
