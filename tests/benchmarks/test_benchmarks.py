@@ -33,15 +33,11 @@ def test_every_twin_returns_the_same_bits(key):
 
 
 @needs_gcc
-def test_the_comparison_sees_one_wrong_rounding():
+def test_the_comparison_sees_one_wrong_rounding_and_a_twin_that_leaves_the_chart():
     kernel = kernels.kernel(("stormer-verlet", "angles"))
     nudged = np.nextafter(kernel.rule.drift[0], 1.0)
     other = twin.Twin(kernel._replace(rule=kernel.rule._replace(drift=(nudged,))), twin.EXACT)
     assert np.any(other.shown(STEPS)[0] != twin.ours(kernel, STEPS)[0])
-
-
-@needs_gcc
-def test_a_twin_that_leaves_the_chart_says_so():
     kernel = kernels.kernel(("stormer-verlet", "angles"))
     with pytest.raises(RuntimeError, match="stopped after"):
         twin.Twin(kernel._replace(state=(0.01, -9.0, 0.0, 0.0)), twin.EXACT)(STEPS)

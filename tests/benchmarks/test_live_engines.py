@@ -36,13 +36,10 @@ def test_a_map_is_an_engines_own_if_one_step_agrees(method, stepped, same):
     assert measure.agrees(measure.row(engine(method, stepped))) is same
 
 
-def test_the_axis_error_is_that_of_the_catalogue():
+def test_the_axis_error_is_that_of_the_catalogue_and_an_engine_that_raises_a_row_with_its_reason():
     made = measure.row(engine("mujoco-euler", "mujoco-euler"))
     assert made["goldstein_axis"] == pytest.approx(0.61079, rel=1e-4)
     assert made["goldstein_steps"] == 0.0
-
-
-def test_an_engine_that_raises_is_a_row_with_its_reason():
     made = measure.row(engines.Setting("Engine", "1", "bad", engines.FREE, "ode", broken))
     assert made["failed"] == "RuntimeError: no such body"
     assert not measure.agrees(made)

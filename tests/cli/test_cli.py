@@ -2,22 +2,29 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
 
+import symtop
+from symtop.cli import runs
 from symtop.cli.main import main
 from symtop.core import netcdf, parallel
 from symtop.core.errors import SymtopError
+from symtop.measure import timing
+from symtop.methods.framework.registry import bibliography, citation_keys, engines, methods
+from symtop.run.ensemble import population
 from tests.commands import call
 
 
-def test_run_prints_the_errors_and_writes_the_dataset(tmp_path):
+def test_run_prints_the_errors_and_writes_the_dataset_also_of_a_run_that_fails(tmp_path):
     words = ("run", "spheroid", "midpoint", "--step-size", 0.01, "--output", tmp_path / "run.nc")
     assert "angle between axes" in call(*words).output
     assert netcdf.read(tmp_path / "run.nc").attrs["integrator"] == "midpoint"
@@ -27,9 +34,6 @@ def test_run_prints_the_errors_and_writes_the_dataset(tmp_path):
     assert report["errors"]["p_psi"]["largest"] < 1e-14
     once = call("run", "spheroid", "strang", "--step-size", 8, "--no-guard").output
     assert "\n1 step, 1 force evaluation\n" in once
-
-
-def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):
     path = tmp_path / "run.nc"
     result = call("run", "spheroid", "stormer-verlet", "--step-size", 1.0, "--horizon", 50, "--output", path, code=3)
     assert "theta left (0, pi)" in result.output
@@ -194,12 +198,6 @@ def ending(before="", code="3"):
     return subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
 
 
-def test_a_command_ends_with_its_code_and_takes_nothing_apart():
-    result = ending()
-    assert (result.returncode, result.stdout, result.stderr) == (3, "the answer\nwhat was registered\n", "")
-    assert ending(code="None").returncode == 0
-
-
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
 def test_what_cannot_be_printed_is_told_in_a_sentence():
     with Path("/dev/full").open("w") as full:
@@ -233,7 +231,10 @@ def test_a_reader_that_leaves_is_no_case_that_has_failed(words, reader, code):
     assert "Traceback" not in result.stderr
 
 
-def test_a_command_whose_threads_work_or_whose_code_is_a_text_ends_as_python_does():
+def test_a_command_ends_with_its_code_takes_nothing_apart_and_waits_for_threads():
+    result = ending()
+    assert (result.returncode, result.stdout, result.stderr) == (3, "the answer\nwhat was registered\n", "")
+    assert ending(code="None").returncode == 0
     result = ending(before="threading.Thread(target=work).start()")
     assert result.stdout.splitlines() == ["the answer", "the thread is done", "what was registered", "taken apart"]
     assert result.returncode == 3
@@ -251,3 +252,116 @@ def test_however_it_is_called_linear_algebra_has_one_thread(words, tmp_path):
     command, path = [sys.executable, *words, "scenes"], os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
     result = subprocess.run(command, capture_output=True, text=True, env=clean | {"PYTHONPATH": path}, check=True)
     assert result.stdout.endswith("threads 1\n")
+
+
+def printed(*words, columns=80):
+    return call(*words, COLUMNS=str(columns)).output
+
+
+@pytest.mark.parametrize(
+    ("command", "entries"),
+    [(["integrators"], methods), (["integrators", "--engines"], engines), (["scenes"], symtop.scenes)],
+)
+def test_a_list_fits_the_terminal_and_names_every_entry(command, entries):
+    for columns in (80, 120):
+        lines = printed(*command, columns=columns).splitlines()
+        assert max(map(len, lines)) <= columns
+        names = {line.split(" ")[0] for line in lines}
+        assert names >= set(entries())
+        assert ("mujoco-euler" in names, "strang" in names) == (entries is engines, entries is methods)
+    assert max(map(len, printed(*command, "--wide").splitlines())) > 80
+
+
+def cited(*arguments):
+    return call("cite", *arguments)
+
+
+@pytest.mark.parametrize("name", ["strang", "gauss-4", "midpoint"])
+def test_a_run_cites_the_sources_of_its_method(tmp_path, name):
+    data = symtop.simulate("spheroid", name, step_size=0.01, horizon=0.1)
+    file = netcdf.write(data, tmp_path / "run.nc")
+    text = cited(file, file).stdout
+    sources = citation_keys(symtop.integrator(name))
+    assert sources
+    for key in sources:
+        assert bibliography()[key] in text
+    assert text.count("\n@") == len(sources)  # once each
+
+
+def test_without_a_file_the_package_is_cited_and_a_method_without_a_known_source_is_said(tmp_path):
+    text = cited().stdout
+    assert re.findall(r"^@(\w+)", text, re.MULTILINE) == ["software"]
+    assert f"version = {{{symtop.__version__}}}" in text
+    data = symtop.simulate("spheroid", "strang", step_size=0.01, horizon=0.1).assign_attrs(integrator="of-a-user")
+    result = cited(netcdf.write(data, tmp_path / "run.nc"))
+    assert "no source is known of of-a-user" in result.stderr
+    assert result.stdout.count("@") == 1
+
+
+SLOW = """\
+import sys, time
+from symtop.cli import clock
+clock.FIRST, clock.EVERY = 0.1, 0.15
+with clock.telling("judge"):
+    time.sleep(float(sys.argv[1]))
+    with clock.ticking("trying methods"):
+        time.sleep(float(sys.argv[1]))
+"""
+
+
+def stderr_of(code, *words):
+    return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True).stderr
+
+
+def test_a_command_that_waits_says_what_it_does_and_one_that_is_quick_nothing():
+    lines = stderr_of(SLOW, "0.5").splitlines()
+    assert lines[0].startswith("symtop: judge, ")
+    assert lines[-1].startswith("symtop: trying methods, ")
+    assert 3 <= len(lines) <= 8
+    assert all(line.endswith(" s") for line in lines)
+    assert stderr_of(SLOW, "0.01") == ""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_the_lines_end_with_a_command_that_is_killed():
+    code = SLOW.replace("with clock", "print('on', flush=True)\nwith clock", 1)
+    process = subprocess.Popen([sys.executable, "-c", code, "60"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process.stdout.readline()
+    time.sleep(0.5)
+    process.kill()
+    assert process.communicate(timeout=10)[1].count(b"symtop: judge") < 20  # the pipe is closed by all who wrote to it
+
+
+def test_a_run_of_many_steps_says_how_long_it_takes(capsys, monkeypatch):
+    """Steps of a microsecond: a million are not timed, five million take five seconds, a billion a quarter hour."""
+    few, now, step = [], [0.0], 1e-6
+    monkeypatch.setattr(timing, "time", SimpleNamespace(perf_counter=lambda: now[0]))
+
+    def run(steps):
+        few.append(steps)
+        now[0] += 0.3 + step * steps  # whatever the steps, as the set-up of a long run does
+
+    runs.estimate(1e6, run)
+    assert not few
+    runs.estimate(5e6, run)
+    assert capsys.readouterr().err == ""
+    runs.estimate(1e9, run)
+    minutes = re.fullmatch(r"symtop: 1e\+09 steps take about (\d+) min\n", capsys.readouterr().err)
+    assert 15 <= int(minutes[1]) <= 25
+    runs.estimate(9e9, run)  # and so many two and a half hours
+    assert re.fullmatch(r"symtop: 9e\+09 steps take about 2.\d h\n", capsys.readouterr().err)
+    assert max(few) < 1.1e6
+    few.clear()
+    step = 1e-4  # in plain Python
+    runs.estimate(3e6, run)
+    assert "take about 5" in capsys.readouterr().err
+    assert sum(few) < 40_000
+
+
+def test_members_that_do_not_fit_into_memory_are_refused_before_they_are_drawn(monkeypatch):
+    monkeypatch.setattr(population, "memory", lambda: 1000.0 * population.BYTES)
+    assert population.population(1000).sizes["member"] == 1000
+    with pytest.raises(symtop.SymtopError, match=r"n must be at most 1e\+03 in the .* GiB of this machine.*, not 1001"):
+        population.population(1001)
+    result = call("ensemble", "strang", "--members", "1001", "--per-nutation", "20", "--nutations", "1", code=2)
+    assert "--members must be at most" in result.stderr

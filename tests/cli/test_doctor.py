@@ -46,14 +46,11 @@ def test_every_form_of_a_requirement_is_read(monkeypatch, requirement, result, h
     assert all(finding.healthy or finding.advice for finding in findings)
 
 
-def test_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
+def test_a_cache_that_cannot_be_written_and_a_wrong_number_are_seen(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "file" / "cache"))
     assert "SYMTOP_CACHE" in faults(doctor._caches(Path()))["cache"].advice
     assert set(faults(doctor._results(Path("/proc/none")))) == {"results"}
-
-
-def test_a_wrong_number_is_seen(monkeypatch):
     wrong = published.Published("somebody", "something", 1.0, 1.1, 1e-3, "printed")
     monkeypatch.setattr(published, "published_values", lambda: [wrong])
     findings = faults(doctor._self_check(Path()))

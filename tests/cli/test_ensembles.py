@@ -39,15 +39,12 @@ def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path):
         assert np.asarray(picture.convert("L")).std() > 10.0
 
 
-def test_json_has_outcomes_and_errors_and_a_finer_step_has_smaller_ones():
+def test_json_has_outcomes_and_errors_finer_steps_smaller_ones_and_failures_are_counted():
     words = ("--members", 40, "strang", "--nutations", 2, "--json", "--per-nutation")
     coarse, fine = (json.loads(call(*words, per).output) for per in (30, 300))
     assert coarse["outcomes"] == {"ok": 40}
     assert fine["largest_errors"]["axis"]["0.5"] < 0.02 * coarse["largest_errors"]["axis"]["0.5"]
     assert fine["steps"] == 10 * coarse["steps"]
-
-
-def test_members_that_fail_are_counted():
     assert "left_chart" in call("--members", 60, "stormer-verlet", *STEPS, "--samples", 21).output
     result = call("--members", 20, "--kind", "grazing", "stormer-verlet", *STEPS, "--json", code=3)
     assert json.loads(result.output)["largest_errors"]["axis"] == dict.fromkeys(("0.01", "0.1", "0.5", "0.9", "0.99"))

@@ -54,16 +54,6 @@ def test_a_script_counts_by_the_functions_and_globals_that_are_reached(tmp_path)
     assert changes(before, Code().reasons("measure", module.measure)) == ["code script.py"]
 
 
-def test_changes_name_what_differs():
-    before, now = {"file a": "1", "file b": "2", "scene x": "3"}, {"file a": "1", "file b": "9", "package n": "4"}
-    assert changes(before, now) == ["file b", "scene x (no longer counts)", "package n (did not count before)"]
-    assert changes(now, now) == []
-    assert digest(before) == digest(dict(reversed(before.items())))
-    assert digest(before) != digest(now)
-    assert merged([{"a": "1"}, {"a": "1", "b": "2"}]) == {"a": "1", "b": "2"}
-    assert merged([{"a": "1"}, {"a": "2"}])["a"] not in ("1", "2")
-
-
 def test_words_do_not_count_and_numbers_do():
     def reasons_of(thing):
         return Code().reasons("thing", thing)
@@ -255,7 +245,14 @@ def test_the_cache_keeps_what_was_used_last(tmp_path):
     files.prune(tmp_path / "nothing", 100)
 
 
-def test_versions_of_packages_are_reasons():
+def test_changes_name_what_differs_and_versions_of_packages_are_reasons():
+    before, now = {"file a": "1", "file b": "2", "scene x": "3"}, {"file a": "1", "file b": "9", "package n": "4"}
+    assert changes(before, now) == ["file b", "scene x (no longer counts)", "package n (did not count before)"]
+    assert changes(now, now) == []
+    assert digest(before) == digest(dict(reversed(before.items())))
+    assert digest(before) != digest(now)
+    assert merged([{"a": "1"}, {"a": "1", "b": "2"}]) == {"a": "1", "b": "2"}
+    assert merged([{"a": "1"}, {"a": "2"}])["a"] not in ("1", "2")
     assert code_hash.packages("numpy", "no-such-package") == {
         "package numpy": importlib.metadata.version("numpy"),
         "package no-such-package": "absent",

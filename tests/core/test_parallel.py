@@ -96,14 +96,11 @@ def unset(monkeypatch):
         monkeypatch.delenv(name, raising=False)
 
 
-def test_a_process_has_one_thread_and_this_one_keeps_its_environment():
+def test_a_process_has_one_thread_and_what_the_user_has_set_is_obeyed(monkeypatch):
     before = dict(os.environ)
     assert seen_by(OneThreadEach()) == ["1"] * len(VARIABLES)
     assert dict(os.environ) == before
     assert seen_by(multiprocessing.get_context("spawn")) == [None] * len(VARIABLES), "nobody else is told"
-
-
-def test_what_the_user_has_set_is_obeyed(monkeypatch):
     monkeypatch.setenv(VARIABLES[0], "3")
     assert seen_by(OneThreadEach()) == ["3", "1", "1"]
     assert os.environ[VARIABLES[0]] == "3"

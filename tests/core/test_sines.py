@@ -90,13 +90,10 @@ def test_any_angle_has_its_quadrant(size):
     assert max(errors(x, compiled(x), relative=False)) < 0.5
 
 
-def test_what_is_no_angle_stays_bounded_and_nan_stays_nan():
+def test_nan_stays_nan_and_one_angle_has_the_bits_of_many():
     assert np.all(np.isnan(compiled([math.nan, math.inf, -math.inf])))
     assert np.all(np.isfinite(compiled([1e15, 1e16, -1e17, 1e40, -1e200, 1e308])))
     assert np.max(np.abs(compiled([*np.geomspace(1e15, 1e308, 3000)]))) <= 1.01
-
-
-def test_one_angle_has_the_same_bits_as_among_many_and_the_interpreter_nearly():
     x = quarter(500, seed=4)
     together = compiled(x)
     assert np.array_equal(together, np.hstack([compiled(angle) for angle in x]))

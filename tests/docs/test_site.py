@@ -127,17 +127,13 @@ def test_every_public_name_and_every_derivation_is_on_a_page():
 
 
 @pytest.mark.slow
-def test_every_derivation_and_every_public_name_is_there(site):
+def test_derivations_public_names_figures_studies_and_commands_are_on_the_site(site):
     api = (site / "reference" / "api.html").read_text(encoding="utf-8")
     for name in set(symtop.__all__) - {"__version__"}:
         assert f'id="symtop.{name}"' in api, name
     theory = "".join(path.read_text(encoding="utf-8") for path in (site / "theory").glob("*.html"))
     for method in symtop.integrators().values():
         assert f'id="{method.name}"' in theory, method.name
-
-
-@pytest.mark.slow
-def test_every_figure_has_its_study_and_command(site):
     page = (site / "reference" / "gallery.html").read_text(encoding="utf-8")
     files = (ROOT / "docs" / "snapshot" / "figures").iterdir()
     figures = {path.name for path in files if path.suffix in {".png", ".gif"}}

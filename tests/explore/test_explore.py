@@ -187,16 +187,6 @@ def test_the_server_answers_this_machine_and_nothing_else(site):
     assert (status, "I3 must be" in json.loads(body)["error"]) == (400, True)
 
 
-def test_exports_over_http(site, tmp_path):
-    chosen = fields(integrator="strang")
-    status, body, _ = request(site, "POST", "/netcdf", json.dumps(chosen), **JSON)
-    assert status == 200
-    (tmp_path / "run.nc").write_bytes(body)
-    assert netcdf.read(tmp_path / "run.nc").equals(answers.dataset(answers.setup(chosen), str))
-    status, body, _ = request(site, "POST", "/script", json.dumps(chosen), **JSON)
-    assert body.decode() == answers.script(answers.setup(chosen))
-
-
 @pytest.mark.parametrize(("method", "tolerance", "seconds"), [
     ("taylor-quad", 1e-30, 0.5),
     ("rk45", 1e-9, 0.5),
@@ -247,7 +237,14 @@ def test_two_runs_that_never_end_do_not_keep_a_small_one_waiting(site):
     assert time.monotonic() - began < 25.0  # 5 s on two free cores
 
 
-def test_a_bad_port_is_refused(site):
+def test_exports_over_http_and_a_bad_port_is_refused(site, tmp_path):
+    chosen = fields(integrator="strang")
+    status, body, _ = request(site, "POST", "/netcdf", json.dumps(chosen), **JSON)
+    assert status == 200
+    (tmp_path / "run.nc").write_bytes(body)
+    assert netcdf.read(tmp_path / "run.nc").equals(answers.dataset(answers.setup(chosen), str))
+    status, body, _ = request(site, "POST", "/script", json.dumps(chosen), **JSON)
+    assert body.decode() == answers.script(answers.setup(chosen))
     for port in (site.server_address[1], 70_000):
         result = call("explore", "--no-browser", "--port", port, code=2)
         assert "port must be" in result.output
@@ -384,7 +381,7 @@ def costs(**changes):
     return answer
 
 
-def test_the_first_chart_of_costs_is_there_at_once_and_its_lines_are_those_of_compare(monkeypatch):
+def test_the_first_chart_of_costs_is_there_at_once_its_lines_those_of_compare_timed_together(monkeypatch):
     monkeypatch.setattr(cost, "_charts", {})
     setups = cost.question(fields(integrator="trapezoidal", second="strang", horizon=7.5))
     began = time.thread_time()
@@ -403,10 +400,7 @@ def test_the_first_chart_of_costs_is_there_at_once_and_its_lines_are_those_of_co
     assert np.argmin(lines["trapezoidal"]["error"]) in slower[-2:]
     again = costs(integrator="trapezoidal", second="strang", horizon=7.5)
     assert again["lines"] == whole["lines"]  # stored; the runs of the page are timed again
-
-
-def test_the_lines_of_a_chart_are_timed_together(monkeypatch):
-    """Timed one by one, a slow moment of the machine would be a slow method."""
+    # Timed one by one, a slow moment of the machine would be a slow method.
     timed = []
     monkeypatch.setattr(cost, "_charts", {})
     monkeypatch.setattr(cost, "timed_rows", lambda cells: (timed.append(cells), timed_rows(cells)))

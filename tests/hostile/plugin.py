@@ -191,11 +191,6 @@ BROKEN = {
     "reached-nan": changed(outcome=lambda _: "not_finite", reached=lambda _: np.nan),
 }  # each is a run that failed, exit code 3
 
-for name, solve in {
-    **REFUSED,
-    **TOLERATED,
-    **BROKEN,
-    "signals-itself": signals_itself,
-    "forwards-only": forwards_only,
-}.items():
+OTHERS = {"signals-itself": signals_itself, "forwards-only": forwards_only}
+for name, solve in (REFUSED | TOLERATED | BROKEN | OTHERS).items():
     symtop.register(symtop.Integrator(name, "other", "misbehaves", {"angles": solve}, implementation="python"))

@@ -35,15 +35,11 @@ def output_of(words):
 
 
 @pytest.mark.parametrize("guard", ["--guard", "--no-guard"])
-def test_every_refused_run_is_one_sentence(misbehaving, guard):
+def test_every_refused_run_is_one_sentence_and_what_can_be_used_is_used(misbehaving, guard):
     for name in misbehaving.REFUSED:
         code, lines = output_of(["run", "spheroid", name, *RUN, guard])
         assert (code, len(lines)) == (2, 1), (name, lines)
         assert lines[0].startswith(f"symtop: integrator {name} "), lines
-
-
-@pytest.mark.parametrize("guard", ["--guard", "--no-guard"])
-def test_what_can_be_used_is_used(misbehaving, guard):
     _, (_, *expected) = output_of(["run", "spheroid", "midpoint[angles]", *RUN, guard])
     for name in misbehaving.TOLERATED:
         code, (_, *lines) = output_of(["run", "spheroid", name, *RUN, guard])
@@ -70,7 +66,7 @@ def test_the_claims_of_all_of_them_are_judged(misbehaving):
         assert output_of(["claims", name, "--quick"])[0] in (0, 1), name
 
 
-def test_a_solver_does_not_reach_the_plan_or_an_earlier_run(misbehaving):
+def test_a_solver_does_not_reach_the_plan_or_an_earlier_run_and_its_interrupt_is_not_the_users(misbehaving):
     scene, plan = symtop.scene("spheroid"), Plan.steps(0.01, np.arange(5))
     before = scene.top.I1, scene.start.theta
     for name in ("changes-arguments", "changes-and-raises"):
@@ -82,10 +78,6 @@ def test_a_solver_does_not_reach_the_plan_or_an_earlier_run(misbehaving):
     first = solve(keeper, "angles", scene.top, scene.start, plan)
     solve(keeper, "angles", scene.top, scene.start, plan)
     assert np.isfinite(first.states).all()
-
-
-def test_an_interrupt_of_the_user_is_not_that_of_a_plugin(misbehaving):
-    scene, plan = symtop.scene("spheroid"), Plan.steps(0.01, np.arange(5))
     for name, error in (("signals-itself", InterruptedByUser), ("raises-interrupt", symtop.SymtopError)):
         with told_apart(), pytest.raises(error):
             solve(symtop.integrator(name), "angles", scene.top, scene.start, plan)

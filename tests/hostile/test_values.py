@@ -265,12 +265,8 @@ def test_odd_times_are_refused_in_one_sentence(times):
         with pytest.raises(symtop.SymtopError, match="times must be") as info:
             ask(times)
         assert len(str(info.value)) < 300
-
-
-@pytest.mark.parametrize("numbers", ODD_TIMES, ids=lambda numbers: repr(numbers)[:20])
-def test_odd_tops_are_refused_in_one_sentence(numbers):
     with pytest.raises(symtop.SymtopError):
-        ClosedForms(numbers)
+        ClosedForms(times)  # tops
 
 
 def test_numbers_of_every_kind_are_read():
@@ -317,16 +313,14 @@ def test_references_of_extreme_tops_are_told_or_refused(numbers, spin):
             assert numbers[2] == 1e30
 
 
-@pytest.mark.parametrize("theta", [5e-324, 1e-320, 1e-200, 1e-162])
-def test_a_swing_too_narrow_for_numbers_is_refused_and_one_that_is_not_is_followed(theta):
+def test_a_swing_too_narrow_for_numbers_is_refused_and_one_that_is_not_is_followed():
     """A hanging top that swings through the pole: its distance from it is theta^2/2."""
     hanging = symtop.SymmetricTop(1.0, 1.5, -1.0)
-    for ask in (
-        lambda: ClosedForm(hanging, symtop.Angles(theta)),
-        lambda: symtop.simulate(symtop.Scene("s", hanging, symtop.Angles(theta), 3.0), "rk4", step_size=0.01),
-    ):
+    for theta in (5e-324, 1e-320, 1e-200, 1e-162):
         with pytest.raises(symtop.SymtopError, match="leave it by as much"):
-            ask()
+            ClosedForm(hanging, symtop.Angles(theta))
+        with pytest.raises(symtop.SymtopError, match="leave it by as much"):
+            symtop.simulate(symtop.Scene("s", hanging, symtop.Angles(theta), 3.0), "rk4", step_size=0.01)
     swing = ClosedForm(hanging, symtop.Angles(1e-140))(np.array([0.0, 1.0])).theta
     assert swing[0] == pytest.approx(1e-140, rel=1e-12)
     assert abs(swing[1]) == pytest.approx(1e-140 * math.cos(1.0), rel=1e-6)

@@ -12,6 +12,7 @@ from symtop.measure import datasets
 from symtop.measure.accuracy import error_table
 from symtop.measure.conservation import trend
 from symtop.measure.order import order
+from symtop.measure.published import OTHER_BODY, START, TRAJECTORY, published_values
 from symtop.measure.settings import ladder
 from symtop.measure.timing import Timing, agree, timings
 from symtop.runner.study import Case
@@ -19,7 +20,7 @@ from symtop.runner.study import Case
 STEPS = 0.1 / 1.5 ** np.arange(16)
 
 
-def test_an_exact_power_is_found_and_points_near_the_bound_are_left_out():
+def test_an_exact_power_is_found_and_stray_points_are_left_out():
     fit = order(STEPS, 3.0 * STEPS**2, 1e-16, 1.0)
     assert fit.slope == pytest.approx(2.0, abs=1e-12)
     assert fit.constant == pytest.approx(3.0, rel=1e-12)
@@ -29,9 +30,6 @@ def test_an_exact_power_is_found_and_points_near_the_bound_are_left_out():
     assert masked.slope == pytest.approx(2.0, abs=0.03)
     assert np.all(noisy[masked.used] > 10.0 * floor)
     assert not masked.used[-1]
-
-
-def test_one_stray_point_does_not_take_the_finer_ones_with_it():
     error = 0.1 * STEPS**2
     error[5] *= 0.2
     fit = order(STEPS, error, 1e-16, 1.0)
@@ -74,14 +72,11 @@ def test_errors_of_momenta_and_energy_are_relative_to_their_documented_scales():
     assert errors["energy"].values == pytest.approx(0.16 / 0.24705927, rel=1e-6)  # E0 - p_psi^2/2 I3 - min V
 
 
-def test_a_table_stops_for_good_once_a_run_took_too_much_work():
+def test_a_table_stops_after_too_much_work_and_ladders_end():
     scene = symtop.scene("spheroid")
     method = symtop.integrator("rk45")
     table = error_table(scene, method, [1e-3, 1e-12, 1e-13, 1e-4], 12.0)
     assert list(table["outcome"].values) == ["ok", "ok", "not_run", "not_run"]
-
-
-def test_ladders_end_at_the_largest_number_of_steps_and_the_least_tolerance():
     scene = symtop.scene("spheroid")
     for name in ("midpoint", "kahan-li-8", "gauss-12"):
         steps = ladder(symtop.integrator(name), scene, 8.0, 6, most=1e4)
@@ -121,14 +116,11 @@ def taking(clock, each):
     return call
 
 
-def test_a_function_that_has_taken_long_is_asked_no_more_but_so_often_at_least(clock):
+def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agree(clock):
     for patience, least, counts in ((math.inf, 2, [4, 4, 4]), (0.05, 2, [4, 3, 2]), (0.05, 1, [4, 3, 1])):
         naps = [taking(clock, itertools.repeat(seconds)) for seconds in (1e-3, 0.02, 0.06)]
         results = timings(naps, 4, 5e-3, warm=True, patience=patience, least=least, exact=False)
         assert [len(timing.samples) for timing in results] == counts
-
-
-def test_a_function_whose_three_least_samples_agree_is_asked_no_more(clock):
     for close, count in ((0.5, 6), (0.0, 8)):
         calls = taking(clock, (0.01, 0.011, 0.03, 0.03, 0.03, 0.012, 0.03, 0.03))
         (timing,) = timings([calls], 8, 2e-3, warm=True, close=close, exact=False)
@@ -137,10 +129,7 @@ def test_a_function_whose_three_least_samples_agree_is_asked_no_more(clock):
     assert not agree([1.0, 3.0, 1.005, 3.0, 1.02], 0.01)
     assert not agree([1.0, 1.0, 1.0, 1.0], 0.01)
 
-
-def test_a_slow_minute_is_no_slow_function_among_those_that_are_timed_together(clock):
-    """The machine is half as fast in its first second; of functions that are timed one by one the first look so."""
-
+    # The machine is half as fast in its first second; of functions that are timed one by one the first look so.
     def work():
         clock[0] += 0.02 if clock[0] < 1.0 else 0.01
 
@@ -157,3 +146,13 @@ def test_timings_know_when_they_are_noisy():
     quick, slow = timings([lambda: sum(range(100)), lambda: sum(range(20_000))], batches=3, batch=0.002)
     assert slow.best > 20.0 * quick.best
     assert len(quick.samples) == 3
+
+
+def test_every_published_value_is_reproduced_and_one_off_by_its_last_digit_is_not():
+    values = published_values()
+    assert [(one.source, one.quantity) for one in values if not one.reproduced] == []
+    printed = [one.tests for one in values if one.kind == "printed"]
+    assert [printed.count(what) for what in (TRAJECTORY, START, OTHER_BODY)] == [3, 1, 3]
+    assert len(values) - len(printed) == 6
+    for one in published_values():
+        assert not one._replace(published=one.published + 1.01 * one.unit).reproduced

@@ -21,16 +21,13 @@ def data():
     return symtop.sweep(["spheroid", "goldstein"], METHODS, **ARGUMENTS)
 
 
-def test_each_entry_is_that_of_one_run(data):
+def test_each_entry_is_that_of_one_run_whose_settings_are_its_own(data):
     assert dict(data.sizes) == {"scene": 2, "variant": 4, "setting": 3}
     for scene in ("spheroid", "goldstein"):
         row = error_row(symtop.scene(scene), symtop.integrator("strang"), 0.01, 2.0)
         cell = data.sel(scene=scene, variant="strang").isel(setting=1)
         for name in ("axis", "attitude_end", "energy_bound", "force_evaluations", "step_size", "outcome"):
             assert cell[name].values == row[name]
-
-
-def test_settings_belong_to_those_who_have_them(data):
     adaptive, formula = (data.sel(variant=name, scene="spheroid") for name in ("rk45-compiled", "exact"))
     assert adaptive["outcome"].values.tolist() == ["ok", "ok", "not_run"]
     assert adaptive["tolerance"].values[:2].tolist() == [1e-4, 1e-6]
@@ -155,16 +152,13 @@ def test_bad_input_is_one_sentence(words, says):
         symtop.sweep(**{"scenes": "spheroid", "integrators": "strang", **words})
 
 
-def test_a_file_of_something_else_is_refused(tmp_path):
+def test_steps_a_nutation_are_those_of_each_scene_and_a_file_of_something_else_is_refused(tmp_path):
     file = tmp_path / "run.nc"
     symtop.simulate("spheroid", "strang", step_size=0.01).to_netcdf(file)
     before = file.read_bytes()
     with pytest.raises(symtop.SymtopError, match="path must be a new file or that of a sweep"):
         symtop.sweep("spheroid", "strang", step_size=0.01, path=file)
     assert file.read_bytes() == before
-
-
-def test_steps_a_nutation_are_those_of_each_scene():
     data = symtop.sweep(["spheroid", "goldstein"], "strang", per_nutation=[50], horizon=2.0, quiet=True)
     for name in ("spheroid", "goldstein"):
         steps = 2.0 / round(2.0 * 50 / symtop.scene(name).nutation_period)

@@ -51,7 +51,7 @@ def one_step(name, scene, h, chart="attitude"):
 
 
 @pytest.mark.parametrize("name", AXIS_ERROR)
-def test_a_step_is_the_engines_formula_in_body_axes(name):
+def test_a_step_is_the_engines_formula_in_body_axes_of_tops_and_of_bodies_without_symmetry(name):
     """Kernels on the axis, with equations solved by hand, against matrices in body axes: the same to rounding."""
     formula = getattr(engine_formulas, name.replace("-", "_"))
     for scene in (GOLDSTEIN, *random_scenes(6, seed=3)):
@@ -72,10 +72,6 @@ def test_a_step_is_the_engines_formula_in_body_axes(name):
             np.testing.assert_allclose(
                 one_step(name, scene, h, "axis"), [*new.as_matrix()[:, 2], *L], atol=2e-14 * (1.0 + np.linalg.norm(L))
             )
-
-
-@pytest.mark.parametrize("name", AXIS_ERROR)
-def test_a_step_of_a_body_without_symmetry_is_the_formula(name):
     quaternion = np.array([0.8, 0.4, -0.3, 0.2]) / math.sqrt(0.93)
     at, h = Attitude(tuple(quaternion), (0.7, -1.1, 2.0)), 0.013
     for moments in ((0.5, 0.9, 1.3), (1.3, 0.5, 0.9)):
@@ -112,7 +108,7 @@ def test_explicit_maps_fly_apart(name, time):
     assert run["time"].values[np.argmax(np.abs(energy) > 1e6)] == pytest.approx(time, abs=0.2)
 
 
-def test_without_the_gyroscopic_term_an_engine_follows_the_spherical_top():
+def test_without_the_gyroscopic_term_an_engine_follows_the_spherical_top_and_conservation_does_not_show_it():
     """Agreement of order h with the closed form of the top with I3 := I1, none with its own."""
     top = GOLDSTEIN.top
     spherical = symtop.ClosedForm(symtop.SymmetricTop(top.I1, top.I1, top.mgl), GOLDSTEIN.start)
@@ -124,9 +120,6 @@ def test_without_the_gyroscopic_term_an_engine_follows_the_spherical_top():
     assert min(axis_error("no-gyro[axis]", steps) for steps in counts) > 1.5
     with_term = [axis_error("mujoco-euler[axis]", steps, against=spherical) for steps in counts]
     assert min(with_term) > 1.0
-
-
-def test_no_test_of_conservation_sees_that_it_is_another_top():
     run = symtop.simulate(GOLDSTEIN, "no-gyro", step_size=0.0025, horizon=100.0, samples=2001, guard=False)
     scale = abs(float(run["energy"][0])) + GOLDSTEIN.top.mgl
     assert float(abs(run["energy"] - run["energy"][0]).max()) < 1e-4 * scale

@@ -66,7 +66,7 @@ def test_random_tops_follow_the_closed_form_at_every_step():
     assert worst < 2e-12
 
 
-def test_a_step_agrees_with_fifty_digits():
+def test_a_step_agrees_with_fifty_digits_and_a_neighbour_of_the_map_is_no_motion():
     scene = symtop.scene("spheroid")
     precise = PreciseForm(scene.top, scene.start, digits=50)
     h = scene.nutation_period / 3.1
@@ -74,9 +74,6 @@ def test_a_step_agrees_with_fifty_digits():
     for k in range(1, 4):
         quaternion = charts.quaternion_from_angles(*(float(value) for value in precise(k * h)[:3]))
         assert charts.attitude_distance(done.states[k, :4], quaternion) < 5e-15
-
-
-def test_a_neighbour_of_the_map_is_no_motion():
     scene = symtop.scene("spheroid")
     h = scene.nutation_period / 20.0
     kernel = inside(METHOD.solvers["axis"])
@@ -93,7 +90,7 @@ def test_a_neighbour_of_the_map_is_no_motion():
     assert gaps[1] > 1e-3
 
 
-def test_a_free_top_and_a_step_back():
+def test_a_free_top_a_step_back_and_the_separatrix_where_large_steps_are_divided():
     top, start = symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(0.7, 0.2, 0.1, 0.3, -0.8, 1.1)
     form = symtop.model.exact.closed_form.ClosedForm(top, start)
     done = run(top, start, 0.7, 30)
@@ -104,9 +101,6 @@ def test_a_free_top_and_a_step_back():
     back = run(scene.top, scene.start, -0.3, 20)
     truth = closed_form(scene).quaternion(-0.3 * np.arange(21))
     assert charts.attitude_distance(back.states[:, :4], truth).max() < 1e-13
-
-
-def test_the_separatrix_is_climbed_and_large_steps_are_divided_there():
     scene = symtop.scene("separatrix")
     h = scene.horizon / 4.0
     done = run(scene.top, scene.start, h, 4)

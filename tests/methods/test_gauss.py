@@ -46,11 +46,6 @@ def test_order(scene, order):
     assert_order(scene, integrator(f"gauss-{order}"), order, 0.05 if order <= 6 else 0.3, WINDOWS[order])
 
 
-def test_a_wrong_table_loses_the_order():
-    with pytest.raises(AssertionError, match="order"):
-        assert_order("spheroid", nudged(3, 1e-3, mirrored=True), 6, 0.05, WINDOWS[6])
-
-
 @pytest.mark.parametrize("stages", STAGES)
 def test_the_table(stages):
     mu, b = gauss_rule(stages)[:2]
@@ -73,7 +68,9 @@ def assert_keeps_everything(method, scene, observe, nutation_steps, limit=1e-13,
     assert np.max(np.abs(np.linalg.norm(run["axis"], axis=1) - 1.0)) < limit, "length"
 
 
-def test_a_table_that_is_not_antisymmetric_keeps_nothing():
+def test_a_wrong_table_loses_the_order_and_one_that_is_not_antisymmetric_the_constants():
+    with pytest.raises(AssertionError, match="order"):
+        assert_order("spheroid", nudged(3, 1e-3, mirrored=True), 6, 0.05, WINDOWS[6])
     # 1e-12 is 4500 rounding units of one coefficient
     with pytest.raises(AssertionError, match=r"energy|p_psi"):
         assert_keeps_everything(nudged(3, 1e-12, mirrored=False), "spheroid", "axis", 30.3)
@@ -256,15 +253,13 @@ def test_a_step_is_what_newton_finds_and_sweeps_do_not(stages, scene):
 
 def test_a_sweep_ends_at_its_own_limit_and_the_step_goes_on():
     """In `steady-fast` sweeps of one stage contract up to h omega = 1.9; the step there and beyond is one function."""
-    scene = symtop.scene("steady-fast")
-    omega = scene.top.nutation_frequency(scene.top.momenta(scene.start))
-    par, state = on_axis(scene.top, scene.start)
+    par, state = on_axis(STEADY.top, STEADY.start)
     y = np.array(state) + 1e-3
-    assert sweep_step(par, 1, y, 1.6 / omega, 400)[1] < 1e-12
-    assert not sweep_step(par, 1, y, 2.2 / omega, 400)[1] < 1e-2
+    assert sweep_step(par, 1, y, 1.6 / OMEGA, 400)[1] < 1e-12
+    assert not sweep_step(par, 1, y, 2.2 / OMEGA, 400)[1] < 1e-2
     for phase in np.linspace(1.2, 2.4, 49):
-        done = march_axis(par, gauss_rule(1), tuple(y), phase / omega, ONE)
-        np.testing.assert_allclose(done.states[0], newton_step(par, 1, y, phase / omega)[0], rtol=0, atol=1e-13)
+        done = march_axis(par, gauss_rule(1), tuple(y), phase / OMEGA, ONE)
+        np.testing.assert_allclose(done.states[0], newton_step(par, 1, y, phase / OMEGA)[0], rtol=0, atol=1e-13)
 
 
 def test_a_step_beyond_newtons_reach_is_found_by_growing_it():

@@ -229,7 +229,7 @@ def test_a_long_run_in_which_lanes_are_given_up_between_samples():
     assert_runs_alone(SOLVERS["strang[axis]"], numbers, h, marks, SOLVERS["strang[axis]"].many(numbers, h, marks))
 
 
-def test_members_stand_in_the_order_of_their_steps_and_uneven_blocks_are_left():
+def test_members_stand_in_the_order_of_their_steps_and_of_their_turns_and_uneven_blocks_are_left():
     steps = np.concatenate([np.full(40, 100), [1000, 10_000], np.arange(1, 30)])
     chosen, left = divided(np.arange(len(steps)), steps)
     assert sorted((*chosen, *left)) == list(range(len(steps)))
@@ -239,10 +239,7 @@ def test_members_stand_in_the_order_of_their_steps_and_uneven_blocks_are_left():
     assert [part.size for part in divided(np.arange(0), steps)] == [0, 0]
     assert divided(np.arange(LEAST - 1), np.full(9, 7))[0].size == 0
     assert divided(np.arange(LEAST), np.full(9, 7))[1].size == 0
-
-
-def test_members_with_as_many_steps_stand_in_the_order_of_their_turns():
-    """Without turns they stand as they came (the negative control); with them, unlike steps still stand apart."""
+    # Without turns they stand as they came (the negative control); with them, unlike steps still stand apart.
     count, draw = 8 * W, np.random.default_rng(0)
     turn, everybody = draw.uniform(size=count), np.arange(count)
     turn[7] = np.nan  # a member whose step overflows: beside the largest
@@ -320,33 +317,19 @@ def of_table(*rows, bent=False):
     return lie_runge_kutta("any", rows, 1, "", "", bent=bent).solvers["attitude"]
 
 
-@pytest.mark.parametrize(
-    "solver",
-    [
-        of_table(((1.0,),)),
-        of_table(((1.0,),), ((0.5, 0.5), (0.0, 0.0)), bent=True),
-        lie_variational("any", Variational(EULER_POINCARE, SUZUKI_4.drift), 4, "", "").solvers["axis"],
-        generalised_alpha("any", 0.0).solvers["axis"],
-        dataclasses.replace(SOLVERS["rkmk-se3-2[attitude]"], rule=LieTable((0.0,), (1.0,))),
-        with_shares("rkmk-se3-2[attitude]", (0.25, 0.75)),
-        with_shares("generalised-alpha[axis]", (0.25, 0.5, 0.25)),
-        runge_kutta("any", ((),), (1.0,)).solvers["axis"],
-        runge_kutta("any", ((), (1 / 3,), (0.0, 2 / 3)), (0.25, 0.0, 0.75)).solvers["axis"],
-        discrete_lagrangian("mixed", (0.0, 0.0, 0.3, 1.0), (0.1, 0.2, 0.3, 0.4)).solvers["angles"],
-    ],
-    ids=[
-        "euler",
-        "heun",
-        "euler-poincare-4",
-        "alpha-0",
-        "zeros",
-        "rkmk-twice",
-        "alpha-thrice",
-        "rk-1",
-        "rk-3",
-        "weights",
-    ],
-)
+@pytest.mark.parametrize("solver", [
+    of_table(((1.0,),)),
+    of_table(((1.0,),), ((0.5, 0.5), (0.0, 0.0)), bent=True),
+    lie_variational("any", Variational(EULER_POINCARE, SUZUKI_4.drift), 4, "", "").solvers["axis"],
+    generalised_alpha("any", 0.0).solvers["axis"],
+    dataclasses.replace(SOLVERS["rkmk-se3-2[attitude]"], rule=LieTable((0.0,), (1.0,))),
+    with_shares("rkmk-se3-2[attitude]", (0.25, 0.75)),
+    with_shares("generalised-alpha[axis]", (0.25, 0.5, 0.25)),
+    runge_kutta("any", ((),), (1.0,)).solvers["axis"],
+    runge_kutta("any", ((), (1 / 3,), (0.0, 2 / 3)), (0.25, 0.0, 0.75)).solvers["axis"],
+    discrete_lagrangian("mixed", (0.0, 0.0, 0.3, 1.0), (0.1, 0.2, 0.3, 0.4)).solvers["angles"],
+], ids=["euler", "heun", "euler-poincare-4", "alpha-0", "zeros", "rkmk-twice", "alpha-thrice", "rk-1", "rk-3",
+        "weights"])  # fmt: skip
 def test_tables_and_compositions_of_ones_own_have_the_bits_of_runs_alone(solver):
     """A weight of 0 is carried out like any other, and each share of generalised-alpha goes on from the last one."""
     given = members(200, seed=12)

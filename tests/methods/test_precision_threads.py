@@ -61,10 +61,6 @@ def test_coefficients_and_starts_are_those_computed_alone_while_others_change_th
     assert all(np.array_equal(values, alone[0]) for values in rule)
     assert set(first) == {alone[1]}
     assert set(second) == {alone[2]}
-
-
-def test_the_precision_of_mpmath_itself_is_neither_used_nor_changed():
-    alone = coefficients(), numbers("spheroid")
     with mpmath.workdps(5):
         assert np.array_equal(coefficients(), alone[0])
         assert numbers("spheroid") == alone[1]

@@ -72,7 +72,7 @@ def test_the_grid_is_that_of_the_formulas(k):
     assert np.abs(other.states[:, :2] - points[:, 1:]).max() > 1e-6
 
 
-def test_samples_move_no_step_and_are_counted():
+def test_samples_and_blocks_move_no_step(monkeypatch):
     scene, h = symtop.scene("goldstein"), 0.05
     few, many = run(scene, h, [400, 800]), run(scene, h, np.arange(801))
     assert np.array_equal(few.states, many.states[[400, 800]])
@@ -81,9 +81,6 @@ def test_samples_move_no_step_and_are_counted():
         assert done.force_evaluations == done.steps
         assert done.newton_iterations == 0
     assert many.steps == few.steps + 798  # the start costs nothing
-
-
-def test_blocks_of_steps_join_without_a_seam(monkeypatch):
     scene = symtop.scene("grazing")
     whole = run(scene, 0.02, [50, 200])
     monkeypatch.setattr(reversible, "BLOCK", 7)

@@ -49,15 +49,12 @@ START = symtop.Angles(theta=0.7, phi=0.3, psi=-0.2, theta_dot=0.4, phi_dot=0.9, 
 MAP = symtop.Scene("map", TOP, START, 1.0)
 
 
-def test_the_tuned_step_is_symplectic_but_for_the_number_it_takes_from_the_start():
+def test_the_tuned_step_is_symplectic_but_for_its_number_and_an_unsymmetric_table_does_not_come_back():
     defect = symplectic_defect(one_step(METHODS["cayley-tuned"], "attitude", MAP, 0.2), START)
     assert defect.size > 1e-4
     assert defect.rest < 1e-10
     other = symplectic_defect(one_step(symtop.integrator("gauss-4"), "attitude", MAP, 0.2), START)
     assert other.rest > 1e-7  # a number of the start explains nothing here
-
-
-def test_an_unsymmetric_table_is_left_as_it_is_and_its_step_does_not_come_back():
     euler = composition("euler", (1.0,), (1.0, 0.0), chart="space", order=1)
     assert not euler.symmetric
     assert return_miss(one_step(euler, "attitude", MAP, 0.1), START) > 1e-3

@@ -30,12 +30,8 @@ def largest_gap(scene_name, first, second, steps=10_000):
 def test_the_reduced_kernel_assumed_nothing(scene_name, name):
     """Ten thousand steps: rounding grows as n^1.5 and stays below 1e-11 rad (measured 7e-13)."""
     assert largest_gap(scene_name, name, name + TWIN) < 1e-11
-
-
-@pytest.mark.parametrize("scene_name", SCENES)
-def test_another_rule_is_another_trajectory(scene_name):
-    """The negative control: two methods of order 2 are nowhere near each other on that scale."""
-    assert largest_gap(scene_name, "midpoint", "trapezoidal" + TWIN) > 1e-7
+    if name == "midpoint":  # the control: another rule of order 2 is another trajectory
+        assert largest_gap(scene_name, "midpoint", "trapezoidal" + TWIN) > 1e-7
 
 
 def test_the_study_finds_rounding_between_the_forms_and_iterations_that_end_soon():

@@ -158,16 +158,13 @@ def test_values_at_the_ends_of_the_range_end_in_a_status(numbers):
     assert status in closed_form.REASONS
 
 
-def test_a_few_forms_import_no_slow_library():
+def test_a_few_forms_import_no_slow_library_and_many_samples_are_worth_compiling(monkeypatch):
     code = (
         "import sys, symtop\n"
         "for scene in symtop.scenes().values(): symtop.ClosedForm(scene.top, scene.start).axis([0.0, 1.0])\n"
         "print(*({'numba', 'mpmath', 'scipy', 'heyoka'} & set(sys.modules)))"
     )
     assert printed_by(code, cwd=ROOT).strip() == ""
-
-
-def test_many_samples_are_worth_compiling(monkeypatch):
     kernel = closed_form.LazyKernel(samples.all_samples, closed_form._fill.arguments, patience=0.2)
     monkeypatch.setattr(kernel, "_worth", lambda: kernel.patience)
     assert not kernel.ready(0.1)
@@ -290,16 +287,13 @@ def test_a_member_has_the_bits_of_its_own_form(implementation):
     assert forms.arithmetic[-2:] == ["double", "40 digits"]
 
 
-def test_the_mean_precession_is_that_of_a_period():
+def test_the_mean_precession_is_that_of_a_period_and_each_member_may_have_times_of_its_own():
     forms = ClosedForms([flat(*pair) for pair in _pairs(1) if math.isfinite(ClosedForm(*pair).nutation_period)])
     period = forms.nutation_period
     np.testing.assert_allclose(forms.precession_rate * period, forms.phi_per_period, rtol=1e-14, atol=1e-300)
     grown = np.diff(forms(np.stack([0.21 * period, 1.21 * period], axis=1)).phi, axis=1)[:, 0]
     gap = (grown - forms.phi_per_period) / math.pi  # phi jumps by pi where the axis passes through a pole
     assert np.abs(gap - np.rint(gap)).max() < 1e-12
-
-
-def test_each_member_may_have_times_of_its_own():
     forms = ClosedForms([flat(*pair) for pair in _pairs(1)])
     times = np.random.default_rng(5).uniform(-10.0, 10.0, (len(forms), 7))
     each, strided = forms.axis(times), forms.axis(np.repeat(times, 2, axis=1)[:, ::2])
@@ -307,9 +301,6 @@ def test_each_member_may_have_times_of_its_own():
     for i in (0, len(forms) - 1):
         assert each[i].tobytes() == forms.axis(times[i])[i].tobytes()
     assert forms(times).theta.shape == (len(forms), 7)
-
-
-def test_one_row_of_times_does_not_pass_for_a_row_of_each_member():
     forms = ClosedForms([flat(*SEPARATRIX), flat(*ASLEEP)])
     for bad in ([[0.0, 1.0]], [[0.0], [1.0], [2.0]], [[[0.0]]]):
         with pytest.raises(SymtopError, match=r"shape \(2, samples\)"):
@@ -350,24 +341,6 @@ def test_no_members_and_no_times_are_no_trouble(implementation):
     assert ClosedForms([flat(*ASLEEP)]).state([]).shape == (1, 0, 7)
 
 
-def test_threads_share_forms_and_kernels():
-    """A kernel that several threads ask for at once is made once, and none of them sees half of it."""
-    rows = np.array([flat(*pair) for pair in _pairs(1)])
-    alone = ClosedForms(rows).state(TIMES).tobytes()
-    forms, begin = ClosedForms(rows), threading.Barrier(8)
-    kernel = LazyKernel(samples.all_samples, closed_form._fill.arguments, patience=1e9)
-
-    def work(_):
-        begin.wait()
-        kernel.compile()
-        assert kernel.compiled is not None
-        return forms.state(TIMES).tobytes(), ClosedForms(rows).state(TIMES).tobytes()
-
-    with ThreadPoolExecutor(8) as pool:
-        for result in pool.map(work, range(8)):
-            assert result == (alone, alone)
-
-
 def test_distances_from_an_axis_are_those_of_the_chart(implementation):
     """However small: an axis turned by 1e-12 is 1e-12 away; and strided axes, as a state has them."""
     forms = ClosedForms([flat(*pair) for pair in _pairs(1)])
@@ -384,7 +357,22 @@ def test_distances_from_an_axis_are_those_of_the_chart(implementation):
     assert alone.tobytes() == gap[0].tobytes()
 
 
-def test_momenta_of_a_run_are_read_off_its_states():
+def test_members_momenta_and_threads():
+    """A kernel that several threads ask for at once is made once, and none of them sees half of it."""
+    rows = np.array([flat(*pair) for pair in _pairs(1)])
+    alone = ClosedForms(rows).state(TIMES).tobytes()
+    forms, begin = ClosedForms(rows), threading.Barrier(8)
+    kernel = LazyKernel(samples.all_samples, closed_form._fill.arguments, patience=1e9)
+
+    def work(_):
+        begin.wait()
+        kernel.compile()
+        assert kernel.compiled is not None
+        return forms.state(TIMES).tobytes(), ClosedForms(rows).state(TIMES).tobytes()
+
+    with ThreadPoolExecutor(8) as pool:
+        for result in pool.map(work, range(8)):
+            assert result == (alone, alone)
     forms = ClosedForms([flat(*pair) for pair in _pairs(1)])
     states, momenta = forms.run(TIMES)
     assert states.tobytes() == forms.state(TIMES).tobytes()

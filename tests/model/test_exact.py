@@ -238,14 +238,6 @@ def test_a_top_without_motion(mgl, theta):
     assert np.isinf(form.nutation_period) == (mgl == 0.0 or (mgl > 0.0 and theta == 0.0))
 
 
-def test_free_top_precesses_about_its_momentum():
-    top, start = SymmetricTop(2.0, 1.3, 0.0), Angles(1.0, 0.2, 0.3, 0.4, 0.5, 3.0)
-    form, times = ClosedForm(top, start), np.linspace(0.0, 1e4, 11)
-    momentum = _momentum(top, start)
-    np.testing.assert_allclose(form.momentum(times), [momentum] * 11, atol=8 * EPS * np.linalg.norm(momentum))
-    assert form.nutation_period == pytest.approx(2.0 * math.pi * top.I1 / np.linalg.norm(momentum), rel=2 * EPS)
-
-
 @pytest.mark.parametrize("kind", [ClosedForm, PreciseForm])
 @pytest.mark.parametrize("facing", [1.0, -1.0])
 @pytest.mark.parametrize("rate", [2.0, -2.0])
@@ -275,7 +267,12 @@ def test_views_of_one_motion_agree(kind):
     assert motion.theta.max() <= form.theta_range[1] + 4 * EPS
 
 
-def test_one_period_adds_the_precession_and_the_spin():
+def test_a_free_top_precesses_about_its_momentum_and_one_period_adds_the_precession_and_the_spin():
+    top, start = SymmetricTop(2.0, 1.3, 0.0), Angles(1.0, 0.2, 0.3, 0.4, 0.5, 3.0)
+    form, times = ClosedForm(top, start), np.linspace(0.0, 1e4, 11)
+    momentum = _momentum(top, start)
+    np.testing.assert_allclose(form.momentum(times), [momentum] * 11, atol=8 * EPS * np.linalg.norm(momentum))
+    assert form.nutation_period == pytest.approx(2.0 * math.pi * top.I1 / np.linalg.norm(momentum), rel=2 * EPS)
     form = PreciseForm(*SPHEROID, digits=40)
     first, second = form("0.4"), form(mp.mpf("0.4") + form.nutation_period)
     assert abs(second.theta - first.theta) < 1e-38
@@ -299,15 +296,12 @@ def test_values_outside_the_model_are_refused(body, state, words):
         PreciseForm(body, state)
 
 
-def test_kinds_of_numbers_that_mean_the_same_give_the_same():
+def test_kinds_of_numbers_and_the_working_precision_of_the_caller_do_not_matter():
     mixed = PreciseForm((mp.mpf(2), 1, "26.5"), ("0.5", 0.125, mp.mpf("0.25"), "0", 10, -0.5))
     floats = PreciseForm(SymmetricTop(2.0, 1.0, 26.5), Angles(0.5, 0.125, 0.25, 0.0, 10.0, -0.5))
     assert mixed("1.5") == floats(mp.mpf(1.5)) == floats(1.5)
     decimal, double = (PreciseForm((2, 1, "26.5"), (theta, 0, 0, 0, 10, 0)) for theta in ("0.1", 0.1))
     assert decimal(1) != double(1)
-
-
-def test_working_precision_of_the_caller_does_not_matter():
     with mp.workdps(5):
         low = PreciseForm(*SPHEROID, digits=40)(8)
         assert mp.mp.dps == 5

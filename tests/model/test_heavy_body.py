@@ -96,7 +96,7 @@ def test_both_precisions_of_random_bodies_agree_within_the_bound_of_the_first():
     assert max(shares) < 1.0
 
 
-def test_what_is_lost_in_chaos_is_not_a_number():
+def test_what_is_lost_in_chaos_is_not_a_number_and_a_run_that_is_too_long_ends_as_lost(monkeypatch):
     times = np.linspace(0.0, 300.0, 31)
     body = HeavyBody(BRICK, WEIGHT, START, MOMENTUM)
     motion = body.samples(times)
@@ -115,9 +115,6 @@ def test_what_is_lost_in_chaos_is_not_a_number():
     assert body.samples(times[:5]).lost(times[:5]) is None
     assert body.samples(-times).lost(-times) < 0.0
     assert np.array_equal(body.samples([0.0]).quaternion, [START])
-
-
-def test_a_run_that_is_too_long_ends_as_lost(monkeypatch):
     monkeypatch.setattr(heavy_body, "MOST_STEPS", 50)
     times = np.linspace(0.0, 60.0, 13)
     motion = HeavyBody(BRICK, WEIGHT, START, MOMENTUM).samples(times)

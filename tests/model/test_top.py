@@ -63,7 +63,7 @@ def test_the_potential_keeps_its_digits_at_a_pole_where_the_textbook_form_does_n
     assert abs(naive / float(exact_rate) - 1.0) > 1e-10
 
 
-def test_nutation_frequency_is_the_limit_of_small_nutations():
+def test_nutation_frequency_is_the_limit_of_small_nutations_and_has_the_classical_threshold():
     chosen = scene("steady")
     momenta = chosen.top.momenta(chosen.start)
     assert chosen.top.steady_theta(momenta) == pytest.approx(math.pi / 3, abs=1e-8)
@@ -72,10 +72,7 @@ def test_nutation_frequency_is_the_limit_of_small_nutations():
     nudged = Angles(theta=chosen.start.theta + 1e-4, phi_dot=chosen.start.phi_dot, psi_dot=chosen.start.psi_dot)
     period = chosen.top.nutation_period(nudged)
     assert 2.0 * math.pi / period == pytest.approx(chosen.top.nutation_frequency(chosen.top.momenta(nudged)), rel=1e-6)
-
-
-def test_nutation_frequency_of_sleeping_tops_has_the_classical_threshold():
-    """Stable for I3 w3 > 2 sqrt(I1 mgl): omega^2 = p_psi^2/4 I1^2 - mgl/I1 at theta = 0."""
+    # Stable for I3 w3 > 2 sqrt(I1 mgl): omega^2 = p_psi^2/4 I1^2 - mgl/I1 at theta = 0.
     asleep = SymmetricTop(1.0, 1.0, 1.0)
     awake = asleep.momenta(Angles(theta=0.0, psi_dot=2.5))
     assert asleep.steady_theta(awake) == 0.0

@@ -73,7 +73,7 @@ def test_nothing_overflows_and_every_figure_is_there(browser, scheme, width):
     assert browser.problems == []
 
 
-def test_every_text_has_the_contrast_of_wcag_aa(browser, scheme):
+def test_every_text_has_the_contrast_of_wcag_aa_in_both_schemes(browser, scheme):
     browser.resize(1280, 900)
     assert browser.evaluate(FAINT) == []
     shown = browser.evaluate("getComputedStyle(document.body).backgroundColor")
@@ -96,7 +96,7 @@ def test_the_reader_chooses_the_colours(browser):
     browser.prefer("")
 
 
-def test_headings_figures_and_tables_have_addresses_of_their_own(browser):
+def test_headings_figures_and_tables_have_addresses_and_the_contents_follow_the_reader(browser):
     titles = "[...document.querySelectorAll('main h2, main h3, figcaption')]"
     assert browser.evaluate(f"{titles}.filter(one => !one.querySelector('a.anchor')).length") <= 1  # of the registry
     ids = browser.evaluate("[...document.querySelectorAll('[id]')].map(one => one.id)")
@@ -104,9 +104,6 @@ def test_headings_figures_and_tables_have_addresses_of_their_own(browser):
     local = browser.evaluate("[...document.querySelectorAll('a[href^=\"#\"]')].map(one => one.hash.slice(1))")
     assert set(local) <= set(ids)
     assert len(local) > 10
-
-
-def test_the_contents_follow_the_reader(browser):
     browser.resize(1280, 900)
     here = "document.querySelector('nav a[aria-current]')?.hash"
     for name in ("part-provenance", "part-equations", "part-measured", "part-convergence"):
@@ -185,15 +182,12 @@ def test_it_prints_with_every_figure_and_in_black_on_white(browser, scheme, resu
     assert browser.evaluate("matchMedia('print').matches") is False
 
 
-def test_it_paints_within_a_second_is_small_and_asks_for_nothing_from_elsewhere(browser, results):
+def test_it_paints_within_a_second_asks_for_nothing_and_can_be_sent_alone(browser, results, tmp_path):
     browser.open((results / "report.html").as_uri())
     first = browser.wait_for("performance.getEntriesByName('first-contentful-paint')[0]?.startTime")
     assert first < 1000.0  # ms
     assert all(address.startswith(("file:", "data:")) for address in browser.requests)
     assert (results / "report.html").stat().st_size < 5e6
-
-
-def test_the_page_can_be_sent_alone(results, tmp_path):
     for folder in ("figures", "tables"):
         shutil.copytree(results / folder, tmp_path / folder)
     for name in ("convergence", "speed", "pitfalls"):

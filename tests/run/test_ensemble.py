@@ -120,7 +120,7 @@ def test_scenes_are_members_with_horizons_and_units_of_their_own():
     np.testing.assert_array_equal(data.isel(member=1).phi, run.phi)
 
 
-def test_scalars_count_for_all_members_and_times_that_all_share_are_one_row():
+def test_scalars_count_for_all_members_and_steps_and_horizons_may_differ():
     members = xr.Dataset({"I1": 2.0, "I3": 1.0, "mgl": 2.0, "theta": ("member", [0.3, 0.8, 1.2]), "psi_dot": 5.0})
     settings = {"horizon": 2.0, "samples": 31, "quiet": True}
     for step in (0.05, 0.5):  # more steps than samples, and fewer
@@ -132,9 +132,6 @@ def test_scalars_count_for_all_members_and_times_that_all_share_are_one_row():
     np.testing.assert_array_equal(data["time"], [0.0, 0.5, 1.0, 1.5, 2.0, *[np.nan] * 26])
     other = symtop.ensemble(members, "strang[axis]", step_size=[0.5, 0.5, 0.4], **settings)
     assert other["time"].dims == ("member", "time")
-
-
-def test_steps_and_horizons_may_differ_by_member():
     members = SOME.isel(member=slice(0, 3))
     period = nutation_periods(numbers_of(members))
     steps, ends = period / [10.0, 20.0, 35.0], period * [1.0, 2.0, 3.0]
@@ -204,14 +201,6 @@ def test_settings_that_make_no_sense_are_refused_as_they_were_given(name, settin
         symtop.ensemble(SOME, name, quiet=True, **settings)
 
 
-def test_a_member_without_a_nutation_has_no_steps_per_nutation():
-    hanging = {"I1": 1.0, "I3": 0.5, "mgl": -1.0, "theta": 0.0, "theta_dot": ("member", [1.9, 2.0])}
-    with pytest.raises(symtop.SymtopError, match="member 1 is endless"):
-        symtop.ensemble(xr.Dataset(hanging), "strang", per_nutation=20, horizon=8.0)
-    data = symtop.ensemble(xr.Dataset(hanging), "strang", step_size=0.1, horizon=8.0, quiet=True)
-    assert data.outcome.values.tolist() == ["ok", "ok"]
-
-
 @pytest.mark.parametrize("steps", [None, 7, 40, 1000, 12_347])
 @pytest.mark.parametrize("samples", [2, 9, 33, 41, 50, 101])
 def test_a_schedule_has_the_rows_of_sample_times(steps, samples):
@@ -233,7 +222,12 @@ def test_a_schedule_has_the_rows_of_sample_times(steps, samples):
             np.testing.assert_array_equal(rows.marks[i, : rows.counts[i]], marks)
 
 
-def test_periods_are_those_of_one_top_and_of_the_closed_form():
+def test_periods_are_those_of_one_top_and_one_without_a_nutation_has_no_steps_per_nutation():
+    hanging = {"I1": 1.0, "I3": 0.5, "mgl": -1.0, "theta": 0.0, "theta_dot": ("member", [1.9, 2.0])}
+    with pytest.raises(symtop.SymtopError, match="member 1 is endless"):
+        symtop.ensemble(xr.Dataset(hanging), "strang", per_nutation=20, horizon=8.0)
+    data = symtop.ensemble(xr.Dataset(hanging), "strang", step_size=0.1, horizon=8.0, quiet=True)
+    assert data.outcome.values.tolist() == ["ok", "ok"]
     numbers = numbers_of(symtop.population(300, seed=4))
     numbers[::7, 2] = 0.0  # some are free
     period = nutation_periods(numbers)
@@ -344,14 +338,6 @@ def test_a_member_on_which_a_solver_raises_is_lost_alone_and_told(path, tmp_path
         xr.testing.assert_identical(one.isel(member=rest).drop_attrs(), bare.isel(member=rest).drop_attrs())
 
 
-def test_a_solver_that_raises_on_every_member_is_refused_and_leaves_nothing(tmp_path):
-    every = raising(TypeError, *range(36))
-    for more in ({}, {"path": tmp_path / "runs.nc"}):
-        with pytest.raises(symtop.SymtopError, match=r"on member 0 failed: TypeError: a reason"):
-            symtop.ensemble(SOME, every, step_size=0.1, horizon=2.0, quiet=True, **more)
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize(("name", "meant"), [
     ("thetadot", "theta_dot"), ("dphi_dt", "phi_dot"), ("psi_rate", "psi_dot"), ("Phi", "phi"), ("theta0", "theta"),
     ("phi_dto", "phi_dot"),
@@ -365,15 +351,12 @@ def test_a_misspelled_variable_of_members_is_refused(name, meant):
             symtop.ensemble(members, "strang[axis]", **settings)
 
 
-def test_members_may_have_labels_of_any_other_name():
+def test_members_may_have_labels_of_any_other_name_and_rows_are_taken_by_label():
     settings = {"per_nutation": 20, "nutations": 2, "quiet": True}
     names = ("period", "weight", "phase", "p_phi", "theta_max", "group", "steps")
     members = SOME.assign(dict.fromkeys(names, SOME.I1)).assign(curve=("place", [1.0, 2.0]))
     plain = symtop.ensemble(SOME, "strang[axis]", **settings)
     assert symtop.ensemble(members, "strang[axis]", **settings).identical(plain)
-
-
-def test_rows_are_taken_by_label_and_labels_are_kept():
     counts, settings = np.linspace(10.0, 45.0, 36), {"nutations": 2, "quiet": True}
     plain = symtop.ensemble(SOME, "strang[axis]", per_nutation=counts, **settings)
     for labels in ([f"m{i}" for i in range(36)], list(range(100, 136))):
@@ -407,7 +390,12 @@ def test_rows_of_others_are_refused(name):
             symtop.ensemble(members, "strang[axis]", quiet=True, **rest, **{name: row})
 
 
-def test_an_ensemble_for_a_cluster_is_refused_before_it_is_sent(tmp_path):
+def test_a_solver_that_raises_on_every_member_is_refused_and_an_ensemble_for_a_cluster_before_it_is_sent(tmp_path):
+    every = raising(TypeError, *range(36))
+    for more in ({}, {"path": tmp_path / "runs.nc"}):
+        with pytest.raises(symtop.SymtopError, match=r"on member 0 failed: TypeError: a reason"):
+            symtop.ensemble(SOME, every, step_size=0.1, horizon=2.0, quiet=True, **more)
+    assert list(tmp_path.iterdir()) == []
     settings = {"step_size": 0.1, "horizon": 2.0, "quiet": True, "path": tmp_path / "runs.nc"}
     with pytest.raises(symtop.SymtopError, match=r"scheduler must be the address of a dask scheduler.* not 5"):
         symtop.ensemble(SOME, "strang", scheduler=5, **settings)

@@ -115,17 +115,6 @@ def test_the_limits_of_verlet_and_rk4_are_found():
             assert "grow" not in caution(scene, name, step_size=phase / frequency, observe="nutation")
 
 
-def test_landmarks_are_those_of_the_closed_form():
-    marks = landmarks(grazing(1e-4))
-    assert marks.pole == "upper"
-    assert marks.gap == pytest.approx(1.105e-4, rel=1e-2)
-    motion = closed_form(grazing(1e-4))(np.linspace(0.0, 4.23, 2_000_001))
-    assert marks.rate == pytest.approx(np.abs(motion.phi_dot).max(), rel=1e-3)
-    lower = landmarks(symtop.scene("bruls-cardona-arnold"))
-    assert lower.pole == "lower"
-    assert math.degrees(lower.gap) == pytest.approx(4.15e-5, rel=1e-2)
-
-
 def test_each_cause_is_named():
     fast = steady(20.0)
     frequency = landmarks(fast).frequency
@@ -190,8 +179,16 @@ def test_the_step_that_is_advised_works_whatever_the_cause():
     assert np.mean(before > EXPECTED) > 0.9  # the warnings were right, too
 
 
-def test_no_step_is_advised_that_a_run_may_not_have():
-    """Past a pole at 1e-12 rad a step that follows the axis is 1e-13: more steps than `simulate` takes."""
+def test_landmarks_are_those_of_the_closed_form_and_no_step_is_advised_that_a_run_may_not_have():
+    marks = landmarks(grazing(1e-4))
+    assert marks.pole == "upper"
+    assert marks.gap == pytest.approx(1.105e-4, rel=1e-2)
+    motion = closed_form(grazing(1e-4))(np.linspace(0.0, 4.23, 2_000_001))
+    assert marks.rate == pytest.approx(np.abs(motion.phi_dot).max(), rel=1e-3)
+    lower = landmarks(symtop.scene("bruls-cardona-arnold"))
+    assert lower.pole == "lower"
+    assert math.degrees(lower.gap) == pytest.approx(4.15e-5, rel=1e-2)
+    # Past a pole at 1e-12 rad a step that follows the axis is 1e-13: more steps than `simulate` takes.
     for gap, steps in ((1e-4, True), (1e-12, False)):
         sentence = caution(grazing(gap), "stormer-verlet", step_size=0.02)
         assert ("take a step of about" in sentence) is steps
@@ -315,29 +312,23 @@ def test_the_guard_without_the_truth_is_asked_for_by_its_name():
         symtop.simulate("heavy-brick", "rk4", **controls | {"guard": "exact"})
 
 
-def test_a_free_top_without_spin_which_has_no_small_nutations_is_judged_like_any():
+def test_a_run_far_longer_than_is_watched_is_warned_of_and_a_free_top_judged_like_any():
     for spin in (0.0, 0.5):
         free = symtop.Scene(
             "free", symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(1.0, 0.0, 0.0, 1.0, 0.0, spin), 20.0
         )
         assert "expect an axis error" in caution(free, "rk4[axis]", step_size=1.5)
         assert caution(free, "rk4[axis]", step_size=1e-3) == ""
-
-
-def test_a_run_that_is_far_longer_than_is_watched_is_warned_of():
     body = symtop.Scene("far", symtop.RigidBody(1.0, 2.0, 3.0), symtop.Attitude(omega_body=(1e-6, 1.0, 1e-6)), 1e22)
     assert "rounding alone decides" in caution(body, "rk4", step_size=1e15)
 
 
-def test_an_unstable_motion_is_warned_of_beyond_the_errors_of_its_piece():
+def test_changes_tell_chaos_from_order_and_unstable_motions_are_warned_of_beyond_their_piece():
     """What a method commits later than its piece may exceed it; a stable motion has no such margin."""
     for name, margin in (("heavy-chaotic", 30.0), ("heavy-brick", 1.0)):
         motion = Integrated(symtop.model.scenes.scene(name, bodies=True))
         grown = motion.amplification(50.0, 50.0) / motion.amplification(5.0, 50.0)
         assert motion.amplified(1e-12, 5.0, 50.0) == pytest.approx(1e-12 * grown * margin)
-
-
-def test_what_a_motion_makes_of_a_change_tells_chaos_from_order():
     scenes = (symtop.model.scenes.scene(name, bodies=True) for name in ("heavy-chaotic", "heavy-brick"))
     grown = [Integrated(one).amplification(50.0, 50.0) for one in scenes]
     assert grown[0] > 1e4

@@ -212,16 +212,13 @@ def test_a_result_that_cannot_be_written_leaves_the_checkpoint(tmp_path, monkeyp
     assert data.identical(long_run(SCENE, "rk4", steps=50_000, step_size=H, quiet=True))
 
 
-def test_a_checkpoint_of_another_run_is_refused(tmp_path):
+def test_checkpoints_of_other_runs_are_refused_and_a_failed_run_shows_the_windows_it_had(tmp_path):
     file = tmp_path / "run.nc"
     book = longrun._Checkpoint(file, "another")
     book.note(drive.Position((1.0,), (0.0,), (), 7), [[0.0]])
     book.save()
     with pytest.raises(SymtopError, match="belongs to another run"):
         long_run(SCENE, "cayley", steps=1000, step_size=H, checkpoint=file, quiet=True)
-
-
-def test_a_failed_run_shows_the_windows_it_had():
     scene = symtop.scene("bruls-cardona-arnold")
     data = long_run(scene, "stormer-verlet", steps=10**6, step_size=2e-3, quiet=True)
     assert data.attrs["outcome"] == "left_chart"

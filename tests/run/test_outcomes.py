@@ -123,7 +123,12 @@ def test_a_quaternion_that_leaves_length_one_has_failed_alone_and_in_an_ensemble
     np.testing.assert_array_equal(many["quaternion"].values[: shown.size], run["quaternion"].values)
 
 
-def test_a_quaternion_that_keeps_its_length_has_not_failed():
+DOUBTFUL = symtop.Scene(
+    "doubtful", symtop.SymmetricTop(0.1862, 0.2285, 0.1828), symtop.Angles(0.00337, psi_dot=-1.61), 87.0
+)
+
+
+def test_a_quaternion_that_keeps_its_length_has_not_failed_and_a_state_whose_squares_overflow_is_not_finite():
     run = symtop.simulate("spheroid", "strang[attitude]", step_size=0.5, guard=False)
     assert run.attrs["outcome"] == "ok"
     near = symtop.simulate("spheroid", "rk4[attitude]", step_size=0.05, guard=False)
@@ -131,15 +136,7 @@ def test_a_quaternion_that_keeps_its_length_has_not_failed():
     assert np.abs(np.linalg.norm(near["quaternion"].values, axis=1) - 1.0).max() > 5e-4
     far = charts.attitude_distance(np.array([3e116, 0.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 0.0]))
     assert far == np.pi
-
-
-DOUBTFUL = symtop.Scene(
-    "doubtful", symtop.SymmetricTop(0.1862, 0.2285, 0.1828), symtop.Angles(0.00337, psi_dot=-1.61), 87.0
-)
-
-
-def test_a_state_whose_squares_overflow_is_not_finite():
-    """L is finite, about 1e160; the energy is the square of it."""
+    # L is finite, about 1e160; the energy is the square of it.
     run = symtop.simulate(DOUBTFUL, "rk4[axis]", step_size=43.5, horizon=130.5, guard=False)
     assert np.isfinite(run["axis"].values).all()
     assert not np.isfinite(run["energy"].values).all()

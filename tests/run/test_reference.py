@@ -273,16 +273,13 @@ def test_without_heyoka_the_closed_form_stands_in_and_says_so(monkeypatch, cache
     assert "integration" not in data.attrs["certificate"]
 
 
-def test_checks_reach_the_horizon_and_the_fastest_moments():
+def test_checks_reach_the_horizon_and_a_certificate_is_of_a_known_kind_and_of_the_closed_form():
     scene = symtop.scene("spheroid")
     checks, form = check_times(scene, 17.0), scenes.closed_form(scene)
     assert checks[-1] == 17.0
     assert np.all(np.diff(checks) > 0.0)
     speed = np.abs(form(np.linspace(0.0, 1.2, 500)).theta_dot).max()
     assert np.abs(form(checks).theta_dot).max() > 0.98 * speed
-
-
-def test_a_certificate_is_of_a_kind_that_is_known_and_of_the_closed_form():
     with pytest.raises(symtop.SymtopError, match="certify 'twice' is unknown"):
         symtop.reference("spheroid", [1.0], certify="twice")
     with pytest.raises(symtop.SymtopError, match="certify is for the closed form"):

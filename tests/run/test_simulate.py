@@ -16,7 +16,7 @@ from symtop.run.simulation import WIDEST_GAP, integrate, sample_times
 from symtop.run.trajectory import Trajectory, dataset
 
 
-def test_the_dataset_is_the_one_that_is_promised():
+def test_the_dataset_is_the_one_that_is_promised_and_begins_with_exact_values():
     run = symtop.simulate("spheroid", "midpoint", step_size=0.013, samples=51, guard=False)
     assert list(run["component"].values) == ["x", "y", "z"]
     for name in ("theta", "phi", "psi", "energy", "p_phi", "p_psi", "p_theta"):
@@ -28,9 +28,6 @@ def test_the_dataset_is_the_one_that_is_promised():
     assert {"integrator", "scene", "force_evaluations", "newton_iterations", "symtop_version"} <= attrs.keys()
     steps = run["time"].values / attrs["step_size"]
     assert steps == pytest.approx(np.rint(steps), abs=1e-9)
-
-
-def test_energy_and_momenta_start_at_their_exact_values():
     scene = symtop.scene("goldstein-rising")
     for name, control in (("midpoint", {"step_size": 0.1}), ("rk45", {"tolerance": 1e-6}), ("taylor", {})):
         run = symtop.simulate(scene, name, horizon=1.0, **control)
@@ -106,7 +103,7 @@ def test_the_dataset_is_the_one_of_xarray_itself(scene, row, monkeypatch, tmp_pa
         assert quick.attrs[record] == json.dumps(numbers, sort_keys=True)
 
 
-def test_two_datasets_share_nothing_that_can_be_written_to():
+def test_two_datasets_share_nothing_and_a_trajectory_has_the_numbers_of_its_dataset():
     trajectory = integrate("spheroid", "strang[attitude]", step_size=0.1)
     first, second = (dataset(trajectory.time, trajectory.columns) for _ in range(2))
     for name in ("time", "component", "part", "theta"):
@@ -115,9 +112,6 @@ def test_two_datasets_share_nothing_that_can_be_written_to():
         assert "mark" not in second[name].attrs
         assert "mark" not in second[name].encoding
     assert not np.shares_memory(first["time"].values, trajectory.time)
-
-
-def test_a_trajectory_has_the_numbers_of_the_dataset():
     settings = {"step_size": 0.01, "observe": "attitude", "horizon": 1.0}
     data = symtop.simulate("spheroid", "midpoint", guard=False, **settings)
     trajectory = integrate("spheroid", "midpoint", **settings)
@@ -127,28 +121,20 @@ def test_a_trajectory_has_the_numbers_of_the_dataset():
     }
 
 
-def test_files_are_whole_reproducible_and_readable(tmp_path):
+def test_files_are_whole_and_a_failed_write_leaves_the_old_one(tmp_path, monkeypatch):
     run = symtop.simulate("spheroid", "stormer-verlet", step_size=0.01)
     first = netcdf.write(run, tmp_path / "a" / "run.nc")
     second = netcdf.write(symtop.simulate("spheroid", "stormer-verlet", step_size=0.01), tmp_path / "b.nc")
     assert first.read_bytes() == second.read_bytes()
-    back = netcdf.read(first)
-    assert back.identical(run)
-    assert sorted(path.name for path in tmp_path.rglob("*") if path.is_file()) == ["b.nc", "run.nc"]
-
-
-def test_a_failed_write_leaves_the_old_file_and_no_scraps(tmp_path, monkeypatch):
-    run = symtop.simulate("spheroid", "stormer-verlet", step_size=0.01)
-    path = netcdf.write(run, tmp_path / "run.nc")
-    before = path.read_bytes()
+    assert netcdf.read(first).identical(run)
+    before = second.read_bytes()
     with pytest.raises(symtop.SymtopError, match="it is a folder"):
         netcdf.write(run, tmp_path)
-
     monkeypatch.setattr(type(run), "to_netcdf", Mock(side_effect=OSError(28, "No space left on device")))
     with pytest.raises(symtop.SymtopError, match="No space left"):
-        netcdf.write(run, path)
-    assert path.read_bytes() == before
-    assert [item.name for item in tmp_path.iterdir()] == ["run.nc"]
+        netcdf.write(run, second)
+    assert second.read_bytes() == before
+    assert sorted(path.name for path in tmp_path.rglob("*") if path.is_file()) == ["b.nc", "run.nc"]
 
 
 @pytest.mark.parametrize("theta", [0.0, math.pi])

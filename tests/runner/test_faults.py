@@ -103,15 +103,12 @@ def test_a_file_where_a_folder_should_be(tmp_path, place):
     assert (tmp_path / place).read_text() == "I was here first"
 
 
-def test_results_that_are_a_file_or_cannot_be_made(tmp_path):
+def test_files_where_folders_should_be_and_folders_where_files(tmp_path):
     (tmp_path / "file").touch()
     code, output = probe(tmp_path / "file")
     assert code == 2
     assert "is a file" in output
     refused("/proc/nowhere", "/proc/nowhere")
-
-
-def test_a_folder_where_a_file_should_be(tmp_path):
     assert probe(tmp_path)[0] == 0
     for name in ("probe.nc", "probe.json", "figures/probe-energy.png"):
         target = tmp_path / "quick" / name
@@ -144,18 +141,6 @@ def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
     about = str(arrays["about"]).replace('"made_of": {', '"made_of": {"code nothing.py": "0", ')
     np.savez(cases[1], **arrays | {"about": about})  # the numbers are right, and what is said of them is not
     assert "1 of 4 cases computed" in probe(tmp_path)[1]
-
-
-def test_damaged_findings_are_made_again(tmp_path):
-    assert probe(tmp_path)[0] == 0
-    path = tmp_path / "quick" / "probe.json"
-    good = json.loads(path.read_text())
-    for damage in ("", "{", "[1, 2]", '{"stamp": 3}', "\0\0\0"):
-        path.write_text(damage)
-        code, output = probe(tmp_path)
-        assert code == 0, damage
-        assert "0 of 4 cases computed" in output
-        assert json.loads(path.read_text()) == good
 
 
 def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
@@ -199,7 +184,16 @@ def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
     assert not leftovers(tmp_path / "shared")
 
 
-def test_what_a_killed_worker_left_beside_a_case_goes_when_it_is_computed_here(tmp_path):
+def test_damaged_findings_and_what_a_killed_worker_left_are_made_again(tmp_path):
+    assert probe(tmp_path)[0] == 0
+    path = tmp_path / "quick" / "probe.json"
+    good = json.loads(path.read_text())
+    for damage in ("", "{", "[1, 2]", '{"stamp": 3}', "\0\0\0"):
+        path.write_text(damage)
+        code, output = probe(tmp_path)
+        assert code == 0, damage
+        assert "0 of 4 cases computed" in output
+        assert json.loads(path.read_text()) == good
     code, output = probe(tmp_path)
     assert code == 0, output
     (case,) = tmp_path.rglob("cases/probe/goldstein--midpoint--*.npz")
@@ -347,21 +341,26 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
     assert states.count("done") == 14
 
 
-def test_a_case_has_its_time_and_a_call_that_ends_in_time_is_left_alone():
+def test_a_case_has_its_time_and_the_limit_is_heard_by_the_runner(tmp_path, monkeypatch):
     with pytest.raises(TimeoutError, match="not done after"), at_most(0.05, processor=False):
         time.sleep(60.0)
     with at_most(0.2, processor=False):
         pass
     time.sleep(0.3)  # nothing comes later
     assert signal.getitimer(signal.ITIMER_REAL)[0] == 0.0
-
-
-def test_the_limit_is_heard_by_the_runner(tmp_path, monkeypatch):
     monkeypatch.setenv("PROBE_PAUSE", "1.0")
     code, output = probe(tmp_path, "--limit", 0.05)
     assert code == 2  # not one case could be measured
     assert "TimeoutError: it was not done after 0.05 s" in output
     assert probe(tmp_path, "--limit", -1)[0] == 2
+
+
+def test_paths_that_are_not_ascii(tmp_path):
+    place = tmp_path / "Ergebnisse für θ – 結果"
+    plugin = tmp_path / "méthode_à_moi.py"
+    plugin.write_text("import symtop\n")
+    assert probe(place, "--plugin", plugin)[0] == 0
+    assert len(contents(place)) == 5
 
 
 def test_a_clock_that_jumps(tmp_path, monkeypatch):
@@ -371,14 +370,6 @@ def test_a_clock_that_jumps(tmp_path, monkeypatch):
     assert probe(tmp_path / "r")[0] == 0
     monkeypatch.undo()
     same(tmp_path / "calm", tmp_path / "r")
-
-
-def test_paths_that_are_not_ascii(tmp_path):
-    place = tmp_path / "Ergebnisse für θ – 結果"
-    plugin = tmp_path / "méthode_à_moi.py"
-    plugin.write_text("import symtop\n")
-    assert probe(place, "--plugin", plugin)[0] == 0
-    assert len(contents(place)) == 5
 
 
 @pytest.mark.slow

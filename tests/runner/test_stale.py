@@ -152,7 +152,7 @@ def test_a_case_depends_on_the_integrators_that_its_study_says_it_runs():
     assert fingerprint.uses(of_everyone(), starred) == sorted(symtop.integrators())
 
 
-def test_all_digests_of_all_studies_are_the_same_whatever_the_process_has_run():
+def test_digests_are_the_same_whatever_the_process_has_run_or_registered():
     """Values that calls have left in modules are state and count for nothing."""
     studies = [runner.load(name) for name in ("convergence", "cost", "notebook")]
     cases = [(study, case) for study in studies for case in study.cases(True)[:20]]
@@ -164,8 +164,6 @@ def test_all_digests_of_all_studies_are_the_same_whatever_the_process_has_run():
     forget()
     assert [fingerprint.digest(*one) for one in cases] == before
 
-
-def test_a_function_counts_alike_before_and_after_a_kernel_registers_it():
     def part(x):
         return 2.0 * x
 

@@ -98,18 +98,6 @@ def test_lobatto_on_the_whole_top_is_galerkin_on_the_routhian_and_not_on_the_top
     assert np.max(np.abs(last - lobatto)) < 1e-3 * np.max(np.abs(np.array(lobatto) - start))
 
 
-def test_an_unreduced_form_steps_the_same_rule_whatever_it_is_called(monkeypatch):
-    known = dict(registry.integrators())
-    known["whole"] = dataclasses.replace(known.pop("midpoint-unreduced"), name="whole")
-    monkeypatch.setattr(registry, "_registry", known)
-    assert unreduced_forms() == {"midpoint": "whole", "trapezoidal": "trapezoidal-unreduced"}
-
-
-def test_a_method_that_has_no_reduced_twin_is_refused_in_one_sentence():
-    with pytest.raises(symtop.SymtopError, match="must be a reduced discrete Lagrangian, not 'rk45'"):
-        commutation_table(symtop.scene("spheroid"), symtop.integrator("rk45"), 1.0, (10,))
-
-
 def test_what_a_reduced_kernel_saves_is_split_into_iterations_and_the_time_of_one():
     dims = ("scene", "variant", "kernel", "twin_step")
     data = xr.Dataset(
@@ -138,7 +126,7 @@ def measured():
     return datasets.combine(parts)
 
 
-def test_facts_are_those_of_the_rules_and_charts(measured):
+def test_facts_and_page_are_those_of_the_rules_and_charts(measured, tmp_path):
     answers = facts.facts(measured)
     assert answers["commuting"] == "midpoint"
     assert answers["commuting_gap"] < 1e-13
@@ -151,9 +139,6 @@ def test_facts_are_those_of_the_rules_and_charts(measured):
     assert facts.facts(two)["others"] == answers["others"]
     assert np.isnan(facts.facts(two)["power_least"])
     assert len(figures.pictures(two)) == 1
-
-
-def test_the_page_says_what_was_measured(measured, tmp_path):
     text = checked("reduction", measured, tmp_path)
     assert "With midpoint it makes no difference" in text
     assert "With trapezoidal, simpson-linear, galerkin-simpson it does." in text
@@ -170,6 +155,12 @@ def test_a_run_that_failed_has_no_part_in_the_time_of_a_chart(failed, ratio):
     assert (one.chart, one.base, one.time) == ("attitude", "axis", ratio)
 
 
-def test_a_kernel_is_known_under_any_name():
+def test_a_kernel_is_known_under_any_name_and_a_method_without_a_twin_refused(monkeypatch):
+    with pytest.raises(symtop.SymtopError, match="must be a reduced discrete Lagrangian, not 'rk45'"):
+        commutation_table(symtop.scene("spheroid"), symtop.integrator("rk45"), 1.0, (10,))
+    known = dict(registry.integrators())
+    known["whole"] = dataclasses.replace(known.pop("midpoint-unreduced"), name="whole")
+    monkeypatch.setattr(registry, "_registry", known)
+    assert unreduced_forms() == {"midpoint": "whole", "trapezoidal": "trapezoidal-unreduced"}
     assert commutation.is_galerkin(dataclasses.replace(symtop.integrator("galerkin-simpson"), name="mine"))
     assert not commutation.is_galerkin(symtop.integrator("midpoint"))

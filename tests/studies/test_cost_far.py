@@ -45,23 +45,17 @@ def test_a_power_is_found_and_continued_over_six_decades(power):
     np.testing.assert_allclose(found.at(FAR)[0], 1e-9 * FAR**power, rtol=1e-9)
 
 
-def test_a_drift_below_an_oscillation_is_found_and_noise_is_no_second_power():
+def test_a_drift_below_an_oscillation_is_found_and_too_few_points_have_no_law():
     drift = 1e-6 + 4e-9 * FAR
     rough = 1e-6 * (1.0 + 0.05 * np.sin(40.0 * np.arange(FAR.size)))
     found = laws.fit(FAR, np.where(SHORT, np.stack([drift, rough]), np.nan))
     np.testing.assert_allclose(found.at(FAR)[0], drift, rtol=1e-6)
     assert found.leading.tolist() == [1.0, 0.0]
     assert np.isnan(found.powers[1, 1])
-
-
-def test_too_few_points_and_saturated_ones_have_no_law():
     errors = np.full((2, FAR.size), np.nan)
     errors[0, :3] = 1e-5
     errors[1, :8] = 2.0
     assert np.isnan(laws.fit(FAR, errors).at(FAR)).all()
-
-
-def test_rounding_adds_a_walk_and_its_phase():
     walked = laws.rounding("energy", 1e-16, FAR, 100.0 * FAR)
     np.testing.assert_allclose(walked, 1e-15 * np.sqrt(FAR))
     np.testing.assert_allclose(laws.rounding("axis", 1e-16, FAR, 100.0 * FAR) / walked, 2 * np.pi * FAR / np.sqrt(3))
@@ -143,17 +137,7 @@ def test_step_times_number_is_exact():
     np.testing.assert_allclose(h * 17.48, tops.period, rtol=1e-7)
 
 
-def test_costs_rise_with_the_horizon_and_with_the_accuracy(data):
-    for quantity in runs.QUANTITIES:
-        panel = diagram(data, quantity)
-        cheapest = panel.costs.min(axis=0)
-        finite = np.isfinite(cheapest)
-        assert finite.any()
-        assert (finite[:, 1:] <= finite[:, :-1]).all()
-        assert ((panel.winner >= 0) == finite).all()
-
-
-def test_a_variant_whose_energy_drifts_loses_the_energy_at_long_horizons(data):
+def test_a_variant_whose_energy_drifts_loses_it_late_and_one_that_keeps_it_takes_no_part(data):
     panel = diagram(data, "energy")
     late = panel.horizons > 1e7
     assert not DRIFTING & {panel.names[k] for k in panel.winner[:, late].ravel() if k >= 0}
@@ -161,14 +145,18 @@ def test_a_variant_whose_energy_drifts_loses_the_energy_at_long_horizons(data):
     row = panel.names.index("rk4[axis]")
     behind = panel.costs[row, t] / panel.costs[:, t].min(axis=0)
     assert behind[h] > 5.0 * behind[0]  # by much more than at ten nutations
-
-
-def test_variants_that_conserve_the_energy_take_no_part_in_energy_and_shape(data):
     assert "gauss-8[axis]" in runs.variants_of(data, "axis")
     assert not any("gauss" in name for name in runs.variants_of(data, "shape"))
 
 
-def test_what_is_within_reach_is_measured_and_the_rest_predicted(data):
+def test_costs_rise_with_horizon_and_accuracy_and_what_is_within_reach_is_measured(data):
+    for quantity in runs.QUANTITIES:
+        panel = diagram(data, quantity)
+        cheapest = panel.costs.min(axis=0)
+        finite = np.isfinite(cheapest)
+        assert finite.any()
+        assert (finite[:, 1:] <= finite[:, :-1]).all()
+        assert ((panel.winner >= 0) == finite).all()
     reach = float(data["far"]["reach"].max())
     for quantity in runs.QUANTITIES:
         panel = diagram(data, quantity)

@@ -120,14 +120,11 @@ def test_every_timed_run_meets_its_target_when_it_is_run_again(rows):
             assert (met.error, met.evaluations) == row
 
 
-def test_the_search_ends_closer_to_the_target_if_asked():
+def test_the_search_ends_closer_if_asked_and_languages_of_one_method_have_the_same_setting_and_work(measured):
     horizon = 10.0 * SCENE.nutation_period
     for name in ("rk4[axis]", "rk4[attitude]", "strang[axis]"):
         answers = settings.search(SCENE, symtop.integrator(name), 1e-5, "axis", horizon, least=LEAST)
         assert LEAST * 1e-5 <= answers.error <= 1e-5
-
-
-def test_languages_of_one_method_have_the_same_setting_and_the_same_work(measured):
     part = measured.isel(scene=0, horizon=0, target=0)
     for chart in ("angles", "axis", "attitude"):
         trio = [part.sel(variant=f"{name}[{chart}]") for name in ("rk45-compiled", "rk45", "rk45-numba")]
@@ -192,16 +189,13 @@ def test_times_of_a_busy_machine_are_not_compared(quiet, share, busy):
     assert {one.name for one in figures.pictures(data)} == (set() if busy else {"waterfall"})
 
 
-def test_where_nothing_was_timed_nothing_is_said(quiet):
+def test_where_nothing_was_timed_nothing_is_said_and_the_page_has_numbers_and_none(quiet, tmp_path):
     nothing = quiet.assign({name: quiet[name] * np.nan for name in ("seconds", "spread")})
     answers = facts.facts(nothing)
     assert answers["whole"] is answers["busy"] is None
     assert answers["times"] == 0
     assert np.isnan(answers["near_share"])
     assert list(figures.pictures(nothing)) == []
-
-
-def test_the_page_is_rendered_with_numbers_and_without(quiet, tmp_path):
     text = checked("factors", quiet, tmp_path)
     assert f"becomes {number(facts.facts(quiet)['whole'], 3)} times faster" in text
     assert "busy" not in text
@@ -222,16 +216,13 @@ def test_neighbours_in_the_waterfall_differ_in_exactly_the_factor_they_name(rows
         assert bar["time (s)"] == seconds
 
 
-def test_the_product_of_the_ratios_is_the_total(quiet, rows):
+def test_the_product_of_the_ratios_is_the_total_and_a_waterfall_with_a_missing_step_is_not_drawn(quiet, rows):
     part = first_goal(rows)
     total = facts.facts(quiet)["whole"]
     for order in (waterfall(part), waterfall(part, call_first=True)):
         seconds = order["time (s)"].to_numpy()
         assert total == pytest.approx(seconds[0] / seconds[-1], rel=1e-12)
         assert math.prod(order["times faster"].iloc[1:]) == pytest.approx(total, rel=1e-12)
-
-
-def test_a_waterfall_with_a_missing_step_is_not_drawn(rows):
     bars = waterfall(rows)
     assert len(bars)
     for bar in bars.iloc[:-1].to_dict("records"):
@@ -265,16 +256,13 @@ def test_the_effect_of_a_factor_is_found_where_effects_multiply_and_spread_where
     assert answers["count"] == 3 * len(LANGUAGES) * len(CALLS)
 
 
-def test_scipy_is_compared_in_its_fastest_chart_with_the_fastest_compiled_variant():
+def test_scipy_and_charts_are_compared_by_the_fastest():
     """As called: 8 x 100 x 2.5 over 2; kernels: 8 x 100 over 1."""
     (row,) = facts.against_scipy(synthetic()).to_dict("records")
     assert (row["times, as called"], row["times, kernels"]) == (pytest.approx(1000.0), pytest.approx(800.0))
     assert (row["SciPy's"], row["fastest compiled"]) == (
         f"{DORMAND_PRINCE}-axis-{SCIPY_PYTHON}-{SOLVE_IVP}", f"Takahashi-Imada-axis-{COMPILED}-{SIMULATE}",
     )  # fmt: skip
-
-
-def test_charts_are_compared_by_compiled_kernels():
     table = charts(synthetic(interaction=4.0))
     assert list(table["family"]) == ["Dormand-Prince", "rk4", "splitting"]
     np.testing.assert_allclose(table["angles / axis"], 12.0)

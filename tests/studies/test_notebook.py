@@ -71,7 +71,7 @@ def test_the_lagrangian_is_the_same_in_three_forms(symbols, points):
             assert np.abs(symbols.values([symbols.hy.diff(way, coordinate)], points)).max() < 1e-13
 
 
-def test_the_kernels_accelerations_solve_the_symbolic_euler_lagrange_equations(symbols, points):
+def test_accelerations_and_momenta_of_the_kernels_are_those_of_the_symbolic_lagrangian(symbols, points):
     """d/dt dL/dv - dL/dq = 0 by differentiation, solved for the accelerations, against the kernels' formula."""
     hy, L = symbols.hy, symbols.ways[1]
     mass = [[hy.diff(hy.diff(L, a), b) for b in symbols.v] for a in symbols.v]
@@ -84,9 +84,6 @@ def test_the_kernels_accelerations_solve_the_symbolic_euler_lagrange_equations(s
     true = np.linalg.solve(M, F[..., None])[..., 0]
     for point, expected in zip(points, true, strict=True):
         assert accelerations(*NUMBERS, point[0], *point[3:]) == pytest.approx(expected, rel=1e-11, abs=1e-11)
-
-
-def test_the_kernels_momenta_are_the_derivatives_of_the_symbolic_lagrangian(symbols, points):
     top = symtop.SymmetricTop(*NUMBERS)
     slopes = symbols.values([symbols.hy.diff(symbols.ways[0], v) for v in symbols.v[1:]], points)
     for k, point in enumerate(points):

@@ -14,21 +14,15 @@ def data():
     return datasets.combine([(case, study.measure(case)) for case in study.cases(True)])
 
 
-def test_no_step_is_short_enough_without_the_gyroscopic_term_and_with_it_one_is(data):
+def test_no_step_is_short_enough_without_the_term_energy_is_kept_where_the_axis_is_wrong_and_angles_end(data):
     largest = {name: study.run_of(data, study.TERM, name)["axis"].max("sample").values
                for name in (study.WITHOUT, study.WITH, study.RIGHT)}  # fmt: skip
     assert np.ptp(largest[study.WITHOUT]) < 0.01 * largest[study.WITHOUT].mean()
     assert largest[study.WITH][-1] < 0.2 * largest[study.WITH][0]
     assert largest[study.RIGHT][-1] < 1e-4
-
-
-def test_the_energy_is_kept_where_the_axis_is_wrong(data):
     answers = study.facts(data)
     assert answers["falling_energy"] < 0.01
     assert answers["falling"] > 0.5
-
-
-def test_the_run_in_angles_ends_and_that_on_the_axis_does_not(data):
     answers = study.facts(data)
     assert answers["ended"] < 1.0
     through = study.run_of(data, study.POLE, study.AXIS).isel(setting=0)

@@ -110,7 +110,7 @@ def test_at_half_a_period_a_is_zero_and_any_planar_oscillator_has_its_own_functi
     assert here == pytest.approx(later, abs=1e-14)
 
 
-def test_mcmillans_map_keeps_a_biquadratic_and_stormer_verlet_does_not():
+def test_mcmillans_map_keeps_a_biquadratic_and_a_map_that_leaves_ends():
     """x0^2 + x1^2 - 2 A x0.x1 + B |x0|^2 |x1|^2 of the radial map, at a step that is not small."""
     oscillator = oscillator_of("planar-hardening")
     h = oscillator.period / 6.0
@@ -121,9 +121,6 @@ def test_mcmillans_map_keeps_a_biquadratic_and_stormer_verlet_does_not():
         s0, s1 = np.abs(first) ** 2, np.abs(second) ** 2
         invariant = s0 + s1 - 2.0 * (1.0 + rule.lift) * (np.conj(first) * second).real + rule.B * s0 * s1
         assert (np.ptp(invariant) < 1e-12) == kept
-
-
-def test_a_map_that_leaves_the_oscillator_ends():
     oscillator = oscillator_of("planar-hardening")
     path = discrete_path(oscillator, "stormer-verlet", oscillator.period / 2.1, 200)
     assert np.isnan(path[-1])
