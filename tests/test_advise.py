@@ -229,13 +229,6 @@ def test_advice_on_drawn_scenes_costs_little_more_than_the_best_of_all(monkeypat
     assert np.median([row.advice for row in rows]) <= candidates.TIE, rows
 
 
-def test_a_cover_prefers_what_serves_tops_that_nothing_before_it_does():
-    costs = np.array([[1.0, 1.0, 1.0, 9.0], [1.05, 1.05, 1.05, 8.0], [5.0, 5.0, 5.0, 1.0], [np.inf] * 4])
-    assert candidates.cover(costs, 3) == [0, 2, 1]
-    assert candidates.cover(costs, 9) == [0, 2, 1]  # nothing of what gets nowhere
-    assert candidates.cover(np.full((2, 3), np.inf), 2) == []
-
-
 def random_scene(rng, number):
     """A top of any shape and regime: slow and fast spin, hanging and standing, falling and precessing."""
     I3 = math.exp(rng.uniform(math.log(0.1), math.log(1.9)))
@@ -374,7 +367,11 @@ def test_a_quantity_that_the_motion_has_not_is_refused(name, has, monkeypatch):
         symtop.recommend(name, accuracy=1e-2, quantity="nutation_period")
 
 
-def test_the_command_of_a_plug_in_loads_it(tmp_path, monkeypatch):
+def test_the_command_of_a_plug_in_loads_it_and_a_cover_prefers_what_nothing_before_it_serves(tmp_path, monkeypatch):
+    costs = np.array([[1.0, 1.0, 1.0, 9.0], [1.05, 1.05, 1.05, 8.0], [5.0, 5.0, 5.0, 1.0], [np.inf] * 4])
+    assert candidates.cover(costs, 3) == [0, 2, 1]
+    assert candidates.cover(costs, 9) == [0, 2, 1]  # nothing of what gets nowhere
+    assert candidates.cover(np.full((2, 3), np.inf), 2) == []
     file = tmp_path / "my scene.py"
     monkeypatch.setattr(advise, "loaded", lambda: (str(file),))
     assert symtop.recommend("spheroid", accuracy=1e-6, needs="solution").command.endswith(f" --plugin '{file}'")
@@ -418,13 +415,6 @@ def test_a_body_is_answered_with_a_method_of_its_chart():
             symtop.recommend("heavy-chaotic", **{"accuracy": 1e-6} | wrong)
 
 
-def test_every_setting_has_a_map_and_every_map_of_the_engines_a_setting():
-    maps = {method for settings in SETTINGS.values() for method in settings.values()}
-    assert maps <= set(engines())
-    rest = {name.removesuffix("-float32") for name in set(engines()) - maps}
-    assert rest <= {name.removesuffix("-float32") for name in maps} | {"fincham"}  # as published, in no engine
-
-
 @pytest.mark.slow
 def test_mujoco_is_told_its_best_setting_and_the_gain_of_another_method():
     advice = i_use("mujoco", "goldstein", step_size=0.025, horizon=10.0)
@@ -445,7 +435,11 @@ def test_an_engine_is_told_of_by_its_settings_and_a_map_by_itself(engine):
     assert all(f"{name} (" in str(advice) for name in advice.errors)
 
 
-def test_an_engine_without_a_gyroscopic_term_or_an_error_has_nothing_to_match():
+def test_engines_have_maps_and_one_without_a_gyroscopic_term_nothing_to_match():
+    maps = {method for settings in SETTINGS.values() for method in settings.values()}
+    assert maps <= set(engines())
+    rest = {name.removesuffix("-float32") for name in set(engines()) - maps}
+    assert rest <= {name.removesuffix("-float32") for name in maps} | {"fincham"}  # as published, in no engine
     advice = i_use("havok", "goldstein", horizon=10.0)
     assert advice.advice is None
     assert "nothing to match" in str(advice)

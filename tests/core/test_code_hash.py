@@ -98,7 +98,7 @@ def measure():
 """
 
 
-def test_a_script_counts_by_code_with_its_classes_and_their_bases_and_without_comments():
+def test_an_import_inside_a_function_is_followed_and_a_script_counts_by_code_with_its_classes():
     def reasons_of(*numbers):
         text = CLASSES.format(*numbers)
         space = {"__name__": "few", "__package__": "unknown"}
@@ -109,9 +109,6 @@ def test_a_script_counts_by_code_with_its_classes_and_their_bases_and_without_co
     assert reasons_of(2, 1, "other words", "another comment") == plain
     assert changes(plain, reasons_of(2, 3, "words", "comment")) == ["code <string>"]
     assert reasons_of(4, 1, "words", "comment") != plain
-
-
-def test_an_import_inside_a_function_is_followed_at_every_level():
     space = {"__name__": "symtop.measure.made", "__package__": "symtop.measure"}
     exec(
         "def measure():\n    from . import errors\n    from ..methods.runge_kutta.gauss import farthest\n"

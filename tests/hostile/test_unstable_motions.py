@@ -47,14 +47,6 @@ def test_the_guard_warns_where_the_motion_grows_what_a_tolerance_leaves(case):
     assert "try tolerance" in messages[0]
 
 
-def test_it_is_silent_where_the_motion_is_stable():
-    scenes = sleeper(1e-3, 1.2), symtop.scene("spheroid"), symtop.scene("goldstein")
-    for scene, name in itertools.product(scenes, ("dop853", "lsoda", "rk45")):
-        method = symtop.integrator(name)
-        plan, _ = make_plan(scene, method, tolerance=1e-8, horizon=5.0 * scene.nutation_period, samples=101)
-        assert guard.warning(scene, method, method.chart_for("axis"), plan) == ""
-
-
 @pytest.mark.parametrize("tilt", [1e-3, 1e-4, 1e-5, 1e-6])
 @pytest.mark.parametrize("ratio", [0.9, *(pytest.param(share, marks=pytest.mark.slow) for share in (0.3, 0.99))])
 def test_what_two_integrations_differ_by_is_the_start_and_not_the_closed_form(tilt, ratio):
@@ -81,7 +73,12 @@ def test_what_two_integrations_differ_by_is_the_start_and_not_the_closed_form(ti
         assert "rounding the start anew moves the axis by" in truth.attrs["conditioning"]
 
 
-def test_conditioning_is_the_growth_of_the_motion():
+def test_it_is_silent_where_the_motion_is_stable_and_conditioning_is_its_growth():
+    scenes = sleeper(1e-3, 1.2), symtop.scene("spheroid"), symtop.scene("goldstein")
+    for scene, name in itertools.product(scenes, ("dop853", "lsoda", "rk45")):
+        method = symtop.integrator(name)
+        plan, _ = make_plan(scene, method, tolerance=1e-8, horizon=5.0 * scene.nutation_period, samples=101)
+        assert guard.warning(scene, method, method.chart_for("axis"), plan) == ""
     flat, steep = conditioning(symtop.scene("spheroid"), 5.0), conditioning(sleeper(1e-6), 60.0)
     assert 1.0 <= flat < 100.0
     assert steep > 1e5

@@ -59,7 +59,7 @@ def test_a_scipy_class_makes_the_steps_that_it_is_told_to():
     assert misses[0] / misses[1] == pytest.approx(8.0, rel=0.1)
 
 
-def test_a_rotation_is_that_of_the_top():
+def test_separable_steps_are_those_of_the_splitting_and_a_rotation_is_that_of_the_top():
     stepper = RotationStep(lambda q, w, h, inertia, torque: (q, w))
     par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
     shown = stepper.form.present(par, np.zeros(1), np.array([state]))[0]
@@ -67,9 +67,6 @@ def test_a_rotation_is_that_of_the_top():
     np.testing.assert_allclose(np.abs(shown[:4] @ at["quaternion"].values), 1.0, atol=1e-14)
     p_phi, p_psi = stepper.form.momenta(par, np.array([state]))
     np.testing.assert_allclose([p_phi[0], p_psi[0]], SPHEROID.top.momenta(SPHEROID.start)[:2], rtol=1e-14)
-
-
-def test_a_separable_step_makes_the_steps_of_the_splitting_that_it_is():
     ours = symtop.simulate(SPHEROID, "stormer-verlet", step_size=0.004, horizon=0.8, samples=2).isel(time=-1)
     stepper = SeparableStep(verlet)
     par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)

@@ -202,7 +202,7 @@ def test_what_knows_every_state_again_is_caught_by_its_last_bit(only, monkeypatc
     assert symtop.judge(remembers, quick=True, order=2).refuted == ["calls"]
 
 
-def test_without_a_claim_it_says_the_order_that_a_step_has_and_not_the_slope(only):
+def test_a_seed_draws_the_same_and_without_a_claim_the_order_is_said_and_not_the_slope(only):
     only("order")
     ledger = symtop.judge(wrong.rounded_triple, quick=True)
     assert ledger.refuted == []
@@ -210,9 +210,6 @@ def test_without_a_claim_it_says_the_order_that_a_step_has_and_not_the_slope(onl
     assert text == "2: in one step the term in h^3 is the first that is wrong, by 1e-07"
     assert 0.0 < float(doubt.removesuffix(" of it")) < 1e-9
     assert description(ledger.findings) == "order 2"
-
-
-def test_the_same_seed_draws_the_same(only):
     only("order")
     first, again = (symtop.judge(wrong.late_euler, quick=True, order=4, seed=7) for _ in range(2))
     assert first["order"].why == again["order"].why

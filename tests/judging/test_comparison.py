@@ -189,7 +189,7 @@ def test_times_are_those_of_timeit_by_hand():
     pytest.fail(f"off by {statistics.median(gaps):.0%}")
 
 
-def test_a_step_that_is_called_as_a_method_of_ours_is_told_apart(tmp_path, monkeypatch):
+def test_a_step_called_as_a_method_of_ours_is_told_apart_and_a_library_needs_no_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in ("rk4", "mine"):
         (tmp_path / f"{name}.py").write_text("def step(f, t, y, h):\n    return y + h * f(t, y)\n", encoding="utf-8")
@@ -198,9 +198,6 @@ def test_a_step_that_is_called_as_a_method_of_ours_is_told_apart(tmp_path, monke
     assert data["variant"].values.tolist() == ["own-rk4[axis]", "rk4[axis]", "mine[axis]"]
     error = data["error"].isel(setting=-1).values
     assert error[0] == error[2] != error[1]
-
-
-def test_a_library_needs_no_folder_in_its_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for target in ("my.so", "my.so:other", "./my.so"):
         with pytest.raises(symtop.SymtopError, match="a shared object must be a file that is there"):

@@ -64,14 +64,6 @@ def test_false_alarms_of_the_trend_are_as_rare_as_it_says():
     assert drifting.rise == pytest.approx(1.0, rel=0.3)
 
 
-def test_errors_of_momenta_and_energy_are_relative_to_their_documented_scales():
-    scene = symtop.scene("goldstein")
-    run = symtop.simulate(scene, "exact", samples=5)
-    errors = symtop.errors(run.assign(p_phi=run["p_phi"] + 0.5, energy=run["energy"] + 0.16))
-    assert errors["p_phi"].values == pytest.approx(0.5 / 5.0, rel=1e-12)  # the larger momentum is p_psi = 5
-    assert errors["energy"].values == pytest.approx(0.16 / 0.24705927, rel=1e-6)  # E0 - p_psi^2/2 I3 - min V
-
-
 def test_a_table_stops_after_too_much_work_and_ladders_end():
     scene = symtop.scene("spheroid")
     method = symtop.integrator("rk45")
@@ -140,7 +132,12 @@ def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agre
     assert alone == pytest.approx([0.02] * 5 + [0.01] * 5)
 
 
-def test_timings_know_when_they_are_noisy():
+def test_timings_know_when_they_are_noisy_and_errors_are_relative_to_their_scales():
+    scene = symtop.scene("goldstein")
+    run = symtop.simulate(scene, "exact", samples=5)
+    errors = symtop.errors(run.assign(p_phi=run["p_phi"] + 0.5, energy=run["energy"] + 0.16))
+    assert errors["p_phi"].values == pytest.approx(0.5 / 5.0, rel=1e-12)  # the larger momentum is p_psi = 5
+    assert errors["energy"].values == pytest.approx(0.16 / 0.24705927, rel=1e-6)  # E0 - p_psi^2/2 I3 - min V
     assert Timing((1.0, 1.01, 1.02), 1.0).reliable
     assert not Timing((1.0, 1.9, 2.0), 1.0).reliable
     quick, slow = timings([lambda: sum(range(100)), lambda: sum(range(20_000))], batches=3, batch=0.002)

@@ -68,7 +68,7 @@ def assert_keeps_everything(method, scene, observe, nutation_steps, limit=1e-13,
     assert np.max(np.abs(np.linalg.norm(run["axis"], axis=1) - 1.0)) < limit, "length"
 
 
-def test_a_wrong_table_loses_the_order_and_one_that_is_not_antisymmetric_the_constants():
+def test_a_wrong_table_loses_the_order_or_the_constants_and_no_gauss_method_is_poisson():
     with pytest.raises(AssertionError, match="order"):
         assert_order("spheroid", nudged(3, 1e-3, mirrored=True), 6, 0.05, WINDOWS[6])
     # 1e-12 is 4500 rounding units of one coefficient
@@ -76,10 +76,7 @@ def test_a_wrong_table_loses_the_order_and_one_that_is_not_antisymmetric_the_con
         assert_keeps_everything(nudged(3, 1e-12, mirrored=False), "spheroid", "axis", 30.3)
     # the order is lost but not the constants: they need only mu + mu^T = 1
     assert_keeps_everything(nudged(3, 1e-3, mirrored=True), "spheroid", "axis", 30.3)
-
-
-def test_gauss_methods_are_not_poisson():
-    """Why `symplectic` is false: the bracket is missed by the method's own local error, of order 2s + 1."""
+    # Why `symplectic` is false: the bracket is missed by the method's own local error, of order 2s + 1.
     scene = symtop.scene("spheroid")
 
     def defect(order, h):
@@ -251,7 +248,7 @@ def test_a_step_is_what_newton_finds_and_sweeps_do_not(stages, scene):
     assert not sweep_step(par, stages, y, h)[1] < 1e3  # diverges
 
 
-def test_a_sweep_ends_at_its_own_limit_and_the_step_goes_on():
+def test_a_sweep_ends_at_its_own_limit_and_a_step_beyond_newtons_reach_is_grown():
     """In `steady-fast` sweeps of one stage contract up to h omega = 1.9; the step there and beyond is one function."""
     par, state = on_axis(STEADY.top, STEADY.start)
     y = np.array(state) + 1e-3
@@ -260,9 +257,6 @@ def test_a_sweep_ends_at_its_own_limit_and_the_step_goes_on():
     for phase in np.linspace(1.2, 2.4, 49):
         done = march_axis(par, gauss_rule(1), tuple(y), phase / OMEGA, ONE)
         np.testing.assert_allclose(done.states[0], newton_step(par, 1, y, phase / OMEGA)[0], rtol=0, atol=1e-13)
-
-
-def test_a_step_beyond_newtons_reach_is_found_by_growing_it():
     par, y, h = started("spheroid", 10.0)
 
     def constants(z):

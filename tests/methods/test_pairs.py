@@ -63,15 +63,6 @@ def test_the_tables_of_order_five_and_eight_are_scipys():
         np.testing.assert_array_equal(weights(mine, 16), other)
 
 
-def test_the_interpolant_of_tsit5_has_order_four():
-    """b(x) meets sum b_i(x) Phi_i(t) = x^|t| / gamma(t) for the trees of up to four vertices, not for five."""
-    matrix = square(TSIT5, 7)
-    scale = 0.37  # conditions of the table with the nodes divided by x are those of the interpolant at x
-    b = np.array([np.polyval((*reversed(row), 0.0), scale) for row in TSIT5.dense]) / scale
-    assert conditions(matrix / scale, b, 5).order == 4
-    np.testing.assert_allclose(np.sum(TSIT5.dense, axis=1), weights(TSIT5.b, 7), atol=1e-14)
-
-
 @pytest.mark.parametrize("chart", list(FORMULATIONS))
 @pytest.mark.parametrize(("name", "scene", "tolerance", "close"), [
     ("dop853", "spheroid", 1e-6, 2e-8), ("dop853", "spheroid", 1e-10, 2e-8), ("dop853", "goldstein", 1e-4, 2e-8),
@@ -88,7 +79,13 @@ def test_a_pair_accepts_and_rejects_scipys_steps(name, scene, tolerance, close, 
         np.testing.assert_allclose(mine["axis"], theirs["axis"], rtol=0.0, atol=apart)
 
 
-def test_samples_cost_three_evaluations_in_the_steps_that_hold_some():
+def test_the_interpolant_of_tsit5_has_order_four_and_costs_where_it_is_asked():
+    """b(x) meets sum b_i(x) Phi_i(t) = x^|t| / gamma(t) for the trees of up to four vertices, not for five."""
+    matrix = square(TSIT5, 7)
+    scale = 0.37  # conditions of the table with the nodes divided by x are those of the interpolant at x
+    b = np.array([np.polyval((*reversed(row), 0.0), scale) for row in TSIT5.dense]) / scale
+    assert conditions(matrix / scale, b, 5).order == 4
+    np.testing.assert_allclose(np.sum(TSIT5.dense, axis=1), weights(TSIT5.b, 7), atol=1e-14)
     few, many = (
         symtop.simulate("spheroid", "dop853-compiled[axis]", tolerance=1e-6, samples=n, guard=False).attrs
         for n in (2, 2000)

@@ -65,14 +65,6 @@ def test_the_tables_of_a_kernel_are_closed_as_python_closes_them(name):
             assert tuple(made.bend) == tuple(c * bend for c in rule.gradient)
 
 
-def test_a_table_that_is_not_closed_is_another_one():
-    """The negative control: scaled without closing, one table in two is off by a rounding somewhere."""
-    rule = METHODS["srkn-14-6"].table
-    steps = np.random.default_rng(0).uniform(0.01, 0.1, 100)
-    off = sum(exact_sum([a * h for a in rule.drift], h) != tuple(a * h for a in rule.drift) for h in steps)
-    assert off > 20
-
-
 def in_python(solver):
     """The same solver with a preparation that does not compile: a run in stretches."""
     return dataclasses.replace(solver, prepare=solver.prepare.__call__)
@@ -137,8 +129,13 @@ def test_a_rule_may_be_whatever_a_kernel_takes(rule):
     assert (solver._whole is not None) == isinstance(rule, tuple)
 
 
-def test_a_composition_travels_as_an_array_and_arrives_whole():
-    """Numbers of every kind, a rule that hangs on the start included, to the bits of the rule that Python makes."""
+def test_tables_and_compositions_travel_as_arrays_and_arrive_whole():
+    """The negative control: scaled without closing, one table in two is off by a rounding somewhere."""
+    rule = METHODS["srkn-14-6"].table
+    steps = np.random.default_rng(0).uniform(0.01, 0.1, 100)
+    off = sum(exact_sum([a * h for a in rule.drift], h) != tuple(a * h for a in rule.drift) for h in steps)
+    assert off > 20
+    # Numbers of every kind, a rule that hangs on the start included, to the bits of the rule that Python makes.
     scene = symtop.scene("spheroid")
     drift, kick = [0.1, 0.2, 0.4, 0.2, 0.1], [0.05, 0.15, 0.3, 0.3, 0.15, 0.05]
     for more in ({"rotation": "cayley-tuned"}, {"gradient": [0.0, 1e-3, 0.0, 0.0, 1e-3, 0.0], "processor": 0.01}):

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.measure.test_step_series import series
 
 import symtop
 from symtop.methods.framework.angles import field_angles, with_rates
@@ -18,7 +19,6 @@ from symtop.model.scenes import closed_form
 from symtop.run.simulation import make_plan
 from tests.conftest import random_scenes
 from tests.judging.blind.right import CLASSICAL, explicit
-from tests.measure.test_step_series import series
 
 KUTTA_A, KUTTA_B, _ = CLASSICAL
 
@@ -36,14 +36,6 @@ def test_a_step_of_a_users_tableau_is_the_definition_and_has_its_order(a, b, ord
     result = LOOPS["angles"](par, method.solvers["angles"].rule, state, h, np.array([1])).states[0]
     np.testing.assert_allclose(result, expected, rtol=2e-15)
     assert series(method, "axis").order == order
-
-
-def test_a_tableau_may_be_made_of_arrays():
-    heun = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([0.5, 0.5]), np.array([0.0, 1.0])
-    rules = [runge_kutta("heun", *tableau).solvers["axis"].rule for tableau in (heun, [part.tolist() for part in heun])]
-    assert rules[0] == rules[1]
-    rows = [np.array([]), np.array([1.0])]
-    assert runge_kutta("heun", rows, heun[1]).solvers["axis"].rule == rules[0]
 
 
 @pytest.mark.parametrize(("a", "b", "c", "words"), [
@@ -161,17 +153,6 @@ def _walk(scene, tolerance, pair=pairs.RK45, **limits):
     return plan, replace(pairs.solver(FORMULATIONS["angles"], pair, pair.rows), **limits)(scene.top, scene.start, plan)
 
 
-def test_adaptive_outcomes():
-    scene, pair = symtop.scene("spheroid"), pairs.RK45
-    for error in (math.inf, math.nan):
-        hopeless = _walk(scene, 1e-6, pair._replace(table=DORMAND_PRINCE._replace(error=(error,) * 7)))[1]
-        assert (hopeless.outcome, hopeless.steps) == ("step_too_small", 0)
-    plan, run = _walk(scene, 1e-9, block=500, most=1000)
-    assert run.outcome == "out_of_budget"
-    assert 0.0 < run.reached < 8.0
-    assert np.array_equal(np.isfinite(run.states[:, 0]), plan.times <= run.reached)
-
-
 def _error(name, tolerance, quantity="axis", **controls):
     scene = symtop.scene("spheroid")
     run = symtop.simulate(scene, name, tolerance=tolerance, **controls)
@@ -197,7 +178,12 @@ def test_scipys_solvers_are_solve_ivp(name):
         assert rhs.calls == done.nfev
 
 
-def test_taylor_in_three_precisions():
+def test_a_tableau_may_be_made_of_arrays_and_taylor_runs_in_three_precisions():
+    heun = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([0.5, 0.5]), np.array([0.0, 1.0])
+    rules = [runge_kutta("heun", *tableau).solvers["axis"].rule for tableau in (heun, [part.tolist() for part in heun])]
+    assert rules[0] == rules[1]
+    rows = [np.array([]), np.array([1.0])]
+    assert runge_kutta("heun", rows, heun[1]).solvers["axis"].rule == rules[0]
     pytest.importorskip("heyoka")
     result = {}
     for name in ("taylor", "taylor-longdouble", "taylor-quad"):
@@ -225,7 +211,15 @@ def test_extended_precision_is_not_lost_on_the_way():
         assert abs(float(constant[1] - constant[0])) < 1e-30
 
 
-def test_tolerances_stop_at_the_arithmetic():
+def test_adaptive_outcomes_and_tolerances_that_stop_at_the_arithmetic():
+    scene, pair = symtop.scene("spheroid"), pairs.RK45
+    for error in (math.inf, math.nan):
+        hopeless = _walk(scene, 1e-6, pair._replace(table=DORMAND_PRINCE._replace(error=(error,) * 7)))[1]
+        assert (hopeless.outcome, hopeless.steps) == ("step_too_small", 0)
+    plan, run = _walk(scene, 1e-9, block=500, most=1000)
+    assert run.outcome == "out_of_budget"
+    assert 0.0 < run.reached < 8.0
+    assert np.array_equal(np.isfinite(run.states[:, 0]), plan.times <= run.reached)
     pytest.importorskip("heyoka")
     integrator("taylor-quad").check_tolerance(1e-36)
     for name, tolerance in (("taylor", 1e-20), ("taylor-quad", 1e-40), ("rk45-compiled", 1e-15), ("radau", 1e-15)):

@@ -49,20 +49,6 @@ START = symtop.Angles(theta=0.7, phi=0.3, psi=-0.2, theta_dot=0.4, phi_dot=0.9, 
 MAP = symtop.Scene("map", TOP, START, 1.0)
 
 
-def test_the_tuned_step_is_symplectic_but_for_its_number_and_an_unsymmetric_table_does_not_come_back():
-    defect = symplectic_defect(one_step(METHODS["cayley-tuned"], "attitude", MAP, 0.2), START)
-    assert defect.size > 1e-4
-    assert defect.rest < 1e-10
-    other = symplectic_defect(one_step(symtop.integrator("gauss-4"), "attitude", MAP, 0.2), START)
-    assert other.rest > 1e-7  # a number of the start explains nothing here
-    euler = composition("euler", (1.0,), (1.0, 0.0), chart="space", order=1)
-    assert not euler.symmetric
-    assert return_miss(one_step(euler, "attitude", MAP, 0.1), START) > 1e-3
-    assert tables.exact_sum((1.0, 0.0)) == (1.0, 0.0)
-    closed = tables.exact_sum((0.7, 0.2, 0.1 - 1e-10, 0.0))
-    assert closed == pytest.approx((0.7, 0.2 + 5e-11, 0.1 - 5e-11, 0.0), abs=1e-15)
-
-
 @pytest.mark.parametrize("chart", ["space", "angles"])
 def test_a_table_without_a_last_kick_kicks_with_the_newest_axis(chart):
     # the force that the last drift leads to is the next step's first, whether or not the table kicks with it before
@@ -139,7 +125,18 @@ def largest_error(name, scene, h, horizon):
     return float(error_table(scene, METHODS[name], [h], horizon, observe="attitude")["axis"][0])
 
 
-def test_in_the_fast_top_strang_is_far_more_accurate_than_verlet():
+def test_the_tuned_step_is_symplectic_but_for_its_number_and_strang_accurate_in_the_fast_top():
+    defect = symplectic_defect(one_step(METHODS["cayley-tuned"], "attitude", MAP, 0.2), START)
+    assert defect.size > 1e-4
+    assert defect.rest < 1e-10
+    other = symplectic_defect(one_step(symtop.integrator("gauss-4"), "attitude", MAP, 0.2), START)
+    assert other.rest > 1e-7  # a number of the start explains nothing here
+    euler = composition("euler", (1.0,), (1.0, 0.0), chart="space", order=1)
+    assert not euler.symmetric
+    assert return_miss(one_step(euler, "attitude", MAP, 0.1), START) > 1e-3
+    assert tables.exact_sum((1.0, 0.0)) == (1.0, 0.0)
+    closed = tables.exact_sum((0.7, 0.2, 0.1 - 1e-10, 0.0))
+    assert closed == pytest.approx((0.7, 0.2 + 5e-11, 0.1 - 5e-11, 0.0), abs=1e-15)
     for name, far in (("fast", True), ("goldstein", False)):
         scene = symtop.scene(name)
         verlet, strang = (

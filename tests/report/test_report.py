@@ -206,15 +206,6 @@ POINT = """(() => {
 })()"""
 
 
-def test_pointing_at_a_run_shows_what_it_was(browser, results):
-    browser.resize(1280, 900)
-    tip = browser.evaluate(POINT % (0, 0))
-    name, step = re.fullmatch(r"(\S+) \(\S+\): step (\S+) s", tip).groups()
-    cell = xr.load_dataset(results / "speed.nc").sel(scene="goldstein", variant=name).isel(nutations=0)
-    assert any(f"{value:.3g}" == step for value in cell["step_size"].values)
-    assert browser.evaluate(POINT % (0, 100_000)) == ""  # far from every run: nothing
-
-
 def test_methods_cost_error_and_run_length_are_chosen(browser, results):
     browser.resize(1280, 900)
     marks = "document.querySelectorAll('.chart .mark').length"
@@ -246,14 +237,20 @@ def test_methods_cost_error_and_run_length_are_chosen(browser, results):
         assert browser.evaluate(lines) == before
 
 
-def test_the_chart_takes_the_place_of_its_figure_on_the_screen_and_not_in_print(browser):
+def test_the_chart_takes_the_place_of_its_figure_and_pointing_at_a_run_shows_what_it_was(browser, results):
+    browser.resize(1280, 900)
+    tip = browser.evaluate(POINT % (0, 0))
+    name, step = re.fullmatch(r"(\S+) \(\S+\): step (\S+) s", tip).groups()
+    cell = xr.load_dataset(results / "speed.nc").sel(scene="goldstein", variant=name).isel(nutations=0)
+    assert any(f"{value:.3g}" == step for value in cell["step_size"].values)
+    assert browser.evaluate(POINT % (0, 100_000)) == ""  # far from every run: nothing
     place = "document.querySelector('#speed-error-against-time .scroll').checkVisibility()"
     assert browser.evaluate(place) is False
     assert browser.evaluate("document.querySelector('#speed-error-against-time .chart svg').checkVisibility()")
     assert browser.evaluate("document.querySelector('#pitfalls-three .scroll').checkVisibility()")
 
 
-def test_words_follow_from_the_stored_data_and_from_nothing_else(results, tmp_path):
+def test_words_follow_from_the_stored_data_and_findings_that_are_not_whole_are_told(results, tmp_path):
     study, stored = runner.load("convergence"), xr.load_dataset(results / "convergence.nc")
     findings = json.loads((results / "convergence.json").read_text(encoding="utf-8"))
     text = re.sub(r"<[^>]+>", "", html.unescape((results / "report.html").read_text(encoding="utf-8")))
@@ -263,9 +260,6 @@ def test_words_follow_from_the_stored_data_and_from_nothing_else(results, tmp_pa
         assert template.answer(findings, results) in one
     later = stored.assign(force_evaluations=2.0 * stored["force_evaluations"])
     assert study.facts(later) != findings["facts"]  # they read the data, they do not remember it
-
-
-def test_findings_that_are_not_whole_are_told_of(results, tmp_path):
     shutil.copytree(results, tmp_path, dirs_exist_ok=True)
     (tmp_path / "tables" / "convergence-costs.csv").unlink()
     with pytest.raises(symtop.SymtopError, match=r"convergence-costs.csv is missing\); run it again: symtop study"):

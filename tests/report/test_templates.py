@@ -66,7 +66,7 @@ It is {{ f.a }}. It is not {{ f.b }}. So it ends.
 """
 
 
-def test_a_sentence_about_what_was_not_measured_is_left_out_and_the_page_says_so_once(tmp_path):
+def test_a_page_without_what_was_not_measured_says_so_once_and_points_without_a_number_are_null(tmp_path):
     findings = {"study": "mine", "question": "Q?", "page": PAGE, "facts": {"a": 1, "b": None}, "tables": [],
                 "pictures": [{"name": "drawn", "file": "a.png"}], "failures": [], "cases": 1}  # fmt: skip
     text = template.filled(findings, tmp_path)
@@ -79,9 +79,6 @@ def test_a_sentence_about_what_was_not_measured_is_left_out_and_the_page_says_so
     assert "- two 2 and more" in whole
     with pytest.raises(SymtopError, match="page of mine"):
         template.filled(findings | {"facts": {"a": 1}}, tmp_path)
-
-
-def test_points_without_a_number_are_null_and_findings_of_another_kind_are_none(tmp_path):
     chart = {"title": "c", "panels": {"one": [("rk4", [(1.0, math.nan, 1e-3, "w"), (2.0, math.inf, 1e-4, "v")])]}}
     points = json.loads(prepared(chart))["panels"]["one"][0]["points"]
     assert points == [[1.0, None, 1e-3, "w"], [2.0, None, 1e-4, "v"]]

@@ -151,7 +151,7 @@ def test_a_motion_may_begin_at_zero():
     assert (still.error, still.setting) == (0.0, 10.0)  # no step is longer than the run
 
 
-def test_f_may_return_one_array_again_and_write_to_its_argument():
+def test_f_may_return_one_array_again_and_a_horizon_beyond_the_end_is_refused():
     one = np.empty(2)
 
     def swing_in_place(_, y):
@@ -162,10 +162,7 @@ def test_f_may_return_one_array_again_and_write_to_its_argument():
     for name, control in (("rk4", {"step_size": 0.1}), ("rk45", {"tolerance": 1e-4})):
         expected = symtop.guard(swing, 0.0, [1.0, 0.0], 30.0, name, **control)
         assert symtop.guard(swing_in_place, 0.0, [1.0, 0.0], 30.0, name, **control) == expected
-
-
-def test_a_horizon_beyond_the_end_of_a_motion_is_refused():
-    """y' = y^2 from 1 is 1/(1 - t)."""
+    # y' = y^2 from 1 is 1/(1 - t).
     with pytest.raises(symtop.SymtopError, match=r"horizon must be below 1, not 2\.0: the motion goes beyond"):
         symtop.guard(lambda _t, y: y * y, 0.0, [1.0], 2.0, step_size=0.01)
     assert symtop.guard(lambda _t, y: y * y, 0.0, [1.0], 0.9, step_size=0.01).error < 1e-3

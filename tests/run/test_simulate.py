@@ -36,21 +36,6 @@ def test_the_dataset_is_the_one_that_is_promised_and_begins_with_exact_values():
         assert float(run["p_psi"][0]) == pytest.approx(5.0, rel=1e-15)
 
 
-def test_samples_commensurate_with_the_nutation_are_dithered_and_said_to_be():
-    """F11: sampled at multiples of the nutation period, Verlet's energy error reads a thousand times too small."""
-    scene = symtop.scene("spheroid")
-    period = scene.nutation_period
-    run = symtop.simulate(scene, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=51)
-    assert run.attrs["sampling"] == "dithered"
-    honest = float(np.max(np.abs(run["energy"] - run["energy"][0])))
-    dense = symtop.simulate(scene, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=10_001)
-    assert dense.attrs["sampling"] == "uniform"
-    every = np.abs(dense["energy"].values - dense["energy"].values[0])
-    assert honest > 0.3 * every.max()
-    blind = every[::200]  # what uniform samples would have shown
-    assert blind.max() < 0.01 * every.max()
-
-
 def sorted_times(horizon, samples, period, steps):
     """Samples as they are defined: each mark once, and the widest gap of all phases in their order."""
     last = samples - 1
@@ -68,7 +53,19 @@ def sorted_times(horizon, samples, period, steps):
     return times, marks, dithered
 
 
-def test_samples_are_those_of_a_sort_whether_it_was_needed_or_not():
+def test_samples_are_dithered_where_commensurate_and_those_of_a_sort():
+    """F11: sampled at multiples of the nutation period, Verlet's energy error reads a thousand times too small."""
+    scene = symtop.scene("spheroid")
+    period = scene.nutation_period
+    run = symtop.simulate(scene, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=51)
+    assert run.attrs["sampling"] == "dithered"
+    honest = float(np.max(np.abs(run["energy"] - run["energy"][0])))
+    dense = symtop.simulate(scene, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=10_001)
+    assert dense.attrs["sampling"] == "uniform"
+    every = np.abs(dense["energy"].values - dense["energy"].values[0])
+    assert honest > 0.3 * every.max()
+    blind = every[::200]  # what uniform samples would have shown
+    assert blind.max() < 0.01 * every.max()
     draw, dithered = np.random.default_rng(4), 0
     for k in range(4000):
         samples, period = int(draw.integers(2, 300)), float(10.0 ** draw.uniform(-1, 1))

@@ -80,16 +80,6 @@ def test_columns_that_are_run_together_have_the_bits_of_runs_one_by_one(name, mo
         np.testing.assert_array_equal(values, others)
 
 
-def test_errors_are_followed_where_they_are_asked_for():
-    """A column that is not followed has the same verdicts, and an error that is too large where the run is wrong."""
-    spins, method = [0.3, 1.0, 8.0], integrator("strang")
-    whole, one = (outcome_map("cusp", spins, method, STEPS, 12.0, followed) for followed in (None, [3]))
-    np.testing.assert_array_equal(whole.verdict, one.verdict)
-    np.testing.assert_array_equal(whole.axis_error[:, 3], one.axis_error[:, 3])
-    np.testing.assert_array_equal(whole.axis_error[whole.verdict == 0], one.axis_error[whole.verdict == 0])
-    assert (one.axis_error < whole.axis_error).any()
-
-
 SETTLING = {"strang": np.geomspace(0.01, 2.0, 40), "gauss-4": np.geomspace(0.02, 2.0, 30),
             "stormer-verlet": np.geomspace(0.01, 0.5, 30), "rk45-compiled": np.geomspace(1e-9, 0.1, 30)}  # fmt: skip
 
@@ -134,7 +124,14 @@ def test_a_top_that_had_settled_and_is_not_accurate_is_run_at_every_setting(monk
     assert (after.verdict[1] == VERDICTS.index("drifting")).sum() == 2
 
 
-def test_rows_share_phases_and_are_not_commensurate_with_the_nutation():
+def test_rows_share_phases_and_errors_are_followed_where_they_are_asked_for():
+    """A column that is not followed has the same verdicts, and an error that is too large where the run is wrong."""
+    spins, method = [0.3, 1.0, 8.0], integrator("strang")
+    whole, one = (outcome_map("cusp", spins, method, STEPS, 12.0, followed) for followed in (None, [3]))
+    np.testing.assert_array_equal(whole.verdict, one.verdict)
+    np.testing.assert_array_equal(whole.axis_error[:, 3], one.axis_error[:, 3])
+    np.testing.assert_array_equal(whole.axis_error[whole.verdict == 0], one.axis_error[whole.verdict == 0])
+    assert (one.axis_error < whole.axis_error).any()
     runs = row_plan(integrator("strang"), [0.01, 0.25, 2.0], 12.0)
     assert [marks[-1] for marks in runs.marks] == [1200, 48, 6]
     assert np.isnan(runs.phases[2]).sum() == 49 - 7
@@ -146,7 +143,7 @@ def test_rows_share_phases_and_are_not_commensurate_with_the_nutation():
     assert [piece.stop - piece.start for piece in together_in(near, 1, alone={1, 2})] == [2, 1, 1, 1, 1, 1]
 
 
-def test_the_families_are_what_they_say():
+def test_the_families_are_what_they_say_and_limits_end_at_verlets_and_rk4s():
     for ratio in (0.1, 1.0, 30.0):
         spun = with_spin(scene("cusp"), ratio)
         assert spun.start.spin * spun.top.I3 / (2.0 * math.sqrt(spun.top.I1 * spun.top.mgl)) == pytest.approx(ratio)
@@ -154,10 +151,7 @@ def test_the_families_are_what_they_say():
     free = symtop.Scene("free", symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(theta=1.0, psi_dot=2.0), 1.0)
     assert spin_unit(free) == 1.0
     assert closed_form(family("grazing")(1e-3)).theta_range[0] == pytest.approx(1.1e-3, rel=0.05)
-
-
-def test_limits_over_a_family_end_at_verlets_and_rk4s():
-    """A fast top's nutation is harmonic: h omega = 2 is 1/pi of a nutation, 2 sqrt 2 of one for rk4."""
+    # A fast top's nutation is harmonic: h omega = 2 is 1/pi of a nutation, 2 sqrt 2 of one for rk4.
     limit, third = family_limits("cusp", integrator("stormer-verlet"), 30.0, 2.0)
     assert limit == pytest.approx(1.0 / math.pi, rel=1e-3)
     assert third == pytest.approx(math.sqrt(3.0) / (2.0 * math.pi), rel=1e-3)
@@ -225,14 +219,6 @@ def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
     assert shapes == {"strang": (2, 2), "midpoint": (3, 3)}
 
 
-def test_a_pole_that_halves_the_reach_is_told_from_one_that_does_not():
-    gaps = (1e-6, 1e-5, 1e-2, 0.2)
-    near = hand_made([[L, L, L], [L, L, L], [A, L, L], [A, A, L]], parameter=gaps, scene_name="grazing")
-    assert atlas.halved_by_pole(atlas.maps(near, "grazing")["midpoint"]) is True
-    unspoiled = hand_made([[A, A, L]] * 4, parameter=gaps, scene_name="grazing")
-    assert atlas.halved_by_pole(atlas.maps(unspoiled, "grazing")["midpoint"]) is False
-
-
 def spins(**made):
     """Maps over three slow and three fast tops, at three settings, by variant."""
     cells = []
@@ -247,7 +233,12 @@ def spins(**made):
 SLOW_FINER, FAST_FINER = [[A, L, L]] * 3 + [[A, A, L]] * 3, [[A, A, L]] * 3 + [[A, L, L]] * 3
 
 
-def test_finer_settings_are_counted_and_variants_that_reach_equally_far_all_named():
+def test_a_pole_that_halves_the_reach_is_told_and_variants_that_reach_equally_far_are_all_named():
+    gaps = (1e-6, 1e-5, 1e-2, 0.2)
+    near = hand_made([[L, L, L], [L, L, L], [A, L, L], [A, A, L]], parameter=gaps, scene_name="grazing")
+    assert atlas.halved_by_pole(atlas.maps(near, "grazing")["midpoint"]) is True
+    unspoiled = hand_made([[A, A, L]] * 4, parameter=gaps, scene_name="grazing")
+    assert atlas.halved_by_pole(atlas.maps(unspoiled, "grazing")["midpoint"]) is False
     data = spins(rk4=("step_size", SLOW_FINER), strang=("step_size", SLOW_FINER), rk45=("tolerance", FAST_FINER),
                  angles_rk45=("tolerance", SLOW_FINER), angles_dop853=("tolerance", FAST_FINER))  # fmt: skip
     answers = facts.atlas_facts(data, "cusp")

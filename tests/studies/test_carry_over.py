@@ -154,16 +154,6 @@ def costs_of(medians, bodies=60, seed=0):
                     np.full(len(medians), 0.02))  # fmt: skip
 
 
-def test_tau_is_kendalls_with_ties():
-    generator = np.random.default_rng(1)
-    for _ in range(20):
-        first, second = (generator.integers(0, 8, 15).astype(float) for _ in range(2))
-        assert by.tau_of(first, second) == pytest.approx(kendalltau(first, second).statistic)
-    reached = np.array([1.0, 2.0, 3.0, 1e300, 1e300])
-    assert by.tau_of(reached, reached) == 1.0  # those that nobody reaches say nothing
-    assert np.isnan(by.tau_of(reached[3:], reached[3:]))
-
-
 def test_a_planted_difference_of_rankings_is_seen_and_scatter_is_none_nor_prices_of_what_is_not_reached():
     medians, rows = 1e-6 * 1.6 ** np.arange(20), ([*range(20)],) * 2
     same = by.bootstrap_tau(costs_of(medians), costs_of(3.0 * medians, seed=1), rows, paired=False)
@@ -192,7 +182,14 @@ def test_steps_beyond_the_budget_are_no_steps_that_carry_over(beyond, verdict):
     assert facts.pooled([each]).verdict == verdict
 
 
-def test_verdicts_follow_the_limits_that_were_fixed_before():
+def test_tau_is_kendalls_with_ties_and_verdicts_follow_limits_fixed_before():
+    generator = np.random.default_rng(1)
+    for _ in range(20):
+        first, second = (generator.integers(0, 8, 15).astype(float) for _ in range(2))
+        assert by.tau_of(first, second) == pytest.approx(kendalltau(first, second).statistic)
+    reached = np.array([1.0, 2.0, 3.0, 1e300, 1e300])
+    assert by.tau_of(reached, reached) == 1.0  # those that nobody reaches say nothing
+    assert np.isnan(by.tau_of(reached[3:], reached[3:]))
     for ends, verdict in (((0.91, 0.99), by.YES), ((0.7, 0.95), by.PARTLY), ((0.6, 0.79), by.NO)):
         assert by.ranking_verdict(by.Interval(0.85, *ends)) == verdict
     assert [by.factor_verdict(one) for one in (1.05, 1.0 / 1.05, 1.8, 0.6, 2.5, 0.3)] == [

@@ -75,7 +75,7 @@ def test_the_energy_over_time_is_that_of_the_run_that_it_names():
     assert float(taylor["history_tolerance"]) > 0.0
 
 
-def test_the_work_of_an_error_constant_is_the_work_of_a_run_with_that_error(data):
+def test_work_follows_from_runs_beside_it_or_from_its_error_constant(data):
     """error = C h^p: a target that some run met costs what that run cost; four times less error, twice the work."""
     pair = "goldstein", "stormer-verlet[angles]"
     cell, fit = data.sel(scene=pair[0], variant=pair[1]), measures.fits(data, "axis")[pair]
@@ -88,10 +88,7 @@ def test_the_work_of_an_error_constant_is_the_work_of_a_run_with_that_error(data
     assert far.foreseen
     assert beyond.work == pytest.approx(2.0 * far.work, rel=1e-6)
     assert ("goldstein", "rk45[angles]") not in measures.efficiencies(data, error)  # it has no step to choose
-
-
-def test_work_next_to_which_runs_were_made_is_theirs_and_not_that_of_a_law(data):
-    """An implicit method iterates more at longer steps: the evaluations of other steps say nothing of these."""
+    # An implicit method iterates more at longer steps: the evaluations of other steps say nothing of these.
     pair = "goldstein", "midpoint[angles]"
     cell = data.sel(scene=pair[0], variant=pair[1])
     k = int(np.flatnonzero(measures.fits(data, "axis")[pair].used)[-1])

@@ -77,16 +77,6 @@ def test_wins_and_what_is_met_have_one_denominator_each():
     assert hindsight(["a", "b"], np.full((2, 4), INF), QUIET).first is None
 
 
-def test_a_lead_is_called_if_neither_the_tops_nor_the_prices_can_turn_it():
-    draw = np.random.default_rng(0)
-    fair, ahead = draw.random((2, 2000)), draw.random((2, 2000)) * [[0.7], [1.0]]
-    assert not hindsight("ab", fair, QUIET).called
-    assert hindsight("ab", ahead, QUIET).called
-    assert not hindsight("ab", ahead[:, :12], QUIET).called  # too few tops
-    assert not hindsight("ab", ahead, QUIET * 40.0).called  # the same tops, with prices that are hardly known
-    assert not hindsight("ab", ahead, QUIET, marked=["a"]).called
-
-
 def test_noise_of_a_price_widens_the_interval_of_a_share_which_covers_it_as_often_as_it_says():
     """Tops from a known distribution: a wins where its cost is 1/1.1 of b's, on a share that can be worked out."""
     draw, inside = np.random.default_rng(5), 0
@@ -123,8 +113,15 @@ def test_a_safe_setting_serves_95_of_100_tops():
     assert tight.setting == pytest.approx(10.0 ** -(2.0 + 4.0 * 94 / 99), rel=1e-6)
 
 
-def test_hindsight_and_safe_may_have_other_winners_and_a_safe_lead_inside_the_prices_is_not_called():
-    """A step that suits most tops and fails on one in five, against one that costs a little more on all of them."""
+def test_a_lead_is_called_if_neither_tops_nor_prices_can_turn_it_and_hindsight_may_differ():
+    draw = np.random.default_rng(0)
+    fair, ahead = draw.random((2, 2000)), draw.random((2, 2000)) * [[0.7], [1.0]]
+    assert not hindsight("ab", fair, QUIET).called
+    assert hindsight("ab", ahead, QUIET).called
+    assert not hindsight("ab", ahead[:, :12], QUIET).called  # too few tops
+    assert not hindsight("ab", ahead, QUIET * 40.0).called  # the same tops, with prices that are hardly known
+    assert not hindsight("ab", ahead, QUIET, marked=["a"]).called
+    # A step that suits most tops and fails on one in five, against one that costs a little more on all of them.
     met = np.full(200, 4.0)
     met[::5] = 100.0
     choices, called = safe([steps("spoilt", met), steps("even", np.full(200, 6.0))])
@@ -194,15 +191,6 @@ def test_prices_of_fresh_processes_agree_with_a_run_timed_by_hand():
         assert evaluations * price + rest == pytest.approx(by_hand, rel=0.5)
 
 
-def test_variants_whose_order_follows_the_tolerance_have_a_price_at_each():
-    assert pricing.tolerances_of(integrator("series-adaptive[axis]")) == pricing.TOLERANCES
-    assert pricing.tolerances_of(integrator("rk45-compiled[axis]")) == (pricing.TOLERANCE,)
-    known = pricing.Prices(["a"], np.array([8.0 / 4.0 ** np.arange(7)]), np.zeros((1, 7)), np.zeros(1), np.zeros(1), [],
-                           NAN)  # fmt: skip
-    price, _ = known.at("a", np.array([1e-2, 1e-3, 1e-4, NAN]))
-    assert price[:3] == pytest.approx([8.0, 4.0, 2.0])
-
-
 @pytest.fixture(scope="module")
 def tops():
     return tops_of(60, 20, 3, 10.0)
@@ -216,7 +204,13 @@ def regime(scene):
     return [low, high, psi, phi] if top.mgl > 0.0 else [-high, -low, -psi, phi]
 
 
-def test_the_natural_tops_are_those_that_are_written_down():
+def test_the_natural_tops_are_written_down_and_variants_of_variable_order_have_prices():
+    assert pricing.tolerances_of(integrator("series-adaptive[axis]")) == pricing.TOLERANCES
+    assert pricing.tolerances_of(integrator("rk45-compiled[axis]")) == (pricing.TOLERANCE,)
+    known = pricing.Prices(["a"], np.array([8.0 / 4.0 ** np.arange(7)]), np.zeros((1, 7)), np.zeros(1), np.zeros(1), [],
+                           NAN)  # fmt: skip
+    price, _ = known.at("a", np.array([1e-2, 1e-3, 1e-4, NAN]))
+    assert price[:3] == pytest.approx([8.0, 4.0, 2.0])
     tops = natural(20_000, 1)
     I1, I3, mgl, theta, _, _, theta_dot, phi_dot, psi_dot = tops.T
     assert (natural(50, 1) == tops[:50]).all()
@@ -345,34 +339,9 @@ def test_no_method_of_this_top_takes_part_for_any_body_and_variants_are_asked_fo
     assert all(integrator(name).general for name in study.far.candidates())
 
 
-def test_the_grid_has_every_compiled_variant_and_the_old_names_answer_with_the_new_one():
-    for name in ("population", "work_precision", "phase_diagram"):
-        with pytest.raises(symtop.SymtopError, match="is now cost"):
-            load(name)
-    names = {case.integrator for case in study.STUDY.cases(True) if case.group == "short"}
-    assert {"strang[axis]", "strang[attitude]", "midpoint[angles]", "rk45-compiled[angles]", "taylor[axis]"} <= names
-    assert not {name for name in names if "unreduced" in name or name.startswith("exact")}
-    assert sum(case.timed for case in study.STUDY.cases(False)) == 5
-
-
 @pytest.fixture(scope="module")
 def data(quick_results):
     return netcdf.read_any(quick_results / "cost.nc")
-
-
-def test_quick_results_hold_every_verdict(data):
-    assert {"short", "long", "tops", "prices", "far"} <= set(data.children)
-    winners = cells.winners(data)
-    assert len(winners) == 2 * len(cells.CLASSES) * 2 * len(TARGETS)
-    for one in winners:
-        for best in filter(None, (one["safe"], one["hindsight"])):
-            method = integrator(best.name)
-            assert cells.of_class(method.needs, method.general, one["needs"])
-            assert best.low <= best.high
-        if one["hindsight"]:
-            assert one["solved"] <= one["asked"]
-    taken = cells.costs(data, Cell("short", "axis", 1e-3, NATURAL))
-    assert not any("[attitude]" in name for name in taken.names if f"{name.split('[')[0]}[axis]" in taken.names)
 
 
 @pytest.fixture(scope="module")
@@ -409,7 +378,14 @@ def test_facts_and_tables_are_those_of_the_cells(small):
     assert tables["have"]["1e-3 rad"][0].endswith(f" {number(rk4.seconds / best.seconds)} times")
 
 
-def test_what_is_kept_is_declared_or_linear_in_the_state():
+def test_the_grid_has_every_compiled_variant_and_what_is_kept_is_declared_or_linear():
+    for name in ("population", "work_precision", "phase_diagram"):
+        with pytest.raises(symtop.SymtopError, match="is now cost"):
+            load(name)
+    names = {case.integrator for case in study.STUDY.cases(True) if case.group == "short"}
+    assert {"strang[axis]", "strang[attitude]", "midpoint[angles]", "rk45-compiled[angles]", "taylor[axis]"} <= names
+    assert not {name for name in names if "unreduced" in name or name.startswith("exact")}
+    assert sum(case.timed for case in study.STUDY.cases(False)) == 5
     kept = {
         "rk4[axis]": "p_phi", "rk4[angles]": "nothing exactly", "rkmk-se3-4[axis]": "p_psi, |e|",
         "gauss-8[axis]": "p_phi, p_psi, |e|, energy", "takahashi-imada[axis]": "p_phi, p_psi, energy bounded",
@@ -417,7 +393,19 @@ def test_what_is_kept_is_declared_or_linear_in_the_state():
     assert {name: facts.keeps(name) for name in kept} == kept
 
 
-def test_a_cost_holds_the_call_and_who_must_keep_constants_is_answered_by_those_that_keep_them(data):
+def test_quick_results_hold_every_verdict_and_a_cost_holds_the_call(data):
+    assert {"short", "long", "tops", "prices", "far"} <= set(data.children)
+    winners = cells.winners(data)
+    assert len(winners) == 2 * len(cells.CLASSES) * 2 * len(TARGETS)
+    for one in winners:
+        for best in filter(None, (one["safe"], one["hindsight"])):
+            method = integrator(best.name)
+            assert cells.of_class(method.needs, method.general, one["needs"])
+            assert best.low <= best.high
+        if one["hindsight"]:
+            assert one["solved"] <= one["asked"]
+    taken = cells.costs(data, Cell("short", "axis", 1e-3, NATURAL))
+    assert not any("[attitude]" in name for name in taken.names if f"{name.split('[')[0]}[axis]" in taken.names)
     cell = Cell("short", "axis", 1e-3, NATURAL)
     seconds, counted = cells.costs(data, cell), cells.costs(data, cell, cells.EVALUATIONS)
     row = seconds.names.index("rk4[axis]")

@@ -44,7 +44,7 @@ def test_the_behaviour_of_a_quantity_is_that_on_its_worst_scene(sizes, exponents
     assert measures.worst_behaviour(cell.assign(outcome=("scene", ["ok", "left_chart"])), "energy") == "failed"
 
 
-def test_a_history_says_with_what_it_ran():
+def test_a_history_says_with_what_it_ran_and_has_one_behaviour_in_every_study():
     on = symtop.scene("spheroid")
     short = {"horizon": 20.0 * on.nutation_period, "samples": 101}
     step = run_history(on, symtop.integrator("rk4[axis]"), step_size=on.nutation_period / 50.0, **short)
@@ -57,10 +57,7 @@ def test_a_history_says_with_what_it_ran():
     assert float(step["p_phi_largest"]) == 0.0
     other = run_history(on, symtop.integrator("rk4[angles]"), step_size=on.nutation_period / 50.0, **short)
     assert float(other["p_phi_largest"]) > 1e-9
-
-
-def test_the_same_run_has_one_behaviour_in_every_study():
-    """kahan-li-6 changes the energy by 9e-13 of the spin's and has an exponent of 0: an error of the step, bounded."""
+    # kahan-li-6 changes the energy by 9e-13 of the spin's and has an exponent of 0: an error of the step, bounded.
     for size, exponent, interval in ((9e-12, 0.0, 0.001), (1e-15, 0.9, 0.1), (1e-4, 1.0, 0.1), (1e-4, 0.0, 0.01)):
         measured = {"energy_largest": size, "energy_exponent": exponent, "energy_exponent_interval": interval}
         columns = {"outcome": ("scene", ["ok"]), **{name: ("scene", [value]) for name, value in measured.items()}}
@@ -137,17 +134,6 @@ def test_a_group_alone_has_the_same_facts_and_none_of_the_others(data, group):
     for other, names in facts.NAMES.items():
         assert all((answers[name] is None) is (other != group) for name in names.split()), other
     assert len(figures.pictures(alone)) == (group in (measures.HISTORIES, measures.ROUNDINGS))
-
-
-def test_growth_as_time_is_told_from_faster_growth_and_shifts_are_relative_to_the_band():
-    means = xr.DataArray([[0.0, 1e-5, 3e-5, np.nan]], dims=("variant", "window"))
-    cells = xr.Dataset({"energy_mean": means.copy(data=[[0.0, 4e-5, 1e-6, np.nan]]),
-                        "energy_largest": means + 5e-5, "energy_least": means - 5e-5})  # fmt: skip
-    moves = np.abs(measures.shifts(cells))
-    assert (float(moves.isel(window=-1).max()), float(moves.max())) == pytest.approx((0.01, 0.4))
-    slopes = np.array([0.91, 1.0, 1.09, 0.88, 1.12, 2.0])
-    assert measures.as_time(slopes).tolist() == [True, True, True, False, False, False]
-    assert measures.faster(slopes).tolist() == [False, False, False, False, True, True]
 
 
 def test_phases_are_grouped_by_the_energy_and_a_run_that_keeps_it_is_none_of_those_that_lose_it(histories):
@@ -228,7 +214,15 @@ def test_a_planted_exponent_is_found_under_an_oscillation(exponent):
     assert law(fit) == {1.0: "linear", 1.5: "t^3/2", 2.0: "quadratic"}[exponent]
 
 
-def test_a_law_is_named_where_the_interval_holds_one():
+def test_a_law_is_named_where_the_interval_holds_one_and_growth_as_time_is_told():
+    means = xr.DataArray([[0.0, 1e-5, 3e-5, np.nan]], dims=("variant", "window"))
+    cells = xr.Dataset({"energy_mean": means.copy(data=[[0.0, 4e-5, 1e-6, np.nan]]),
+                        "energy_largest": means + 5e-5, "energy_least": means - 5e-5})  # fmt: skip
+    moves = np.abs(measures.shifts(cells))
+    assert (float(moves.isel(window=-1).max()), float(moves.max())) == pytest.approx((0.01, 0.4))
+    slopes = np.array([0.91, 1.0, 1.09, 0.88, 1.12, 2.0])
+    assert measures.as_time(slopes).tolist() == [True, True, True, False, False, False]
+    assert measures.faster(slopes).tolist() == [False, False, False, False, True, True]
     assert law(growth(TIME, np.sin(5.3 * TIME))) == "bounded"
     assert law(growth(TIME, np.abs(TIME) ** 0.75)) == "t^0.75"
     fit = growth(TIME, np.abs(TIME))

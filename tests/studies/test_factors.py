@@ -82,7 +82,7 @@ def test_the_loops_in_numpy_return_the_trajectory_of_the_compiled_ones(plain, na
         assert gap > 1e-9  # the control: another step is another trajectory
 
 
-def test_taylor_in_angles_solves_the_same_equations():
+def test_a_cell_is_named_once_and_taylor_in_angles_solves_the_same_equations():
     hy = pytest.importorskip("heyoka")
     from symtop.methods.taylor.heyoka import equations
 
@@ -95,9 +95,6 @@ def test_taylor_in_angles_solves_the_same_equations():
     assert run.attrs["chart"] == "angles"
     assert float(symtop.errors(run)["attitude"].max()) < 1e-11
     assert 0.0 < float(np.ptp(run["p_phi"].values)) < 1e-12  # free to drift, by rounding
-
-
-def test_a_cell_is_named_once_and_is_one_method_in_one_chart():
     every = cells()
     assert len({cell.name for cell in every}) == len({cell.key for cell in every}) == len(every)
     for cell in every:
@@ -106,18 +103,6 @@ def test_a_cell_is_named_once_and_is_one_method_in_one_chart():
     schemes = {cell.scheme for cell in every}
     compiled = {cell.scheme for cell in every if cell.language == COMPILED}
     assert {scheme for members in FAMILIES.values() for scheme in members} == compiled == schemes - {"DOP853"}
-
-
-def test_every_timed_run_meets_its_target_when_it_is_run_again(rows):
-    known = {cell.name: cell for cell in cells()}
-    assert ((rows["axis"] > 0.0) & (rows["axis"] <= SHORT.target)).all()
-    for name in ("rk45-compiled[attitude]", "takahashi-imada[axis]", "rk45-numba[axis]"):
-        mine = rows[rows["variant"] == name]
-        (row,) = set(zip(mine["axis"], mine["force_evaluations"], strict=True))
-        met = settle(SCENE, [known[name]], SHORT)[known[name]]
-        assert met.error <= SHORT.target
-        if known[name].language == COMPILED:  # it was searched for by itself
-            assert (met.error, met.evaluations) == row
 
 
 def test_the_search_ends_closer_if_asked_and_languages_of_one_method_have_the_same_setting_and_work(measured):
@@ -146,7 +131,16 @@ def test_what_is_not_within_the_budget_has_a_reason_and_no_time(monkeypatch):
     assert (str(fast["reason"].values), bool(np.isnan(fast["seconds"]))) == ("", False)
 
 
-def test_every_time_is_the_median_of_its_processes(measured, rows):
+def test_every_timed_run_meets_its_target_and_its_time_is_the_median_of_its_processes(rows, measured):
+    known = {cell.name: cell for cell in cells()}
+    assert ((rows["axis"] > 0.0) & (rows["axis"] <= SHORT.target)).all()
+    for name in ("rk45-compiled[attitude]", "takahashi-imada[axis]", "rk45-numba[axis]"):
+        mine = rows[rows["variant"] == name]
+        (row,) = set(zip(mine["axis"], mine["force_evaluations"], strict=True))
+        met = settle(SCENE, [known[name]], SHORT)[known[name]]
+        assert met.error <= SHORT.target
+        if known[name].language == COMPILED:  # it was searched for by itself
+            assert (met.error, met.evaluations) == row
     samples, seconds = measured["seconds_samples"], measured["seconds"]
     assert samples.sizes["process"] == 2
     assert np.array_equal(np.isfinite(seconds), np.isfinite(samples).all("process"))
@@ -247,17 +241,14 @@ def synthetic(interaction=1.0):
     return pd.DataFrame(grid, columns=[*GOAL, *FACTORS, "variant", "seconds"])
 
 
-def test_the_effect_of_a_factor_is_found_where_effects_multiply_and_spread_where_they_do_not():
+def test_effects_that_multiply_are_found_and_scipy_and_charts_compared_by_the_fastest():
     for pair in pairs(synthetic()).to_dict("records"):
         assert pair["ratio"] == pytest.approx(EFFECT[pair["before"]] / EFFECT[pair["after"]], rel=1e-12)
     table = effects(synthetic(interaction=4.0)).set_index(["factor", "before", "after"])
     answers = table.loc["chart", "angles", "axis"]
     assert (answers["min"], answers["max"]) == (pytest.approx(3.0), pytest.approx(12.0))
     assert answers["count"] == 3 * len(LANGUAGES) * len(CALLS)
-
-
-def test_scipy_and_charts_are_compared_by_the_fastest():
-    """As called: 8 x 100 x 2.5 over 2; kernels: 8 x 100 over 1."""
+    # As called: 8 x 100 x 2.5 over 2; kernels: 8 x 100 over 1.
     (row,) = facts.against_scipy(synthetic()).to_dict("records")
     assert (row["times, as called"], row["times, kernels"]) == (pytest.approx(1000.0), pytest.approx(800.0))
     assert (row["SciPy's"], row["fastest compiled"]) == (

@@ -65,17 +65,6 @@ def test_a_start_next_to_a_pole_has_the_momenta_that_were_asked_for(theta):
     assert theta == 0.7 or abs(naive / rate - 1.0) > 1e-10  # the control
 
 
-def test_the_trapezoidal_rule_has_its_own_limit_and_the_midpoint_rule_none():
-    trapezoidal, midpoint = integrator("trapezoidal"), integrator("midpoint")
-    limit = trapezoidal_limit(STEADY.top, STEADY.start.phi_dot, STEADY.start.theta)
-    assert linear_limits(trapezoidal, STEADY, np.linspace(0.02, 1.2, 60) * limit)[0] == pytest.approx(limit, rel=1e-6)
-    assert math.isnan(linear_limits(midpoint, STEADY, np.linspace(0.02, 1.2, 60) * limit)[0])
-    for place in (0.5, 0.99, 1.01, 2.0):
-        assert (abs(trace(trapezoidal, STEADY, place * limit).trace) < 2.0) is (place < 1.0)
-        assert abs(trace(midpoint, STEADY, place * limit).trace) < 2.0
-    assert trapezoidal_limit(SymmetricTop(1.0, 1.5, 2.0), 1.0, 1.0) == math.inf
-
-
 @pytest.mark.parametrize(("name", "turn"), [("stormer-verlet", math.asin), ("midpoint", math.atan)])
 def test_the_trace_is_that_of_the_discrete_nutation(name, turn):
     """Phase per step: 2 asin(h omega/2) for Verlet, 2 atan(h omega/2) for the midpoint rule."""
@@ -215,15 +204,15 @@ def test_methods_without_a_shift_keep_the_threshold(name):
         assert sleeping_threshold(integrator(name), h) == pytest.approx(2.0, abs=1e-6)
 
 
-def test_every_row_of_fixed_step_is_scanned_for_sleep_but_those_that_are_left_out():
-    left = {name for names in study.NOT_SLEEPING.values() for name in names}
-    fixed = {row.name for row in grid_variants("axis") if row.fixed_step}
-    assert left < fixed  # a name that no variant has would leave nothing out
-    for quick in (True, False):
-        assert {case.integrator for case in study.cases(quick) if case.scene == "sleeping"} == fixed - left
-
-
-def test_long_runs_fall_on_one_side_of_the_threshold_only():
+def test_the_trapezoidal_rule_has_its_own_limit_and_long_runs_fall_on_one_side_of_it():
+    trapezoidal, midpoint = integrator("trapezoidal"), integrator("midpoint")
+    limit = trapezoidal_limit(STEADY.top, STEADY.start.phi_dot, STEADY.start.theta)
+    assert linear_limits(trapezoidal, STEADY, np.linspace(0.02, 1.2, 60) * limit)[0] == pytest.approx(limit, rel=1e-6)
+    assert math.isnan(linear_limits(midpoint, STEADY, np.linspace(0.02, 1.2, 60) * limit)[0])
+    for place in (0.5, 0.99, 1.01, 2.0):
+        assert (abs(trace(trapezoidal, STEADY, place * limit).trace) < 2.0) is (place < 1.0)
+        assert abs(trace(midpoint, STEADY, place * limit).trace) < 2.0
+    assert trapezoidal_limit(SymmetricTop(1.0, 1.5, 2.0), 1.0, 1.0) == math.inf
     h = 0.5
     for name in ("strang", "cayley"):
         edge = integrator(name).sleeps_from(h)
@@ -355,8 +344,13 @@ NOT_ONE_MAP = {  # of theta and p_theta, so that its samples are no iterates
 }
 
 
-def test_every_fixed_step_method_shows_its_trace():
-    """Consistency: at small steps each turns by h omega, in whatever chart it works."""
+def test_every_fixed_step_method_shows_its_trace_and_is_scanned_but_those_left_out():
+    left = {name for names in study.NOT_SLEEPING.values() for name in names}
+    fixed = {row.name for row in grid_variants("axis") if row.fixed_step}
+    assert left < fixed  # a name that no variant has would leave nothing out
+    for quick in (True, False):
+        assert {case.integrator for case in study.cases(quick) if case.scene == "sleeping"} == fixed - left
+    # Consistency: at small steps each turns by h omega, in whatever chart it works.
     turn = 0.03  # more, and the error of rkmk-se3-2 shows, which grows with the spin; less, and that of the differences
     for name, method in methods().items():
         if method.control == "step_size" and name not in NOT_ONE_MAP:

@@ -14,7 +14,7 @@ def data():
     return datasets.combine([(case, study.measure(case)) for case in study.cases(True)])
 
 
-def test_no_step_is_short_enough_without_the_term_energy_is_kept_where_the_axis_is_wrong_and_angles_end(data):
+def test_the_pitfalls_are_there_and_the_page_says_what_was_measured(data, tmp_path):
     largest = {name: study.run_of(data, study.TERM, name)["axis"].max("sample").values
                for name in (study.WITHOUT, study.WITH, study.RIGHT)}  # fmt: skip
     assert np.ptp(largest[study.WITHOUT]) < 0.01 * largest[study.WITHOUT].mean()
@@ -29,7 +29,4 @@ def test_no_step_is_short_enough_without_the_term_energy_is_kept_where_the_axis_
     assert float(through["axis"].max()) < 1e-3
     assert float(through["time"].max()) == pytest.approx(2.0)
     assert (np.isfinite(through["axis"]) == np.isfinite(through["time"])).all()  # the rest is padding
-
-
-def test_the_page_says_what_was_measured(data, tmp_path):
     assert "left_chart" in checked("pitfalls", data, tmp_path, elsewhere={"three"})
