@@ -61,15 +61,6 @@ def test_a_kernel_takes_at_most_a_quarter_more_than_its_twin(key):
     assert ours.best / theirs.best < kernels.LIMIT
 
 
-@pytest.mark.slow
-def test_an_ensemble_costs_little_around_its_steps():
-    """Ratios within one run: what is around the steps is 5 us on the machine that makes 1000 of them in 4.4."""
-    seconds = {item.name: item.seconds for item in ensemble.measure()}
-    around = seconds["`ensemble`, axis and energy"] - seconds["of it: the steps"]
-    assert around < 1.1 * seconds["of it: the steps"]
-    assert seconds["`simulate`"] > 50.0 * seconds["`ensemble`, axis and energy"]
-
-
 def test_the_tops_that_lanes_are_timed_on_stay_in_lanes_and_reach_the_error():
     """A member that is given up would be timed alone; the closed form says how far the others are off."""
     solver, numbers, steps = lanes.solver_of(*lanes.RIVAL), lanes.members(), 45
@@ -84,11 +75,14 @@ def test_the_tops_that_lanes_are_timed_on_stay_in_lanes_and_reach_the_error():
 
 
 @pytest.mark.slow
-def test_a_closed_form_is_set_up_and_sampled_in_ten_microseconds():
-    """Half of the calls below 10 us, 99 % below 30 us, in both arithmetics; 40 digits take a thousand times as long.
-
-    Other tests that run beside this one slow both down, alike: then the ratio alone counts.
-    """
+def test_an_ensemble_costs_little_around_its_steps_and_a_closed_form_ten_microseconds():
+    """Ratios within one run: what is around the steps is 5 us on the machine that makes 1000 of them in 4.4."""
+    seconds = {item.name: item.seconds for item in ensemble.measure()}
+    around = seconds["`ensemble`, axis and energy"] - seconds["of it: the steps"]
+    assert around < 1.1 * seconds["of it: the steps"]
+    assert seconds["`simulate`"] > 50.0 * seconds["`ensemble`, axis and energy"]
+    # Half of the calls below 10 us, 99 % below 30 us, in both arithmetics; 40 digits take a thousand times as long.
+    # Other tests that run beside this one slow both down, alike: then the ratio alone counts.
     short, long, digits, *others = truth.measure()
     for row in (short, long):
         assert row.median < 1e-3 * digits.median

@@ -84,15 +84,6 @@ def test_a_proposed_step_is_of_use_and_the_guard_warns_of_what_the_verdict_calls
         assert 1e-5 < error < 1e-2
 
 
-@pytest.mark.slow  # half a minute: lanes of one method are compiled
-def test_a_cold_ensemble_is_never_silent_for_long(tmp_path):
-    words = "ensemble strang --members 2000 --per-nutation 50 --nutations 2"
-    recording = recorded(words.split(), SYMTOP_CACHE=str(tmp_path))
-    assert recording.code == 0, recording.text
-    assert recording.silence < 2.0
-    assert recording.widest <= 80
-
-
 LOCKED = """
 import ctypes
 import symtop
@@ -137,9 +128,14 @@ def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
     assert len(refreshes) == count
 
 
-@pytest.mark.slow
-def test_a_recording_hears_a_silence_and_sees_what_wraps(tmp_path):
-    """Negative control: a plug-in that sleeps while it is loaded, and a table of every column."""
+@pytest.mark.slow  # half a minute: lanes of one method are compiled
+def test_a_cold_ensemble_is_never_silent_for_long_and_a_recording_hears_a_silence(tmp_path):
+    words = "ensemble strang --members 2000 --per-nutation 50 --nutations 2"
+    recording = recorded(words.split(), SYMTOP_CACHE=str(tmp_path))
+    assert recording.code == 0, recording.text
+    assert recording.silence < 2.0
+    assert recording.widest <= 80
+    # Negative control: a plug-in that sleeps while it is loaded, and a table of every column.
     (tmp_path / "sleeps.py").write_text("import time\ntime.sleep(2.1)\n")
     recording = recorded(["scenes", "--wide", "--plugin", str(tmp_path / "sleeps.py")])
     assert recording.silence > 2.0

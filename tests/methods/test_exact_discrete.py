@@ -184,19 +184,6 @@ def test_the_discrete_routhians_of_both_oscillators_are_one_map_of_the_height(na
         assert min(gaps) > 1e-8 if wrong else max(gaps) < 1e-12
 
 
-@pytest.mark.slow
-def test_a_thousand_random_tops_and_a_million_nutations():
-    """`python -m benchmarks.exactness` takes ten thousand."""
-    errors = exactness.of_random_tops(1000)
-    assert errors.shape == (1000, 4)
-    assert np.median(errors) < 1e-15
-    assert errors.max() < 1e-12
-    for line in exactness.of_scenes():
-        name, *_, one, thousand, million = line.split()
-        bounds = (1e-11, 1e-9, 1e-4) if name in UNSTABLE else (3e-13, 3e-10, 1e-4)
-        assert all(float(error) < bound for error, bound in zip((one, thousand, million), bounds, strict=True)), line
-
-
 def test_constants_stay_over_long_runs_and_edges_are_met_to_rounding():
     marks = np.arange(20_000, 2_000_001, 20_000)
     changes = np.abs(exactness.constants_of(4.37, marks)).max(axis=1)
@@ -216,8 +203,17 @@ def stay(marks, errors):
 
 
 @pytest.mark.slow
-def test_energy_and_momenta_stay_over_a_hundred_million_steps():
-    """A walk, which sums of one double make, or a drift of 1e-21 a step would be seen: the negative controls."""
+def test_a_thousand_random_tops_and_long_runs_keep_energy_and_momenta():
+    """`python -m benchmarks.exactness` takes ten thousand."""
+    errors = exactness.of_random_tops(1000)
+    assert errors.shape == (1000, 4)
+    assert np.median(errors) < 1e-15
+    assert errors.max() < 1e-12
+    for line in exactness.of_scenes():
+        name, *_, one, thousand, million = line.split()
+        bounds = (1e-11, 1e-9, 1e-4) if name in UNSTABLE else (3e-13, 3e-10, 1e-4)
+        assert all(float(error) < bound for error, bound in zip((one, thousand, million), bounds, strict=True)), line
+    # A walk, which sums of one double make, or a drift of 1e-21 a step would be seen: the negative controls.
     marks = np.unique(np.geomspace(1e6, 1e8, 9).astype(np.int64))
     errors = exactness.walkers(marks)
     assert np.abs(errors[:, 3]).max() < 1e-14

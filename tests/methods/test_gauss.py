@@ -46,18 +46,6 @@ def test_order(scene, order):
     assert_order(scene, integrator(f"gauss-{order}"), order, 0.05 if order <= 6 else 0.3, WINDOWS[order])
 
 
-@pytest.mark.parametrize("stages", STAGES)
-def test_the_table(stages):
-    mu, b = gauss_rule(stages)[:2]
-    assert np.all(mu + mu.T == 1.0)  # to the last bit: this is what conserves
-    c = mu @ b
-    for k in range(1, 2 * stages + 1):
-        assert abs(np.sum(b * c ** (k - 1)) - 1.0 / k) < 4e-16
-    assert abs(np.sum(b * c ** (2 * stages)) - 1.0 / (2 * stages + 1)) > 1e-8  # no quadrature does better
-    if stages == 2:
-        np.testing.assert_allclose(mu[1, 0], 0.5 + 1.0 / np.sqrt(3.0), rtol=2e-16)
-
-
 def assert_keeps_everything(method, scene, observe, nutation_steps, limit=1e-13, steps=100_000):
     """|e|, L.e, L_z and the energy together, over so many steps, relative."""
     h = symtop.scene(scene).nutation_period / nutation_steps
@@ -122,22 +110,6 @@ def test_a_step_next_to_a_vertical_top_is_the_stability_function(stages, phase, 
     np.testing.assert_allclose(measured / tilt, pade(stages, h * slope), rtol=0, atol=1e-8)
     np.testing.assert_allclose(np.abs(np.linalg.eigvals(measured / tilt)), 1.0, rtol=0, atol=1e-8)
     assert abs(abs(pade(stages, 1.0 + 1j * phase)) - 1.0) > 1e-3  # off the imaginary axis it is not one
-
-
-@pytest.mark.parametrize("stages", STAGES)
-def test_small_nutations_are_stable_at_any_step(stages):
-    method = integrator(f"gauss-{2 * stages}")
-    assert math.isnan(linear_limits(method, STEADY, np.linspace(0.02, 10.0, 200) / OMEGA)[0])
-    for phase in LARGE:
-        at = trace(method, STEADY, phase / OMEGA)
-        assert abs(at.trace) < 2.0
-        assert abs(at.theta - STEADY.start.theta) < 1e-12  # where the reduced energy is least, whatever the step
-        gap = abs(at.trace - 2.0 * pade(stages, 1j * phase).real)
-        faster = steady(200.0)  # precesses 10 times slower, and a nutation turns 10 times faster
-        omega = faster.top.nutation_frequency(faster.top.momenta(faster.start))
-        gap_faster = abs(trace(method, faster, phase / omega).trace - 2.0 * pade(stages, 1j * phase).real)
-        assert gap < 0.15
-        assert gap_faster < max(0.02 * gap, 1e-6)  # theory holds as precession / nutation goes to nothing, squared
 
 
 @pytest.mark.parametrize(
@@ -270,8 +242,28 @@ def test_a_sweep_ends_at_its_own_limit_and_a_step_beyond_newtons_reach_is_grown(
 
 
 @pytest.mark.parametrize("stages", STAGES)
-def test_the_frame_stays_orthonormal_and_follows_its_axis(stages):
-    """At large steps a' = L x a / I1 is solved too: the frame's axis is that of the run on (e, L)."""
+def test_the_table_keeps_small_nutations_stable_at_any_step_and_the_frame_orthonormal(stages):
+    mu, b = gauss_rule(stages)[:2]
+    assert np.all(mu + mu.T == 1.0)  # to the last bit: this is what conserves
+    c = mu @ b
+    for k in range(1, 2 * stages + 1):
+        assert abs(np.sum(b * c ** (k - 1)) - 1.0 / k) < 4e-16
+    assert abs(np.sum(b * c ** (2 * stages)) - 1.0 / (2 * stages + 1)) > 1e-8  # no quadrature does better
+    if stages == 2:
+        np.testing.assert_allclose(mu[1, 0], 0.5 + 1.0 / np.sqrt(3.0), rtol=2e-16)
+    method = integrator(f"gauss-{2 * stages}")
+    assert math.isnan(linear_limits(method, STEADY, np.linspace(0.02, 10.0, 200) / OMEGA)[0])
+    for phase in LARGE:
+        at = trace(method, STEADY, phase / OMEGA)
+        assert abs(at.trace) < 2.0
+        assert abs(at.theta - STEADY.start.theta) < 1e-12  # where the reduced energy is least, whatever the step
+        gap = abs(at.trace - 2.0 * pade(stages, 1j * phase).real)
+        faster = steady(200.0)  # precesses 10 times slower, and a nutation turns 10 times faster
+        omega = faster.top.nutation_frequency(faster.top.momenta(faster.start))
+        gap_faster = abs(trace(method, faster, phase / omega).trace - 2.0 * pade(stages, 1j * phase).real)
+        assert gap < 0.15
+        assert gap_faster < max(0.02 * gap, 1e-6)  # theory holds as precession / nutation goes to nothing, squared
+    # At large steps a' = L x a / I1 is solved too: the frame's axis is that of the run on (e, L).
     scene = symtop.scene("goldstein")
     par, state = on_frame(scene.top, scene.start)
     marks = np.arange(0, 201, 20)

@@ -366,7 +366,10 @@ def test_passages_of_a_pole_add_up_and_what_was_lost_is_not_compared():
         assert math.isnan(_apart(lost, whole, units))
     assert _apart(whole, (*whole[:6], 3.5), units) == 0.5
     assert _apart(whole[1:], (1.002, *whole[2:]), units) == 1.002  # an axis
-    # By what the start says alone, the natural period and its own rate, some turn a fifth faster or more.
+
+
+def test_no_body_turns_much_faster_than_the_watch_takes_it_to():
+    """By what the start says alone, the natural period and its own rate, some turn a fifth faster or more."""
     drawn = [one for one in scenes_of(body_population(48, seed=29)) if math.isfinite(one.nutation_period)]
     rates = np.array([fastest(one) for one in drawn])
     bounds = np.array([Integrated(one).fast for one in drawn])

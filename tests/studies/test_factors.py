@@ -83,6 +83,14 @@ def test_the_loops_in_numpy_return_the_trajectory_of_the_compiled_ones(plain, na
 
 
 def test_a_cell_is_named_once_and_taylor_in_angles_solves_the_same_equations():
+    every = cells()
+    assert len({cell.name for cell in every}) == len({cell.key for cell in every}) == len(every)
+    for cell in every:
+        assert cell.method.charts() == (cell.chart,)
+        assert (cell.method.implementation == "compiled") == (cell.language == COMPILED)
+    schemes = {cell.scheme for cell in every}
+    compiled = {cell.scheme for cell in every if cell.language == COMPILED}
+    assert {scheme for members in FAMILIES.values() for scheme in members} == compiled == schemes - {"DOP853"}
     hy = pytest.importorskip("heyoka")
     from symtop.methods.taylor.heyoka import equations
 
@@ -95,14 +103,6 @@ def test_a_cell_is_named_once_and_taylor_in_angles_solves_the_same_equations():
     assert run.attrs["chart"] == "angles"
     assert float(symtop.errors(run)["attitude"].max()) < 1e-11
     assert 0.0 < float(np.ptp(run["p_phi"].values)) < 1e-12  # free to drift, by rounding
-    every = cells()
-    assert len({cell.name for cell in every}) == len({cell.key for cell in every}) == len(every)
-    for cell in every:
-        assert cell.method.charts() == (cell.chart,)
-        assert (cell.method.implementation == "compiled") == (cell.language == COMPILED)
-    schemes = {cell.scheme for cell in every}
-    compiled = {cell.scheme for cell in every if cell.language == COMPILED}
-    assert {scheme for members in FAMILIES.values() for scheme in members} == compiled == schemes - {"DOP853"}
 
 
 def test_the_search_ends_closer_if_asked_and_languages_of_one_method_have_the_same_setting_and_work(measured):
