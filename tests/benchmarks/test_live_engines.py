@@ -15,10 +15,7 @@ SCENES = {body_of(symtop.scene(name)).velocity.tobytes(): symtop.scene(name) for
 
 def engine(method, stepped, name="setting"):
     """An engine that steps by a map of the catalogue and is said to have another."""
-
-    def run(body, h, steps):
-        return measure.mapped(SCENES[body.velocity.tobytes()], stepped, h, steps)
-
+    run = lambda body, h, steps: measure.mapped(SCENES[body.velocity.tobytes()], stepped, h, steps)
     return engines.Setting("Engine", "1", name, engines.FREE, method, run)
 
 

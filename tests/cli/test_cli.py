@@ -1,44 +1,31 @@
-"""The command line: what it prints, its exit codes, and that it starts fast."""
+"""The command line: what it prints and its exit codes, that it starts fast, and `doctor`, which finds each fault."""
 
+import importlib.metadata
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 from click.testing import CliRunner
 
 import symtop
-from symtop.cli import runs
+from symtop.cli import doctor, runs
 from symtop.cli.main import main
 from symtop.core import netcdf, parallel
 from symtop.core.errors import SymtopError
-from symtop.measure import timing
+from symtop.core.files import cache_root
+from symtop.measure import published, timing
 from symtop.methods.framework.registry import bibliography, citation_keys, engines, methods
 from symtop.run.ensemble import population
 from tests.commands import call
-
-
-def test_run_prints_the_errors_and_writes_the_dataset_also_of_a_run_that_fails(tmp_path):
-    words = ("run", "spheroid", "midpoint", "--step-size", 0.01, "--output", tmp_path / "run.nc")
-    assert "angle between axes" in call(*words).output
-    assert netcdf.read(tmp_path / "run.nc").attrs["integrator"] == "midpoint"
-    report = numbers(call(*words, "--json").stdout)
-    assert report["steps"] == 800
-    assert 1e-3 < report["errors"]["axis"]["largest"] < 2e-2
-    assert report["errors"]["p_psi"]["largest"] < 1e-14
-    once = call("run", "spheroid", "strang", "--step-size", 8, "--no-guard").output
-    assert "\n1 step, 1 force evaluation\n" in once
-    path = tmp_path / "run.nc"
-    result = call("run", "spheroid", "stormer-verlet", "--step-size", 1.0, "--horizon", 50, "--output", path, code=3)
-    assert "theta left (0, pi)" in result.output
-    assert netcdf.read(path).attrs["outcome"] == "left_chart"
-
 
 OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --body I1,I2,I3 or --plugin FILE)"
 
@@ -102,9 +89,7 @@ def test_ctrl_c_is_neither_a_failed_case_nor_bad_input(words, called, monkeypatc
     def interrupts(*_, **__):
         os.kill(os.getpid(), signal.SIGINT)
 
-    def raises(*_, **__):
-        raise SymtopError("of its own")
-
+    raises = Mock(side_effect=SymtopError("of its own"))
     for function, code, message in ((interrupts, 130, "interrupted"), (raises, 2, "of its own")):
         monkeypatch.setattr(called, function)
         assert call(*words, code=code).output.splitlines()[-1] == f"symtop: {message}"
@@ -115,7 +100,20 @@ def numbers(text):
     return json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
 
 
-def test_numbers_that_are_not_finite_are_null_in_json(tmp_path):
+def test_run_prints_the_errors_and_writes_the_dataset_also_of_a_run_that_fails_or_has_nan(tmp_path):
+    words = ("run", "spheroid", "midpoint", "--step-size", 0.01, "--output", tmp_path / "run.nc")
+    assert "angle between axes" in call(*words).output
+    assert netcdf.read(tmp_path / "run.nc").attrs["integrator"] == "midpoint"
+    report = numbers(call(*words, "--json").stdout)
+    assert report["steps"] == 800
+    assert 1e-3 < report["errors"]["axis"]["largest"] < 2e-2
+    assert report["errors"]["p_psi"]["largest"] < 1e-14
+    once = call("run", "spheroid", "strang", "--step-size", 8, "--no-guard").output
+    assert "\n1 step, 1 force evaluation\n" in once
+    path = tmp_path / "run.nc"
+    result = call("run", "spheroid", "stormer-verlet", "--step-size", 1.0, "--horizon", 50, "--output", path, code=3)
+    assert "theta left (0, pi)" in result.output
+    assert netcdf.read(path).attrs["outcome"] == "left_chart"
     with pytest.raises(pytest.fail.Exception):
         numbers("[NaN]")
     result = call("recommend", "spheroid", "--accuracy", "1e-17", "--json", code=1)
@@ -365,3 +363,78 @@ def test_members_that_do_not_fit_into_memory_are_refused_before_they_are_drawn(m
         population.population(1001)
     result = call("ensemble", "strang", "--members", "1001", "--per-nutation", "20", "--nutations", "1", code=2)
     assert "--members must be at most" in result.stderr
+
+
+def faults(findings):
+    return {finding.topic: finding for finding in findings if not finding.healthy}
+
+
+@pytest.mark.parametrize(("requirement", "result", "healthy"), [
+    ("numpy[some-extra]>=2.0", "2.4.6", True), ("numpy[some-extra]>=3.0", "2.4.6", False),
+    ("numpy~=2.0", "2.4.6", True), ("numpy~=1.26", "2.4.6", False), ("numpy>=2,!=2.4.6", "2.4.6", False),
+    ("no-such-package", "absent", False), ("no-such-package; extra == 'peers'", "absent, an extra", True),
+    ("numpy<2; extra == 'peers'", "2.4.6", False), ("no-such-package; sys_platform == 'amiga'", None, True),
+    ("no-such-package; extra == 'peers' and sys_platform == 'amiga'", None, True),
+    ("no-such-package; python_version >= '3.8'", "absent", False),
+])  # fmt: skip
+def test_every_form_of_a_requirement_is_read(monkeypatch, requirement, result, healthy):
+    real = importlib.metadata.version
+    monkeypatch.setattr(importlib.metadata, "requires", lambda _: [requirement])
+    monkeypatch.setattr(importlib.metadata, "version", lambda name: "2.4.6" if name == "numpy" else real(name))
+    findings = doctor._packages(Path())
+    assert [(finding.result, finding.healthy) for finding in findings] == ([(result, healthy)] if result else [])
+    assert all(finding.healthy or finding.advice for finding in findings)
+
+
+def test_a_cache_that_cannot_be_written_and_a_wrong_number_are_seen(tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "file" / "cache"))
+    assert "SYMTOP_CACHE" in faults(doctor._caches(Path()))["cache"].advice
+    assert set(faults(doctor._results(Path("/proc/none")))) == {"results"}
+    wrong = published.Published("somebody", "something", 1.0, 1.1, 1e-3, "printed")
+    monkeypatch.setattr(published, "published_values", lambda: [wrong])
+    findings = faults(doctor._self_check(Path()))
+    assert "not somebody, something" in findings["published values"].result
+    assert set(findings) == {"published values"}
+
+
+def test_a_check_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path):
+    def trouble(results):
+        raise OSError("the tools are gone")
+
+    monkeypatch.setitem(doctor.CHECKS, "machine", trouble)
+    monkeypatch.setitem(doctor.CHECKS, "self-check", lambda _: [])
+    result = call("doctor", "--results", tmp_path, code=1)
+    assert "BAD  machine" in result.output
+    assert "OSError: the tools are gone" in result.output
+
+
+def test_all_is_well_here_and_every_compiled_method_is_run_in_each_of_its_charts(tmp_path):
+    result = call("doctor", "--results", tmp_path, "--json")
+    topics = {entry["topic"]: entry["result"] for entry in json.loads(result.output)}
+    expected = {"python", "numba", "cache", "kernels cache", "reference cache", "studies", "published values"}
+    assert expected <= set(topics)
+    assert topics["heyoka quad"] == "33.7 digits"
+    assert topics["numba"] == importlib.metadata.version("numba")
+    count = len(published.published_values())
+    assert topics["published values"] == f"{count} of {count} reproduced"
+    names = doctor.variants()
+    assert len(names) == len(set(names))
+    for method in symtop.integrators().values():
+        variants = {f"{method.name}[{chart}]" for chart in method.charts()}
+        assert variants <= set(names) if method.implementation != "python" else not variants & set(names)
+
+
+@pytest.mark.slow
+def test_all_of_them_are_compiled_once(monkeypatch, tmp_path):
+    """From the kernels that other tests have left, less an eighth: all of them take six minutes."""
+    (cache_root() / "kernels").mkdir(parents=True, exist_ok=True)
+    shutil.copytree(cache_root() / "kernels", tmp_path / "kernels")
+    for folder in sorted((tmp_path / "kernels").iterdir())[::8]:
+        shutil.rmtree(folder)
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
+    result = call("doctor", "--warm", "--results", tmp_path / "r")
+    assert doctor.kernels() > 100
+    assert "not run" not in result.output
+    again = call("doctor", "--warm", "--results", tmp_path / "r")
+    assert "kernels compiled: 0;" in again.output

@@ -55,9 +55,7 @@ def test_a_script_counts_by_the_functions_and_globals_that_are_reached(tmp_path)
 
 
 def test_words_do_not_count_and_numbers_do():
-    def reasons_of(thing):
-        return Code().reasons("thing", thing)
-
+    reasons_of = lambda thing: Code().reasons("thing", thing)
     scene = symtop.scene("spheroid")
     assert reasons_of(dataclasses.replace(scene, purpose="said otherwise", units="")) == reasons_of(scene)
     assert reasons_of(dataclasses.replace(scene, horizon=9.0)) != reasons_of(scene)

@@ -22,9 +22,7 @@ def test_results_come_in_the_order_of_the_pieces(threads):
 
 
 def test_one_thread_is_the_callers_and_several_are_not():
-    def who(_):
-        return threading.current_thread() is threading.main_thread()
-
+    who = lambda _: threading.current_thread() is threading.main_thread()
     assert list(in_threads(who, range(3), 1)) == [True] * 3
     assert list(in_threads(who, range(3), 2)) == [False] * 3
 

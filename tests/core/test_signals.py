@@ -97,9 +97,7 @@ def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, heari
 
 
 def test_handlers_are_left_as_they_were_and_threads_are_left_alone():
-    def handlers():
-        return [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
-
+    handlers = lambda: [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     before, inside = handlers(), []
 
     def other():

@@ -160,10 +160,7 @@ def test_a_docstring_says_the_same_in_restructured_text():
 
     text = "Of |a x b|, u_.\n\nWith `code`, ``more``,\na* b* and *this*:\n\n    x_1 = |L| *a\n\n    y\n\nThe end <h>."
     tree = publish_doctree("\n".join(docstrings.restructured(text)), settings_overrides={"report_level": 1})
-
-    def shown(kind):
-        return [node.astext() for node in tree.findall(lambda node: node.tagname == kind)]
-
+    shown = lambda kind: [node.astext() for node in tree.findall(lambda node: node.tagname == kind)]
     assert not shown("system_message")
     assert not shown("problematic")
     assert shown("literal") == ["code", "more"]

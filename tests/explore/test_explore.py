@@ -8,6 +8,7 @@ import socket
 import threading
 import time
 import warnings
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -173,12 +174,9 @@ def test_the_server_answers_this_machine_and_nothing_else(site):
 
 
 @pytest.mark.parametrize(("method", "tolerance", "seconds"), [
-    ("taylor-quad", 1e-30, 0.5),
-    ("rk45", 1e-9, 0.5),
-    *(
-        pytest.param(*one, answers.MOST_SECONDS, marks=pytest.mark.slow)
-        for one in (("taylor-quad", 1e-6), ("taylor-longdouble", 1e-12), ("radau", 1e-6))
-    ),
+    ("taylor-quad", 1e-30, 0.5), ("rk45", 1e-9, 0.5),
+    *(pytest.param(*one, answers.MOST_SECONDS, marks=pytest.mark.slow)
+      for one in (("taylor-quad", 1e-6), ("taylor-longdouble", 1e-12), ("radau", 1e-6))),
 ])  # fmt: skip
 def test_a_run_to_its_budget_takes_its_seconds_within_a_factor_of_two(method, tolerance, seconds, monkeypatch):
     """Processor time of this thread: other processes do not count."""
@@ -379,7 +377,9 @@ def costs(**changes):
 
 
 def test_the_first_chart_of_costs_is_there_at_once_its_lines_those_of_compare_timed_together(monkeypatch):
+    timed = []
     monkeypatch.setattr(cost, "_charts", {})
+    monkeypatch.setattr(cost, "timed_rows", lambda cells: (timed.append(cells), timed_rows(cells)))
     setups = cost.question(fields(integrator="trapezoidal", second="strang", horizon=7.5))
     began = time.thread_time()
     first = cost.chart(setups)
@@ -398,13 +398,9 @@ def test_the_first_chart_of_costs_is_there_at_once_its_lines_those_of_compare_ti
     again = costs(integrator="trapezoidal", second="strang", horizon=7.5)
     assert again["lines"] == whole["lines"]  # stored; the runs of the page are timed again
     # Timed one by one, a slow moment of the machine would be a slow method.
-    timed = []
-    monkeypatch.setattr(cost, "_charts", {})
-    monkeypatch.setattr(cost, "timed_rows", lambda cells: (timed.append(cells), timed_rows(cells)))
-    lines = costs(integrator="trapezoidal", horizon=7.5)["lines"]
     (cells,) = timed
-    assert [variant.method for _, variant, _, _ in cells] == [line["name"] for line in lines]
-    assert all(len(line["seconds"]) > 3 for line in lines)
+    assert [variant.method for _, variant, _, _ in cells] == [*lines]
+    assert all(len(line["seconds"]) > 3 for line in lines.values())
 
 
 @pytest.mark.slow
@@ -428,9 +424,7 @@ def test_the_run_of_the_page_is_a_point_on_the_line_of_its_method():
 
 
 def test_a_line_that_cannot_be_measured_says_why(monkeypatch):
-    def refused(*args, **options):
-        raise SymtopError("the scene is <odd>")
-
+    refused = Mock(side_effect=SymtopError("the scene is <odd>"))
     monkeypatch.setattr(cost, "_charts", {})
     monkeypatch.setattr(cost, "compare", refused)
     assert {line["message"] for line in costs(theta=0.41)["lines"]} == {"the scene is <odd>"}

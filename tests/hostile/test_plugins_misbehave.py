@@ -122,9 +122,7 @@ def test_a_kernel_that_does_not_compile_or_returns_no_outcome_is_one_sentence(re
 
 @pytest.mark.parametrize("count", [math.nan, math.inf, 1e30])
 def test_a_number_of_steps_that_is_none_is_refused(count, misbehaving):
-    def solve(top, start, plan):
-        return misbehaving.midpoint(top, start, plan)._replace(steps=count)
-
+    solve = lambda top, start, plan: misbehaving.midpoint(top, start, plan)._replace(steps=count)
     counted = symtop.Integrator(name="counted", family="other", summary="", solvers={"angles": solve})
     with pytest.raises(symtop.SymtopError, match="must return a finite number of steps, not"):
         symtop.simulate("spheroid", counted, step_size=0.01, horizon=0.5, guard=False)

@@ -238,14 +238,10 @@ def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, onl
 
 def in_single(step):
     """A step in single precision."""
-
-    def rounded(f, t, y, h):
-        return step(lambda s, z: np.float32(f(s, z)), t, np.float32(y), np.float32(h))
-
-    return rounded
+    return lambda f, t, y, h: step(lambda s, z: np.float32(f(s, z)), t, np.float32(y), np.float32(h))
 
 
-@pytest.mark.parametrize("scene", ["spheroid", "heavy-brick"])
+@pytest.mark.parametrize("scene", [pytest.param("spheroid", marks=pytest.mark.slow), "heavy-brick"])
 def test_single_precision_is_no_other_motion_and_one_of_a_step_in_it_is(scene, only):
     """Runs of more steps than their rounding lets be judged end 1e-6 away; an order that it hides is undecided."""
     only("order")

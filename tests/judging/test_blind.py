@@ -219,9 +219,7 @@ def test_a_seed_draws_the_same_and_without_a_claim_the_order_is_said_and_not_the
 
 
 def test_a_step_written_for_f_of_y_may_say_so(only):
-    def wrong_times(f, t, y, h):
-        return y + h * f(t, y + h / 2 * f(t + 0.3 * h, y))
-
+    wrong_times = lambda f, t, y, h: y + h * f(t, y + h / 2 * f(t + 0.3 * h, y))
     only("time")
     assert symtop.judge(wrong_times, quick=True, order=2).refuted == ["time"]
     ledger = symtop.judge(wrong_times, quick=True, order=2, autonomous=True)

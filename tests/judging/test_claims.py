@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import re
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,14 @@ import pytest
 from symtop_studies.claims import planted
 
 import symtop
+from symtop.judging.adapters import adapter
+from symtop.judging.adapters.python_step import PythonStep
 from symtop.judging.battery import CLAIMS, judge
 from symtop.judging.claims import constants, constants as long, order, structure
-from symtop.judging.claims.subject import Subject
+from symtop.judging.claims.constants import long_run
+from symtop.judging.claims.subject import Subject, seconds_a_step
 from symtop.judging.findings import VERDICTS, Finding, Ledger, Measured, description, pace
+from symtop.judging.remote import Process, separated, solvers_of
 from symtop.measure.conservation import Changed, behaviour
 from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
 from symtop.methods.framework.plan import Run
@@ -24,6 +29,7 @@ from symtop.methods.framework.registry import Integrator, integrator
 from symtop.methods.splitting import composition
 from symtop.model import charts
 from symtop.model.scenes import body_scenes, scene
+from tests import commands
 from tests.commands import answer, call
 from tests.conftest import random_scenes
 from tests.judging.blind import right
@@ -225,7 +231,7 @@ def test_every_splitting_of_the_catalogue_has_the_order_that_it_claims():
 
 @pytest.mark.parametrize(("name", "declared", "verdict"), [
     ("radau", True, "undecided"),
-    ("dop853", True, "undecided"),  # rejected steps cost forces too: see test_costs
+    ("dop853", True, "undecided"),  # rejected steps cost forces too
     ("rk4", True, "confirmed"),
     ("rk4", None, "measured"),
     ("rk4", False, "undecided"),  # a Rosenbrock method costs as evenly
@@ -475,3 +481,135 @@ def test_a_right_step_is_not_refuted_where_a_body_turns_over(only: Callable[...,
     assert ledger.refuted == []
     assert ledger["order"].verdict == "confirmed"
     assert ledger["energy"].measured.kind in ("growing", "drift")  # the length of its runs follows from its speed
+
+
+def seeing(below):
+    few, many = (symtop.integrator(name).solvers["axis"] for name in ("rk4", "gauss-4"))
+    solver = lambda top, start, plan: (few if plan.marks[-1] < below else many)(top, start, plan)
+    return symtop.Integrator("seeing", "other", "sees its plan", {"axis": solver}, order=4)
+
+
+def test_a_solver_that_sees_its_plan_contradicts_itself():
+    for below in (300, 5000, 20_000):
+        ledger = judge(seeing(below), symtop.scene("spheroid"), quick=True)
+        assert ledger.refuted == ["reported"]
+        assert "a run contradicts itself" in ledger["reported"].why
+
+
+PLUGIN = """
+import ctypes, os
+import symtop
+def nothing(top, start, plan): return None
+def leaves(top, start, plan): os._exit(0)
+def crashes(top, start, plan): ctypes.string_at(0)
+for solver in (nothing, leaves, crashes):
+    symtop.register(symtop.Integrator(f"{solver.__name__}-at-once", "other", "x", {"axis": solver}, order=4))
+"""
+
+
+def claims(plugin, *names):
+    """Code, output and errors of `symtop claims`, which would end this process too if it called the plug-in there."""
+    return commands.ended(commands.symtop("claims", *names, "--plugin", plugin, "--quick"))
+
+
+@pytest.mark.slow
+def test_a_plug_in_that_fails_is_told_of(tmp_path):
+    (tmp_path / "plugin.py").write_text(PLUGIN)
+    expected = {"nothing": "must return a Run", "leaves": "ended with code 0", "crashes": "was ended by SIGSEGV"}
+    names = [f"{name}-at-once" for name in expected]
+    code, out, _ = claims(tmp_path / "plugin.py", *names)
+    assert code == 1
+    for name, words in zip(names, expected.values(), strict=True):
+        own = [line for line in out.splitlines() if line.startswith(f"{name}, ")]
+        assert any(words in line for line in own), own
+
+
+def test_a_plug_in_that_ends_its_process_when_it_is_loaded_is_told_of(tmp_path):
+    (tmp_path / "plugin.py").write_text("import os\nos._exit(0)\n")
+    code, _, err = claims(tmp_path / "plugin.py")
+    assert code == 2
+    assert "plugin plugin.py cannot be loaded: its process ended with code 0" in err
+
+
+def test_a_run_that_is_returned_is_one_of_numbers():
+    """What a process sends back is read as numbers and words, never as a pickle."""
+
+    def solver(top, start, plan):
+        shape = (plan.times.size, 6)
+        return Run(np.full(shape, np.nan), np.zeros(shape[0]), np.zeros(shape[0]), 1, 0, 0, "not_finite", 0.0)
+
+    method = symtop.Integrator("nan", "other", "x", {"axis": solver})
+    with Process(lambda: solvers_of(method)) as process:
+        process.allow(30.0)
+        run = symtop.simulate("spheroid", separated(method, process), step_size=0.1, guard=False)
+    assert run.attrs["outcome"] == "not_finite"
+    assert np.isnan(run["energy"].values).all()
+
+
+def test_a_name_that_is_unknown_is_told_before_anything_is_measured(monkeypatch):
+    measured = []
+    monkeypatch.setattr("symtop.judging.judge_step.judge_separately", lambda *one, **_: measured.append(one))
+    result = call("claims", "midpoint", "midpont", code=2)
+    assert "integrator 'midpont' is unknown" in result.output
+    assert measured == []
+
+
+STEP = SPHEROID.nutation_period / 118.02
+
+
+def bytes_a_step(method: Integrator) -> float:
+    """Bytes that a run keeps for each further step, by Python's own count of what NumPy and Python allocate."""
+    few = 4000 if method.implementation == "compiled" else 200
+    control = {"step_size": STEP} if method.control == "step_size" else {}
+    if method.control == "tolerance" and method.default_tolerance is None:
+        control = {"tolerance": 1e-6}
+    peaks, steps = [], []
+    for count in (few, few, 6 * few):  # whatever is made once is made in the first run
+        tracemalloc.start()
+        try:
+            plan = {"horizon": count * STEP, "samples": 11, "observe": "axis", "guard": False}
+            run = symtop.simulate(SPHEROID, method, **plan, **control)
+            peaks.append(tracemalloc.get_traced_memory()[1])
+            steps.append(int(run.attrs["steps"]))
+        finally:
+            tracemalloc.stop()
+    return (peaks[2] - peaks[1]) / max(steps[2] - steps[1], 1)
+
+
+# one of each loop: reduced chart, Newton, space frame, stages, two adaptive ones, SciPy's
+@pytest.mark.parametrize("name", ["stormer-verlet", "midpoint", "strang", "gauss-4", "rk45-compiled", "taylor", "rk45"])
+def test_the_memory_of_a_run_does_not_grow_with_its_steps(name):
+    assert bytes_a_step(symtop.integrator(name)) < 8.0  # less than one number a step
+
+
+def test_memory_that_grows_with_the_steps_is_seen():
+    good, store = symtop.integrator("stormer-verlet"), []
+
+    def hoard(top, start, plan):
+        store.clear()
+        store.append(np.zeros(4 * round(plan.horizon / plan.step_size)))
+        return good.solvers["angles"](top, start, plan)
+
+    assert 16.0 < bytes_a_step(dataclasses.replace(good, solvers={"angles": hoard})) < 48.0
+
+
+def test_a_step_that_blows_up_has_the_time_of_its_finite_steps():
+    """A run that stops at infinity is over at once, however many steps it was asked for."""
+    grows = lambda f, t, y, h: 2.0 * y + h * f(t, y)
+    euler = lambda f, t, y, h: y + h * f(t, y)
+    seconds = [seconds_a_step(PythonStep(step, "axis"), SPHEROID) for step in (grows, euler)]
+    assert 0.1 < seconds[0] / seconds[1] < 10.0
+
+
+@pytest.mark.parametrize("quick", [True, False])
+def test_finer_runs_after_one_that_fails_late_share_its_steps(quick):
+    steps = []
+
+    def fails(f, t, y, h):
+        steps.append(h)
+        return y * (math.nan if t > 20.0 * SPHEROID.nutation_period and h > 0.005 * SPHEROID.nutation_period else 1.0)
+
+    method = adapter.integrator(PythonStep(fails, "axis"))
+    run = long_run(method, SPHEROID, "axis", quick=quick, most=4000)
+    assert run.outcome == "ok"
+    assert (len(steps) < 6000) is quick

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -131,12 +132,8 @@ def test_a_coefficient_that_is_slightly_off_shows_in_the_term_that_it_spoils(off
 
 
 def test_the_terms_of_known_functions_are_found():
-    def motion(h):
-        return np.array([np.exp(h), np.cos(h)])
-
-    def step(h):
-        return motion(h) + np.array([1e-6 * h**2, 0.25 * h**5])
-
+    motion = lambda h: np.array([np.exp(h), np.cos(h)])
+    step = lambda h: motion(h) + np.array([1e-6 * h**2, 0.25 * h**5])
     result = compared(step, motion, 4.0)
     assert result.order == 1
     assert result.defect[2] == pytest.approx(2e-6, rel=1e-3)  # beside 1/2
@@ -156,10 +153,7 @@ def test_a_solver_without_steps_backwards_is_seen_forwards_and_one_without_any_i
     result = series(dataclasses.replace(rk4, name="forward", solvers={"axis": solve}), "axis")
     assert (result.order, result.backward) == (4, False)
     assert result.resolved >= 4
-
-    def step(h):
-        raise symtop.SymtopError("no luck")
-
+    step = Mock(side_effect=symtop.SymtopError("no luck"))
     with pytest.raises(symtop.SymtopError, match="no luck"):
         compared(step, np.cos, 1.0)
 

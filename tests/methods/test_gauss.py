@@ -230,10 +230,7 @@ def test_a_sweep_ends_at_its_own_limit_and_a_step_beyond_newtons_reach_is_grown(
         done = march_axis(par, gauss_rule(1), tuple(y), phase / OMEGA, ONE)
         np.testing.assert_allclose(done.states[0], newton_step(par, 1, y, phase / OMEGA)[0], rtol=0, atol=1e-13)
     par, y, h = started("spheroid", 10.0)
-
-    def constants(z):
-        return z[:3] @ z[:3], z[:3] @ z[3:], z[5], z[3:] @ z[3:] + 2.0 * par.I1 * par.mgl * z[2]
-
+    constants = lambda z: (z[:3] @ z[:3], z[:3] @ z[3:], z[5], z[3:] @ z[3:] + 2.0 * par.I1 * par.mgl * z[2])
     for stages in STAGES:
         done = march_axis(par, gauss_rule(stages), tuple(y), h, ONE)
         assert done.outcome == 0

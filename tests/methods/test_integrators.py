@@ -186,9 +186,7 @@ def test_every_derivative_of_a_trial_is_right(scene):
     """The analytic Jacobian against central differences; one that is off by a thousandth is seen."""
     par, (theta, *_) = on_angles(scene.top, scene.start)
     start, m, d, e = kernel._node(par, theta), 0.03, 0.07, 1e-5
-
-    def trial(shift_m, shift_1):
-        return kernel._evaluate(par, start, theta + m + shift_m, theta + d + shift_1)
+    trial = lambda shift_m, shift_1: kernel._evaluate(par, start, theta + m + shift_m, theta + d + shift_1)
 
     def agree(factor):
         here = trial(0.0, 0.0)

@@ -289,10 +289,7 @@ def test_two_steps_are_those_of_the_generalised_alpha_method(radius, scene):
     beta = 0.25 * (gamma + 0.5) ** 2
     R = matrices(done)[0]
     W = np.linalg.solve(J, R.T @ done[0, 4:])
-
-    def change(R, W):
-        return np.linalg.solve(J, R.T @ (scene.top.mgl * np.cross(K, R[:, 2])) - np.cross(W, J @ W))
-
+    change = lambda R, W: np.linalg.solve(J, R.T @ (scene.top.mgl * np.cross(K, R[:, 2])) - np.cross(W, J @ W))
     slope = a = change(R, W)
     for k in (1, 2):
 

@@ -68,9 +68,7 @@ def test_coefficients_and_starts_are_those_computed_alone_while_others_change_th
 
 
 def test_taylor_runs_of_one_kind_at_once_do_not_share_a_stepper():
-    def runs(name):
-        return [symtop.simulate(name, "taylor", horizon=50.0, samples=200)["axis"].values for _ in range(20)]
-
+    runs = lambda name: [symtop.simulate(name, "taylor", horizon=50.0, samples=200)["axis"].values for _ in range(20)]
     alone = [runs(name)[0] for name in SCENES]
     for expected, states in zip(alone, together(*(lambda name=name: runs(name) for name in SCENES)), strict=True):
         assert all(np.array_equal(expected, one) for one in states)

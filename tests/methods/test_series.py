@@ -43,10 +43,7 @@ def worst_gap(chart, method, scene, per_nutation, nutations=10.0):
 
 def called(function, *arguments):
     """What an intrinsic returns, which only compiled code can call."""
-
-    def call(given):
-        return function(*given)
-
+    call = lambda given: function(*given)
     return njit(call)(arguments)
 
 

@@ -40,16 +40,10 @@ def _four(draw):
     return tuple(parts)
 
 
-@pytest.mark.parametrize(
-    ("ours", "true", "units"),
-    [
-        (dd.add, lambda a, b: a + b, 3),
-        (dd.sub, lambda a, b: a - b, 3),
-        (dd.mul, lambda a, b: a * b, 6),
-        (dd.div, lambda a, b: a / b, 10),
-    ],
-    ids=["add", "sub", "mul", "div"],
-)
+@pytest.mark.parametrize(("ours", "true", "units"), [
+    (dd.add, lambda a, b: a + b, 3), (dd.sub, lambda a, b: a - b, 3), (dd.mul, lambda a, b: a * b, 6),
+    (dd.div, lambda a, b: a / b, 10),
+], ids=["add", "sub", "mul", "div"])  # fmt: skip
 def test_double_double_is_right_to_a_few_units(ours, true, units):
     draw = random.Random(2)
     for number in range(2000):

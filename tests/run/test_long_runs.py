@@ -157,9 +157,7 @@ def test_a_checkpoint_knows_a_method_by_what_it_holds_and_not_by_its_name():
     def triple(x):
         return symtop.composition("triple", (x, 1.0 - 2.0 * x, x), (x / 2, (1 - x) / 2, (1 - x) / 2, x / 2), order=2)
 
-    def identity(method):
-        return longrun._identity(SCENE, method, h, 500, True)
-
+    identity = lambda method: longrun._identity(SCENE, method, h, 500, True)
     assert identity(triple(0.3)) == identity(triple(0.3))  # the control: made twice, it is the same
     assert identity(triple(0.3)) != identity(triple(0.3000001))
     plain = symtop.integrator("stormer-verlet")

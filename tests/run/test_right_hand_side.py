@@ -106,8 +106,8 @@ def test_a_run_of_few_steps_is_forecast_as_any_other(horizon, step):
 def test_chaos_is_told_from_order_and_what_was_not_watched_says_so():
     said = str(symtop.guard(prothero_robinson(1e6), 0.0, [1.0], 10.0, "radau", tolerance=1e-6))
     assert "; the motion was watched to t = 0.0" in said
-    assert "watched" not in str(symtop.guard(swing, 0.0, [1.0, 0.0], 3000.0, "rk4", step_size=0.1))
-    y0, horizon = of_energy(1.0 / 6.0, -0.1), 200.0
+    assert "watched" not in str(symtop.guard(swing, 0.0, [1.0, 0.0], 1500.0, "rk4", step_size=0.1))
+    y0, horizon = of_energy(1.0 / 6.0, -0.1), 120.0
     chaotic = symtop.guard(henon_heiles, 0.0, y0, horizon, "rk45", tolerance=1e-6)
     assert chaotic.cause == "instability"
     assert "the motion multiplies a small change" in str(chaotic)
@@ -117,8 +117,8 @@ def test_chaos_is_told_from_order_and_what_was_not_watched_says_so():
 
 
 @pytest.mark.parametrize(("f", "y0", "horizon", "name", "control", "cause"), [
-    (prothero_robinson(1e3), [1.0], 1.5, "rk4", {"step_size": 0.01}, "stiffness"),
-    (prothero_robinson(1e3), [1.0], 1.5, "radau", {"tolerance": 1e-8}, ""),
+    (prothero_robinson(1e3), [1.0], 0.5, "rk4", {"step_size": 0.01}, "stiffness"),
+    (prothero_robinson(1e3), [1.0], 0.5, "radau", {"tolerance": 1e-8}, ""),
     (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 3.0}, "instability"),
     (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 0.5}, "step"),
     (swing, [1.0, 0.0], 30.0, "vern9-fixed", {"step_size": 0.1, "accuracy": 1e-15}, "rounding"),
@@ -133,10 +133,7 @@ def test_each_cause_is_named(f, y0, horizon, name, control, cause):
 def test_a_motion_may_begin_at_zero():
     """Its size is that of what drives it: z'' = c sin t - 2 z is c (sin t - sin(t sqrt 2)/sqrt 2)."""
     c, h, z = 1e-9, 0.1, np.zeros(2)
-
-    def driven(t, y):
-        return np.array([y[1], c * math.sin(t) - 2.0 * y[0]])
-
+    driven = lambda t, y: np.array([y[1], c * math.sin(t) - 2.0 * y[0]])
     error = 0.0
     for k in range(200):
         z, t = rk4(driven, k * h, z, h), (k + 1) * h
@@ -146,7 +143,7 @@ def test_a_motion_may_begin_at_zero():
         )
     expected = symtop.guard(driven, 0.0, [0.0, 0.0], 20.0, step_size=h, accuracy=1e-12)
     assert 1.0 / 3.0 < expected.error / error < 3.0
-    assert symtop.guard(prothero_robinson(1e3), 0.0, [0.0], 1.5, step_size=0.01).cause == "stiffness"
+    assert symtop.guard(prothero_robinson(1e3), 0.0, [0.0], 0.5, step_size=0.01).cause == "stiffness"
     still = symtop.guard(lambda _t, y: 0.0 * y, 0.0, [0.0], 10.0, step_size=0.1)
     assert (still.error, still.setting) == (0.0, 10.0)  # no step is longer than the run
 

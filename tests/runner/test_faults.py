@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -63,9 +64,7 @@ def test_a_full_disk_ends_the_run_and_what_was_computed_is_kept(tmp_path, monkey
     (store.tempfile, "TemporaryFile", OSError(errno.EROFS, os.strerror(errno.EROFS)), "Read-only file system"),
 ])  # fmt: skip
 def test_what_the_netcdf_library_or_the_system_refuses_to_write(tmp_path, monkeypatch, place, name, error, says):
-    def refuse(*arguments, **options):
-        raise error
-
+    refuse = Mock(side_effect=error)
     monkeypatch.setattr(place, name, refuse)
     refused(tmp_path, says)
     if place is xr.Dataset:
@@ -85,7 +84,6 @@ def test_a_real_limit_on_the_size_of_files(tmp_path):
     code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192)); "
     code += "from symtop.cli.main import main; sys.argv[0] = 'symtop'; main()"
     words = ["study", str(PROBE), "--results", str(tmp_path / "small")]
-
     command = [sys.executable, "-c", code, *words]
     result = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert result.returncode == 2, result.stderr
@@ -312,12 +310,9 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
     assert code == 1
     assert "2 of 24 cases computed" in out  # those that return NaN: a result like any other
     says = {
-        "raises": "RuntimeError: no luck",
-        "hangs": "it was not done after 3 s",
-        "deaf": "it was not done after 3 s and did not answer",
-        "exits": "its process was ended",
-        "shape": "must return a Run with real states",
-    }
+        "raises": "RuntimeError: no luck", "hangs": "it was not done after 3 s", "exits": "its process was ended",
+        "deaf": "it was not done after 3 s and did not answer", "shape": "must return a Run with real states",
+    }  # fmt: skip
     lines = sentences(err)
     assert len(lines) == 2 * len(says)
     for name, sentence in says.items():
@@ -375,7 +370,6 @@ def test_a_clock_that_jumps(tmp_path, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("closed", ["0", "1", "2", "012"])
 def test_no_terminal_and_closed_streams(tmp_path, closed):
-
     words = f"{sys.executable} -m symtop.cli study {PROBE} --results {tmp_path / 'r'} --jobs 2"
     words += "".join(f" {n}>&-" if n != "0" else " 0<&-" for n in closed)
     result = subprocess.run(["/bin/sh", "-c", words], timeout=240, check=False)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.linalg import expm
-from scipy.stats import kendalltau
 from symtop_studies.carry_over import comparison as by, facts, figures, limits as of, measures
 from symtop_studies.carry_over.bodies import FAMILIES, FREE, SYMMETRIC, Bodies, as_tops, bodies_of, run_level
 from symtop_studies.carry_over.measures import ASYMPTOTE, growth_table, observed_order, own_table, table, verdicts
@@ -183,6 +182,8 @@ def test_steps_beyond_the_budget_are_no_steps_that_carry_over(beyond, verdict):
 
 
 def test_tau_is_kendalls_with_ties_and_verdicts_follow_limits_fixed_before():
+    from scipy.stats import kendalltau  # a second to import
+
     generator = np.random.default_rng(1)
     for _ in range(20):
         first, second = (generator.integers(0, 8, 15).astype(float) for _ in range(2))

@@ -62,10 +62,9 @@ def lobatto_step(top, point, h):
     IIIB = np.array([[1 / 6, -1 / 6, 0.0], [1 / 6, 1 / 3, 0.0], [1 / 6, 5 / 6, 0.0]])
     weights = IIIA[2]
     theta, _, _, p_theta, p_phi, p_psi = point
-    # the force on phi and psi is zero, so that their stage momenta are p_phi and p_psi
 
-    def slopes(stages):
-        return np.array([top.potential_slope(t, top.momenta(start_with(t))) for t in stages])
+    # the force on phi and psi is zero, so that their stage momenta are p_phi and p_psi
+    slopes = lambda stages: np.array([top.potential_slope(t, top.momenta(start_with(t))) for t in stages])
 
     def start_with(t):
         rate = (p_phi - p_psi * np.cos(t)) / (top.I1 * np.sin(t) ** 2)
