@@ -75,9 +75,9 @@ def decay(rate):
 
 
 @pytest.mark.parametrize(("rate", "horizon", "name", "control"), [
-    (1.0, 10.0, "rk4", {"step_size": 0.1}), (1000.0, 10.0, "rk4", {"step_size": 0.002}),
-    (30.0, 10.0, "rk4", {"step_size": 0.1}), (1000.0, 10.0, "radau", {"tolerance": 1e-4}),
-    (1000.0, 10.0, "bdf", {"tolerance": 1e-4}), (1000.0, 10.0, "lsoda", {"tolerance": 1e-4}),
+    (1.0, 10.0, "rk4", {"step_size": 0.1}), (1000.0, 5.0, "rk4", {"step_size": 0.002}),
+    (30.0, 10.0, "rk4", {"step_size": 0.1}), (1000.0, 5.0, "radau", {"tolerance": 1e-4}),
+    (1000.0, 5.0, "bdf", {"tolerance": 1e-4}), (1000.0, 5.0, "lsoda", {"tolerance": 1e-4}),
 ])  # fmt: skip
 def test_an_error_in_a_transient_counts_and_one_that_grows_beyond_the_motion_goes_on(rate, horizon, name, control):
     """Of exp(-1000 t) nothing is left at the first of even times; exp(-30 t) ends at 7e13 where h = 0.1."""
