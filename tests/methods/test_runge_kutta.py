@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.measure.test_step_series import series
 
 import symtop
 from symtop.methods.framework.angles import field_angles, with_rates
@@ -19,6 +18,7 @@ from symtop.model.scenes import closed_form
 from symtop.run.simulation import make_plan
 from tests.conftest import random_scenes
 from tests.judging.blind.right import CLASSICAL, explicit
+from tests.measure.test_order import series
 
 KUTTA_A, KUTTA_B, _ = CLASSICAL
 
